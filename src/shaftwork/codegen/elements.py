@@ -1,0 +1,100 @@
+"""Parameter vector to numbers: the coefficients of all branches and the loop matrix, vectorised over equal templates."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from sympy import Expr, Symbol, lambdify
+
+from shaftwork.components.laws import NUMERICAL
+from shaftwork.network.graph import CircuitGraph
+from shaftwork.network.templates import BranchTemplate, Kind
+from shaftwork.reduction.form import StateForm
+from shaftwork.reduction.gains import Gain, value_of
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+LINEAR = (Kind.ACROSS_STORE, Kind.THROUGH_STORE, Kind.CONDUCTANCE)
+
+
+@dataclass(frozen=True, eq=False)
+class TemplateGroup:
+    """All branches of one template: their numbers (k,) and where their parameters stand in p, (symbols, k)."""
+
+    template: BranchTemplate
+    branches: Index
+    places: Index
+
+
+def groups_of(graph: CircuitGraph, branches: Sequence[int]) -> tuple[TemplateGroup, ...]:
+    """The given branches by template, in order of first appearance."""
+    found: dict[int, list[int]] = {}
+    for index in branches:
+        found.setdefault(id(graph.branches[index].template), []).append(index)
+    made = []
+    for members in found.values():
+        template = graph.branches[members[0]].template
+        places = [[graph.part_of(index).parameters[s.name] for index in members] for s in template.symbols]
+        shape = (len(template.symbols), len(members))
+        made.append(
+            TemplateGroup(template, np.array(members, dtype=np.intp), np.array(places, dtype=np.intp).reshape(shape))
+        )
+    return tuple(made)
+
+
+def numeric(symbols: Sequence[Symbol], expression: Expr) -> Callable[..., Any]:
+    """The expression as a vectorised numpy function of its symbols."""
+    if len(symbols) == 1 and expression == symbols[0]:
+        return lambda value: value
+    function: Callable[..., Any] = lambdify(list(symbols), expression, modules=[NUMERICAL, "numpy"], cse=True)
+    return function
+
+
+class Coefficients:
+    """Capacity, stiffness or conductance of every linear branch as a function of the parameter vector."""
+
+    def __init__(self, graph: CircuitGraph) -> None:
+        linear = [branch.index for branch in graph.branches if branch.template.kind in LINEAR]
+        self._size = len(graph.branches)
+        self._groups = tuple(
+            (group, numeric(group.template.symbols, group.template.law)) for group in groups_of(graph, linear)
+        )
+
+    def __call__(self, p: Array) -> Array:
+        """(branches,) coefficients; 0 for branches that have none."""
+        values = np.zeros(self._size)
+        for group, function in self._groups:
+            values[group.branches] = function(*p[group.places])
+        return values
+
+
+class LoopMatrix:
+    """The loop matrix F (tree branch by link, in branch numbers) as a function of the parameter vector."""
+
+    def __init__(self, form: StateForm) -> None:
+        entries = [(tree, link, gain) for link, row in form.tree.loops.items() for tree, gain in row.items()]
+        self._rows = np.array([tree for tree, _, _ in entries], dtype=np.intp)
+        self._columns = np.array([link for _, link, _ in entries], dtype=np.intp)
+        self._data = np.array([value_of(gain) for _, _, gain in entries], dtype=float)
+        self._size = len(form.graph.branches)
+        variable = [(k, gain.exact) for k, (_, _, gain) in enumerate(entries) if isinstance(gain, Gain)]
+        self._variable = np.array([k for k, _ in variable], dtype=np.intp)
+        names = {name: k for k, name in enumerate(form.graph.parameters)}
+        symbols = sorted(
+            {s for _, exact in variable for s in exact.free_symbols if s.name in names}, key=lambda s: names[s.name]
+        )
+        self._places = np.array([names[s.name] for s in symbols], dtype=np.intp)
+        self._function = lambdify([symbols], [exact for _, exact in variable], "numpy") if variable else None
+
+    def __call__(self, p: Array) -> Any:
+        """F as scipy.sparse.csr_array (branches, branches)."""
+        data = self._data.copy()
+        if self._function is not None:
+            data[self._variable] = self._function(p[self._places])
+        return sparse.csr_array((data, (self._rows, self._columns)), shape=(self._size, self._size))

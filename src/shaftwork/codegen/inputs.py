@@ -1,0 +1,118 @@
+"""The inputs u = (w, e) of the linear part: nonlinear laws, sources of torque, prescribed speeds, and their slopes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sympy import Expr, Integer
+
+from shaftwork.codegen.elements import Array, Index, TemplateGroup, groups_of, numeric
+from shaftwork.components.branches import ACROSS, INTEGRAL
+from shaftwork.components.laws import t as TIME
+from shaftwork.network.templates import Kind
+from shaftwork.reduction.form import StateForm
+
+Function = Callable[..., Any]
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """The inputs of one template: where they stand in u, where their across variable stands in y, their integral in x."""
+
+    made_of: TemplateGroup
+    inputs: Index
+    outputs: Index
+    integrals: Index
+    value: Function
+    slopes: tuple[Function | None, Function | None, Function | None]
+
+
+class Inputs:
+    """Values and slopes of all inputs, vectorised over equal templates.
+
+    Args:
+        form: the state form.
+        order: branch numbers of the inputs in the order of u.
+        outputs: branch numbers of y.
+    """
+
+    def __init__(self, form: StateForm, order: Sequence[int], outputs: Sequence[int]) -> None:
+        self.size = len(order)
+        self.outputs = len(outputs)
+        self.states = len(form.states)
+        place = {int(branch): k for k, branch in enumerate(order)}
+        output = {int(branch): k for k, branch in enumerate(outputs)}
+        first = self.states - len(form.integrals)
+        integral = {branch: first + k for k, branch in enumerate(form.integrals)}
+        self._groups = tuple(self._group(made, place, output, integral) for made in groups_of(form.graph, order))
+        self.of_time = np.ones(self.size, dtype=bool)
+        for group in self._groups:
+            if group.outputs.size or group.integrals.size:
+                self.of_time[group.inputs] = False
+
+    @staticmethod
+    def _group(made: TemplateGroup, place: Any, output: Any, integral: Any) -> _Group:
+        law = made.template.law
+        symbols = (TIME, ACROSS, INTEGRAL, *made.template.symbols)
+        members = [int(branch) for branch in made.branches]
+
+        def function(expression: Expr) -> Function | None:
+            return None if expression == 0 else numeric(symbols, expression)
+
+        reads = made.template.kind is Kind.LAW
+        return _Group(
+            made,
+            np.array([place[branch] for branch in members], dtype=np.intp),
+            np.array([output[branch] for branch in members] if reads else [], dtype=np.intp),
+            np.array([integral[branch] for branch in members] if made.template.has_integral else [], dtype=np.intp),
+            function(law) or numeric(symbols, Integer(0)),
+            (function(law.diff(TIME)), function(law.diff(ACROSS)), function(law.diff(INTEGRAL))),
+        )
+
+    def values(self, t: Any, y: Array, x: Array, p: Array) -> Array:
+        """u at time t from the outputs y and the states x; with t (k,) and y, x of shape (., k) the result is (m, k)."""
+        return self._evaluate(lambda group: group.value, t, y, x, p)
+
+    def time_slopes(self, t: Any, y: Array, x: Array, p: Array) -> Array:
+        """The partial derivative of u by time."""
+        return self._evaluate(lambda group: group.slopes[0], t, y, x, p)
+
+    def across_slopes(self, t: Any, y: Array, x: Array, p: Array) -> Array:
+        """The partial derivative of each input by its own across variable."""
+        return self._evaluate(lambda group: group.slopes[1], t, y, x, p)
+
+    def integral_slopes(self, t: Any, y: Array, x: Array, p: Array) -> Array:
+        """The partial derivative of each input by its own integral."""
+        return self._evaluate(lambda group: group.slopes[2], t, y, x, p)
+
+    def reading(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+        """Which input reads which output, and which input reads which integral: (inputs, outputs), (inputs, states)."""
+        pairs = [(g.inputs, g.outputs) for g in self._groups if g.outputs.size]
+        integrals = [(g.inputs, g.integrals) for g in self._groups if g.integrals.size]
+        return (*_joined(pairs), *_joined(integrals))
+
+    def _evaluate(self, pick: Callable[[_Group], Function | None], t: Any, y: Array, x: Array, p: Array) -> Array:
+        result = np.zeros((self.size, *np.shape(x)[1:]))
+        for group in self._groups:
+            function = pick(group)
+            if function is None:
+                continue
+            across = y[group.outputs] if group.outputs.size else 0.0
+            integral = x[group.integrals] if group.integrals.size else 0.0
+            parameters = p[group.made_of.places]
+            if result.ndim > 1:
+                parameters = parameters[..., None]
+            result[group.inputs] = function(t, across, integral, *parameters)
+        return result
+
+
+def _joined(pairs: Sequence[tuple[Index, Index]]) -> tuple[Index, Index]:
+    none = np.array([], dtype=np.intp)
+    if not pairs:
+        return none, none
+    first, second = zip(*pairs, strict=True)
+    return np.concatenate(first), np.concatenate(second)

@@ -1,0 +1,218 @@
+"""The linear part of a network as sparse matrices of the parameter vector.
+
+    x' = A x + B u + B1 u',    y = C x + D u,    u = (w, e)
+
+with w the through variables of the nonlinear laws and sources, e the prescribed across variables, y the across variables
+that the laws and the integrals read. The equations are those of `reduction.form`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+
+from shaftwork.codegen.elements import Coefficients, LoopMatrix
+from shaftwork.core.errors import CompileError
+from shaftwork.reduction.form import StateForm
+
+Array = NDArray[np.float64]
+SINGULAR = 1e-13
+"""Reciprocal condition below which a block of algebraic equations has no solution to speak of."""
+
+
+@dataclass(frozen=True, eq=False)
+class LinearPart:
+    """The matrices above (scipy.sparse.csr_array), the maps needed to recover eliminated quantities, and F itself.
+
+    Args:
+        A: (n, n); B: (n, m); B1: (n, m); C: (k, n); D: (k, m), with n states, m inputs, k outputs y.
+        conductance_x: (tree conductances, n) their across variables from the states.
+        conductance_u: (tree conductances, m) the same from the inputs.
+        loops: F (branches, branches).
+        coefficients: (branches,) capacities, stiffnesses and conductances.
+    """
+
+    A: Any
+    B: Any
+    B1: Any
+    C: Any
+    D: Any
+    conductance_x: Any
+    conductance_u: Any
+    loops: Any
+    coefficients: Array
+
+
+class MatrixAssembly:
+    """Makes the `LinearPart` of a state form for any parameter vector.
+
+    Args:
+        form: the state form.
+        outputs: branches whose across variables make up y.
+    """
+
+    def __init__(self, form: StateForm, outputs: Sequence[int]) -> None:
+        self.form = form
+        self.outputs = np.array(outputs, dtype=np.intp)
+        self.coefficients = Coefficients(form.graph)
+        self.loops = LoopMatrix(form)
+        self.inputs = np.array([*form.laws, *form.across_sources], dtype=np.intp)
+
+    def __call__(self, p: Array) -> LinearPart:
+        """Assemble for the parameter vector p.
+
+        Raises:
+            CompileError: a block of the algebraic equations is singular for these values; names its branches.
+        """
+        form, F, k = self.form, self.loops(p), self.coefficients(p)
+        blocks = _Blocks(form, F, len(self.inputs))
+        solve_conductances = self._inverse_of_conductances(blocks, k)
+        link_g = sparse.diags_array(k[blocks.R])
+        # across variables of the tree conductances from states and inputs
+        drive_x = blocks.F("G", "R") @ link_g @ blocks.across_x("R") + blocks.F("G", "L") @ blocks.pick("L")
+        drive_u = blocks.F("G", "R") @ link_g @ blocks.across_u("R") + blocks.F("G", "W") @ blocks.input("W")
+        g_x, g_u = -solve_conductances @ drive_x, -solve_conductances @ drive_u
+        r_x = link_g @ (blocks.across_x("R") + blocks.F("G", "R").T @ g_x)
+        r_u = link_g @ (blocks.across_u("R") + blocks.F("G", "R").T @ g_u)
+        # torque balance of the tree capacities
+        K = sparse.diags_array(k[blocks.K])
+        mass = sparse.diags_array(k[blocks.C]) + blocks.F("C", "K") @ K @ blocks.F("C", "K").T
+        to_speed = self._inverse(mass, blocks.C, "inertia")
+        c_x = -to_speed @ (blocks.F("C", "R") @ r_x + blocks.F("C", "L") @ blocks.pick("L"))
+        c_u = -to_speed @ (blocks.F("C", "R") @ r_u + blocks.F("C", "W") @ blocks.input("W"))
+        c_du = -to_speed @ blocks.F("C", "K") @ K @ blocks.F("E", "K").T @ blocks.input("E")
+        # speed balance of the loops with compliances
+        S = sparse.diags_array(1 / k[blocks.S])
+        compliance = sparse.diags_array(1 / k[blocks.L]) + blocks.F("S", "L").T @ S @ blocks.F("S", "L")
+        to_torque = self._inverse(compliance, blocks.L, "compliance")
+        l_x = to_torque @ (blocks.across_x("L") + blocks.F("G", "L").T @ g_x)
+        l_u = to_torque @ (blocks.across_u("L") + blocks.F("G", "L").T @ g_u)
+        l_du = -to_torque @ blocks.F("S", "L").T @ S @ blocks.F("S", "W") @ blocks.input("W")
+        C, D = blocks.output_rows(self.outputs, g_x, g_u)
+        z_x, z_u = blocks.integral_rows(self.outputs, C, D)
+        return LinearPart(
+            A=sparse.vstack([c_x, l_x, z_x], format="csr"),
+            B=sparse.vstack([c_u, l_u, z_u], format="csr"),
+            B1=sparse.vstack([c_du, l_du, sparse.csr_array(z_u.shape)], format="csr"),
+            C=C,
+            D=D,
+            conductance_x=sparse.csr_array(g_x),
+            conductance_u=sparse.csr_array(g_u),
+            loops=F,
+            coefficients=k,
+        )
+
+    def _inverse_of_conductances(self, blocks: _Blocks, k: Array) -> Any:
+        F_GR = blocks.F("G", "R")
+        matrix = sparse.diags_array(k[blocks.G]) + F_GR @ sparse.diags_array(k[blocks.R]) @ F_GR.T
+        return self._inverse(matrix, blocks.G, "conductance")
+
+    def _inverse(self, matrix: Any, branches: NDArray[np.intp], what: str) -> Any:
+        """The inverse, block by block of connected unknowns; diagonal where nothing is coupled."""
+        matrix = sparse.csr_array(matrix)
+        size = matrix.shape[0]
+        count, label = connected_components(matrix, directed=False)
+        diagonal = matrix.diagonal()
+        if count == size:
+            if (bad := np.flatnonzero(diagonal == 0)).size:
+                raise self._singular(branches[bad[:1]], what)
+            return sparse.diags_array(1 / diagonal, format="csr")
+        order = np.argsort(label, kind="stable")
+        starts = np.searchsorted(label[order], np.arange(count + 1))
+        rows, columns, data = [], [], []
+        for first, last in zip(starts[:-1], starts[1:], strict=True):
+            members = order[first:last]
+            block = matrix[members][:, members].toarray()
+            scale = 1 / np.sqrt(np.abs(np.diag(block)) + np.finfo(float).tiny)
+            scaled = block * scale[:, None] * scale[None, :]
+            if not 1 / np.linalg.cond(scaled) > SINGULAR:
+                raise self._singular(branches[members], what)
+            inverse = np.linalg.inv(scaled) * scale[:, None] * scale[None, :]
+            rows.append(np.repeat(members, len(members)))
+            columns.append(np.tile(members, len(members)))
+            data.append(inverse.ravel())
+        entries = (np.concatenate(data), (np.concatenate(rows), np.concatenate(columns)))
+        return sparse.csr_array(entries, shape=matrix.shape)
+
+    def _singular(self, branches: NDArray[np.intp], what: str) -> CompileError:
+        names = ", ".join(f"'{name}'" for name in dict.fromkeys(self.form.graph.part_of(int(b)).name for b in branches))
+        return CompileError(
+            f"The {what} matrix of the parts {names} is singular for these values, so their speeds are not determined. "
+            f"Give one of their nodes an inertia, or change the values that cancel."
+        )
+
+
+class _Blocks:
+    """The blocks of F by group, and the rows that pick states and inputs."""
+
+    def __init__(self, form: StateForm, loops: Any, inputs: int) -> None:
+        groups = {
+            "C": form.across_states,
+            "L": form.through_states,
+            "E": form.across_sources,
+            "G": form.tree_conductances,
+            "R": form.link_conductances,
+            "K": form.dependent_across,
+            "S": form.dependent_through,
+            "W": form.laws,
+        }
+        self._groups = {name: np.array(members, dtype=np.intp) for name, members in groups.items()}
+        self._loops = loops
+        self._cache: dict[tuple[str, str], Any] = {}
+        self._integrals = form.integrals
+        self._states, self._inputs = len(form.states), inputs
+
+    def __getattr__(self, name: str) -> NDArray[np.intp]:
+        return self._groups[name]
+
+    def F(self, tree: str, link: str) -> Any:
+        """The block of the loop matrix between two groups."""
+        if (tree, link) not in self._cache:
+            self._cache[tree, link] = self._loops[self._groups[tree]][:, self._groups[link]]
+        return self._cache[tree, link]
+
+    def pick(self, group: str) -> Any:
+        """(group, n) rows that pick the states of C or L."""
+        size = len(self._groups[group])
+        offset = 0 if group == "C" else len(self.C)
+        return _selection(np.arange(size) + offset, self._states)
+
+    def input(self, group: str) -> Any:
+        """(group, m) rows that pick the inputs w or e."""
+        size = len(self._groups[group])
+        offset = 0 if group == "W" else len(self.W)
+        return _selection(np.arange(size) + offset, self._inputs)
+
+    def across_x(self, link: str) -> Any:
+        """(link, n) across variables of the links, from the states alone."""
+        return self.F("C", link).T @ self.pick("C")
+
+    def across_u(self, link: str) -> Any:
+        """(link, m) across variables of the links, from the prescribed speeds alone."""
+        return self.F("E", link).T @ self.input("E")
+
+    def output_rows(self, outputs: NDArray[np.intp], g_x: Any, g_u: Any) -> tuple[Any, Any]:
+        """C and D: the across variables of the output branches, each a link or a tree branch."""
+        links = self._loops[:, outputs].T
+        own = _selection(outputs, self._loops.shape[0])
+        rows = sparse.csr_array(links + own)  # a tree branch has no loop: its own column stands for it
+        x = rows[:, self.C] @ self.pick("C") + rows[:, self.G] @ g_x
+        u = rows[:, self.E] @ self.input("E") + rows[:, self.G] @ g_u
+        return sparse.csr_array(x), sparse.csr_array(u)
+
+    def integral_rows(self, outputs: NDArray[np.intp], C: Any, D: Any) -> tuple[Any, Any]:
+        """The rows z' = y of the integrals."""
+        place = {int(branch): k for k, branch in enumerate(outputs)}
+        rows = np.array([place[branch] for branch in self._integrals], dtype=np.intp)
+        return C[rows], D[rows]
+
+
+def _selection(columns: NDArray[np.intp], width: int) -> Any:
+    size = len(columns)
+    return sparse.csr_array((np.ones(size), (np.arange(size), columns)), shape=(size, width))

@@ -1,0 +1,150 @@
+"""What a component is: a name, declared parameters, ports, and the branches it yields. It knows no solver."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any, ClassVar, Literal, TypeVar, dataclass_transform
+
+from shaftwork.components.branches import Branch, End
+from shaftwork.core.domains import ROTATION, Domain
+from shaftwork.core.errors import ParameterError
+from shaftwork.core.parameters import Parameter, parameter
+
+Role = Literal["store", "loss", "source", "coupling"]
+
+
+@dataclass(frozen=True)
+class Port:
+    """A place where a component meets a node; `domain` None takes any node; an optional port may be left at rest."""
+
+    name: str
+    domain: Domain | None = ROTATION
+    optional: bool = False
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A quantity that can be read from a part: what it is made of, its sign and the quantity's name for the units.
+
+    Args:
+        kind: "through" (what the node at `ends[0]` gives to the part), "across" (of the two ends), "twist" (integral of
+            across of the part's through store), "store" (the through variable of the store alone).
+        ends: the port, or the pair of ports, that it belongs to.
+        sign: 1 or -1.
+    """
+
+    kind: Literal["through", "across", "twist", "store"]
+    ends: tuple[End, End]
+    domain: Domain | None
+    sign: int = 1
+
+
+@dataclass(frozen=True)
+class Component:
+    """Base of all components. A subclass decorated with `component` declares parameters and yields branches.
+
+    Args:
+        name: unique name of the part in its network.
+        symbol: subscript of the part's quantities in LaTeX; by default the name.
+    """
+
+    name: str
+    symbol: str | None = parameter("1", "subscript in LaTeX", default=None)
+
+    ports: ClassVar[tuple[Port, ...]] = (Port("a"), Port("b"))
+    inner: ClassVar[tuple[Port, ...]] = ()
+    role: ClassVar[Role] = "store"
+    declared: ClassVar[Mapping[str, Parameter]] = {}
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        """Yield the branches; `p.name` is the symbol of parameter `name` (0 where its value is exactly zero)."""
+        raise NotImplementedError
+
+    def signals(self) -> dict[str, Signal]:
+        """The quantities that can be read from the part; by default all that its ports and stores define."""
+        return default_signals(self)
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """Parameter values as given, in the order of their declaration."""
+        return {name: getattr(self, name) for name in self.declared}
+
+
+REGISTRY: dict[str, type[Component]] = {}
+"""Every component class by name, in the order of definition; text files and the documentation read it."""
+
+C = TypeVar("C", bound=Component)
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(parameter,))
+def component(cls: type[C]) -> type[C]:
+    """Make a class a component: a frozen record of its declared parameters, entered in the registry."""
+    made = dataclass(frozen=True)(cls)
+    fields = (field for field in dataclasses.fields(made) if field.name not in ("name", "symbol"))
+    made.declared = {field.name: field.metadata["declare"](field.name) for field in fields}
+    _explain_wrong_arguments(made)
+    REGISTRY[made.__name__] = made
+    return made
+
+
+def _explain_wrong_arguments(made: type[Component]) -> None:
+    """Let the constructor answer a wrong or missing argument with the list of parameters."""
+    plain: Callable[..., None] = made.__init__
+    signature = inspect.signature(plain)
+
+    def __init__(self: Component, *args: Any, **kwargs: Any) -> None:
+        try:
+            signature.bind(self, *args, **kwargs)
+        except TypeError as error:
+            name = args[0] if args else kwargs.get("name", "?")
+            rows = [
+                f"{p.name} [{p.unit}] {p.meaning}{'' if p.required else f' (default {p.default})'}"
+                for p in made.declared.values()
+            ]
+            raise ParameterError(
+                f"{made.__name__} '{name}': {error}. It takes a name and: {'; '.join(rows) or 'no parameters'}."
+            ) from None
+        plain(self, *args, **kwargs)
+
+    made.__init__ = __init__  # type: ignore[method-assign]
+    made.__signature__ = signature  # type: ignore[attr-defined]
+
+
+def default_signals(part: Component) -> dict[str, Signal]:
+    """Signals by the ports: one port gives (omega, tau), two of one domain (omega_rel, tau), more a pair for each port."""
+    ports = part.ports
+    if any(port.domain is None for port in ports):
+        return {"reaction": Signal("through", (ports[0].name, None), None)}
+    sign = 1 if part.role in ("store", "coupling") or len(ports) > 1 else -1
+    if len(ports) == 1:
+        domain, ends = ports[0].domain, (ports[0].name, None)
+        return {
+            domain.across.name: Signal("across", ends, domain),
+            domain.through.name: Signal("through", ends, domain, sign),
+        }
+    if len(ports) == 2 and part.role != "coupling":
+        domain, pair = ports[0].domain, (ports[0].name, ports[1].name)
+        suffix = "" if domain.name == "electrical" else "_rel"
+        signals = {
+            domain.through.name: Signal("through", pair, domain, -1 if part.role == "source" else 1),
+            domain.across.name + suffix: Signal("across", pair, domain),
+        }
+        if part.role == "store" and domain.name != "electrical":
+            signals[domain.integral.name + suffix] = Signal("twist", pair, domain)
+            signals[domain.through.name + "_c"] = Signal("store", pair, domain)
+        return signals
+    several: dict[str, Signal] = {}
+    for port in ports:
+        ends = (port.name, None)
+        several[f"{port.domain.across.name}_{port.name}"] = Signal("across", ends, port.domain)
+        several[f"{port.domain.through.name}_{port.name}"] = Signal("through", ends, port.domain)
+    return several
+
+
+def symbols_of(values: Mapping[str, Any]) -> SimpleNamespace:
+    """The namespace handed to `Component.branches`."""
+    return SimpleNamespace(**values)

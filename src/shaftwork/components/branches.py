@@ -1,0 +1,76 @@
+"""The closed set of branch laws: everything a component can be made of.
+
+A branch runs from its first end to its second; its through variable is what the first node gives to the branch, its across
+variable is the first node's value less the second's. Power through * across is therefore absorbed by the branch.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sympy import Expr, Integer, Symbol
+
+ACROSS = Symbol("across", real=True)
+"""The across variable of the branch in whose law it stands."""
+INTEGRAL = Symbol("integral", real=True)
+"""The integral of the across variable of the branch in whose law it stands (an angle, a position)."""
+
+End = str | None
+"""A port or an inner node of the component; None is the reference of the domain (speed zero)."""
+
+
+@dataclass(frozen=True)
+class AcrossStore:
+    """Through = capacity * d(across)/dt: inertia, mass, capacitor."""
+
+    capacity: Expr
+    ends: tuple[End, End] | None = None
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class ThroughStore:
+    """d(through)/dt = stiffness * across: shaft compliance, spring, inductor (stiffness 1/L)."""
+
+    stiffness: Expr
+    ends: tuple[End, End] | None = None
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class ThroughLaw:
+    """Through = f(across, integral of across, t): damper, friction, motor curve, load, resistor, source of torque."""
+
+    through: Expr
+    ends: tuple[End, End] | None = None
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class AcrossLaw:
+    """Across = f(t): prescribed speed, voltage source."""
+
+    across: Expr
+    ends: tuple[End, End] | None = None
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class IdealCoupling:
+    """Sum of coefficient * across over the terms is zero, power conserving: gear, drum, electrical machine, rigid joint.
+
+    Every term is (coefficient, first end, second end); the through variable of a term is coefficient * lambda with one
+    lambda for the coupling, so that the powers of the terms sum to zero.
+    """
+
+    terms: tuple[tuple[Expr, End, End], ...]
+    label: str = ""
+
+
+Branch = AcrossStore | ThroughStore | ThroughLaw | AcrossLaw | IdealCoupling
+
+
+def rigid(ends: tuple[End, End] | None, label: str = "") -> IdealCoupling:
+    """The coupling that holds two ends at the same across value."""
+    first, second = ends or (None, None)
+    return IdealCoupling(((Integer(1), first, second),), label)

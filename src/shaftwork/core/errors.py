@@ -1,0 +1,80 @@
+"""The errors of the package: one base, one child for each stage in which a user can meet them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Severity = Literal["error", "warning", "note"]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing that is wrong with, or worth saying about, a network.
+
+    Args:
+        kind: short name of the diagnosis, stable across releases ("massless node").
+        message: what is wrong, with the part and the node.
+        hint: what exists instead and the next step.
+        parts: names of the parts concerned.
+        nodes: names of the nodes concerned.
+        severity: "error" stops the assembly; "warning" is raised as `NetworkWarning`; "note" is only listed.
+    """
+
+    kind: str
+    message: str
+    hint: str
+    parts: tuple[str, ...] = ()
+    nodes: tuple[str, ...] = ()
+    severity: Severity = "error"
+
+    def __str__(self) -> str:
+        return f"{self.kind}: {self.message} {self.hint}".rstrip()
+
+
+class ShaftworkError(Exception):
+    """Base of every error that Shaftwork raises on purpose."""
+
+
+class ParameterError(ShaftworkError, ValueError):
+    """A parameter is missing, out of its bounds, not finite or of the wrong unit."""
+
+
+class NetworkError(ShaftworkError, ValueError):
+    """A network cannot be assembled; `problems` holds every reason found, not only the first."""
+
+    def __init__(self, title: str, problems: tuple[Problem, ...]) -> None:
+        self.problems = problems
+        count = "1 problem" if len(problems) == 1 else f"{len(problems)} problems"
+        lines = [f"{title}: {count}", *(f"  {number}. {problem}" for number, problem in enumerate(problems, 1))]
+        super().__init__("\n".join(lines))
+
+
+class NetworkWarning(UserWarning):
+    """A network can be assembled, but probably does not do what its author expects."""
+
+
+class ModelFileError(ShaftworkError, ValueError):
+    """A model file or an expression in it cannot be read."""
+
+
+class CompileError(ShaftworkError):
+    """A network's equations cannot be turned into an explicit model."""
+
+
+class SimulationError(ShaftworkError, RuntimeError):
+    """An integration failed: says when, in which state and why."""
+
+
+class MissingExtraError(ShaftworkError, ImportError):
+    """An optional library is needed; the message names the extra that brings it."""
+
+    def __init__(self, library: str, extra: str, purpose: str) -> None:
+        super().__init__(f"{purpose} needs {library}. Install it with: pip install 'shaftwork[{extra}]'", name=library)
+
+
+class SignalError(ShaftworkError, KeyError):
+    """A solution was asked for a quantity that it does not have; the message lists those that it has."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])

@@ -1,0 +1,106 @@
+"""Declared parameters: unit, bounds, default and meaning are data, from which checks, docs and LaTeX tables are made."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+REQUIRED = dataclasses.MISSING
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """The declaration of one parameter of a component.
+
+    Args:
+        name: keyword under which it is given.
+        unit: SI unit as text, "1" for a pure number.
+        meaning: what it is, a few words.
+        default: value where the user gives none, or `REQUIRED`.
+        above: exclusive lower bound, or None.
+        at_least: inclusive lower bound, or None.
+        at_most: inclusive upper bound, or None.
+        nonzero: zero is refused.
+        law: also takes a table or an expression of time, speed and angle.
+        latex: LaTeX symbol.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    default: Any = REQUIRED
+    above: float | None = None
+    at_least: float | None = None
+    at_most: float | None = None
+    nonzero: bool = False
+    law: bool = False
+    latex: str = ""
+
+    @property
+    def required(self) -> bool:
+        return self.default is REQUIRED
+
+    @property
+    def bounds(self) -> str:
+        """The admissible range in words, empty when every finite number will do."""
+        rules = (
+            (self.above, "above"),
+            (self.at_least, "at least"),
+            (self.at_most, "at most"),
+        )
+        words = [f"{text} {value:g}" for value, text in rules if value is not None]
+        return " and ".join([*words, "not zero"] if self.nonzero else words)
+
+    def objection(self, value: float) -> str | None:
+        """Why a number is not admissible, or None when it is."""
+        if not math.isfinite(value):
+            return "must be a finite number"
+        outside = (
+            (self.above is not None and value <= self.above)
+            or (self.at_least is not None and value < self.at_least)
+            or (self.at_most is not None and value > self.at_most)
+            or (self.nonzero and value == 0)
+        )
+        return f"must be {self.bounds}" if outside else None
+
+    def magnitude(self, value: Any) -> tuple[Any, str | None]:
+        """The value in SI as a float (or, for a law, the expression itself), and the objection to it if there is one."""
+        if hasattr(value, "dimensionality") and hasattr(value, "to"):
+            return self._from_quantity(value)
+        if isinstance(value, bool) or isinstance(value, (str, bytes, complex)) or value is None:
+            return value, f"must be a number{' or a law' if self.law else ''}, not {type(value).__name__} {value!r}"
+        try:
+            number = float(value)
+        except (TypeError, ValueError, OverflowError):
+            if self.law and callable(getattr(value, "has", None)):
+                return value, None
+            return value, f"must be a number{' or a law' if self.law else ''}, not {type(value).__name__}"
+        return number, self.objection(number)
+
+    def _from_quantity(self, value: Any) -> tuple[Any, str | None]:
+        try:
+            number = float(value.to("dimensionless" if self.unit == "1" else self.unit.replace("*", " * ")).magnitude)
+        except Exception as error:  # pint raises its own classes, which must not be imported here
+            return value, f"is given in '{value.units}', but needs {self.unit} ({error})"
+        return number, self.objection(number)
+
+
+def parameter(unit: str, meaning: str, *, default: Any = REQUIRED, latex: str = "", **bounds: Any) -> Any:
+    """Declare a parameter of a component: a dataclass field that carries its `Parameter` declaration.
+
+    Args:
+        unit: SI unit as text.
+        meaning: what it is, a few words.
+        default: value where the user gives none; without it the parameter is required.
+        latex: LaTeX symbol, by default the name.
+        **bounds: `above`, `at_least`, `at_most`, `nonzero`, `law` of `Parameter`.
+    """
+
+    def declare(name: str) -> Parameter:
+        return Parameter(name=name, unit=unit, meaning=meaning, default=default, latex=latex or name, **bounds)
+
+    metadata: dict[str, Callable[[str], Parameter]] = {"declare": declare}
+    return dataclasses.field(default=default, metadata=metadata, kw_only=True)

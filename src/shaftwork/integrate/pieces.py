@@ -1,0 +1,111 @@
+"""The smooth pieces of a problem, and the trajectory that is put together from them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shaftwork.core.errors import SimulationError
+from shaftwork.integrate.problem import Array, Problem
+
+Dense = Callable[[Array], Array]
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A span of time in which the right-hand side is smooth.
+
+    Args:
+        start: s.
+        end: s.
+    """
+
+    start: float
+    end: float
+
+    def inside(self, time: float) -> float:
+        """The time in s, moved by one rounding unit where it touches an end: there another piece's input may be met."""
+        # A method's last stage lies exactly on the end of its step, and a step function is one-sided at its jump.
+        return min(max(time, float(np.nextafter(self.start, self.end))), float(np.nextafter(self.end, self.start)))
+
+
+def pieces(problem: Problem) -> tuple[Piece, ...]:
+    """The pieces between the start, the breakpoints and the end of a problem, in order."""
+    ends = (problem.t0, *problem.breakpoints, problem.t_end)
+    return tuple(Piece(start, end) for start, end in zip(ends[:-1], ends[1:], strict=True))
+
+
+def start_of_piece(problem: Problem, piece: Piece, x: Array) -> Array:
+    """State (n,) with which a piece starts, from the state at the end of the piece before (or the start state)."""
+    if problem.jump is None or piece.start == problem.t0:
+        return x
+    return np.asarray(problem.jump(piece.start, x), dtype=float)
+
+
+@dataclass(frozen=True)
+class PiecewiseDense:
+    """Dense output of a whole run; at a breakpoint it gives the state after the jump.
+
+    Args:
+        starts: (m,) start times of the pieces in s.
+        parts: dense output of each piece, times (k,) to states (k, n).
+        size: number of states n.
+    """
+
+    starts: Array
+    parts: tuple[Dense, ...]
+    size: int
+
+    def __call__(self, times: Array) -> Array:
+        times = np.atleast_1d(np.asarray(times, dtype=float))
+        if len(self.parts) == 1:
+            return self.parts[0](times)
+        index = np.clip(np.searchsorted(self.starts, times, side="right") - 1, 0, len(self.parts) - 1)
+        states = np.empty((times.size, self.size))
+        for number in np.unique(index):
+            chosen = index == number
+            states[chosen] = self.parts[number](times[chosen])
+        return states
+
+
+def both_sides(problem: Problem, times: Sequence[Array], states: Sequence[Array]) -> tuple[Array, Array]:
+    """Join the step ends of all pieces: (k,) times and (k, n) states.
+
+    Where the state is continuous a breakpoint is listed once, where it may jump twice: before and after.
+    """
+    first = 0 if problem.jump is not None else 1
+    t = np.concatenate([times[0], *(part[first:] for part in times[1:])])
+    x = np.concatenate([states[0], *(part[first:] for part in states[1:])])
+    return t, x
+
+
+def failure(problem: Problem, engine: str, t: float, x: Array, reason: str) -> SimulationError:
+    """The error of a failed run: when, in which state, why, and what to try.
+
+    Args:
+        problem: what was to be solved.
+        engine: name of the engine for the message.
+        t: last time reached, in s.
+        x: (n,) state there.
+        reason: the solver's own reason.
+    """
+    if problem.names:
+        bad = np.flatnonzero(~np.isfinite(x))
+        worst = int(bad[0]) if bad.size else int(np.argmax(np.abs(x) / np.maximum(problem.atol, np.finfo(float).tiny)))
+        kind = "not finite" if bad.size else "the largest against its tolerance"
+        state = f" State {problem.names[worst]!r} = {float(x[worst]):.6g} is {kind}."
+    else:
+        state = ""
+    return SimulationError(
+        f"The {engine} engine failed at t = {t:.9g} s (asked: {problem.t0:.6g} to {problem.t_end:.6g} s): "
+        f"{reason.strip().rstrip('.')}.{state} "
+        "Check the parameters and laws that act on this state, or try another engine or a looser rtol."
+    )
+
+
+def check_finite(problem: Problem, engine: str, t: float, x: Array) -> None:
+    """Raise `SimulationError` when a state (n,) at time t in s is not finite."""
+    if not np.isfinite(x).all():
+        raise failure(problem, engine, t, x, "the state is not finite")

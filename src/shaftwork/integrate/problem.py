@@ -1,0 +1,89 @@
+"""What an engine is given and what it returns: plain arrays and functions, no symbols."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LinearInputs:
+    """A linear system x' = A x + u(t) whose input is, between breakpoints, a polynomial in t of degree at most 1.
+
+    Args:
+        A: (n, n) scipy.sparse.csr_array, 1/s times the units of the states.
+        forcing: u(t), shape (n,); evaluated strictly inside a piece it is that piece's own polynomial.
+    """
+
+    A: Any
+    forcing: Callable[[float], Array]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """An initial value problem x' = rhs(t, x) on [t0, t_end], smooth between its breakpoints.
+
+    Args:
+        rhs: right-hand side, (time, (n,)) to a new (n,) array.
+        jacobian: d rhs / d x as a scipy.sparse.csc_array (n, n), or None.
+        x0: (n,) start state.
+        t0: start time in s.
+        t_end: end time in s, greater than t0.
+        names: n state names for messages, such as "J1.omega".
+        atol: (n,) absolute tolerances, in the units of the states.
+        rtol: relative tolerance.
+        breakpoints: strictly increasing times in (t0, t_end) where an input jumps or kinks. An engine ends a step there
+            and starts anew; inside a piece it never evaluates `rhs` at or past the piece's end.
+        jump: state after a breakpoint from (breakpoint, state before it), or None where the state is continuous.
+        t_eval: strictly increasing output times in [t0, t_end], or None for the engine's own steps. At a breakpoint the
+            state after the jump is the output.
+        linear: the same system in linear form when it is one, else None.
+        symbolic: the same system as a heyoka program (see `codegen.heyoka`), else None.
+        max_steps: an engine gives up, with a reason, after this many steps.
+    """
+
+    rhs: Callable[[float, Array], Array]
+    jacobian: Callable[[float, Array], Any] | None
+    x0: Array
+    t0: float
+    t_end: float
+    names: tuple[str, ...]
+    atol: Array
+    rtol: float = 1e-8
+    breakpoints: tuple[float, ...] = ()
+    jump: Callable[[float, Array], Array] | None = None
+    t_eval: Array | None = None
+    linear: LinearInputs | None = None
+    symbolic: Any = None
+    max_steps: int = 10_000_000
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """What an engine found.
+
+    Args:
+        t: (k,) times: `Problem.t_eval`, or the ends of the steps (both sides of a breakpoint with a jump are listed).
+        x: (k, n) states.
+        dense: states (k, n) at any times (k,) inside [t0, t_end], to about the accuracy of the steps.
+        steps: (s,) every time at which a step ended, t0 first: between two neighbours `dense` is smooth.
+        statistics: counts by name: "steps", "rejected", "rhs", "jacobians" as far as the engine knows them.
+    """
+
+    t: Array
+    x: Array
+    dense: Callable[[Array], Array]
+    steps: Array
+    statistics: Mapping[str, int] = field(default_factory=dict)
+
+
+class Engine(Protocol):
+    """An engine solves a `Problem` or raises `SimulationError` with the time, the state and the reason."""
+
+    def __call__(self, problem: Problem) -> Trajectory: ...

@@ -1,0 +1,146 @@
+"""The engine that is always there: scipy's adaptive methods, stepped piece by piece."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from scipy.integrate import BDF, DOP853, LSODA, OdeSolution, Radau
+
+from shaftwork.core.errors import SimulationError
+from shaftwork.integrate.pieces import Dense, Piece, PiecewiseDense, both_sides, failure, pieces, start_of_piece
+from shaftwork.integrate.problem import Array, Problem, Trajectory
+
+Method = Literal["DOP853", "Radau", "BDF", "LSODA"]
+
+METHODS: dict[str, Any] = {"DOP853": DOP853, "Radau": Radau, "BDF": BDF, "LSODA": LSODA}
+
+# Below this relative tolerance scipy's methods only warn and clip, so it is clipped here without the warning.
+TIGHTEST_RTOL = 100 * np.finfo(float).eps
+
+
+class _Guard:
+    """The right-hand side of one piece, which stays inside the piece and remembers where it was last not finite."""
+
+    def __init__(self, problem: Problem, piece: Piece) -> None:
+        self._problem = problem
+        self._low = piece.inside(piece.start)
+        self._high = piece.inside(piece.end)
+        self.not_finite: tuple[float, Array] | None = None
+
+    def rhs(self, t: float, x: Array) -> Array:
+        derivative = self._problem.rhs(min(max(t, self._low), self._high), x)
+        # The sum is a cheap test that cannot miss a NaN or an infinity. A trial stage that is too bold may meet one
+        # and recover with a smaller step, so it is only remembered here.
+        if not np.isfinite(derivative.sum()):
+            self.not_finite = (t, derivative)
+        return derivative
+
+    def jacobian(self, t: float, x: Array) -> Any:
+        assert self._problem.jacobian is not None
+        return self._problem.jacobian(min(max(t, self._low), self._high), x)
+
+    def dense_jacobian(self, t: float, x: Array) -> Any:
+        return self.jacobian(t, x).toarray()
+
+    def reason(self, reason: str) -> str:
+        """The solver's reason, with the first equation that was not finite when there was one."""
+        if self.not_finite is None:
+            return reason
+        t, derivative = self.not_finite
+        bad = np.flatnonzero(~np.isfinite(derivative))
+        if bad.size == 0:
+            return reason
+        name = self._problem.names[int(bad[0])]
+        return f"{reason.rstrip('.')}; the derivative of {name!r} was {derivative[bad[0]]} at t = {t:.9g} s"
+
+
+@dataclass(frozen=True)
+class _Run:
+    """One piece, solved: step ends (s,), states there (s, n), dense output and counts."""
+
+    times: Array
+    states: Array
+    dense: Dense
+    counts: dict[str, int]
+
+
+def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
+    """Integrate with one of scipy's methods.
+
+    Args:
+        problem: what to solve.
+        method: "DOP853" (explicit, order 8) for smooth motion, "Radau" or "BDF" for stiff systems, "LSODA" switches.
+
+    Raises:
+        SimulationError: the step became too small, a value was not finite, or `max_steps` were not enough.
+
+    Source: scipy.integrate; Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I (DOP853) and II (Radau).
+    """
+    x = np.asarray(problem.x0, dtype=float)
+    runs: list[_Run] = []
+    parts = pieces(problem)
+    with np.errstate(all="ignore"):
+        for piece in parts:
+            taken = sum(run.counts["steps"] for run in runs)
+            run = _piece(problem, piece, start_of_piece(problem, piece, x), method, problem.max_steps - taken)
+            runs.append(run)
+            x = run.states[-1]
+    dense = PiecewiseDense(np.array([piece.start for piece in parts]), tuple(run.dense for run in runs), x.size)
+    steps = np.concatenate([runs[0].times, *(run.times[1:] for run in runs[1:])])
+    if problem.t_eval is None:
+        t, states = both_sides(problem, [run.times for run in runs], [run.states for run in runs])
+    else:
+        t = np.asarray(problem.t_eval, dtype=float)
+        states = dense(t)
+    statistics = {name: sum(run.counts[name] for run in runs) for name in runs[0].counts}
+    return Trajectory(t, states, dense, steps, statistics)
+
+
+def _piece(problem: Problem, piece: Piece, x: Array, method: Method, max_steps: int) -> _Run:
+    guard = _Guard(problem, piece)
+    times, states, interpolants = [piece.start], [x], []
+    try:
+        solver = _solver(problem, piece, x, method, guard)
+        while solver.status == "running":
+            if len(interpolants) >= max_steps:
+                raise failure(problem, "scipy", solver.t, solver.y, f"{problem.max_steps} steps were not enough")
+            reason = _step(solver, method)
+            if solver.status == "failed":
+                reached = states[-1] if np.isfinite(states[-1]).all() else solver.y
+                raise failure(problem, "scipy", times[-1], reached, guard.reason(f"{method}: {reason}"))
+            if not np.isfinite(solver.y.sum()):
+                raise failure(problem, "scipy", solver.t, solver.y, guard.reason(f"{method}: the state is not finite"))
+            if solver.t <= times[-1]:  # LSODA goes on with steps below the spacing of numbers
+                raise failure(problem, "scipy", solver.t, solver.y, guard.reason(f"{method}: the step became too small"))
+            interpolants.append(solver.dense_output())
+            times.append(solver.t)
+            states.append(solver.y)
+    except SimulationError:
+        raise
+    except (ValueError, RuntimeError) as error:  # a factorisation that met a NaN
+        if guard.not_finite is None:
+            raise
+        raise failure(problem, "scipy", times[-1], states[-1], guard.reason(f"{method}: {error}")) from error
+    solution = OdeSolution(times, interpolants)
+    counts = {"steps": len(interpolants), "rhs": solver.nfev, "jacobians": solver.njev}
+    return _Run(np.array(times), np.array(states), lambda at: np.asarray(solution(at)).T, counts)
+
+
+def _solver(problem: Problem, piece: Piece, x: Array, method: Method, guard: _Guard) -> Any:
+    options: dict[str, Any] = {"rtol": max(problem.rtol, TIGHTEST_RTOL), "atol": problem.atol}
+    if method != "DOP853" and problem.jacobian is not None:
+        options["jac"] = guard.dense_jacobian if method == "LSODA" else guard.jacobian
+    return METHODS[method](guard.rhs, piece.start, x, piece.end, **options)
+
+
+def _step(solver: Any, method: Method) -> str:
+    """Take one step; the solver's message, which LSODA gives as a warning."""
+    if method != "LSODA":
+        return str(solver.step() or "")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        message = solver.step()
+    return "; ".join([*(str(warning.message) for warning in caught), str(message or "")])

@@ -1,0 +1,210 @@
+"""The circuit graph: nodes, parts and an ordered table of branches, also as a networkx multigraph."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import networkx as nx
+from sympy import Expr, Symbol
+
+from shaftwork.components.base import Component
+from shaftwork.components.branches import End
+from shaftwork.core.domains import ROTATION, Domain
+from shaftwork.network.netlist import REFERENCE, Netlist, Placed
+from shaftwork.network.templates import BranchTemplate, Kind, Template, as_expression, make_template
+
+GROUND = -1
+"""Node number of the reference."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GraphBranch:
+    """One branch of the circuit.
+
+    Args:
+        index: place in the branch table.
+        part: place of its part in the part table.
+        template: its law in the symbols of its component.
+        plus: number of its first node (`GROUND` for the reference); -1 for couplings.
+        minus: number of its second node.
+        terms: of a coupling, (coefficient in the component's symbols, first node, second node).
+    """
+
+    index: int
+    part: int
+    template: BranchTemplate
+    plus: int
+    minus: int
+    terms: tuple[tuple[Expr, int, int], ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GraphPart:
+    """A part with its nodes by port name, the places of its parameters in the parameter vector, and its branches."""
+
+    component: Component
+    nodes: Mapping[str, int]
+    parameters: Mapping[str, int]
+    branches: tuple[int, ...]
+
+    @property
+    def name(self) -> str:
+        return self.component.name
+
+
+@dataclass(frozen=True, eq=False)
+class CircuitGraph:
+    """A network as branches between nodes.
+
+    Args:
+        name: title of the network.
+        nodes: node names; inner nodes of a part are named "part.inner".
+        domains: domain of each node.
+        parts: the part table.
+        branches: the branch table, in the order of the parts.
+        parameters: every parameter that is left in a law, "part.name" to value.
+        zeros: every parameter that is exactly zero and therefore left out.
+    """
+
+    name: str
+    nodes: tuple[str, ...]
+    domains: tuple[Domain, ...]
+    parts: tuple[GraphPart, ...]
+    branches: tuple[GraphBranch, ...]
+    parameters: Mapping[str, float]
+    zeros: tuple[str, ...]
+
+    @cached_property
+    def multigraph(self) -> nx.MultiDiGraph:
+        """Nodes by name, an edge for each branch term from its first to its second node, keyed by branch and term."""
+        made = nx.MultiDiGraph(name=self.name)
+        made.add_nodes_from(self.nodes)
+        for branch in self.branches:
+            for key, plus, minus in ends_of(branch):
+                made.add_edge(self.node_name(plus), self.node_name(minus), key=key, part=self.parts[branch.part].name)
+        return made
+
+    def node_name(self, number: int) -> str:
+        return REFERENCE if number == GROUND else self.nodes[number]
+
+    def part_of(self, branch: int) -> GraphPart:
+        return self.parts[self.branches[branch].part]
+
+    def symbol_of(self, part: GraphPart, name: str) -> Symbol:
+        """The symbol of a parameter in the equations of the whole network."""
+        return Symbol(f"{part.name}.{name}", real=True)
+
+    def in_network_symbols(self, expression: Expr, branch: GraphBranch) -> Expr:
+        """An expression of a template with the part's own parameter symbols replaced by the network's."""
+        part = self.parts[branch.part]
+        return expression.xreplace({s: self.symbol_of(part, s.name) for s in branch.template.symbols})
+
+
+def ends_of(branch: GraphBranch) -> tuple[tuple[tuple[int, int], int, int], ...]:
+    """((branch, term), first node, second node) for each edge that the branch stands for."""
+    if branch.terms:
+        return tuple(((branch.index, k), plus, minus) for k, (_, plus, minus) in enumerate(branch.terms))
+    return (((branch.index, 0), branch.plus, branch.minus),)
+
+
+@dataclass(frozen=True)
+class ResolvedPart:
+    """A placed component with its parameter values in SI: floats, or expressions for laws."""
+
+    placed: Placed
+    values: Mapping[str, Any]
+
+
+def resolve(placed: Placed) -> tuple[ResolvedPart, tuple[tuple[str, Any, str], ...]]:
+    """The part with its values in SI, and the objections as (parameter, given value, objection).
+
+    A value that cannot be used is replaced by 1, so that the analysis of the network can go on and report everything.
+    """
+    values: dict[str, Any] = {}
+    objections: list[tuple[str, Any, str]] = []
+    for name, declared in placed.part.declared.items():
+        given = getattr(placed.part, name)
+        value, objection = declared.magnitude(given)
+        if objection is None and not isinstance(value, float):
+            value = as_expression(value)
+        if objection is not None:
+            objections.append((name, given, objection))
+            value = 1.0
+        values[name] = value
+    return ResolvedPart(placed, values), tuple(objections)
+
+
+class _Table:
+    """Collects nodes and branches while the graph is made."""
+
+    def __init__(self) -> None:
+        self.numbers: dict[str, int] = {REFERENCE: GROUND}
+        self.domains: list[Domain] = []
+        self.templates: dict[Any, Template] = {}
+
+    def node(self, name: str, domain: Domain | None) -> int:
+        if name not in self.numbers:
+            self.numbers[name] = len(self.domains)
+            self.domains.append(domain or ROTATION)
+        return self.numbers[name]
+
+    def template(self, part: Component, values: Mapping[str, Any]) -> Template:
+        pattern = tuple(bool(value) if isinstance(value, float) else value for value in values.values())
+        key = (type(part), pattern)
+        if key not in self.templates:
+            self.templates[key] = make_template(part, values)
+        return self.templates[key]
+
+
+def build_graph(netlist: Netlist) -> CircuitGraph:
+    """Netlist to graph. The netlist must have passed `checks.declaration_problems`."""
+    resolved = tuple(resolve(placed)[0] for placed in netlist.placed)
+    table = _Table()
+    for placed in netlist.placed:  # ports with a domain first, so that a Ground does not decide the domain of its node
+        for port, node in zip(placed.part.ports, placed.nodes, strict=False):
+            if port.domain is not None:
+                table.node(node, port.domain)
+    parameters: dict[str, float] = {}
+    zeros: list[str] = []
+    parts: list[GraphPart] = []
+    branches: list[GraphBranch] = []
+    for item in resolved:
+        part, values = item.placed.part, item.values
+        template = table.template(part, values)
+        places: dict[str, int] = {}
+        for name in template.parameters:
+            places[name] = len(parameters)
+            parameters[f"{part.name}.{name}"] = values[name]
+        zeros.extend(f"{part.name}.{name}" for name, value in values.items() if isinstance(value, float) and not value)
+        nodes = _port_nodes(item.placed, table)
+        first = len(branches)
+        branches.extend(_place(made, first + k, len(parts), nodes) for k, made in enumerate(template.branches))
+        parts.append(GraphPart(part, nodes, places, tuple(range(first, len(branches)))))
+    names = tuple(table.numbers)[1:]
+    return CircuitGraph(
+        netlist.name, names, tuple(table.domains), tuple(parts), tuple(branches), parameters, tuple(zeros)
+    )
+
+
+def _port_nodes(placed: Placed, table: _Table) -> dict[str, int]:
+    part = placed.part
+    nodes = {port.name: GROUND for port in part.ports}
+    for port, node in zip(part.ports, placed.nodes, strict=False):
+        nodes[port.name] = table.node(node, port.domain)
+    for port in part.inner:
+        nodes[port.name] = table.node(f"{part.name}.{port.name}", port.domain)
+    return nodes
+
+
+def _place(template: BranchTemplate, index: int, part: int, nodes: Mapping[str, int]) -> GraphBranch:
+    def number(end: End) -> int:
+        return GROUND if end is None else nodes[end]
+
+    if template.kind is Kind.COUPLING:
+        terms = tuple((coefficient, number(plus), number(minus)) for coefficient, plus, minus in template.terms)
+        return GraphBranch(index, part, template, GROUND, GROUND, terms)
+    plus, minus = template.ends
+    return GraphBranch(index, part, template, number(plus), number(minus), ())

@@ -1,0 +1,166 @@
+"""From a component to its branches: one symbolic template for each class and pattern of zeros, shared by all its parts.
+
+A parameter that is exactly zero is put into the laws as the number 0 before anything else is made of them. So a damping of
+zero leaves no branch, a resistance of zero becomes a rigid joint, and neither leaves a trace in equations or code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+from sympy import Expr, Integer, Symbol, nan, oo, zoo
+
+from shaftwork.components.base import Component, symbols_of
+from shaftwork.components.branches import (
+    ACROSS,
+    INTEGRAL,
+    AcrossLaw,
+    AcrossStore,
+    Branch,
+    End,
+    IdealCoupling,
+    ThroughLaw,
+    ThroughStore,
+    rigid,
+)
+from shaftwork.components.laws import Table
+from shaftwork.components.laws import t as TIME
+from shaftwork.core.domains import DOMAINS
+
+
+class Kind(IntEnum):
+    """The kinds of branches, in the order in which the normal tree prefers them."""
+
+    COUPLING = 0
+    ACROSS_SOURCE = 1
+    ACROSS_STORE = 2
+    CONDUCTANCE = 3
+    LAW = 4
+    THROUGH_STORE = 5
+    THROUGH_SOURCE = 6
+
+
+@dataclass(frozen=True, eq=False)
+class BranchTemplate:
+    """A branch in symbols of its own component.
+
+    Args:
+        kind: what the law is; it decides the place in the normal tree.
+        law: capacity, stiffness or conductance of a store or conductance; through or across variable of the others.
+        ends: first and second end.
+        terms: of a coupling, (coefficient, first end, second end); else empty.
+        label: name of its through variable where the part has several.
+        symbols: the parameters that `law` and `terms` contain, in the order of their declaration.
+    """
+
+    kind: Kind
+    law: Expr
+    ends: tuple[End, End]
+    terms: tuple[tuple[Expr, End, End], ...]
+    label: str
+    symbols: tuple[Symbol, ...]
+
+    @property
+    def has_integral(self) -> bool:
+        """Whether the law reads the angle, position or flux linkage of its branch."""
+        return bool(self.law.has(INTEGRAL))
+
+
+@dataclass(frozen=True, eq=False)
+class Template:
+    """All branches of a component with a given pattern of zero parameters."""
+
+    branches: tuple[BranchTemplate, ...]
+    parameters: tuple[str, ...]
+
+
+def as_expression(law: Any) -> Expr:
+    """A law as the user gave it, as an expression; a table alone is a law of time."""
+    return law(TIME) if isinstance(law, Table) else law
+
+
+def substitution(part: Component) -> dict[Any, Any]:
+    """The names that users write in laws (omega, phi; v, s; u, psi), as the across variable of the branch and its integral."""
+    names: dict[Any, Any] = {}
+    for domain in DOMAINS:
+        if any(port.domain is domain for port in part.ports):
+            names[Symbol(domain.across.name, real=True)] = ACROSS
+            names[Symbol(domain.integral.name, real=True)] = INTEGRAL
+    return names
+
+
+def make_template(part: Component, values: Mapping[str, Any]) -> Template:
+    """The branches of a part whose parameter values are floats or, for laws, expressions."""
+    translate = substitution(part)
+    placed: dict[str, Any] = {}
+    for name, value in values.items():
+        if isinstance(value, float):
+            placed[name] = Symbol(name, real=True) if value else Integer(0)
+        else:
+            placed[name] = value.xreplace(translate)
+    known = {Symbol(name, real=True): name for name, value in values.items() if isinstance(value, float) and value}
+    branches = tuple(
+        made
+        for branch in part.branches(symbols_of(placed))
+        for made in _resolve(branch, _default_ends(part), tuple(known))
+    )
+    return Template(branches, tuple(known.values()))
+
+
+def _default_ends(part: Component) -> tuple[End, End]:
+    return (part.ports[0].name, part.ports[1].name if len(part.ports) > 1 else None)
+
+
+def _resolve(branch: Branch, default: tuple[End, End], symbols: tuple[Symbol, ...]) -> Iterator[BranchTemplate]:
+    """The branch as templates: none when its law vanishes, a rigid joint when it is infinite, two when it is affine."""
+    match branch:
+        case IdealCoupling(terms, label):
+            yield _template(Kind.COUPLING, Integer(0), (None, None), terms, label, symbols)
+        case AcrossLaw(across, ends, label):
+            yield _template(Kind.ACROSS_SOURCE, across, ends or default, (), label, symbols)
+        case AcrossStore(capacity, ends, label):
+            yield from _linear(Kind.ACROSS_STORE, capacity, ends or default, label, symbols)
+        case ThroughStore(stiffness, ends, label):
+            yield from _linear(Kind.THROUGH_STORE, stiffness, ends or default, label, symbols)
+        case ThroughLaw(through, ends, label):
+            yield from _through_law(through, ends or default, label, symbols)
+
+
+def _linear(
+    kind: Kind, coefficient: Expr, ends: tuple[End, End], label: str, symbols: tuple[Symbol, ...]
+) -> Iterator[BranchTemplate]:
+    if coefficient.has(zoo, oo, nan):
+        joint = rigid(ends, label)
+        yield _template(Kind.COUPLING, Integer(0), (None, None), joint.terms, label, symbols)
+    elif coefficient != 0:
+        yield _template(kind, coefficient, ends, (), label, symbols)
+
+
+def _through_law(
+    through: Expr, ends: tuple[End, End], label: str, symbols: tuple[Symbol, ...]
+) -> Iterator[BranchTemplate]:
+    slope = through.diff(ACROSS)
+    if slope.has(ACROSS, INTEGRAL, TIME):
+        yield _template(Kind.LAW, through, ends, (), label, symbols)
+        return
+    yield from _linear(Kind.CONDUCTANCE, slope, ends, label, symbols)
+    rest = through.subs(ACROSS, 0)
+    if rest != 0 and not rest.has(nan):
+        kind = Kind.LAW if rest.has(INTEGRAL) else Kind.THROUGH_SOURCE
+        yield _template(kind, rest, ends, (), label, symbols)
+
+
+def _template(
+    kind: Kind,
+    law: Expr,
+    ends: tuple[End, End],
+    terms: Iterable[tuple[Expr, End, End]],
+    label: str,
+    symbols: tuple[Symbol, ...],
+) -> BranchTemplate:
+    kept = tuple(terms)
+    found = law.free_symbols.union(*(coefficient.free_symbols for coefficient, _, _ in kept))
+    return BranchTemplate(kind, law, ends, kept, label, tuple(symbol for symbol in symbols if symbol in found))

@@ -1,0 +1,137 @@
+"""The state form of a network: which branches are states, inputs and dependent, ready to become rows or matrices.
+
+With C, L the stores that are states (tree capacities, link compliances), G and R the tree and link conductances, w the
+through variables of the nonlinear laws and sources, e the prescribed across variables, and F the loops:
+
+    v_R = F_CR' x_C + F_ER' e + F_GR' v_G                                         loops of the link conductances
+    (G + F_GR R F_GR') v_G = -F_GR R (F_CR' x_C + F_ER' e) - F_GL x_L - F_GW w    cutsets of the tree conductances
+    M x_C' = -F_CR R v_R - F_CL x_L - F_CW w - F_CK K F_EK' e'                    M = C + F_CK K F_CK'
+    N x_L' = F_CL' x_C + F_EL' e + F_GL' v_G - F_SL' S F_SW w'                    N = L + F_SL' S F_SL
+
+K are the dependent capacities (rigidly geared inertias), S the dependent compliances (springs in series). This is exact:
+nothing is lost by the elimination, and every eliminated quantity comes back from F.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from shaftwork.core.domains import Domain
+from shaftwork.network.graph import CircuitGraph, GraphBranch
+from shaftwork.network.templates import Kind
+from shaftwork.reduction.tree import NormalTree, normal_tree
+
+
+@dataclass(frozen=True)
+class State:
+    """A state variable: its name, the branch that carries it, its quantity's unit and LaTeX symbol."""
+
+    name: str
+    branch: int
+    kind: str
+    unit: str
+    latex: str
+
+
+@dataclass(frozen=True, eq=False)
+class StateForm:
+    """Graph, normal tree and the groups of branches in the equations above.
+
+    Args:
+        graph: the circuit graph.
+        tree: its normal tree.
+        angles: branches whose angle (position, flux linkage) is asked for although no law reads it.
+    """
+
+    graph: CircuitGraph
+    tree: NormalTree
+    angles: tuple[int, ...] = ()
+
+    @property
+    def across_sources(self) -> tuple[int, ...]:
+        return self.tree.tree[Kind.ACROSS_SOURCE]
+
+    @property
+    def across_states(self) -> tuple[int, ...]:
+        return self.tree.tree[Kind.ACROSS_STORE]
+
+    @property
+    def through_states(self) -> tuple[int, ...]:
+        return self.tree.links[Kind.THROUGH_STORE]
+
+    @property
+    def tree_conductances(self) -> tuple[int, ...]:
+        return self.tree.tree[Kind.CONDUCTANCE]
+
+    @property
+    def link_conductances(self) -> tuple[int, ...]:
+        return self.tree.links[Kind.CONDUCTANCE]
+
+    @property
+    def dependent_across(self) -> tuple[int, ...]:
+        """Capacities whose across variable follows from others: rigidly geared inertias, capacitor loops."""
+        return self.tree.links[Kind.ACROSS_STORE]
+
+    @property
+    def dependent_through(self) -> tuple[int, ...]:
+        """Compliances whose through variable follows from others: springs in series, inductor cutsets."""
+        return self.tree.tree[Kind.THROUGH_STORE]
+
+    @property
+    def laws(self) -> tuple[int, ...]:
+        """The inputs w: nonlinear laws first, then sources that depend on time alone."""
+        return self.tree.links[Kind.LAW] + self.tree.links[Kind.THROUGH_SOURCE]
+
+    @cached_property
+    def integrals(self) -> tuple[int, ...]:
+        """Branches whose integrated across variable is read by a law or asked for: each adds a state."""
+        read = (index for index in self.laws if self.graph.branches[index].template.has_integral)
+        return tuple(dict.fromkeys((*read, *self.angles)))
+
+    @cached_property
+    def outputs(self) -> tuple[int, ...]:
+        """Branches whose across variable is read: by a nonlinear law or by an integral."""
+        return tuple(dict.fromkeys((*self.tree.links[Kind.LAW], *self.integrals)))
+
+    @cached_property
+    def states(self) -> tuple[State, ...]:
+        """The states: speeds of the tree's stores, torques of the links' stores, integrals."""
+        return (
+            *(_across_state(self.graph, self.graph.branches[index]) for index in self.across_states),
+            *(_through_state(self.graph, self.graph.branches[index]) for index in self.through_states),
+            *(_integral_state(self.graph, self.graph.branches[index]) for index in self.integrals),
+        )
+
+
+def state_form(graph: CircuitGraph, angles: tuple[int, ...] = ()) -> StateForm:
+    """Graph to state form. Whether the form is solvable is for `diagnosis` to say."""
+    return StateForm(graph, normal_tree(graph), angles)
+
+
+def branch_name(graph: CircuitGraph, branch: GraphBranch) -> str:
+    """A name for the branch's through variable that is unique in the network: "shaft.tau_c"."""
+    part = graph.parts[branch.part]
+    domain = _domain(graph, branch)
+    label = branch.template.label or domain.through.name
+    return f"{part.name}.{label}"
+
+
+def _domain(graph: CircuitGraph, branch: GraphBranch) -> Domain:
+    node = branch.plus if branch.plus >= 0 else branch.minus
+    return graph.domains[node]
+
+
+def _across_state(graph: CircuitGraph, branch: GraphBranch) -> State:
+    quantity = _domain(graph, branch).across
+    return State(f"{graph.parts[branch.part].name}.{quantity.name}", branch.index, "across", quantity.unit, quantity.latex)
+
+
+def _through_state(graph: CircuitGraph, branch: GraphBranch) -> State:
+    quantity = _domain(graph, branch).through
+    return State(branch_name(graph, branch), branch.index, "through", quantity.unit, quantity.latex)
+
+
+def _integral_state(graph: CircuitGraph, branch: GraphBranch) -> State:
+    quantity = _domain(graph, branch).integral
+    return State(f"{graph.parts[branch.part].name}.{quantity.name}", branch.index, "integral", quantity.unit, quantity.latex)

@@ -1,0 +1,167 @@
+"""The normal tree: which branches carry the state, and the fundamental loops and cutsets that follow from it.
+
+Branches are offered to the tree in the order of `Kind`. A branch whose across variable is not yet fixed by the branches
+taken before enters the tree; otherwise it is a link, and its across variable is a sum of the tree's: its loop. An ideal
+coupling takes part as a branch of across value zero whose column of the incidence matrix holds the ratios. Nothing else is
+needed for gears: the loops then have ratios as entries, and the coupling's torque comes out as that of any other branch.
+
+With v the across and i the through variables, F the matrix of the loops (tree branch by link):
+
+    v_link = F^T v_tree  (speed around every loop),   i_tree = -F i_link  (torque through every cutset).
+
+Sources: Popenda 2019, (1)-(4) for the equations; the normal tree is that of linear circuit theory (Bryant 1959).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from sympy import Expr, Float
+
+from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch
+from shaftwork.network.templates import Kind
+from shaftwork.reduction.gains import Gain, Number, add, divide, value_of
+
+Row = dict[int, Number]
+
+
+@dataclass(frozen=True, eq=False)
+class NormalTree:
+    """The tree, the loops of its links, and what the couplings alone say about the nodes.
+
+    Args:
+        tree: tree branches by kind, each in the order of the branch table.
+        links: link branches by kind, likewise.
+        loops: for each link the across variables that it is the sum of: tree branch to factor. Couplings stand in it
+            with their factor too (their across value is zero): it is what their torque is made of.
+        potentials: for each node the sum of tree across variables that its own is; None where nothing fixes it.
+        locked: nodes that a closed loop of couplings of unequal ratio holds at rest, with the coupling that closed it.
+        redundant: couplings that say what others have said already.
+        frozen: expressions of ratios that vanish for the given values only: these ratios decide the structure.
+    """
+
+    tree: Mapping[Kind, tuple[int, ...]]
+    links: Mapping[Kind, tuple[int, ...]]
+    loops: Mapping[int, Row]
+    potentials: tuple[Row | None, ...]
+    locked: tuple[tuple[int, tuple[int, ...]], ...]
+    redundant: tuple[int, ...]
+    frozen: tuple[Expr, ...]
+
+
+class _Elimination:
+    """Node values expressed through tree branches and nodes still free; free nodes are counted from 0, branches as ~index."""
+
+    def __init__(self, nodes: int) -> None:
+        self.solved: list[Row | None] = [None] * nodes
+        self.users: list[list[int]] = [[] for _ in range(nodes)]
+        self.frozen: list[Expr] = []
+
+    def reduce(self, column: Row) -> Row:
+        """The across variable of a branch in terms of free nodes and tree branches."""
+        result: Row = {}
+        for node, factor in column.items():
+            row = self.solved[node]
+            self._accumulate(result, {node: 1} if row is None else row, factor)
+        return result
+
+    def _accumulate(self, target: Row, row: Row, factor: Number) -> None:
+        for key, entry in row.items():
+            product = factor * entry
+            total = add(target[key], product, self.frozen) if key in target else product
+            if isinstance(total, int) and total == 0:
+                del target[key]
+            else:
+                target[key] = total
+
+    def solve_for_a_node(self, reduced: Row, branch: int | None) -> int:
+        """Fix one free node by `sum of reduced = across of the branch` (zero without one) and return it."""
+        free = [node for node in reduced if node >= 0]
+        pivot = min(free, key=lambda node: (len(self.users[node]), -abs(value_of(reduced[node])), node))
+        factor = reduced.pop(pivot)
+        row: Row = {key: divide(-entry, factor) for key, entry in reduced.items()}
+        if branch is not None:
+            row[~branch] = divide(1, factor)
+        self._replace(pivot, row)
+        return pivot
+
+    def _replace(self, pivot: int, row: Row) -> None:
+        self.solved[pivot] = row
+        users, self.users[pivot] = self.users[pivot], []
+        keys = [key for key in row if key >= 0]
+        for node in users:
+            target = self.solved[node]
+            if target is None or pivot not in target:
+                continue
+            before = set(target)
+            self._accumulate(target, row, target.pop(pivot))
+            for key in keys:
+                if key in target and key not in before:
+                    self.users[key].append(node)
+        for key in keys:
+            self.users[key].append(pivot)
+
+
+def column_of(graph: CircuitGraph, branch: GraphBranch) -> Row:
+    """The column of the incidence matrix: node to factor (+1 where the branch leaves, -1 where it enters, or the ratios)."""
+    column: Row = {}
+    for coefficient, plus, minus in branch.terms or ((None, branch.plus, branch.minus),):
+        factor = 1 if coefficient is None else _gain(graph, branch, coefficient)
+        for node, sign in ((plus, 1), (minus, -1)):
+            if node == GROUND:
+                continue
+            total = add(column.get(node, 0), factor * sign, [])
+            if isinstance(total, int) and total == 0:
+                column.pop(node, None)
+            else:
+                column[node] = total
+    return column
+
+
+def _gain(graph: CircuitGraph, branch: GraphBranch, coefficient: Expr) -> Number:
+    if coefficient.is_Integer:
+        return int(coefficient)
+    part = graph.parts[branch.part]
+    values = {s: Float(graph.parameters[f"{part.name}.{s.name}"]) for s in branch.template.symbols}
+    return Gain(float(coefficient.xreplace(values)), graph.in_network_symbols(coefficient, branch))
+
+
+def _by_branch(row: Row) -> Row:
+    """A row in terms of tree branches alone, by branch number in ascending order."""
+    return {~key: row[key] for key in sorted(row, reverse=True)}
+
+
+def _closes_a_loop(work: _Elimination, column: Row, reduced: Row) -> tuple[int, ...]:
+    """The nodes that a coupling brings to rest because other couplings already tie them together, else nothing."""
+    moving = tuple(node for node in column if (row := work.solved[node]) is None or max(row, default=-1) >= 0)
+    return moving if len(moving) > 1 and sum(key >= 0 for key in reduced) == 1 else ()
+
+
+def normal_tree(graph: CircuitGraph) -> NormalTree:
+    """Choose the normal tree and express every link by it."""
+    work = _Elimination(len(graph.nodes))
+    tree: dict[Kind, list[int]] = {kind: [] for kind in Kind}
+    links: dict[Kind, list[int]] = {kind: [] for kind in Kind}
+    locked: list[tuple[int, tuple[int, ...]]] = []
+    columns = {branch.index: column_of(graph, branch) for branch in graph.branches}
+    for branch in sorted(graph.branches, key=lambda item: item.template.kind):  # stable: keeps the order of the table
+        kind = branch.template.kind
+        reduced = work.reduce(columns[branch.index])
+        if not any(key >= 0 for key in reduced):
+            links[kind].append(branch.index)
+            continue
+        if kind is Kind.COUPLING and (closed := _closes_a_loop(work, columns[branch.index], reduced)):
+            locked.append((branch.index, closed))
+        tree[kind].append(branch.index)
+        work.solve_for_a_node(reduced, branch.index)
+    loops = {index: _by_branch(work.reduce(columns[index])) for kind in Kind for index in links[kind]}
+    return NormalTree(
+        {kind: tuple(tree[kind]) for kind in Kind},
+        {kind: tuple(links[kind]) for kind in Kind},
+        loops,
+        tuple(None if row is None or max(row, default=-1) >= 0 else _by_branch(row) for row in work.solved),
+        tuple(locked),
+        tuple(links[Kind.COUPLING]),
+        tuple(work.frozen),
+    )
