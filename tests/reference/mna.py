@@ -334,7 +334,7 @@ def rest_jumps(pieces: Sequence[Piece], u: Mapping[str, Signal | float] | None =
     for p in pieces:
         if p.type in CAPACITY:
             names, value = [f"{n}.across" for n in p.nodes], _across(response, p)[0]
-        elif p.type in STORE and p.values.get("L", 1.0) > 0.0:
+        elif p.type in STORE and p.values.get("L", p.values.get("c", 0.0)) > 0.0:
             names = [f"{p.name}.{STORE[p.type]}"]
             value = response.through.get(names[0], np.zeros(1))[0]
         else:

@@ -15,7 +15,7 @@ from shaftwork.components.laws import NUMERICAL
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.templates import BranchTemplate, Kind
 from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.gains import Gain, value_of
+from shaftwork.reduction.gains import Gain, Number, value_of
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -74,27 +74,47 @@ class Coefficients:
         return values
 
 
-class LoopMatrix:
-    """The loop matrix F (tree branch by link, in branch numbers) as a function of the parameter vector."""
+class GainMatrix:
+    """A sparse matrix whose entries are whole numbers or gear ratios, as a function of the parameter vector.
 
-    def __init__(self, form: StateForm) -> None:
-        entries = [(tree, link, gain) for link, row in form.tree.loops.items() for tree, gain in row.items()]
-        self._rows = np.array([tree for tree, _, _ in entries], dtype=np.intp)
-        self._columns = np.array([link for _, link, _ in entries], dtype=np.intp)
+    Args:
+        graph: the network whose parameters the entries contain.
+        entries: (row, column, entry) of every entry.
+        shape: shape of the matrix.
+    """
+
+    def __init__(self, graph: CircuitGraph, entries: Sequence[tuple[int, int, Number]], shape: tuple[int, int]) -> None:
+        self._rows = np.array([row for row, _, _ in entries], dtype=np.intp)
+        self._columns = np.array([column for _, column, _ in entries], dtype=np.intp)
         self._data = np.array([value_of(gain) for _, _, gain in entries], dtype=float)
-        self._size = len(form.graph.branches)
+        self._shape = shape
         variable = [(k, gain.exact) for k, (_, _, gain) in enumerate(entries) if isinstance(gain, Gain)]
         self._variable = np.array([k for k, _ in variable], dtype=np.intp)
-        names = {name: k for k, name in enumerate(form.graph.parameters)}
-        symbols = sorted(
-            {s for _, exact in variable for s in exact.free_symbols if s.name in names}, key=lambda s: names[s.name]
-        )
-        self._places = np.array([names[s.name] for s in symbols], dtype=np.intp)
-        self._function = lambdify([symbols], [exact for _, exact in variable], "numpy") if variable else None
+        names = {name: k for k, name in enumerate(graph.parameters)}
+        found = {symbol.name: symbol for _, exact in variable for symbol in exact.free_symbols}
+        ordered = sorted(found, key=names.__getitem__)
+        self._places = np.array([names[name] for name in ordered], dtype=np.intp)
+        arguments = [[found[name] for name in ordered]]
+        self._function = lambdify(arguments, [exact for _, exact in variable], "numpy") if variable else None
 
     def __call__(self, p: Array) -> Any:
-        """F as scipy.sparse.csr_array (branches, branches)."""
+        """The matrix as scipy.sparse.csr_array."""
         data = self._data.copy()
         if self._function is not None:
             data[self._variable] = self._function(p[self._places])
-        return sparse.csr_array((data, (self._rows, self._columns)), shape=(self._size, self._size))
+        return sparse.csr_array((data, (self._rows, self._columns)), shape=self._shape)
+
+
+def loop_matrix(form: StateForm) -> GainMatrix:
+    """F, (branches, branches): entry (tree branch, link) is the factor of the tree branch in the loop of the link."""
+    size = len(form.graph.branches)
+    entries = [(tree, link, gain) for link, row in form.tree.loops.items() for tree, gain in row.items()]
+    return GainMatrix(form.graph, entries, (size, size))
+
+
+def potential_matrix(form: StateForm) -> GainMatrix:
+    """(nodes, branches): the across variable of every node from those of the tree branches."""
+    shape = (len(form.graph.nodes), len(form.graph.branches))
+    rows = enumerate(form.tree.potentials)
+    entries = [(node, tree, gain) for node, row in rows if row is not None for tree, gain in row.items()]
+    return GainMatrix(form.graph, entries, shape)

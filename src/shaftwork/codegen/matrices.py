@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from shaftwork.codegen.elements import Coefficients, LoopMatrix
+from shaftwork.codegen.elements import Coefficients, loop_matrix
 from shaftwork.core.errors import CompileError
 from shaftwork.reduction.form import StateForm
 
@@ -61,7 +61,7 @@ class MatrixAssembly:
         self.form = form
         self.outputs = np.array(outputs, dtype=np.intp)
         self.coefficients = Coefficients(form.graph)
-        self.loops = LoopMatrix(form)
+        self.loops = loop_matrix(form)
         self.inputs = np.array([*form.laws, *form.across_sources], dtype=np.intp)
 
     def __call__(self, p: Array) -> LinearPart:

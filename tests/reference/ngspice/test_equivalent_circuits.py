@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import shutil
+
 import numpy as np
 import pytest
 
@@ -17,6 +20,9 @@ def network(case: Case) -> sw.Network:
     return net
 
 
+@pytest.mark.skipif(
+    shutil.which("ngspice") is None and "CI" not in os.environ, reason="needs ngspice (Debian package); CI has it"
+)
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_a_train_moves_like_its_equivalent_circuit(case: Case) -> None:
     times = np.linspace(0.0, case.t_end, 201)[1:]

@@ -1,0 +1,157 @@
+"""From states back to everything else: across and through variable of every branch, and the signals of every part."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from shaftwork.codegen.arrays import BoundArrays
+from shaftwork.codegen.elements import Array, potential_matrix
+from shaftwork.components.base import Signal
+from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart
+from shaftwork.network.templates import Kind
+
+
+class History:
+    """All branch quantities at given times.
+
+    Args:
+        bound: the array program for one parameter vector.
+        t: (k,) times.
+        x: (k, n) states.
+    """
+
+    def __init__(self, bound: BoundArrays, t: Array, x: Array) -> None:
+        self.bound, self.t, self.x = bound, t, np.ascontiguousarray(x.T)
+        self.form = bound.program.form
+
+    @cached_property
+    def _inputs(self) -> tuple[Array, Array, Array]:
+        """u, its derivative by time alone, and x', each (., k)."""
+        y, u = self.bound.values(self.t, self.x)
+        slopes = self.bound.program.inputs.time_slopes(self.t, y, self.x, self.bound.p)
+        part = self.bound.part
+        rate = part.A @ self.x + part.B @ u + part.B1 @ slopes
+        return u, slopes, rate
+
+    @cached_property
+    def across(self) -> Array:
+        """(branches, k) across variables."""
+        form, part = self.form, self.bound.part
+        u, slopes, rate = self._inputs
+        laws = len(form.laws)
+        tree = np.zeros((len(form.graph.branches), len(self.t)))
+        first, last = len(form.across_states), len(form.across_states) + len(form.through_states)
+        tree[list(form.across_states)] = self.x[:first]
+        tree[list(form.across_sources)] = u[laws:]
+        tree[list(form.tree_conductances)] = part.conductance_x @ self.x + part.conductance_u @ u
+        if series := list(form.dependent_through):
+            rates = np.zeros_like(tree)
+            rates[list(form.through_states)] = rate[first:last]
+            rates[list(form.laws)] = slopes[:laws]
+            tree[series] = -(part.loops[series] @ rates) / part.coefficients[series][:, None]
+        return np.asarray(tree + part.loops.T @ tree)
+
+    @cached_property
+    def through(self) -> Array:
+        """(branches, k) through variables; of a coupling its lambda."""
+        form, part = self.form, self.bound.part
+        u, slopes, rate = self._inputs
+        laws = len(form.laws)
+        links = np.zeros((len(form.graph.branches), len(self.t)))
+        first, last = len(form.across_states), len(form.across_states) + len(form.through_states)
+        links[list(form.through_states)] = self.x[first:last]
+        links[list(form.laws)] = u[:laws]
+        conductances = list(form.link_conductances)
+        links[conductances] = part.coefficients[conductances][:, None] * self.across[conductances]
+        if dependent := list(form.dependent_across):
+            rates = np.zeros_like(links)
+            rates[list(form.across_states)] = rate[:first]
+            rates[list(form.across_sources)] = slopes[laws:]
+            links[dependent] = part.coefficients[dependent][:, None] * (part.loops.T @ rates)[dependent]
+        return np.asarray(links - part.loops @ links)
+
+    @cached_property
+    def potentials(self) -> Array:
+        """(nodes + 1, k) across variables of the nodes against the reference, which is the last row."""
+        nodes = potential_matrix(self.form)(self.bound.p) @ np.where(self._is_tree[:, None], self.across, 0.0)
+        return np.vstack([nodes, np.zeros((1, len(self.t)))])
+
+    @property
+    def _is_tree(self) -> Any:
+        mask = np.ones(len(self.form.graph.branches), dtype=bool)
+        mask[list(self.form.tree.loops)] = False
+        return mask
+
+    def stored(self, part: GraphPart) -> Array:
+        """(k,) energy in the stores of a part, J."""
+        energy = np.zeros(len(self.t))
+        for index in part.branches:
+            coefficient = self.bound.part.coefficients[index]
+            match self.form.graph.branches[index].template.kind:
+                case Kind.ACROSS_STORE:
+                    energy += 0.5 * coefficient * self.across[index] ** 2
+                case Kind.THROUGH_STORE:
+                    energy += 0.5 * self.through[index] ** 2 / coefficient
+        return energy
+
+    def absorbed(self, part: GraphPart) -> Array:
+        """(k,) power that goes into a part at its ports, W."""
+        return np.asarray(sum((self.across[k] * self.through[k] for k in part.branches), start=np.zeros(len(self.t))))
+
+    def lost(self, part: GraphPart) -> Array:
+        """(k,) power that a part takes in without storing it, W; negative where it supplies."""
+        kinds = (Kind.CONDUCTANCE, Kind.LAW, Kind.THROUGH_SOURCE, Kind.ACROSS_SOURCE)
+        members = (k for k in part.branches if self.form.graph.branches[k].template.kind in kinds)
+        return np.asarray(sum((self.across[k] * self.through[k] for k in members), start=np.zeros(len(self.t))))
+
+    def signal(self, part: GraphPart, signal: Signal) -> Array:
+        """(k,) one of the part's signals."""
+        match signal.kind:
+            case "across":
+                plus, minus = (GROUND if end is None else part.nodes[end] for end in signal.ends)
+                return np.asarray(signal.sign * (self.potentials[plus] - self.potentials[minus]))
+            case "through":
+                return signal.sign * self._through_port(part, str(signal.ends[0]))
+            case "store":
+                return np.asarray(self.through[self._store(part)])
+            case "twist":
+                store = self._store(part)
+                return np.asarray(self.through[store] / self.bound.part.coefficients[store])
+
+    def _store(self, part: GraphPart) -> int:
+        branches = self.form.graph.branches
+        return next(k for k in part.branches if branches[k].template.kind is Kind.THROUGH_STORE)
+
+    def _through_port(self, part: GraphPart, port: str) -> Array:
+        """What the node at a port gives to the part: the sum over the branches that begin or end there."""
+        total = np.zeros(len(self.t))
+        for index in part.branches:
+            template = self.form.graph.branches[index].template
+            for factor in self._factors(part, index, port) if template.terms else _ends(template.ends, port):
+                total += factor * self.through[index]
+        return total
+
+    def _factors(self, part: GraphPart, index: int, port: str) -> Iterator[float]:
+        template = self.form.graph.branches[index].template
+        values = {s: float(self.bound.p[part.parameters[s.name]]) for s in template.symbols}
+        for coefficient, plus, minus in template.terms:
+            for sign in _ends((plus, minus), port):
+                yield sign * float(coefficient.xreplace(values))
+
+
+def _ends(ends: tuple[str | None, str | None], port: str) -> Iterator[float]:
+    if ends[0] == port:
+        yield 1.0
+    if ends[1] == port:
+        yield -1.0
+
+
+def signals_of(graph: CircuitGraph, part: GraphPart) -> Mapping[str, Signal]:
+    """The signals that a part has in this network: those of a store that was left out are missing."""
+    stores = any(graph.branches[k].template.kind is Kind.THROUGH_STORE for k in part.branches)
+    declared = part.component.signals()
+    return {name: made for name, made in declared.items() if stores or made.kind not in ("twist", "store")}

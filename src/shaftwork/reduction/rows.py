@@ -1,0 +1,188 @@
+"""The state equations row by row as sympy expressions: for small networks, for reading and for scalar code.
+
+The same equations as in `form`, solved symbolically in blocks of coupled unknowns. A network with a larger block is left to
+the sparse matrices of the array program; both are tested to agree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import networkx as nx
+from sympy import Add, Expr, Integer, Matrix, Symbol
+
+from shaftwork.components.branches import ACROSS, INTEGRAL
+from shaftwork.components.laws import t as TIME
+from shaftwork.network.templates import Kind
+from shaftwork.reduction.form import StateForm
+from shaftwork.reduction.gains import exact_of
+
+LARGEST_BLOCK = 3
+"""Coupled unknowns that are solved symbolically; the formulas for more are longer than anyone reads."""
+
+
+class BlockTooLargeError(Exception):
+    """More unknowns are coupled than are solved symbolically."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Explicit state equations.
+
+    Args:
+        states: state symbols, in the order of `StateForm.states`.
+        parameters: parameter symbols, in the order of the graph's parameters.
+        rates: d(state)/dt, each in states, parameters and time.
+        across: across variable of every branch whose value needs no derivative, by branch.
+        through: through variable of every law, conductance and source of torque, by branch.
+    """
+
+    states: tuple[Symbol, ...]
+    parameters: tuple[Symbol, ...]
+    rates: tuple[Expr, ...]
+    across: Mapping[int, Expr]
+    through: Mapping[int, Expr]
+
+
+def explicit_rows(form: StateForm) -> Rows:
+    """Solve the state form for the rates.
+
+    Raises:
+        BlockTooLargeError: more than `LARGEST_BLOCK` unknowns are coupled.
+    """
+    return _Solution(form).rows()
+
+
+class _Solution:
+    def __init__(self, form: StateForm) -> None:
+        self.form, self.graph = form, form.graph
+        self.states = tuple(Symbol(state.name, real=True) for state in form.states)
+        carried = zip(form.states, self.states, strict=True)
+        own = {(state.kind, state.branch): symbol for state, symbol in carried}
+        self.loops = {
+            link: tuple((tree, exact_of(gain)) for tree, gain in row.items()) for link, row in form.tree.loops.items()
+        }
+        self.cutsets: dict[int, list[tuple[int, Expr]]] = {}
+        for link, row in self.loops.items():
+            for tree, gain in row:
+                self.cutsets.setdefault(tree, []).append((link, gain))
+        self.across: dict[int, Expr] = {k: own["across", k] for k in form.across_states}
+        self.across.update({k: self.law(k) for k in form.across_sources})
+        self.across.update(dict.fromkeys(form.tree.tree[Kind.COUPLING], Integer(0)))
+        self.through: dict[int, Expr] = {k: own["through", k] for k in form.through_states}
+        self.integral = {k: own["integral", k] for k in form.integrals}
+
+    def law(self, branch: int) -> Expr:
+        """Coefficient or law of a branch in the symbols of the network."""
+        made = self.graph.branches[branch]
+        return self.graph.in_network_symbols(made.template.law, made)
+
+    def around(self, link: int) -> Expr:
+        """Across variable of a link: the sum over its loop, as far as the tree is known."""
+        return Add(*(gain * self.across[tree] for tree, gain in self.loops[link] if tree in self.across))
+
+    def out_of(self, tree: int, links: Iterable[int]) -> Expr:
+        """Through variables of the given links that leave through the cutset of a tree branch."""
+        wanted = frozenset(links)
+        return Add(*(gain * self.through[link] for link, gain in self.cutsets.get(tree, ()) if link in wanted))
+
+    def rows(self) -> Rows:
+        form = self.form
+        sources = form.tree.links[Kind.THROUGH_SOURCE]
+        self.through.update({k: self.law(k) for k in sources})
+        self._solve_conductances(sources)
+        for link in form.link_conductances:
+            self.across[link] = self.around(link)
+            self.through[link] = self.law(link) * self.across[link]
+        for link in form.tree.links[Kind.LAW]:
+            self.across[link] = self.around(link)
+            known = {ACROSS: self.across[link], INTEGRAL: self.integral.get(link, INTEGRAL)}
+            self.through[link] = self.law(link).xreplace(known)
+        for link in (*sources, *form.through_states, *form.dependent_across):
+            self.across[link] = self.around(link)
+        rates = (*self._speed_rates(), *self._torque_rates(), *(self.across[k] for k in form.integrals))
+        parameters = tuple(Symbol(name, real=True) for name in self.graph.parameters)
+        return Rows(self.states, parameters, rates, self.across, self.through)
+
+    def _solve_conductances(self, sources: Sequence[int]) -> None:
+        form = self.form
+        unknowns = form.tree_conductances
+        right = {tree: -self.out_of(tree, (*form.through_states, *sources)) for tree in unknowns}
+        matrix: dict[tuple[int, int], Expr] = {(tree, tree): self.law(tree) for tree in unknowns}
+        for link in form.link_conductances:
+            g, drive = self.law(link), self.around(link)
+            self._add_products(matrix, link, g, frozenset(unknowns))
+            for tree, gain in self.loops[link]:
+                if tree in right:
+                    right[tree] -= gain * g * drive
+        self.across.update(zip(unknowns, solve_blocks(matrix, unknowns, right), strict=True))
+
+    def _speed_rates(self) -> tuple[Expr, ...]:
+        form = self.form
+        unknowns = form.across_states
+        links = (*form.link_conductances, *form.through_states, *form.laws)
+        right = {tree: -self.out_of(tree, links) for tree in unknowns}
+        matrix: dict[tuple[int, int], Expr] = {(tree, tree): self.law(tree) for tree in unknowns}
+        for link in form.dependent_across:
+            capacity = self.law(link)
+            self._add_products(matrix, link, capacity, frozenset(unknowns))
+            driven = (gain * self.law(tree).diff(TIME) for tree, gain in self.loops[link] if tree in form.across_sources)
+            prescribed = capacity * Add(*driven)
+            for tree, gain in self.loops[link]:
+                if tree in right:
+                    right[tree] -= gain * prescribed
+        return solve_blocks(matrix, unknowns, right)
+
+    def _torque_rates(self) -> tuple[Expr, ...]:
+        form = self.form
+        unknowns = form.through_states
+        right = {link: self.across[link] for link in unknowns}
+        matrix: dict[tuple[int, int], Expr] = {(link, link): 1 / self.law(link) for link in unknowns}
+        for tree in form.dependent_through:
+            compliance = 1 / self.law(tree)
+            members = self.cutsets.get(tree, [])
+            states = [(link, gain) for link, gain in members if link in right]
+            source = Add(*(gain * self.through[link].diff(TIME) for link, gain in members if link not in right))
+            for first, gain in states:
+                right[first] -= gain * compliance * source
+                for second, other in states:
+                    matrix[first, second] = matrix.get((first, second), Integer(0)) + gain * compliance * other
+        return solve_blocks(matrix, unknowns, right)
+
+    def _add_products(
+        self, matrix: dict[tuple[int, int], Expr], link: int, coefficient: Expr, unknowns: frozenset[int]
+    ) -> None:
+        """Add coefficient * f f' for the column f of a link."""
+        members = [(tree, gain) for tree, gain in self.loops[link] if tree in unknowns]
+        for first, gain in members:
+            for second, other in members:
+                matrix[first, second] = matrix.get((first, second), Integer(0)) + gain * coefficient * other
+
+
+def solve_blocks(
+    matrix: Mapping[tuple[int, int], Expr], unknowns: Sequence[int], right: Mapping[int, Expr]
+) -> tuple[Expr, ...]:
+    """Solve a sparse symbolic system block by block of coupled unknowns.
+
+    Raises:
+        BlockTooLargeError: a block has more than `LARGEST_BLOCK` unknowns.
+    """
+    links: nx.Graph[int] = nx.Graph()
+    links.add_nodes_from(unknowns)
+    links.add_edges_from(matrix)
+    solution: dict[int, Expr] = {}
+    order = {unknown: k for k, unknown in enumerate(unknowns)}
+    for component in nx.connected_components(links):
+        block = sorted(component, key=order.__getitem__)
+        if len(block) > LARGEST_BLOCK:
+            raise BlockTooLargeError
+        if len(block) == 1:
+            (only,) = block
+            solution[only] = right[only] / matrix[only, only]
+            continue
+        square = Matrix(len(block), len(block), lambda i, j: matrix.get((block[i], block[j]), Integer(0)))  # noqa: B023
+        adjugate, determinant = square.adjugate(), square.det(method="berkowitz")
+        for i, unknown in enumerate(block):
+            solution[unknown] = Add(*(adjugate[i, j] * right[other] for j, other in enumerate(block))) / determinant
+    return tuple(solution[unknown] for unknown in unknowns)
