@@ -68,17 +68,17 @@ def _unknown_parameter(net: Network, index: int) -> Network:
 
 BREAKERS: dict[str, Breaker] = {
     "dangling_end": _plus(_part("Spring", "loose", "at", "nowhere", c=100.0)),
-    "floating_part": _plus(_part("Spring", "adrift", "island a", "island b", c=100.0, d=1.0)),
+    "floating_part": _plus(_part("Spring", "adrift", "island_a", "island_b", c=100.0, d=1.0)),
     "floating_circuit": _plus(
-        _part("Resistor", "adrift", "f1", "f2", R=1.0), _part("Inductor", "adrift too", "f1", "f2", L=1.0)
+        _part("Resistor", "adrift", "f1", "f2", R=1.0), _part("Inductor", "adrift_too", "f1", "f2", L=1.0)
     ),
     "contradictory_speeds": _plus(
-        _part("SpeedSource", "first speed", "at", omega=1.0), _part("SpeedSource", "second speed", "at", omega=2.0)
+        _part("SpeedSource", "first_speed", "at", omega=1.0), _part("SpeedSource", "second_speed", "at", omega=2.0)
     ),
     "contradictory_speeds_through_a_gear": _plus(
-        _part("SpeedSource", "first speed", "at", omega=1.0),
+        _part("SpeedSource", "first_speed", "at", omega=1.0),
         _part("Gear", "between", "at", "output", ratio=2.0),
-        _part("SpeedSource", "second speed", "output", omega=2.0),
+        _part("SpeedSource", "second_speed", "output", omega=2.0),
     ),
     "speed_against_ground": _plus(_part("SpeedSource", "speed", "at", omega=1.0), _part("Ground", "wall", "at")),
     "speed_against_a_locked_gear_loop": _plus(
@@ -102,7 +102,7 @@ BREAKERS: dict[str, Breaker] = {
     "shorted_voltage": _plus(_part("VoltageSource", "u", GROUND, GROUND, voltage=1.0)),
     "duplicate_name": _duplicate_name,
     "missing_node": lambda net, index: _nodes_of_many(net, index, lambda nodes: nodes[:-1]),
-    "too_many_nodes": lambda net, index: _nodes_of_many(net, index, lambda nodes: (*nodes, "one more")),
+    "too_many_nodes": lambda net, index: _nodes_of_many(net, index, lambda nodes: (*nodes, "one_more")),
     "empty_node_name": lambda net, index: _nodes_of_many(net, index, lambda nodes: (*nodes[:-1], "")),
     "both_ends_on_one_node": lambda net, index: _nodes_of_many(net, index, lambda nodes: nodes[:1] * len(nodes)),
     "wrong_domain": _plus(_part("Resistor", "stray", "at", GROUND, R=1.0)),

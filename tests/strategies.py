@@ -31,21 +31,9 @@ RATIOS = (
     4.0,
 )  # exact in binary, so that the ratios around a loop of gears multiply exactly
 RADII = (0.1, 0.125, 0.2, 0.25, 0.5)
-LOWEST = {  # power of ten of the smallest value
-    "J": -1,
-    "m": 0,
-    "c": 2,
-    "d": -1,
-    "R": 0,
-    "L": -2,
-    "C": -4,
-    "k": -1,
-    "tau": 0,
-    "force": 0,
-    "omega": -1,
-    "voltage": 0,
-    "current": -1,
-}
+# power of ten of the smallest value of each parameter
+LOWEST = {"J": -1, "m": 0, "c": 2, "d": -1, "R": 0, "L": -2, "C": -4, "k": -1}
+LOWEST |= {"tau": 0, "force": 0, "omega": -1, "voltage": 0, "current": -1}
 TRANSLATION_LOWEST = {"c": 3, "d": 0}
 SHORT = {
     "Inertia": "J",

@@ -4,9 +4,9 @@
     J2 w2' = tau - tau_w tanh(w2 / omega_s),   tau = c phi + d (w1 - w2),  phi' = w1 - w2
 
 Source: Marinkovic 2012, section 3 and equations (12)-(14) without the gap. J1, J2, c, d, ratio, the efficiency, the
-load and the wheel diameter are the paper's; tau_k and s_k are chosen (the paper has them only in a figure), as is omega_s.
-``shaft_torque`` integrates with DOP853 at 1e-13; ``taylor`` integrates the same equations with Taylor series in 40-digit
-arithmetic and says how good that is.
+load and the wheel diameter are the paper's; tau_k, s_k (in the paper only in a figure) and omega_s are chosen.
+``shaft_torque`` integrates with DOP853 at 1e-13; ``taylor`` integrates the same equations with Taylor series in
+40-digit arithmetic and says how good that is.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ unlikely. Every node speed, every torque and every current is an unknown of one 
 a row of balance for each node, a row of law for each part.
 
 ``simulate`` is exact: the quasi-Weierstrass form of the whole system (``pencil``) and one matrix exponential of the
-state and its inputs together. ``simulate_nonlinear`` gives the same form to SUNDIALS IDA.
+state and its inputs together. ``nonlinear.simulate_nonlinear`` gives the same form to SUNDIALS IDA.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag, expm
-from sksundae.ida import IDA
 
 from tests.reference.pencil import RANK_TOLERANCE, Array, Descriptor, IllPosedError, Reduced, reduce
 
@@ -92,13 +91,6 @@ def sine(amplitude: float, omega: float) -> Signal:
 def rise(amplitude: float, rate: float) -> Signal:
     """u(t) = amplitude * (1 - exp(-rate * t)): a smooth start that is consistent with rest."""
     return Signal(np.diag([0.0, -rate]), np.array([amplitude, -amplitude]), np.ones(2))
-
-
-@dataclass(frozen=True)
-class Law:
-    """A source value as a function of time and of the across variable of its part, for ``simulate_nonlinear``."""
-
-    value: Callable[[float, float], float]
 
 
 @dataclass(frozen=True)
@@ -262,7 +254,8 @@ def _signals(pieces: Sequence[Piece], u: Mapping[str, Signal | float] | None) ->
     return [value if isinstance(value, Signal) else constant(float(value)) for value in given.values()]
 
 
-def _response(names: tuple[str, ...], determined: Sequence[bool], t: Array, z: Array) -> Response:
+def named(names: tuple[str, ...], determined: Sequence[bool], t: Array, z: Array) -> Response:
+    """The histories z of all unknowns, shape (unknown, time), sorted by what they are."""
     across, through = {GROUND: np.zeros_like(t)}, {}
     for name, known, history in zip(names, determined, z, strict=True):
         stem, _, kind = name.rpartition(".")
@@ -318,7 +311,7 @@ def simulate(
         state, now = steps[step] @ state, now + step
         states.append(state)
     z = np.hstack([r.V, output]) @ np.array(states).T
-    return _response(d.unknowns, r.determined.tolist(), times, z)
+    return named(d.unknowns, r.determined.tolist(), times, z)
 
 
 def rest_jumps(pieces: Sequence[Piece], u: Mapping[str, Signal | float] | None = None) -> tuple[str, ...]:
@@ -330,6 +323,7 @@ def rest_jumps(pieces: Sequence[Piece], u: Mapping[str, Signal | float] | None =
     d = descriptor(pieces)
     r, response = reduce(d), simulate(pieces, u, [0.0])
     free = {name for name, row in zip(d.unknowns, r.V, strict=True) if np.abs(row).max(initial=0.0) > RANK_TOLERANCE}
+    noise = 1e-8 * max(1.0, *(abs(history[0]) for history in response.through.values()))
     found = []
     for p in pieces:
         if p.type in CAPACITY:
@@ -339,7 +333,7 @@ def rest_jumps(pieces: Sequence[Piece], u: Mapping[str, Signal | float] | None =
             value = response.through.get(names[0], np.zeros(1))[0]
         else:
             continue
-        if abs(value) > 1e-9 and free.intersection(names):
+        if abs(value) > noise and free.intersection(names):
             found.append(p.name)
     return tuple(found)
 
@@ -358,47 +352,3 @@ def stored_energy(pieces: Sequence[Piece], response: Response) -> Array:
             compliance = 1.0 / p.values["c"] if "c" in p.values else p.values.get("L", 0.0)
             total += 0.5 * compliance * response.through[f"{p.name}.{STORE[p.type]}"] ** 2
     return total
-
-
-def simulate_nonlinear(
-    pieces: Sequence[Piece],
-    laws: Mapping[str, Law],
-    t: Sequence[float] | Array,
-    rtol: float = 1e-10,
-    atol: float = 1e-12,
-) -> Response:
-    """Response from rest at the times t (t[0] is the start) by SUNDIALS IDA on all equations in the reduced coordinates.
-
-    ``laws`` replaces source values by functions of time and of the across variable of the source. IDA needs a start
-    that satisfies the equations: laws and values are to be zero at rest, or to act on a node with an inertia.
-    """
-    d = descriptor(pieces)
-    r, by_name = reduce(d), {p.name: p for p in pieces}
-    gaps = np.zeros((len(d.sources), len(d.unknowns)))
-    for k, name in enumerate(d.sources):
-        for node, sign in zip(by_name[name].nodes, (1.0, -1.0), strict=False):
-            if node != GROUND:
-                gaps[k, d.unknowns.index(f"{node}.across")] = sign
-    fixed = {name: float(by_name[name].values[SOURCE_VALUE[by_name[name].type]]) for name in d.sources}
-
-    def inputs(time: float, z: Array) -> Array:
-        across = gaps @ z
-        return np.array(
-            [laws[n].value(time, float(e)) if n in laws else fixed[n] for n, e in zip(d.sources, across, strict=True)]
-        )
-
-    frame, n = np.hstack([r.V, r.W]), r.V.shape[1]
-
-    def residual(time: float, z: Array, rate: Array, out: Array) -> None:
-        u = inputs(time, frame @ z)
-        out[:n] = rate[:n] - r.J @ z[:n] - r.G @ u
-        out[n:] = r.N @ rate[n:] - z[n:] - r.H @ u
-
-    times = np.asarray(t, dtype=float)
-    u0 = inputs(times[0], np.zeros(len(d.unknowns)))
-    algebraic = list(range(n, frame.shape[1]))
-    solver = IDA(residual, rtol=rtol, atol=atol, algebraic_idx=algebraic, max_num_steps=200_000)
-    solution = solver.solve(times, np.concatenate([np.zeros(n), -r.H @ u0]), np.concatenate([r.G @ u0, 0 * r.H @ u0]))
-    if not solution.success:
-        raise ArithmeticError(f"IDA stopped at t = {solution.t[-1]:g} s: {solution.message}")
-    return _response(d.unknowns, r.determined.tolist(), times, frame @ solution.y.T)

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.linalg import qr
+from scipy.linalg import qr, svd
 from scipy.optimize import linear_sum_assignment
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -64,7 +64,10 @@ def _range_and_null(matrix: Array, scale: float) -> tuple[Array, Array]:
     """Orthonormal bases of the range and of the null space; singular values near the tolerance are refused."""
     if 0 in matrix.shape:
         return np.zeros((matrix.shape[0], 0)), np.eye(matrix.shape[1])
-    u, s, vh = np.linalg.svd(matrix)
+    try:
+        u, s, vh = svd(matrix)
+    except np.linalg.LinAlgError:  # divide and conquer fails once in thousands; the QR iteration does not
+        u, s, vh = svd(matrix, lapack_driver="gesvd")
     rank = int(np.sum(s > RANK_TOLERANCE * scale))
     close = (s < RANK_GAP * RANK_TOLERANCE * scale) & (s > RANK_TOLERANCE * scale / RANK_GAP)
     if close.any():
@@ -75,6 +78,8 @@ def _range_and_null(matrix: Array, scale: float) -> tuple[Array, Array]:
 def _equilibrated(d: Descriptor) -> tuple[Descriptor, Array]:
     """The same system with rows and columns scaled by powers of two (exact), and the column factors."""
     weight = np.abs(d.E) + np.abs(d.A)
+    weight[~weight.any(axis=1)] = 1.0  # an empty row or column is found by the ranks, not here
+    weight[:, ~(np.abs(d.E) + np.abs(d.A)).any(axis=0)] = 1.0
     rows, columns = np.ones(weight.shape[0]), np.ones(weight.shape[1])
     for _ in range(8):
         scaled = weight * rows[:, None] * columns

@@ -89,6 +89,12 @@ class Inputs:
         """The partial derivative of each input by its own integral."""
         return self._evaluate(lambda group: group.slopes[2], t, y, x, p)
 
+    @property
+    def linear(self) -> bool:
+        """Whether every input is linear in the across variable and integral that it reads, with constant slope."""
+        slopes = (made.made_of.template.law.diff(read) for made in self._groups for read in (ACROSS, INTEGRAL))
+        return not any(slope.has(ACROSS, INTEGRAL, TIME) for slope in slopes)
+
     def reading(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
         """Which input reads which output, and which input reads which integral: (inputs, outputs), (inputs, states)."""
         pairs = [(g.inputs, g.outputs) for g in self._groups if g.outputs.size]

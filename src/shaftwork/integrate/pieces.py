@@ -10,8 +10,6 @@ import numpy as np
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.problem import Array, Problem
 
-Dense = Callable[[Array], Array]
-
 
 @dataclass(frozen=True)
 class Piece:
@@ -46,22 +44,22 @@ def start_of_piece(problem: Problem, piece: Piece, x: Array) -> Array:
 
 @dataclass(frozen=True)
 class PiecewiseDense:
-    """Dense output of a whole run; at a breakpoint it gives the state after the jump.
+    """Dense output put together from spans of time; where two spans meet, the later one is asked.
 
     Args:
-        starts: (m,) start times of the pieces in s.
-        parts: dense output of each piece, times (k,) to states (k, n).
+        starts: (m,) start times of the spans in s.
+        parts: dense output of each span, times (k,) to states (k, n).
+        steps: (s,) ends of the steps in s, t0 first.
         size: number of states n.
     """
 
     starts: Array
-    parts: tuple[Dense, ...]
+    parts: tuple[Callable[[Array], Array], ...]
+    steps: Array
     size: int
 
     def __call__(self, times: Array) -> Array:
         times = np.atleast_1d(np.asarray(times, dtype=float))
-        if len(self.parts) == 1:
-            return self.parts[0](times)
         index = np.clip(np.searchsorted(self.starts, times, side="right") - 1, 0, len(self.parts) - 1)
         states = np.empty((times.size, self.size))
         for number in np.unique(index):

@@ -44,7 +44,7 @@ class Problem:
         t_eval: strictly increasing output times in [t0, t_end], or None for the engine's own steps. At a breakpoint the
             state after the jump is the output.
         linear: the same system in linear form when it is one, else None.
-        symbolic: the same system as a heyoka program (see `codegen.heyoka`), else None.
+        symbolic: the same system as a heyoka program bound to its parameters (`codegen.heyoka.BoundProgram`), else None.
         max_steps: an engine gives up, with a reason, after this many steps.
     """
 
@@ -64,6 +64,17 @@ class Problem:
     max_steps: int = 10_000_000
 
 
+class DenseOutput(Protocol):
+    """The solution between the output times; an engine may make it when it is first asked for."""
+
+    @property
+    def steps(self) -> Array:
+        """Every time (s,) at which a step ended, t0 first: between two neighbours the solution is smooth."""
+
+    def __call__(self, times: Array) -> Array:
+        """States (k, n) at any times (k,) inside [t0, t_end], to about the accuracy of the steps."""
+
+
 @dataclass(frozen=True)
 class Trajectory:
     """What an engine found.
@@ -71,16 +82,19 @@ class Trajectory:
     Args:
         t: (k,) times: `Problem.t_eval`, or the ends of the steps (both sides of a breakpoint with a jump are listed).
         x: (k, n) states.
-        dense: states (k, n) at any times (k,) inside [t0, t_end], to about the accuracy of the steps.
-        steps: (s,) every time at which a step ended, t0 first: between two neighbours `dense` is smooth.
-        statistics: counts by name: "steps", "rejected", "rhs", "jacobians" as far as the engine knows them.
+        dense: the solution at any time; at a breakpoint the state after the jump.
+        statistics: counts by name: "steps", "rhs", "jacobians", "switches" as far as the engine knows them.
     """
 
     t: Array
     x: Array
-    dense: Callable[[Array], Array]
-    steps: Array
+    dense: DenseOutput
     statistics: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def steps(self) -> Array:
+        """Every time (s,) at which a step ended, t0 first: between two neighbours `dense` is smooth."""
+        return self.dense.steps
 
 
 class Engine(Protocol):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -10,7 +11,7 @@ import numpy as np
 from scipy.integrate import BDF, DOP853, LSODA, OdeSolution, Radau
 
 from shaftwork.core.errors import SimulationError
-from shaftwork.integrate.pieces import Dense, Piece, PiecewiseDense, both_sides, failure, pieces, start_of_piece
+from shaftwork.integrate.pieces import Piece, PiecewiseDense, both_sides, failure, pieces, start_of_piece
 from shaftwork.integrate.problem import Array, Problem, Trajectory
 
 Method = Literal["DOP853", "Radau", "BDF", "LSODA"]
@@ -63,7 +64,7 @@ class _Run:
 
     times: Array
     states: Array
-    dense: Dense
+    dense: Callable[[Array], Array]
     counts: dict[str, int]
 
 
@@ -88,15 +89,16 @@ def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
             run = _piece(problem, piece, start_of_piece(problem, piece, x), method, problem.max_steps - taken)
             runs.append(run)
             x = run.states[-1]
-    dense = PiecewiseDense(np.array([piece.start for piece in parts]), tuple(run.dense for run in runs), x.size)
+    starts = np.array([piece.start for piece in parts])
     steps = np.concatenate([runs[0].times, *(run.times[1:] for run in runs[1:])])
+    dense = PiecewiseDense(starts, tuple(run.dense for run in runs), steps, x.size)
     if problem.t_eval is None:
         t, states = both_sides(problem, [run.times for run in runs], [run.states for run in runs])
     else:
         t = np.asarray(problem.t_eval, dtype=float)
         states = dense(t)
     statistics = {name: sum(run.counts[name] for run in runs) for name in runs[0].counts}
-    return Trajectory(t, states, dense, steps, statistics)
+    return Trajectory(t, states, dense, statistics)
 
 
 def _piece(problem: Problem, piece: Piece, x: Array, method: Method, max_steps: int) -> _Run:
@@ -125,7 +127,7 @@ def _piece(problem: Problem, piece: Piece, x: Array, method: Method, max_steps: 
             raise
         raise failure(problem, "scipy", times[-1], states[-1], guard.reason(f"{method}: {error}")) from error
     solution = OdeSolution(times, interpolants)
-    counts = {"steps": len(interpolants), "rhs": solver.nfev, "jacobians": solver.njev}
+    counts = {"steps": len(interpolants), "rhs": solver.nfev, "jacobians": int(solver.njev)}
     return _Run(np.array(times), np.array(states), lambda at: np.asarray(solution(at)).T, counts)
 
 

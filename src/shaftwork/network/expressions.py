@@ -1,347 +1,135 @@
-"""Laws as text: a small closed grammar, read into sympy and written back exactly.
-
-Nothing here hands a text to Python or to sympy's own readers, so a file from a stranger runs no code. Every number is
-bounded before it is made, so no text builds a huge one. The grammar is Python's for
-
-    numbers, names of symbols, pi, + - * / **, parentheses, the functions of `grammar.FUNCTIONS`,
-    comparisons, and, or, not, True, False      as conditions of Piecewise((value, condition), ...)
-    Table([x0, x1, ...], [y0, y1, ...])(argument)       without the argument a law of time
-"""
+"""Laws as text: `parse` reads the grammar of `expression_reader`, `write` is its exact inverse."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Any, NoReturn
-
 import sympy
 from sympy.core.relational import Relational
-from sympy.logic.boolalg import BooleanAtom, BooleanFunction
 
-from shaftwork.components.laws import SYMBOLS, Interpolation, Table
-from shaftwork.components.laws import t as TIME
-from shaftwork.core.errors import ModelFileError, ParameterError
-from shaftwork.network.grammar import (
-    COMPARISONS,
-    FUNCTION_NAMES,
-    FUNCTIONS,
-    MAXIMUM_DEPTH,
-    MAXIMUM_DIGITS,
-    MAXIMUM_EXPONENT,
-    MAXIMUM_EXTREMA,
-    MAXIMUM_INTEGER,
-    Function,
-    Token,
-    fail,
-    listed_numbers,
-    tokens_of,
-)
+from shaftwork.components.laws import SYMBOLS, Interpolation
+from shaftwork.core.errors import ModelFileError
+from shaftwork.network.expression_reader import parse
+from shaftwork.network.grammar import COMPARISONS, FUNCTION_NAMES, FUNCTIONS
 
-Boolean = Relational | BooleanFunction | BooleanAtom
+__all__ = ["parse", "write"]
+
+OR, AND, NOT, COMPARISON, SUM, PRODUCT, POWER, ATOM = range(8)
+"""How strongly a text binds: a part that binds less than its place asks for stands in parentheses."""
+
+_NAMES = {function.make: name for name, function in FUNCTIONS.items() if name != "sqrt"}
+_SIGNS = {relation: sign for sign, relation in COMPARISONS.items()}
+_CONSTANTS = {sympy.pi: "pi", sympy.E: "exp(1)", sympy.true: "True", sympy.false: "False"}
 
 
-@dataclass(frozen=True)
-class _Node:
-    """What has been read: the expression, and its value where it contains no symbols."""
-
-    expression: Any
-    value: float | None = None
-
-
-_MINUS_ONE = _Node(sympy.S.NegativeOne, -1.0)
-
-
-def parse(text: str, symbols: Iterable[sympy.Symbol] = SYMBOLS) -> sympy.Expr:
-    """The sympy expression that a text of the grammar means.
+def write(expression: sympy.Expr) -> str:
+    """The text of an expression: `parse` of it is the same expression, floats to the last bit.
 
     Args:
-        text: one expression, for example "-22.4*tanh(omega/0.01)".
-        symbols: the symbols that it may contain.
+        expression: a law of the package's symbols.
 
     Raises:
-        ModelFileError: the text is not of the grammar, or exceeds a limit of `grammar`; the message has the place,
-            what is allowed there, and the next step.
+        ModelFileError: a part is not in the grammar, or sympy builds the expression differently when it is read again.
     """
-    return _Parser(text, symbols).read()
-
-
-class _Parser:
-    """Recursive descent over the tokens of one text; sums and products are made at once, as sympy keeps them."""
-
-    def __init__(self, text: str, symbols: Iterable[sympy.Symbol]) -> None:
-        self.text = text
-        self.symbols = {symbol.name: symbol for symbol in symbols}
-        self.tokens = tokens_of(text)
-        self.index = 0
-        self.depth = 0
-        self.extrema = 0
-
-    def read(self) -> sympy.Expr:
-        if self.now.kind == "end":
-            self.fail(self.now, "is empty", "Write a number or an expression.")
-        node = self.value()
-        if self.now.kind != "end":
-            self.fail(self.now, f"does not go on with {self.now.text[:20]!r}", "Write an operator between two values.")
-        return node.expression
-
-    # --- tokens ---------------------------------------------------------------------------------------------------
-
-    @property
-    def now(self) -> Token:
-        return self.tokens[self.index]
-
-    def take(self, *texts: str) -> Token | None:
-        """The token, and one step on, if it is one of the given signs or words."""
-        token = self.now
-        if token.text not in texts:
-            return None
-        self.index += 1
-        return token
-
-    def need(self, text: str, where: str) -> None:
-        if self.take(text) is None:
-            found = f"not {self.now.text[:20]!r}" if self.now.text else "but the expression ends"
-            self.fail(self.now, f"needs {text!r} {where}, {found}", "Check the parentheses and commas.")
-
-    def fail(self, token: Token, what: str, hint: str) -> NoReturn:
-        fail(self.text, token, what, hint)
-
-    @contextmanager
-    def deeper(self, token: Token) -> Iterator[None]:
-        self.depth += 1
-        if self.depth > MAXIMUM_DEPTH:
-            self.fail(token, f"is nested deeper than {MAXIMUM_DEPTH}", "Use fewer parentheses.")
-        yield
-        self.depth -= 1
-
-    # --- grammar, from the weakest binding to the strongest -------------------------------------------------------
-
-    def value(self) -> _Node:
-        token = self.now
-        return self.number(token, self.any())
-
-    def condition(self) -> Any:
-        token = self.now
-        return self.boolean(token, self.any())
-
-    def any(self) -> _Node:
-        return self.joined("or", sympy.Or, lambda: self.joined("and", sympy.And, self.negation))
-
-    def joined(self, word: str, make: Callable[..., Any], part: Callable[[], _Node]) -> _Node:
-        first, node = self.now, part()
-        if self.now.text != word:
-            return node
-        parts = [self.boolean(first, node)]
-        while self.take(word):
-            token = self.now
-            parts.append(self.boolean(token, part()))
-        return self.made(first, make, [_Node(part) for part in parts])
-
-    def negation(self) -> _Node:
-        word = self.take("not")
-        if word is None:
-            return self.comparison()
-        with self.deeper(word):
-            token = self.now
-            operand = self.boolean(token, self.negation())
-        return self.made(word, sympy.Not, [_Node(operand)])
-
-    def comparison(self) -> _Node:
-        first, left = self.now, self.sum()
-        sign = self.take(*COMPARISONS)
-        if sign is None:
-            return left
-        token = self.now
-        right = self.number(token, self.sum())
-        if self.now.text in COMPARISONS:
-            self.fail(self.now, "compares twice", "Write (0 < t) and (t < 1).")
-        return self.made(sign, COMPARISONS[sign.text], [self.number(first, left), right])
-
-    def sum(self) -> _Node:
-        first, node = self.now, self.product()
-        terms = [node]
-        while sign := self.take("+", "-"):
-            token = self.now
-            terms.append(self.number(token, self.product(negative=sign.text == "-")))
-        if len(terms) == 1:
-            return node
-        self.number(first, node)
-        return self.made(first, sympy.Add, terms, lambda *values: math.fsum(values))
-
-    def product(self, *, negative: bool = False) -> _Node:
-        first = self.now
-        factors = [_MINUS_ONE] if negative else []
-        operator: Token | None = None
-        while not factors or operator or negative:
-            negative = False
-            while sign := self.take("+", "-"):
-                factors += [_MINUS_ONE] if sign.text == "-" else []
-            token, node = self.now, self.power()
-            divides = operator is not None and operator.text == "/"
-            factors.append(self.raised(token, node, _MINUS_ONE) if divides else node)
-            operator = self.take("*", "/")
-            if operator is None:
-                break
-        if len(factors) == 1:
-            return factors[0]
-        numbers = [self.number(first, factor) for factor in factors]
-        return self.made(first, sympy.Mul, numbers, lambda *values: math.prod(values))
-
-    def power(self) -> _Node:
-        first, base = self.now, self.atom()
-        sign = self.take("**")
-        if sign is None:
-            return base
-        with self.deeper(sign):
-            negative = False
-            while minus := self.take("+", "-"):
-                negative ^= minus.text == "-"
-            token = self.now
-            exponent = self.number(token, self.power())
-        if negative:
-            exponent = self.made(sign, sympy.Mul, [_MINUS_ONE, exponent], lambda *values: math.prod(values))
-        return self.raised(sign, self.number(first, base), exponent)
-
-    def raised(self, token: Token, base: _Node, exponent: _Node) -> _Node:
-        coefficient = self.number(token, base).expression.as_coeff_Mul()[0]
-        if exponent.value is not None and coefficient.is_Rational:
-            size = (max(abs(coefficient.p), coefficient.q) - 1).bit_length() * abs(exponent.value)
-            if size > 4 * MAXIMUM_INTEGER.bit_length():
-                self.fail(token, "has a power that is too large", "Integers reach 1e40; write 10.0**50 as 1e50.")
-        return self.made(token, sympy.Pow, [base, exponent], math.pow)
-
-    def atom(self) -> _Node:
-        token = self.now
-        self.index += token.kind != "end"
-        if token.kind == "number":
-            return self.literal(token)
-        if token.kind == "name":
-            return self.call(token) if self.take("(") else self.name(token)
-        if token.text == "(":
-            with self.deeper(token):
-                node = self.any()
-            self.need(")", "to close a parenthesis")
-            return node
-        found = f"not {token.text[:20]!r}" if token.text else "but the expression ends"
-        self.fail(token, f"needs a value here, {found}", "Write a number, a name, a function or a parenthesis.")
-
-    def literal(self, token: Token) -> _Node:
-        if len(token.text) > MAXIMUM_DIGITS:
-            self.fail(token, f"has a number of more than {MAXIMUM_DIGITS} characters", "17 digits are enough.")
-        value, exact = float(token.text), token.text.isdigit()
-        if not math.isfinite(value) or (exact and value >= MAXIMUM_INTEGER):
-            self.fail(token, "has a number that is too large", "Integers reach 1e40, numbers with a point 1.7e308.")
-        return _Node(sympy.Integer(int(token.text)) if exact else sympy.Float(value), value)
-
-    def name(self, token: Token) -> _Node:
-        if token.text in self.symbols:
-            return _Node(self.symbols[token.text])
-        if token.text == "pi":
-            return _Node(sympy.pi, math.pi)
-        if token.text in ("True", "False"):
-            return _Node(sympy.true if token.text == "True" else sympy.false)
-        if token.text in (*FUNCTIONS, "Piecewise", "Table"):
-            self.fail(token, f"uses the function {token.text} without arguments", f"Write {token.text}(...).")
-        known = ", ".join([*self.symbols, "pi"])
-        self.fail(token, f"contains the unknown name {token.text[:40]!r}", f"Names here: {known}.")
-
-    def call(self, name: Token) -> _Node:
-        if name.text in (*self.symbols, "pi"):
-            self.fail(name, f"calls {name.text}, which is no function", f"Multiply: {name.text}*(...).")
-        if name.text not in (*FUNCTIONS, "Piecewise", "Table"):
-            self.fail(name, f"contains the unknown function {name.text[:40]!r}", f"Functions: {FUNCTION_NAMES}.")
-        with self.deeper(name):
-            match name.text:
-                case "Piecewise":
-                    return self.piecewise(name)
-                case "Table":
-                    return self.table(name)
-            return self.function(name, FUNCTIONS[name.text])
-
-    def arguments(self, read: Callable[[], Any]) -> list[Any]:
-        found = [read()]
-        while self.take(","):
-            found.append(read())
-        self.need(")", "after the last argument")
-        return found
-
-    def function(self, name: Token, function: Function) -> _Node:
-        arguments = self.arguments(self.value)
-        if not function.fewest <= len(arguments) <= function.most:
-            numbers = " to ".join(str(number) for number in dict.fromkeys((function.fewest, function.most)))
-            self.fail(name, f"gives {name.text} {len(arguments)} arguments", f"It takes {numbers}.")
-        self.extrema += len(arguments) if name.text in ("Max", "Min") else 0
-        if self.extrema > MAXIMUM_EXTREMA:
-            self.fail(name, f"gives Max and Min more than {MAXIMUM_EXTREMA} arguments", "Use a Table or Piecewise.")
-        return self.made(name, function.make, arguments, function.value)
-
-    def piecewise(self, name: Token) -> _Node:
-        pairs = self.arguments(self.pair)
-        conditions = [condition for _, condition in pairs]
-        return self.made(
-            name,
-            lambda *values: sympy.Piecewise(*zip(values, conditions, strict=True)),
-            [value for value, _ in pairs],
+    try:
+        text, _ = _written(expression)
+    except RecursionError:
+        raise ModelFileError("the expression is nested too deeply for text. Split it or use a Table.") from None
+    if (again := parse(text)) != expression:
+        raise ModelFileError(
+            f"the expression {text[:200]} reads back as {str(again)[:200]}, because sympy rewrites it whenever it is "
+            "built. Save the rewritten form: expression.func(*expression.args), or sympy.expand(expression)."
         )
+    return text
 
-    def pair(self) -> tuple[_Node, Any]:
-        self.need("(", "to open a pair (value, condition) of Piecewise")
-        value = self.value()
-        self.need(",", "between value and condition of Piecewise")
-        condition = self.condition()
-        self.need(")", "to close a pair (value, condition) of Piecewise")
-        return value, condition
 
-    def table(self, name: Token) -> _Node:
-        columns = self.arguments(self.column)
-        try:
-            table = Table(*columns)
-        except (ParameterError, TypeError) as error:
-            self.fail(name, f"has a wrong table ({error})", "Write Table([x0, x1, ...], [y0, y1, ...]).")
-        if not self.take("("):
-            return _Node(table(TIME))
-        (argument,) = self.value(), self.need(")", "after the argument of Table")
-        return self.made(name, table, [argument])
+def _written(node: sympy.Basic) -> tuple[str, int]:
+    """Text of a node and how strongly it binds."""
+    if node in _CONSTANTS:
+        return _CONSTANTS[node], ATOM
+    match node:
+        case sympy.Symbol() if node in SYMBOLS:
+            return node.name, ATOM
+        case sympy.Float():
+            return _float(node), ATOM if node >= 0 else PRODUCT
+        case sympy.Rational():
+            return str(node), ATOM if node.is_Integer and node >= 0 else PRODUCT
+        case sympy.Add():
+            return _sum(node), SUM
+        case sympy.Mul():
+            return _product(node), PRODUCT
+        case sympy.Pow():
+            return _power(node)
+        case Relational() if type(node) in _SIGNS:
+            return f"{_at(SUM, node.lhs)} {_SIGNS[type(node)]} {_at(SUM, node.rhs)}", COMPARISON
+        case sympy.Or():
+            return " or ".join(_at(AND, part) for part in sympy.ordered(node.args)), OR
+        case sympy.And():
+            return " and ".join(_at(NOT, part) for part in sympy.ordered(node.args)), AND
+        case sympy.Not():
+            return f"not {_at(NOT, node.args[0])}", NOT
+    return _call(node), ATOM
 
-    def column(self) -> list[float]:
-        token = self.now
-        if token.kind != "list":
-            self.fail(token, "needs a list of numbers in Table", "Write Table([x0, x1, ...], [y0, y1, ...]).")
-        self.index += 1
-        return listed_numbers(self.text, token)
 
-    # --- checks ---------------------------------------------------------------------------------------------------
+def _at(binding: int, node: sympy.Basic) -> str:
+    """Text of a node for a place that asks for a binding at least so strong."""
+    text, own = _written(node)
+    return text if own >= binding else f"({text})"
 
-    def number(self, token: Token, node: _Node) -> _Node:
-        if isinstance(node.expression, Boolean):
-            self.fail(token, "has a condition where a value is needed", "Write Piecewise((1, condition), (0, True)).")
-        return node
 
-    def boolean(self, token: Token, node: _Node) -> Any:
-        if not isinstance(node.expression, Boolean):
-            self.fail(token, "has a value where a condition is needed", "Compare it, as omega > 0.")
-        return node.expression
+def _float(number: sympy.Float) -> str:
+    value = float(number)
+    if sympy.Float(value) != number:
+        raise ModelFileError(
+            f"the number {number} has more digits than a float. Round it with sympy.Float(number, 15)."
+        )
+    return repr(value)
 
-    def made(
-        self, token: Token, make: Callable[..., Any], parts: Sequence[_Node], value: Callable[..., float] | None = None
-    ) -> _Node:
-        """The expression of its parts; computed with plain floats first, so that nothing huge or imaginary is built."""
-        number: float | None = None
-        try:
-            if value is not None and (numbers := [part.value for part in parts if part.value is not None]):
-                number = value(*numbers) if len(numbers) == len(parts) else None
-            expression = make(*(part.expression for part in parts)) if number is None or math.isfinite(number) else None
-            fault = _fault(expression)
-        except (ArithmeticError, ValueError, TypeError):
-            fault = _NOT_REAL
-        if fault is not None:
-            self.fail(token, fault, "Change that part; it may not overflow, divide by zero or be imaginary.")
-        if expression.is_Number:
-            return _Node(expression, float(expression))
-        if number is None and isinstance(expression, sympy.Expr) and not expression.free_symbols:
-            number = next((part.value for part in parts if part.expression == expression), None)
-            if number is None:
-                self.fail(token, "has symbols that cancel", "Write the number that remains.")
-        return _Node(expression, number)
+
+def _sum(node: sympy.Add) -> str:
+    first, *others = (_at(PRODUCT, term) for term in node.as_ordered_terms())
+    return first + "".join(f" - {term[1:]}" if term.startswith("-") else f" + {term}" for term in others)
+
+
+def _product(node: sympy.Mul) -> str:
+    factors = node.as_ordered_factors()
+    coefficient, factors = (factors[0], factors[1:]) if factors[0].is_Number else (sympy.S.One, factors)
+    sign = "-" if coefficient < 0 else ""
+    top = [_at(POWER, factor) for factor in factors if not _is_inverse(factor)]
+    bottom = [_at(POWER, factor.base) for factor in factors if _is_inverse(factor)]
+    numerator, denominator = abs(coefficient).as_numer_denom()
+    if numerator != 1 or not top:
+        top.insert(0, _at(POWER, numerator))
+    if denominator != 1:
+        bottom.insert(0, _at(POWER, denominator))
+    return sign + "*".join(top) + "".join(f"/{factor}" for factor in bottom)
+
+
+def _is_inverse(factor: sympy.Expr) -> bool:
+    return isinstance(factor, sympy.Pow) and factor.exp == -1
+
+
+def _power(node: sympy.Pow) -> tuple[str, int]:
+    if _is_inverse(node):
+        return f"1/{_at(POWER, node.base)}", PRODUCT
+    if node.exp == sympy.S.Half:
+        return f"sqrt({_at(OR, node.base)})", ATOM
+    return f"{_at(ATOM, node.base)}**{_at(ATOM, node.exp)}", POWER
+
+
+def _call(node: sympy.Basic) -> str:
+    match node:
+        case Interpolation():
+            return f"Table({list(node.xs)}, {list(node.ys)})({_at(OR, node.argument)})"
+        case sympy.Piecewise():
+            pairs = (f"({_at(OR, value)}, {_at(OR, condition)})" for value, condition in node.args)
+            return f"Piecewise({', '.join(pairs)})"
+        case sympy.Heaviside() if node.args[1] == sympy.S.Half:
+            return f"Heaviside({_at(OR, node.args[0])})"
+        case sympy.Max() | sympy.Min():
+            return f"{_NAMES[node.func]}({', '.join(_at(OR, argument) for argument in sympy.ordered(node.args))})"
+    if node.func in _NAMES:
+        return f"{_NAMES[node.func]}({', '.join(_at(OR, argument) for argument in node.args)})"
+    names = ", ".join(symbol.name for symbol in SYMBOLS)
+    raise ModelFileError(
+        f"{str(node)[:80]} ({node.func.__name__}) is not in the grammar of model files. "
+        f"Symbols: {names} of this package, pi. Functions: {FUNCTION_NAMES}. Tabulate it, or keep this law in a script."
+    )

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from typing import NoReturn
 
 import sympy
+from sympy.core.relational import Relational
+from sympy.logic.boolalg import BooleanAtom, BooleanFunction
 
 from shaftwork.core.errors import ModelFileError
 
@@ -26,6 +28,10 @@ MAXIMUM_EXPONENT = 1000
 """Largest exponent that is a number."""
 MAXIMUM_EXTREMA = 16
 """Arguments of all Max and Min of an expression together: sympy compares each with each."""
+
+NOT_REAL = "has a part without a finite real value"
+
+Boolean = Relational | BooleanFunction | BooleanAtom
 
 
 @dataclass(frozen=True)
@@ -117,6 +123,27 @@ def listed_numbers(text: str, token: Token) -> list[float]:
     if None in matches:
         fail(text, token, f"has a list whose item {matches.index(None) + 1} is no number", "Lists hold numbers alone.")
     return [float(match[1]) for match in matches if match]
+
+
+def finite(number: float) -> float:
+    """The number itself; an OverflowError where it is infinite or NaN."""
+    if not math.isfinite(number):
+        raise OverflowError(number)
+    return number
+
+
+def fault_of(expression: sympy.Basic) -> str | None:
+    """Why an expression is beyond the limits, or None where it is not."""
+    for node in sympy.preorder_traversal(expression):
+        if node in (sympy.nan, sympy.zoo, sympy.oo, -sympy.oo, sympy.I):
+            return NOT_REAL
+        if isinstance(node, sympy.Rational) and max(abs(node.p), node.q) > MAXIMUM_INTEGER:
+            return "leads to an integer beyond 1e40"
+        if isinstance(node, sympy.Float) and not (math.isfinite(float(node)) and bool(node) == bool(float(node))):
+            return NOT_REAL
+        if isinstance(node, sympy.Pow) and node.exp.is_Number and abs(node.exp) > MAXIMUM_EXPONENT:
+            return f"has an exponent beyond {MAXIMUM_EXPONENT}"
+    return None
 
 
 def fail(text: str, token: Token, what: str, hint: str) -> NoReturn:

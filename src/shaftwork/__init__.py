@@ -1,0 +1,99 @@
+"""Shaftwork: wire a drive train, get its Kirchhoff equations, a fast model, a simulation and LaTeX.
+
+Names are loaded when first used, so that `import shaftwork` costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from shaftwork import scenes
+    from shaftwork.components.base import Component, Port, Signal, component
+    from shaftwork.components.branches import (
+        ACROSS,
+        INTEGRAL,
+        AcrossLaw,
+        AcrossStore,
+        IdealCoupling,
+        ThroughLaw,
+        ThroughStore,
+    )
+    from shaftwork.components.electrical import *
+    from shaftwork.components.laws import Ramp, Step, Table, omega, phi, psi, s, t, u, v
+    from shaftwork.components.loads import *
+    from shaftwork.components.machines import *
+    from shaftwork.components.rotation import *
+    from shaftwork.components.sources import *
+    from shaftwork.components.translation import *
+    from shaftwork.core.errors import (
+        CompileError,
+        MissingExtraError,
+        ModelFileError,
+        NetworkError,
+        NetworkWarning,
+        ParameterError,
+        ShaftworkError,
+        SignalError,
+        SimulationError,
+    )
+    from shaftwork.core.parameters import parameter
+    from shaftwork.pipeline.model import Model
+    from shaftwork.pipeline.network import Network
+    from shaftwork.results.solution import Solution
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "shaftwork.components.base": ("Component", "Port", "Signal", "component"),
+    "shaftwork.components.branches": (
+        "ACROSS",
+        "INTEGRAL",
+        "AcrossLaw",
+        "AcrossStore",
+        "IdealCoupling",
+        "ThroughLaw",
+        "ThroughStore",
+    ),
+    "shaftwork.components.laws": ("Ramp", "Step", "Table", "omega", "phi", "psi", "s", "t", "u", "v"),
+    "shaftwork.core.errors": (
+        "CompileError",
+        "MissingExtraError",
+        "ModelFileError",
+        "NetworkError",
+        "NetworkWarning",
+        "ParameterError",
+        "ShaftworkError",
+        "SignalError",
+        "SimulationError",
+    ),
+    "shaftwork.core.parameters": ("parameter",),
+    "shaftwork.pipeline.model": ("Model",),
+    "shaftwork.pipeline.network": ("Network",),
+    "shaftwork.results.solution": ("Solution",),
+}
+_MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name: one of the table above, a sub-package, or a component from the registry."""
+    if name in _MODULE_OF:
+        value = getattr(import_module(_MODULE_OF[name]), name)
+    elif name == "scenes":
+        value = import_module("shaftwork.scenes")
+    elif name.startswith("_"):
+        raise AttributeError(f"module 'shaftwork' has no attribute '{name}'")
+    else:
+        registry = import_module("shaftwork.components").REGISTRY
+        if name not in registry or not registry[name].__module__.startswith("shaftwork."):
+            raise AttributeError(
+                f"module 'shaftwork' has no attribute '{name}'. Components are: {', '.join(registry)}."
+            )
+        value = registry[name]
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*_MODULE_OF, "scenes", *import_module("shaftwork.components").REGISTRY})

@@ -1,0 +1,197 @@
+"""Sympy expressions in heyoka's terms, conditions as signs of switches."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import reduce
+from typing import Any
+
+import heyoka
+import sympy
+from sympy.functions.elementary.piecewise import ExprCondPair
+from sympy.logic.boolalg import And, BooleanFalse, BooleanTrue, ITE, Not, Or, Xor
+
+from shaftwork.core.errors import CompileError
+
+SAME_NAME: dict[Any, Callable[..., Any]] = {
+    getattr(sympy, name): getattr(heyoka, name)
+    for name in ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh")
+    + ("atanh", "exp", "log", "erf", "erfc")
+}
+RECIPROCALS: dict[Any, Callable[[Any], Any]] = {
+    sympy.sec: heyoka.cos,
+    sympy.csc: heyoka.sin,
+    sympy.cot: heyoka.tan,
+    sympy.sech: heyoka.cosh,
+    sympy.csch: heyoka.sinh,
+    sympy.coth: heyoka.tanh,
+}
+COMPARISONS: dict[Any, Callable[[Any, Any], Any]] = {
+    sympy.StrictGreaterThan: heyoka.gt,
+    sympy.GreaterThan: heyoka.gte,
+    sympy.StrictLessThan: heyoka.lt,
+    sympy.LessThan: heyoka.lte,
+    sympy.Equality: heyoka.eq,
+    sympy.Unequality: heyoka.neq,
+}
+
+
+class Translator:
+    """Translates expressions of one system; equal subexpressions are translated once.
+
+    Args:
+        states: state symbols; they become the heyoka variables `variables`.
+        time: symbol of time.
+        parameters: parameter symbols; they become heyoka.par[0], heyoka.par[1], ...
+    """
+
+    def __init__(
+        self, states: Sequence[sympy.Symbol], time: sympy.Symbol, parameters: Sequence[sympy.Symbol]
+    ) -> None:
+        self.variables = tuple(heyoka.expression(f"x{index}") for index in range(len(states)))
+        self.switches: list[Any] = []
+        self.conditions: list[str] = []
+        self._first_sign = len(parameters)
+        self._moving = frozenset((*states, time))
+        self._done: dict[sympy.Basic, Any] = dict(zip(states, self.variables, strict=True))
+        self._done.update((symbol, heyoka.par[index]) for index, symbol in enumerate(parameters))
+        self._done[time] = heyoka.time
+        self._signs: dict[sympy.Basic, Any] = {}
+
+    def expression(self, node: sympy.Basic) -> Any:
+        """The heyoka expression of a sympy expression or condition.
+
+        Raises:
+            CompileError: it has no heyoka counterpart.
+        """
+        if node not in self._done:
+            self._done[node] = self._translate(node)
+        return self._done[node]
+
+    def _translate(self, node: sympy.Basic) -> Any:
+        kind = node.func
+        if kind in SAME_NAME:
+            return SAME_NAME[kind](*self._arguments(node))
+        if kind in RECIPROCALS:
+            return 1.0 / RECIPROCALS[kind](*self._arguments(node))
+        if kind in COMPARISONS:
+            return COMPARISONS[kind](self._sign(node.args[0] - node.args[1]), heyoka.expression(0.0))  # type: ignore[operator]
+        if kind in SHAPES:
+            return SHAPES[kind](self, node)
+        if isinstance(node, sympy.Number | sympy.NumberSymbol) and math.isfinite(float(node)):
+            return heyoka.expression(float(node))
+        if hasattr(node, "xs") and hasattr(node, "ys"):
+            return self._table(node)
+        if isinstance(node, sympy.Symbol):
+            raise CompileError(f"The symbol {node} is neither a state nor a parameter of this model.")
+        raise CompileError(
+            f"The heyoka engine has no counterpart of {kind.__name__} in {node}. Use engine='scipy' or engine='sundials'."
+        )
+
+    def _arguments(self, node: sympy.Basic) -> list[Any]:
+        return [self.expression(argument) for argument in node.args]
+
+    def _product(self, node: sympy.Mul) -> Any:
+        above: list[Any] = []
+        below: list[Any] = []
+        for factor in node.args:
+            inverse = isinstance(factor, sympy.Pow) and factor.exp.is_number and factor.exp.is_negative
+            (below if inverse else above).append(self.expression(1 / factor if inverse else factor))
+        upper = heyoka.prod(above) if above else heyoka.expression(1.0)
+        return upper / heyoka.prod(below) if below else upper
+
+    def _power(self, node: sympy.Pow) -> Any:
+        base, exponent = self.expression(node.base), node.exp
+        if exponent == sympy.S.Half:
+            return heyoka.sqrt(base)
+        if exponent.is_number and exponent.is_negative:
+            return 1.0 / self.expression(node.base**-exponent)
+        return base ** self.expression(exponent)
+
+    def _sign(self, switch: sympy.Expr) -> Any:
+        """The sign of an expression: -1, 0 or 1; a parameter that an event changes where the sign may change."""
+        if switch.could_extract_minus_sign():
+            return -self._sign(-switch)
+        if switch not in self._signs:
+            value = self.expression(switch)
+            zero, one = heyoka.expression(0.0), heyoka.expression(1.0)
+            if self._moving.isdisjoint(switch.free_symbols):
+                sign = heyoka.select(heyoka.gt(value, zero), one, heyoka.select(heyoka.lt(value, zero), -one, zero))
+            else:
+                sign = heyoka.par[self._first_sign + len(self.switches)]
+                self.switches.append(value)
+                self.conditions.append(f"{switch} > 0")
+            self._signs[switch] = sign
+        return self._signs[switch]
+
+    def _heaviside(self, node: sympy.Heaviside) -> Any:
+        sign = self._sign(node.args[0])
+        at_zero = self.expression(node.args[1])
+        return heyoka.select(sign, 0.5 + 0.5 * sign, at_zero)
+
+    def _extreme(self, node: sympy.Max | sympy.Min) -> Any:
+        zero = heyoka.expression(0.0)
+        better = heyoka.gt if isinstance(node, sympy.Max) else heyoka.lt
+        best, *others = sorted(node.args, key=sympy.default_sort_key)
+        result = self.expression(best)
+        for other in others:
+            # The best so far is itself an extreme: the switch compares with it as a whole.
+            wins = better(self._sign(other - best), zero)
+            result = heyoka.select(wins, self.expression(other), result)
+            best = node.func(best, other)
+        return result
+
+    def _piecewise(self, node: sympy.Piecewise) -> Any:
+        pairs: list[ExprCondPair] = list(node.args)
+        result = self.expression(pairs[-1].expr)
+        if pairs[-1].cond != sympy.true:
+            result = heyoka.select(self.expression(pairs[-1].cond), result, heyoka.expression(math.nan))
+        for pair in reversed(pairs[:-1]):
+            result = heyoka.select(self.expression(pair.cond), self.expression(pair.expr), result)
+        return result
+
+    def _choice(self, node: ITE) -> Any:
+        return heyoka.select(*self._arguments(node))
+
+    def _negation(self, node: Not) -> Any:
+        return heyoka.eq(self.expression(node.args[0]), heyoka.expression(0.0))
+
+    def _table(self, node: Any) -> Any:
+        """Linear interpolation by a balanced tree of decisions, constant beyond the ends."""
+        argument = node.args[0]
+        position, zero = self.expression(argument), heyoka.expression(0.0)
+        xs, ys = tuple(map(float, node.xs)), tuple(map(float, node.ys))
+        segments: list[Any] = [heyoka.expression(ys[0])]
+        for left, right, low, high in zip(xs[:-1], xs[1:], ys[:-1], ys[1:], strict=True):
+            segments.append(low + (high - low) / (right - left) * (position - left))
+        segments.append(heyoka.expression(ys[-1]))
+
+        def choose(first: int, last: int) -> Any:
+            if first == last:
+                return segments[first]
+            middle = (first + last) // 2
+            beyond = heyoka.gte(self._sign(argument - xs[middle]), zero)
+            return heyoka.select(beyond, choose(middle + 1, last), choose(first, middle))
+
+        return choose(0, len(xs))
+
+
+SHAPES: dict[Any, Callable[[Translator, Any], Any]] = {
+    sympy.Add: lambda translator, node: heyoka.sum(translator._arguments(node)),
+    sympy.Mul: Translator._product,
+    sympy.Pow: Translator._power,
+    sympy.sign: lambda translator, node: translator._sign(node.args[0]),
+    sympy.Abs: lambda translator, node: translator._sign(node.args[0]) * translator.expression(node.args[0]),
+    sympy.Heaviside: Translator._heaviside,
+    sympy.Max: Translator._extreme,
+    sympy.Min: Translator._extreme,
+    sympy.Piecewise: Translator._piecewise,
+    ITE: Translator._choice,
+    Not: Translator._negation,
+    And: lambda translator, node: heyoka.logical_and(translator._arguments(node)),
+    Or: lambda translator, node: heyoka.logical_or(translator._arguments(node)),
+    Xor: lambda translator, node: reduce(heyoka.neq, translator._arguments(node)),
+    BooleanTrue: lambda translator, node: heyoka.expression(1.0),
+    BooleanFalse: lambda translator, node: heyoka.expression(0.0),
+}

@@ -1,0 +1,127 @@
+"""The compiled model: right-hand side and Jacobian with the parameters as arguments, in scalar or in array code."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from shaftwork.codegen.arrays import ArrayProgram, BoundArrays
+from shaftwork.codegen.elements import Array
+from shaftwork.codegen.scalar import ScalarProgram
+from shaftwork.core.errors import ParameterError
+from shaftwork.reduction.form import StateForm
+from shaftwork.reduction.rows import BlockTooLargeError, Rows, explicit_rows
+
+SCALAR_STATES = 64
+"""Above this many states the unrolled code costs more to make than it saves."""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What one evaluation of the right-hand side costs.
+
+    Args:
+        form: "scalar" (unrolled, common subexpressions taken out) or "array" (sparse matrix and nonlinear rows).
+        operations: number of operations by name.
+        entries: non-zeros of the Jacobian's linear part.
+    """
+
+    form: str
+    operations: Mapping[str, int]
+    entries: int
+
+    @property
+    def total(self) -> int:
+        """All operations together."""
+        return sum(self.operations.values())
+
+
+class CompiledModel:
+    """A network as a function of time, states and parameters.
+
+    Args:
+        form: a state form without algebraic loops.
+    """
+
+    def __init__(self, form: StateForm) -> None:
+        self.form = form
+        self.states: tuple[str, ...] = tuple(state.name for state in form.states)
+        self.parameters: dict[str, float] = dict(form.graph.parameters)
+        self.arrays = ArrayProgram(form)
+        self.defaults = np.array(list(self.parameters.values()), dtype=float)
+        self._bound: tuple[bytes, BoundArrays] | None = None
+
+    @cached_property
+    def rows(self) -> Rows | None:
+        """The state equations as expressions, or None where the network is too large or too closely coupled for them."""
+        if len(self.states) > SCALAR_STATES:
+            return None
+        try:
+            return explicit_rows(self.form)
+        except BlockTooLargeError:
+            return None
+
+    @cached_property
+    def scalar(self) -> ScalarProgram | None:
+        """The scalar program, where there are rows."""
+        return None if self.rows is None else ScalarProgram(self.rows)
+
+    def vector(self, changed: Mapping[str, float] | None = None) -> Array:
+        """The parameter vector with some values replaced.
+
+        Raises:
+            ParameterError: a name is not among the parameters, or a value is outside its bounds.
+        """
+        p = self.defaults.copy()
+        if changed:
+            places = {name: k for k, name in enumerate(self.parameters)}
+            for name, value in changed.items():
+                if name not in places:
+                    raise ParameterError(
+                        f"The model has no parameter '{name}'. It has: {', '.join(self.parameters) or 'none'}."
+                    )
+                p[places[name]] = value
+        return p
+
+    def bind(self, p: Array | None = None) -> BoundArrays:
+        """The array program for a parameter vector; the last one is kept."""
+        vector = self.defaults if p is None else np.asarray(p, dtype=float)
+        key = vector.tobytes()
+        if self._bound is None or self._bound[0] != key:
+            self._bound = (key, self.arrays.bind(vector))
+        return self._bound[1]
+
+    def rhs(self, t: float, x: Array, p: Array | None = None) -> Array:
+        """Rates of the states.
+
+        Args:
+            t: time in s.
+            x: (n,) states, in the order of `states`.
+            p: (parameters,) values in the order of `parameters`; by default the network's.
+        """
+        if self.scalar is None:
+            return self.bind(p).rhs(t, np.asarray(x, dtype=float))
+        vector = self.defaults if p is None else np.asarray(p, dtype=float)
+        return self.scalar.bind(vector)(t, np.asarray(x, dtype=float))
+
+    def jacobian(self, t: float, x: Array, p: Array | None = None) -> Any:
+        """d rhs / d x as scipy.sparse.csc_array (n, n); arguments as for `rhs`."""
+        return self.bind(p).jacobian(t, np.asarray(x, dtype=float))
+
+    @cached_property
+    def linear(self) -> bool:
+        """Whether the right-hand side is linear in the states with constant coefficients."""
+        return self.arrays.inputs.linear
+
+    def cost(self) -> Cost:
+        """Operations of one right-hand side."""
+        entries = int(self.bind().part.A.nnz)
+        if self.scalar is not None:
+            return Cost("scalar", self.scalar.operations, entries)
+        part = self.bind().part
+        products = int(part.A.nnz + part.B.nnz + part.C.nnz + part.D.nnz + part.B1.nnz)
+        return Cost("array", {"mul": products, "add": products, "law": self.arrays.inputs.size}, entries)

@@ -1,0 +1,88 @@
+"""The names of all quantities of a compiled model, and their values along a trajectory."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+
+import numpy as np
+
+from shaftwork.codegen.arrays import BoundArrays
+from shaftwork.codegen.elements import Array
+from shaftwork.codegen.recovery import History, signals_of
+from shaftwork.components.base import Signal
+from shaftwork.core.domains import ROTATION
+from shaftwork.network.graph import CircuitGraph, GraphPart
+
+
+class ModelObserver:
+    """Recovers every quantity of a network from its states.
+
+    Args:
+        bound: the array program with the parameter vector of the run.
+    """
+
+    def __init__(self, bound: BoundArrays) -> None:
+        self._bound = bound
+        self._graph: CircuitGraph = bound.program.form.graph
+        self._last: tuple[tuple[int, int], History] | None = None
+
+    @cached_property
+    def _signals(self) -> dict[str, tuple[GraphPart, Signal]]:
+        parts = self._graph.parts
+        return {f"{p.name}.{name}": (p, made) for p in parts for name, made in signals_of(self._graph, p).items()}
+
+    @cached_property
+    def _integrals(self) -> dict[str, int]:
+        return {state.name: k for k, state in enumerate(self._bound.program.form.states) if state.kind == "integral"}
+
+    @cached_property
+    def _nodes(self) -> dict[str, int]:
+        pairs = zip(self._graph.nodes, self._graph.domains, strict=True)
+        return {f"{name}.{domain.across.name}": k for k, (name, domain) in enumerate(pairs)}
+
+    @cached_property
+    def units(self) -> Mapping[str, str]:
+        """Every quantity that can be read and its unit; where a part and a node share a name, the part's is meant."""
+        units = {
+            f"{name}": domain.across.unit for name, domain in zip(self._nodes, self._graph.domains, strict=True)
+        }
+        units |= {name: _unit(signal) for name, (_, signal) in self._signals.items()}
+        units |= {s.name: s.unit for s in self._bound.program.form.states if s.kind == "integral"}
+        units |= {f"{part.name}.power": "W" for part in self._graph.parts}
+        return units | {f"{part.name}.energy": "J" for part in self._graph.parts}
+
+    def history(self, t: Array, x: Array) -> History:
+        """All branch quantities along a trajectory; the last one asked for is kept."""
+        key = (id(t), id(x))
+        if self._last is None or self._last[0] != key:
+            self._last = (key, History(self._bound, t, x))
+        return self._last[1]
+
+    def signal(self, name: str, t: Array, x: Array) -> Array:
+        """(k,) a quantity by its name in `units`."""
+        history = self.history(t, x)
+        if name in self._signals:
+            return history.signal(*self._signals[name])
+        if name in self._integrals:
+            return np.asarray(x[:, self._integrals[name]])
+        if name in self._nodes:
+            return np.asarray(history.potentials[self._nodes[name]])
+        owner, quantity = name.rsplit(".", 1)
+        part = next(part for part in self._graph.parts if part.name == owner)
+        return history.absorbed(part) if quantity == "power" else history.stored(part)
+
+    def powers(self, t: Array, x: Array) -> tuple[dict[str, Array], dict[str, Array], dict[str, Array]]:
+        """Stored energy, lost power and supplied power by part."""
+        history = History(self._bound, t, x)
+        parts = self._graph.parts
+        stored = {part.name: history.stored(part) for part in parts if part.component.role != "source"}
+        lost = {part.name: history.lost(part) for part in parts if part.component.role != "source"}
+        supplied = {part.name: -history.lost(part) for part in parts if part.component.role == "source"}
+        return stored, lost, supplied
+
+
+def _unit(signal: Signal) -> str:
+    domain = signal.domain or ROTATION
+    quantity = {"across": domain.across, "twist": domain.integral}.get(signal.kind, domain.through)
+    return quantity.unit

@@ -1,0 +1,112 @@
+"""Start states: from given speeds and twists, and steady operation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import MatrixRankWarning, lsqr, splu
+
+from shaftwork.codegen.arrays import BoundArrays
+from shaftwork.codegen.elements import Array
+from shaftwork.codegen.observer import ModelObserver
+from shaftwork.core.errors import ParameterError, SignalError, SimulationError
+
+CONSISTENT = 1e-9
+"""Two given values contradict each other when they differ by more than this fraction."""
+
+
+def initial_state(bound: BoundArrays, given: Mapping[str, float], t0: float) -> Array:
+    """The states at the start: at rest and untwisted except for what is given.
+
+    A value may be given for any speed or twist, also of a part whose store is dependent. What it leaves open is filled with
+    the smallest possible motion.
+
+    Args:
+        bound: the array program.
+        given: "part.quantity" or "node.quantity" to value in SI.
+        t0: start time, s.
+
+    Raises:
+        SignalError: there is no such quantity.
+        ParameterError: values are not finite or contradict each other (two speeds of one rigid group).
+    """
+    names = [state.name for state in bound.program.form.states]
+    place = {name: k for k, name in enumerate(names)}
+    x = np.zeros(len(names))
+    for name, value in given.items():
+        if not np.isfinite(value):
+            raise ParameterError(f"The start value of '{name}' is {value}; it must be a finite number.")
+        if name in place:
+            x[place[name]] = value
+    indirect = {name: float(value) for name, value in given.items() if name not in place}
+    if indirect:
+        free = [k for k, name in enumerate(names) if name not in given]
+        _fill(bound, names, indirect, free, t0, x)
+    return x
+
+
+def _fill(
+    bound: BoundArrays, names: list[str], given: Mapping[str, float], free: list[int], t0: float, x: Array
+) -> None:
+    """Change the free states of x so that the given quantities, which depend on the states linearly, come true."""
+    observer = ModelObserver(bound)
+    if unknown := [name for name in given if name not in observer.units]:
+        owner = unknown[0].rpartition(".")[0]
+        own = [name for name in observer.units if name.rpartition(".")[0] == owner] or names
+        raise SignalError(f"There is no quantity '{unknown[0]}' to start from. Near it: {', '.join(own)}.")
+    trial = np.vstack([x, x + np.eye(len(x))[free]])
+    times = np.full(len(trial), t0)
+    values = np.array([observer.signal(name, times, trial) for name in given])
+    wanted = np.array(list(given.values()))
+    rows, gap = values[:, 1:] - values[:, :1], wanted - values[:, 0]
+    x[free] += np.linalg.lstsq(rows, gap, rcond=None)[0] if free else 0.0
+    reached = np.array([observer.signal(name, times[:1], x[None, :])[0] for name in given])
+    scale = np.abs(wanted).max() + np.abs(values).max()
+    for name, asked, got in zip(given, wanted, reached, strict=True):
+        if abs(got - asked) > CONSISTENT * scale:
+            raise ParameterError(
+                f"The start value {name} = {asked:g} contradicts the others: what is rigidly joined to it makes it {got:g}. "
+                f"Give one value for each rigid group. The states are: {', '.join(names)}."
+            )
+
+
+def steady_state(bound: BoundArrays, start: Array, t: float, *, tolerance: float = 1e-12, limit: int = 500) -> Array:
+    """States at which nothing changes, reached from a start the way the drive itself would reach it.
+
+    Law: implicit Euler steps (I/h - J) dx = rhs, whose step h grows as the rates fall: at first the motion of the drive, so
+    that of several steady states the one it runs to is found, and in the end Newton's method.
+
+    Raises:
+        SimulationError: the rates do not vanish; the message names the state that keeps changing.
+    """
+    x = np.array(start, dtype=float)
+    names = [state.name for state in bound.program.form.states]
+    rate = bound.rhs(t, x)
+    h = 1e-3 / max(1.0, float(np.abs(rate).max()))
+    identity = sparse.eye_array(len(x), format="csc")
+    for _ in range(limit):
+        size = np.abs(bound.part.A) @ np.abs(x) + np.abs(bound.part.B) @ np.abs(bound.values(t, x)[1])
+        if (np.abs(rate) <= tolerance * (size + np.finfo(float).tiny)).all():
+            return x
+        step = _solve(sparse.csc_array(identity / h - bound.jacobian(t, x)), rate)
+        new = bound.rhs(t, x + step)
+        ratio = np.linalg.norm(rate) / max(float(np.linalg.norm(new)), np.finfo(float).tiny)
+        if not np.isfinite(new).all():
+            h *= 0.1
+            continue
+        x, rate, h = x + step, new, min(h * min(max(2.0, ratio), 100.0), 1e12)
+    worst = int(np.argmax(np.abs(rate)))
+    raise SimulationError(
+        f"No steady state was found: '{names[worst]}' still changes by {rate[worst]:.3g} per second at {x[worst]:.6g}. "
+        f"Does something hold the speed (a load, a damper, a motor's curve)? Give a start near the operating point."
+    )
+
+
+def _solve(matrix: sparse.csc_array, right: Array) -> Array:
+    try:
+        step: Array = splu(matrix).solve(right)
+    except (RuntimeError, MatrixRankWarning):
+        step = lsqr(matrix, right)[0]
+    return step

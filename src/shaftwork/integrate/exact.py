@@ -1,0 +1,274 @@
+"""The engine for linear systems: propagation by the matrix exponential, exact at any step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+from scipy.linalg import expm
+from scipy.sparse.linalg import expm_multiply
+
+from shaftwork.core.errors import SimulationError
+from shaftwork.integrate.modal import find_modes
+from shaftwork.integrate.pieces import Piece, both_sides, failure, pieces, start_of_piece
+from shaftwork.integrate.problem import Array, LinearInputs, Problem, Trajectory
+
+# Intervals of the engine's own output grid, which no accuracy depends on.
+OWN_INTERVALS = 500
+# Measured on one core: a dense product does about this many multiplications a second, a sparse product takes this long.
+DENSE_RATE, SPARSE_CALL, SPARSE_RATE = 1e10, 1e-5, 5e8
+# Products with A that the truncated Taylor series of `expm_multiply` takes for a unit of (norm of A) * time.
+TAYLOR_PRODUCTS = 6.0
+# A forcing may differ from a straight line by this part of its size before it is refused.
+STRAIGHT = 1e-7
+
+
+def solve(problem: Problem) -> Trajectory:
+    """Propagate x' = A x + u(t), u a straight line in each piece, from output to output without a step error.
+
+    Law: a dense A with well-conditioned modes is solved mode by mode. Otherwise, with z = (x, s, 1) and z' = M z, where M holds A and the two coefficients of u, z(t + h) = exp(M h) z(t). A may be
+    singular, defective or stiff.
+
+    Raises:
+        SimulationError: the system is not linear, its forcing is not a straight line, or the motion is unbounded.
+
+    Source: Van Loan, Computing integrals involving the matrix exponential, 1978; Al-Mohy and Higham, Computing the
+    action of the matrix exponential, 2011.
+    """
+    if problem.linear is None:
+        raise SimulationError("The exact engine needs a linear system, and this one is not. Use engine='auto'.")
+    system = _System(problem.linear, prefers_dense(problem))
+    x = np.asarray(problem.x0, dtype=float)
+    spans: list[_Span] = []
+    for piece in pieces(problem):
+        start = start_of_piece(problem, piece, x)
+        with np.errstate(over="ignore", invalid="ignore"):
+            span = _span(problem, system, piece, start)
+        spans.append(span)
+        x = span.states[-1]
+        if not np.isfinite(x).all():
+            raise failure(problem, "exact", piece.end, x, "the motion is unbounded")
+    dense = _ExactDense(tuple(spans))
+    if problem.t_eval is None:
+        t, states = both_sides(problem, [span.times for span in spans], [span.states for span in spans])
+    else:
+        t = np.asarray(problem.t_eval, dtype=float)
+        states = dense(t)
+    return Trajectory(t, states, dense, {"steps": dense.steps.size - 1})
+
+
+def prefers_dense(problem: Problem) -> bool:
+    """Whether a dense exponential of A costs less than products of the sparse A with vectors."""
+    return _dense_cost(problem) <= _sparse_cost(problem)
+
+
+def cost(problem: Problem) -> float:
+    """About how many seconds the exact engine takes for a linear problem."""
+    return min(_dense_cost(problem), _sparse_cost(problem))
+
+
+def _dense_cost(problem: Problem) -> float:
+    n, intervals = _size(problem)
+    return float(n) ** 3 * 30 * (1 + len(problem.breakpoints)) / DENSE_RATE + intervals * n**2 / DENSE_RATE
+
+
+def _sparse_cost(problem: Problem) -> float:
+    assert problem.linear is not None
+    matrix = sparse.csr_array(problem.linear.A)
+    scale = balance(matrix)
+    reach = _norm(_scaled(matrix, scale)) * (problem.t_end - problem.t0)
+    products = TAYLOR_PRODUCTS * reach + 20 * _size(problem)[1]
+    return float(products * (SPARSE_CALL + matrix.nnz / SPARSE_RATE))
+
+
+def _size(problem: Problem) -> tuple[int, int]:
+    return problem.x0.size + 2, OWN_INTERVALS if problem.t_eval is None else problem.t_eval.size
+
+
+def balance(matrix: Any, sweeps: int = 8) -> Array:
+    """Diagonal d (n,) for which d^-1 A d has rows and columns of about equal size; speeds and torques differ by 10^6.
+
+    Source: Osborne, On pre-conditioning of matrices, 1960. Powers of two, so the scaling itself does not round.
+    """
+    size = abs(sparse.csr_array(matrix))
+    scale = np.ones(matrix.shape[0])
+    for _ in range(sweeps):
+        rows = (size @ scale) / scale
+        columns = (size.T @ (1 / scale)) * scale
+        both = (rows > 0) & (columns > 0)
+        # Half of the full correction: all entries move at once, and the full one would overshoot.
+        scale[both] *= (rows[both] / columns[both]) ** 0.25
+    return np.asarray(2.0 ** np.round(np.log2(scale)))
+
+
+def _scaled(matrix: Any, scale: Array) -> Any:
+    return sparse.diags_array(1 / scale) @ matrix @ sparse.diags_array(scale)
+
+
+def _norm(matrix: Any) -> float:
+    return float(abs(matrix).sum(axis=0).max()) if matrix.shape[0] else 0.0
+
+
+class _System:
+    """The matrix of a problem in scaled coordinates x / scale, and its modes where they are of use."""
+
+    def __init__(self, linear: LinearInputs, dense_form: bool) -> None:
+        matrix = sparse.csr_array(linear.A)
+        self.forcing = linear.forcing
+        self.dense_form = dense_form
+        self.scale = balance(matrix)
+        self.matrix = _scaled(matrix, self.scale)
+        self.modes = find_modes(self.matrix.toarray()) if dense_form else None
+
+
+@dataclass(frozen=True)
+class _Propagator:
+    """exp(M h) for one piece in scaled coordinates z = (x / scale, s, 1)."""
+
+    matrix: Any
+    scale: Array
+    dense_form: bool
+
+    def advance(self, block: Array, step: float) -> Array:
+        """exp(M step) times the columns of a block (n + 2, k)."""
+        if self.dense_form:
+            return np.asarray(expm(self.matrix * step) @ block)
+        return np.asarray(expm_multiply(self.matrix * step, block, traceA=self.matrix.trace() * step))
+
+    def march(self, x: Array, elapsed: float, step: float, count: int) -> Array:
+        """States (count, n) after 1..count equal steps from a state x (n,) that is `elapsed` seconds into the piece."""
+        start = np.concatenate([x / self.scale, [elapsed, 1.0]])
+        if not self.dense_form:
+            rows = expm_multiply(self.matrix, start, start=0.0, stop=step * count, num=count + 1, endpoint=True)
+            return np.asarray(rows[1:, :-2] * self.scale)
+        power = expm(self.matrix * step)
+        columns = (power @ start)[:, None]
+        # With k columns known, exp(M step k) gives the next k: about log2(count) products.
+        while columns.shape[1] < count:
+            missing = count - columns.shape[1]
+            columns = np.hstack([columns, power @ columns[:, :missing]])
+            power = power @ power
+        return np.asarray(columns[:-2].T * self.scale)
+
+    def between(self, nodes: Array, states: Array, times: Array) -> Array:
+        """States (k, n) at any times (k,) of a piece, each from the node before it."""
+        index = np.clip(np.searchsorted(nodes, times, side="right") - 1, 0, nodes.size - 1)
+        offsets = times - nodes[index]
+        # Offsets that differ by the rounding of the times share one exponential.
+        rounded = np.round(offsets / (2 * np.spacing(np.abs(nodes).max())))
+        values = states[index]
+        for key in np.unique(rounded[rounded > 0]):
+            chosen = np.flatnonzero(rounded == key)
+            elapsed = nodes[index[chosen]] - nodes[0]
+            block = np.vstack([(values[chosen] / self.scale).T, elapsed, np.ones(chosen.size)])
+            values[chosen] = self.advance(block, float(offsets[chosen].mean()))[:-2].T * self.scale
+        return values
+
+
+@dataclass(frozen=True)
+class _Span:
+    """One piece, propagated.
+
+    Args:
+        times: (k,) nodes in s.
+        states: (k, n) states there.
+        at: states (m, n) at any times (m,) of the piece.
+    """
+
+    times: Array
+    states: Array
+    at: Callable[[Array], Array]
+
+
+class _ExactDense:
+    """The motion at any time of the run."""
+
+    def __init__(self, spans: tuple[_Span, ...]) -> None:
+        self._spans = spans
+        self._starts = np.array([span.times[0] for span in spans])
+
+    @property
+    def steps(self) -> Array:
+        return np.unique(np.concatenate([span.times for span in self._spans]))
+
+    def __call__(self, times: Array) -> Array:
+        times = np.atleast_1d(np.asarray(times, dtype=float))
+        index = np.clip(np.searchsorted(self._starts, times, side="right") - 1, 0, len(self._spans) - 1)
+        states = np.empty((times.size, self._spans[0].states.shape[1]))
+        for number in np.unique(index):
+            states[index == number] = self._spans[number].at(times[index == number])
+        return states
+
+
+def _span(problem: Problem, system: _System, piece: Piece, x: Array) -> _Span:
+    times = _nodes(problem, piece)
+    level, slope = _straight_line(problem, system.forcing, piece)
+    if system.modes is not None:
+        modes, scale = system.modes, system.scale
+        start, line = x / scale, (level / scale, slope / scale)
+
+        def at(asked: Array) -> Array:
+            return modes.response(start, *line, asked - piece.start) * scale
+
+        return _Span(times, np.vstack([x, at(times[1:])]), at)
+    propagator = _propagator(system, level, slope)
+    states = np.empty((times.size, x.size))
+    states[0] = x
+    for first, count in _equal_steps(times):
+        step = (times[first + count] - times[first]) / count
+        block = propagator.march(states[first], times[first] - piece.start, step, count)
+        states[first + 1 : first + 1 + count] = block
+    return _Span(times, states, lambda asked: propagator.between(times, states, asked))
+
+
+def _nodes(problem: Problem, piece: Piece) -> Array:
+    if problem.t_eval is None:
+        share = (piece.end - piece.start) / (problem.t_end - problem.t0)
+        return np.linspace(piece.start, piece.end, max(2, int(OWN_INTERVALS * share)) + 1)
+    outputs = np.asarray(problem.t_eval, dtype=float)
+    inner = outputs[(outputs > piece.start) & (outputs < piece.end)]
+    return np.concatenate([[piece.start], inner, [piece.end]])
+
+
+def _equal_steps(times: Array) -> list[tuple[int, int]]:
+    """Runs (first node, number of steps) of steps that are equal up to the rounding of the times."""
+    steps = np.diff(times)
+    changes = np.flatnonzero(np.abs(np.diff(steps)) > 4 * np.spacing(np.abs(times).max())) + 1
+    edges = [0, *changes.tolist(), steps.size]
+    return [(first, last - first) for first, last in zip(edges[:-1], edges[1:], strict=True)]
+
+
+def _propagator(system: _System, level: Array, slope: Array) -> _Propagator:
+    scale, matrix = system.scale, system.matrix
+    # A common factor of all states brings the forcing to the size of the matrix.
+    largest = max(np.abs(level / scale).max(initial=0.0), np.abs(slope / scale).max(initial=0.0))
+    norm = _norm(matrix)
+    if largest > 0 and norm > 0:
+        scale = scale * 2.0 ** np.ceil(np.log2(largest / norm))
+    forcing = np.column_stack([slope / scale, level / scale])
+    clock = sparse.csr_array(np.array([[0.0, 1.0], [0.0, 0.0]]))
+    augmented = sparse.block_array([[matrix, sparse.csr_array(forcing)], [None, clock]], format="csr")
+    return _Propagator(augmented.toarray() if system.dense_form else augmented, scale, system.dense_form)
+
+
+def _straight_line(
+    problem: Problem, forcing: Callable[[float], Array], piece: Piece
+) -> tuple[Array, Array]:
+    """Level at the start of a piece and slope of u, from values strictly inside the piece."""
+    length = piece.end - piece.start
+    early, middle, late = (
+        np.asarray(forcing(piece.start + part * length), dtype=float) for part in (0.25, 0.5, 0.75)
+    )
+    bend = np.abs(middle - (early + late) / 2)
+    if (bend > STRAIGHT * (np.abs(early) + np.abs(late)).max(initial=0.0)).any():
+        name = problem.names[int(np.argmax(bend))]
+        raise SimulationError(
+            f"The exact engine needs an input that is a straight line between breakpoints; the one of {name!r} bends "
+            f"between t = {piece.start:.6g} s and {piece.end:.6g} s. Use engine='auto'."
+        )
+    slope = (late - early) / (0.5 * length)
+    slope[np.abs(slope) * length <= 8 * np.finfo(float).eps * np.abs(early)] = 0.0
+    return early - 0.25 * length * slope, slope

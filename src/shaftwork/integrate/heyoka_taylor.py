@@ -1,0 +1,194 @@
+"""The fast engine: Taylor series of adaptive step and order, compiled by heyoka."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from shaftwork.core.errors import MissingExtraError, SimulationError
+from shaftwork.integrate.pieces import Piece, PiecewiseDense, both_sides, failure, pieces, start_of_piece
+from shaftwork.integrate.problem import Array, Problem, Trajectory
+from shaftwork.integrate.switches import Watch, settle
+
+# The cost grows only with the logarithm of the tolerance, and a loose one loses events.
+LOOSEST_TOLERANCE, TIGHTEST_TOLERANCE = 1e-10, 1e-15
+
+# From (integrator, step callback, step limit) to (outcome name, steps taken); called again after an interruption.
+Advance = Callable[[Any, Watch | None, int], tuple[str, int]]
+
+
+def solve(problem: Problem) -> Trajectory:
+    """Integrate the heyoka program of a problem.
+
+    With `t_eval` the run only fills the output grid; dense output and step ends are made by a second, identical run
+    when they are first asked for. The integrator belongs to the program: two threads must not run one program at once.
+
+    Raises:
+        MissingExtraError: heyoka is not installed.
+        SimulationError: the problem has no heyoka program, or the integration failed.
+
+    Source: Biscani, Izzo, Revisiting high-order Taylor methods for astrodynamics and celestial mechanics, MNRAS 2021.
+    """
+    if importlib.util.find_spec("heyoka") is None:
+        raise MissingExtraError("heyoka", "fast", "engine='heyoka'")
+    if problem.symbolic is None:
+        raise SimulationError(
+            "The heyoka engine needs the equations as a heyoka program, and this problem has none. Use engine='scipy'."
+        )
+    if problem.t_eval is not None:
+        return _on_grid(problem, np.asarray(problem.t_eval, dtype=float))
+    dense = _Replay(problem)
+    t, x = both_sides(problem, *dense.step_ends)
+    return Trajectory(t, x, dense, {"steps": dense.steps.size - 1})
+
+
+class _Run:
+    """One run of the shared integrator over a problem."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.program = problem.symbolic.program
+        tolerance = min(max(problem.rtol, TIGHTEST_TOLERANCE), LOOSEST_TOLERANCE)
+        self.integrator = self.program.integrator(tolerance)
+        self.parameters = problem.symbolic.parameters
+        self.state: Array = np.array(problem.x0, dtype=float)
+        self.steps = 0
+
+    def piece(self, piece: Piece, advance: Advance) -> None:
+        """Bring the run to the end of a piece; `advance` records what it passes."""
+        integrator = self.integrator
+        integrator.time = piece.start
+        integrator.state[:] = start_of_piece(self.problem, piece, self.state)
+        integrator.pars[: self.parameters.size] = self.parameters
+        watch = self._watch(piece) if self.program.switches else None
+        while True:
+            outcome, steps = advance(integrator, watch, self.problem.max_steps - self.steps)
+            self.steps += steps
+            if outcome == "cb_stop" and watch is not None and watch.reason is None:
+                settle(self.program, integrator, piece.end - piece.start)
+                continue
+            break
+        if outcome not in ("time_limit", "success"):
+            raise failure(self.problem, "heyoka", integrator.time, integrator.state, self._reason(outcome, watch))
+        self.state = integrator.state.copy()
+        if not np.isfinite(self.state).all():
+            raise failure(self.problem, "heyoka", integrator.time, self.state, "the state is not finite")
+
+    def _watch(self, piece: Piece) -> Watch:
+        self.integrator.reset_cooldowns()
+        self.integrator.pars[self.parameters.size :] = 0.0
+        settle(self.program, self.integrator, piece.end - piece.start)
+        return Watch(self.program, piece.start, self.problem.t_end - self.problem.t0)
+
+    def _reason(self, outcome: str, watch: Watch | None) -> str:
+        if outcome == "step_limit":
+            return f"{self.problem.max_steps} steps were not enough"
+        if outcome == "err_nf_state":
+            return "the state or its derivative is not finite"
+        if watch is not None and watch.reason is not None:
+            return watch.reason
+        return f"heyoka stopped with the outcome {outcome!r}"
+
+
+def _on_grid(problem: Problem, times: Array) -> Trajectory:
+    run = _Run(problem)
+    states = np.empty((times.size, run.state.size))
+    done = 0
+    for piece in pieces(problem):
+        # An output at a breakpoint belongs to the next piece: it is the state after the jump.
+        stop = times.size if piece.end == problem.t_end else int(np.searchsorted(times, piece.end, side="left"))
+        recorder = _GridRecorder(states[done:stop], times[done:stop], piece.end)
+        run.piece(piece, recorder)
+        done = stop
+    return Trajectory(times, states, _Replay(problem), {"steps": run.steps})
+
+
+class _GridRecorder:
+    """Fills rows of output while the integrator passes their times."""
+
+    def __init__(self, rows: Array, times: Array, end: float) -> None:
+        self._rows = rows
+        # The grid always ends with the piece, because the next piece starts from there.
+        self._grid = times if times.size and times[-1] == end else np.append(times, end)
+        self._filled = 0
+
+    def __call__(self, integrator: Any, watch: Watch | None, limit: int) -> tuple[str, int]:
+        pending, now = self._grid[self._filled :], integrator.time
+        extra = int(pending[0] != now)  # heyoka's grid starts at the present time
+        outcome, _, _, steps, _, found = integrator.propagate_grid(
+            np.append(now, pending) if extra else pending, max_steps=max(limit, 1), callback=watch
+        )
+        found = found[extra:]
+        kept = found[: len(self._rows) - self._filled]
+        self._rows[self._filled : self._filled + len(kept)] = kept
+        self._filled += len(found)
+        return _outcome(outcome, watch, self._filled == self._grid.size), steps
+
+
+class _SegmentRecorder:
+    """Keeps heyoka's continuous output of the spans that it passes."""
+
+    def __init__(self, end: float) -> None:
+        self._end = end
+        self.segments: list[Any] = []
+
+    def __call__(self, integrator: Any, watch: Watch | None, limit: int) -> tuple[str, int]:
+        outcome, _, _, steps, segment, _ = integrator.propagate_until(
+            self._end, max_steps=max(limit, 1), callback=watch, c_output=True
+        )
+        if segment is not None:
+            self.segments.append(segment)
+        return _outcome(outcome, watch, integrator.time == self._end), steps
+
+
+def _outcome(outcome: Any, watch: Watch | None, arrived: bool) -> str:
+    """Name of heyoka's outcome; a watch that stops the last step of all has not stopped the run unless it has a reason."""
+    failed = watch is not None and watch.reason is not None
+    return "time_limit" if arrived and not failed else str(outcome.name)
+
+
+class _Replay:
+    """Dense output that runs the problem when it is first asked."""
+
+    def __init__(self, problem: Problem) -> None:
+        self._problem = problem
+
+    @cached_property
+    def _segments(self) -> tuple[tuple[Any, ...], ...]:
+        run = _Run(self._problem)
+        recorders = []
+        for piece in pieces(self._problem):
+            recorder = _SegmentRecorder(piece.end)
+            run.piece(piece, recorder)
+            recorders.append(recorder)
+        return tuple(tuple(recorder.segments) for recorder in recorders)
+
+    @cached_property
+    def _dense(self) -> PiecewiseDense:
+        segments = [segment for piece in self._segments for segment in piece]
+        starts = np.array([segment.bounds[0] for segment in segments])
+        steps = np.unique(np.concatenate([segment.times for segment in segments]))
+        # heyoka's output lives in a buffer that the next call writes again.
+        parts = tuple(lambda at, segment=segment: segment(at).copy() for segment in segments)
+        return PiecewiseDense(starts, parts, steps, self._problem.x0.size)
+
+    @property
+    def step_ends(self) -> tuple[list[Array], list[Array]]:
+        """Times and states at the step ends of each piece."""
+        times = [np.unique(np.concatenate([segment.times for segment in piece])) for piece in self._segments]
+        states = []
+        for piece, at in zip(self._segments, times, strict=True):
+            starts = np.array([segment.bounds[0] for segment in piece])
+            states.append(PiecewiseDense(starts, piece, at, self._problem.x0.size)(at))
+        return times, states
+
+    @property
+    def steps(self) -> Array:
+        return self._dense.steps
+
+    def __call__(self, times: Array) -> Array:
+        return self._dense(times)

@@ -1,0 +1,89 @@
+"""Networks to text files and back: what `textfile` reads and writes, in terms of components."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from sympy import Expr
+
+from shaftwork.components import REGISTRY, Component, Table
+from shaftwork.components.laws import SYMBOLS
+from shaftwork.core.errors import ModelFileError, ParameterError
+from shaftwork.network import expressions, textfile
+from shaftwork.network.expression_reader import parse
+from shaftwork.network.netlist import Netlist, Placed
+from shaftwork.network.textfile import ModelText, PartText
+
+
+def write_netlist(netlist: Netlist, path: str | Path) -> None:
+    """Write a netlist to a file.
+
+    Raises:
+        ModelFileError: a parameter has no text form.
+    """
+    parts = tuple(_part_text(placed) for placed in netlist.placed)
+    Path(path).write_text(textfile.write(ModelText(netlist.name, parts)), encoding="utf-8", newline="\n")
+
+
+def read_netlist(path: str | Path) -> Netlist:
+    """Read a netlist from a file.
+
+    Raises:
+        ModelFileError: the file is no model; says where and what would be right.
+    """
+    model = textfile.read(Path(path))
+    try:
+        return Netlist(model.name, tuple(_placed(part) for part in model.parts))
+    except ModelFileError as error:
+        raise ModelFileError(f"{path}: {error}") from None
+
+
+def _part_text(placed: Placed) -> PartText:
+    part = placed.part
+    values = {name: _written(part, name) for name in part.declared if not _is_default(part, name)}
+    return PartText(type(part).__name__, part.name, placed.nodes, values, part.symbol)
+
+
+def _is_default(part: Component, name: str) -> bool:
+    declared = part.declared[name]
+    return not declared.required and isinstance(value := getattr(part, name), float) and value == declared.default
+
+
+def _written(part: Component, name: str) -> Any:
+    value, objection = part.declared[name].magnitude(getattr(part, name))
+    if objection is not None:
+        raise ModelFileError(f"{type(part).__name__} '{part.name}': {name} {objection}, so it cannot be saved.")
+    if isinstance(value, Expr) and not isinstance(value, Table):
+        return expressions.write(value)
+    return value
+
+
+def _placed(part: PartText) -> Placed:
+    cls = REGISTRY.get(part.type)
+    if cls is None:
+        close = get_close_matches(part.type, REGISTRY, n=3) or tuple(REGISTRY)
+        raise ModelFileError(
+            f"Part '{part.name}': there is no component '{part.type}'. Close to it: {', '.join(close)}. "
+            f"A component of your own must be imported before the file is loaded."
+        )
+    values = {name: _read(part, cls, name, value) for name, value in part.parameters.items()}
+    try:
+        return Placed(cls(part.name, symbol=part.symbol, **values), part.nodes)
+    except ParameterError as error:
+        raise ModelFileError(str(error)) from None
+
+
+def _read(part: PartText, cls: type[Component], name: str, value: Any) -> Any:
+    if not isinstance(value, str):
+        return value
+    if name not in cls.declared or not cls.declared[name].law:
+        raise ModelFileError(
+            f"Part '{part.name}': {name} = '{value}' must be a number. The laws of {part.type} are: "
+            f"{', '.join(key for key, declared in cls.declared.items() if declared.law) or 'none'}."
+        )
+    try:
+        return parse(value, {symbol.name: symbol for symbol in SYMBOLS})
+    except ModelFileError as error:
+        raise ModelFileError(f"Part '{part.name}', {name}: {error}") from None

@@ -1,0 +1,322 @@
+"""Model files: a network as TOML text, read and written without knowing any component.
+
+    format = 1
+    name = "crane travel"
+
+    [[part]]
+    type = "Spring"
+    name = "shaft"
+    nodes = ["rotor", "wheel"]
+    c = 24206.0
+    d = 14.0
+
+Values are numbers, texts (laws, see `expressions`) and tables `{ x = [...], y = [...] }`. A file is plain data: a first
+pass over its words refuses what the format has no use for (nested tables, dotted keys, deep or endless lists), so the
+TOML reader behind it never meets its own worst cases.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from shaftwork.components.laws import Table
+from shaftwork.core.errors import ModelFileError, ParameterError
+
+FORMAT = 1
+"""Version of the format; a reader refuses any other."""
+MAXIMUM_SIZE = 2_500_000
+"""Bytes of a model file; 20000 parts take about 2 000 000."""
+MAXIMUM_WORDS = 800_000
+"""Values, keys and brackets of a model file."""
+MAXIMUM_DEPTH = 2
+"""Brackets inside each other: a list in a table."""
+MAXIMUM_NUMBER = 64
+"""Characters of a number."""
+MAXIMUM_TEXT = 200_000
+"""Characters of a text value; a law with long tables takes most of them."""
+MAXIMUM_NAME = 200
+"""Characters of a name of a part, node, type or symbol."""
+MAXIMUM_INTEGER = 2**63 - 1
+"""Largest integer, that of TOML."""
+
+Value = int | float | str | Table
+"""What a parameter may be in a file."""
+
+_RESERVED = ("type", "name", "nodes", "symbol")
+_KEY = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+_WORD = re.compile(
+    r"[ \t]*(?:(?P<newline>\r?\n)|(?P<comment>#[^\n]*)|(?P<multiline>\"\"\"|''')"
+    r"|(?P<text>\"[^\"\\\n]*(?:\\.[^\"\\\n]*)*\"|'[^'\n]*')|(?P<mark>[=,])|(?P<header>\[\[[ \t]*part[ \t]*\]\])"
+    r"|(?P<open>[\[{])|(?P<close>[\]}])|(?P<bare>[A-Za-z0-9_+-]+(?:\.[A-Za-z0-9_+-]+)?)|(?P<end>\Z)|(?P<other>(?s:.)))"
+)
+
+
+@dataclass(frozen=True)
+class PartText:
+    """One part as it stands in a file.
+
+    Args:
+        type: name of the component's class.
+        name: name of the part.
+        nodes: the nodes that it is wired to, in the order of its ports.
+        parameters: its parameters in the order of the file; an int stays an int, a float a float.
+        symbol: LaTeX symbol, or None.
+
+    Raises:
+        ModelFileError: a field could not stand in a file.
+    """
+
+    type: str
+    name: str
+    nodes: tuple[str, ...]
+    parameters: Mapping[str, Value] = field(default_factory=dict)
+    symbol: str | None = None
+
+    def __post_init__(self) -> None:
+        _check_name("type", self.type)
+        _check_name("name", self.name)
+        if not isinstance(self.nodes, tuple) or not self.nodes:
+            found = "is missing" if self.nodes is None else f"is {_shown(self.nodes)}"
+            raise ModelFileError(f'nodes {found}. Give one node or more, such as nodes = ["rotor", "wheel"].')
+        for node in self.nodes:
+            _check_name("nodes", node)
+        if self.symbol is not None:
+            _check_name("symbol", self.symbol)
+        object.__setattr__(self, "parameters", {key: _checked(key, value) for key, value in self.parameters.items()})
+
+
+@dataclass(frozen=True)
+class ModelText:
+    """A network as it stands in a file: its name and its parts in order."""
+
+    name: str
+    parts: tuple[PartText, ...] = ()
+
+    def __post_init__(self) -> None:
+        _check_name("name", self.name)
+
+
+def read(source: str | os.PathLike[str]) -> ModelText:
+    """The model in a text, or in the file at a path.
+
+    Args:
+        source: a str is the text itself, a `pathlib.Path` the place of a file.
+
+    Raises:
+        ModelFileError: there is no such file, or it is no model file; the message has the line, the part, the key and
+            the next step.
+    """
+    title, text = ("model", source) if isinstance(source, str) else (os.fspath(source), _text_of(Path(source)))
+    try:
+        return _model(text)
+    except ModelFileError as error:
+        raise ModelFileError(f"{title}: {error}") from None
+
+
+def write(model: ModelText) -> str:
+    """The text of a model: `read` of it is the same model, numbers to the last bit; equal models give equal texts."""
+    lines = [f"format = {FORMAT}", f"name = {_quoted(model.name)}"]
+    for part in model.parts:
+        lines += ["", "[[part]]", f"type = {_quoted(part.type)}", f"name = {_quoted(part.name)}"]
+        lines.append(f"nodes = [{', '.join(_quoted(node) for node in part.nodes)}]")
+        lines += [] if part.symbol is None else [f"symbol = {_quoted(part.symbol)}"]
+        lines += [f"{key} = {_literal(value)}" for key, value in part.parameters.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _quoted(text: str) -> str:
+    # names and laws hold printable characters alone, and of these JSON escapes what TOML escapes, in the same way
+    return json.dumps(text, ensure_ascii=False)
+
+
+def _literal(value: Value) -> str:
+    match value:
+        case str():
+            return _quoted(value)
+        case Table():
+            return f"{{ x = {list(value.xs)}, y = {list(value.ys)} }}"
+    return repr(value)
+
+
+def _text_of(path: Path) -> str:
+    """The text of a file, at most one byte more than allowed."""
+    try:
+        if not path.is_file():
+            found = "is no file" if path.exists() else f"does not exist, seen from {Path.cwd()}"
+            raise FileNotFoundError(found)
+        with path.open("rb") as file:
+            content = file.read(MAXIMUM_SIZE + 1)
+    except (OSError, ValueError) as error:
+        raise ModelFileError(f"{path} cannot be read: {error}. Give the path of a model file.") from None
+    if len(content) > MAXIMUM_SIZE:
+        raise ModelFileError(f"{path}: has more than {MAXIMUM_SIZE} bytes. Split the model.")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise ModelFileError(f"{path}, line {line}: is not UTF-8 ({error.reason}). Save it as UTF-8.") from None
+
+
+def _part_lines(text: str) -> list[int]:
+    """Line of each part's header, counted from 1, after a check that every word is one of the format."""
+    lines: list[int] = []
+    line, depth, starts, words = 1, 0, True, 0
+    for match in _WORD.finditer(text):
+        kind = match.lastgroup
+        if kind == "newline":
+            line, starts = line + 1, depth == 0
+            continue
+        words += 1
+        if kind == "header" and starts:
+            lines.append(line)
+        elif fault := _word_fault(str(kind), match[str(kind)], starts=starts):
+            raise ModelFileError(f"line {line}: {fault}")
+        depth += (kind == "open") - (kind == "close")
+        if depth > MAXIMUM_DEPTH:
+            raise ModelFileError(
+                f"line {line}: brackets stand inside each other more than {MAXIMUM_DEPTH} deep. {_USE}"
+            )
+        if words > MAXIMUM_WORDS:
+            raise ModelFileError(f"line {line}: there are more than {MAXIMUM_WORDS} words. Split the model.")
+        starts = starts and kind == "comment"
+    return lines
+
+
+_USE = (
+    "Write [[part]], then lines key = value; a value is a number, a text, a list of texts, or { x = [...], y = [...] }."
+)
+
+
+def _word_fault(kind: str, word: str, *, starts: bool) -> str | None:
+    """What is wrong with a word, or None; `starts` where it is the first of its line."""
+    if kind == "other":
+        return f"{word!r} is not expected here. Close each text with its quote. {_USE}"
+    if kind == "multiline":
+        return f"a text stands between {word}. Write texts on one line between single quotes."
+    if kind == "bare" and len(word) > MAXIMUM_NUMBER:
+        return f"a number or key has more than {MAXIMUM_NUMBER} characters. Numbers need 17 digits."
+    if starts and kind in ("open", "text"):
+        return f"a line starts with {word[:40]}. {_USE}"
+    if starts and kind == "bare" and not _KEY.fullmatch(word):
+        return f"the key {word} is no name: letters, digits and _ without dots. {_USE}"
+    return None
+
+
+def _tables(text: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        place = re.search(r"\(at (.*)\)$", str(error))
+        reason = str(error).partition(" (at ")[0]
+        where = "" if place is None else f"{place[1].split(',')[0]}: "
+        raise ModelFileError(f"{where}this is no TOML: {reason}. {_USE}") from None
+
+
+def _model(text: str) -> ModelText:
+    if len(text) > MAXIMUM_SIZE:
+        raise ModelFileError(f"there are more than {MAXIMUM_SIZE} characters. Split the model.")
+    if "=" not in text:
+        raise ModelFileError(
+            f"{_shown(text)} has no line key = value. A model starts with: format = {FORMAT}. "
+            'To read a file, give its place as pathlib.Path("crane.toml").'
+        )
+    lines = _part_lines(text)
+    tables = _tables(text)
+    if "format" not in tables:
+        raise ModelFileError(f"the key format is missing. Start the file with: format = {FORMAT}")
+    if type(tables["format"]) is not int or tables["format"] != FORMAT:
+        raise ModelFileError(
+            f"format is {_shown(tables['format'])}, and this version reads format {FORMAT}. "
+            "Update the package if the file is newer."
+        )
+    if unknown := [key for key in tables if key not in ("format", "name", "part")]:
+        raise ModelFileError(f"the key {unknown[0]} is unknown here. Before the first [[part]] stand format and name.")
+    name: Any = tables.get("name")
+    parts = tables.get("part", [])
+    if not isinstance(parts, list) or len(parts) != len(lines):
+        raise ModelFileError(f"part is {_shown(parts)}. {_USE}")
+    return ModelText(name, tuple(_part(table, line, text) for table, line in zip(parts, lines, strict=True)))
+
+
+def _part(table: dict[str, Any], line: int, text: str) -> PartText:
+    fields: dict[str, Any] = {key: table.get(key) for key in _RESERVED}
+    kind, name, nodes, symbol = fields.values()
+    try:
+        parameters = {
+            key: _table(key, value) if isinstance(value, dict) else value
+            for key, value in table.items()
+            if key not in _RESERVED
+        }
+        return PartText(kind, name, tuple(nodes) if isinstance(nodes, list) else nodes, parameters, symbol)
+    except ModelFileError as error:
+        place = _line_of(str(error).split(maxsplit=1)[0], line, text)
+        raise ModelFileError(f"line {place}, part {_shown(name) if name else 'without a name'}: {error}") from None
+
+
+def _line_of(key: str, header: int, text: str) -> int:
+    """Line of a key of the part whose header stands in a line; that line where the part has no such key."""
+    for number, row in enumerate(text.split("\n")[header:], header + 1):
+        if row.lstrip().startswith("[["):
+            break
+        if row.partition("=")[0].strip() == key:
+            return number
+    return header
+
+
+def _table(key: str, value: dict[str, Any]) -> Table:
+    columns = list(value.values())
+    numbers = [item for column in columns if isinstance(column, list) for item in column]
+    if list(value) != ["x", "y"] or not all(isinstance(column, list) for column in columns):
+        raise ModelFileError(f"{key} is {_shown(value)}. Write a table as {{ x = [0.0, 1.0], y = [0.0, 5.0] }}.")
+    if wrong := [item for item in numbers if type(item) not in (int, float)]:
+        raise ModelFileError(f"{key} has {_shown(wrong[0])} in its table. Tables hold numbers alone.")
+    try:
+        return Table(*columns)
+    except ParameterError as error:
+        raise ModelFileError(f"{key} has a wrong table. {error}") from None
+
+
+def _check_name(key: str, value: Any) -> None:
+    if not isinstance(value, str):
+        missing = "is missing" if value is None else f"is {_shown(value)}"
+        raise ModelFileError(f'{key} {missing}. Write names as texts in quotes, such as "shaft".')
+    if not value.strip() or len(value) > MAXIMUM_NAME or not value.isprintable():
+        raise ModelFileError(
+            f"{key} is {_shown(value)}. Use 1 to {MAXIMUM_NAME} printable characters, without line ends and tabs."
+        )
+
+
+def _checked(key: str, value: Any) -> Value:
+    """A parameter's value as it can stand in a file."""
+    if not isinstance(key, str) or not _KEY.fullmatch(key) or key in _RESERVED or len(key) > MAXIMUM_NUMBER:
+        raise ModelFileError(f"{key} is no name of a parameter. Use letters, digits and _, not {', '.join(_RESERVED)}.")
+    match value:
+        case bool():
+            raise ModelFileError(f"{key} is {_shown(value)}, which is no number. Write 0, 1 or a text.")
+        case int() if abs(value) <= MAXIMUM_INTEGER:
+            return int(value)
+        case float() if math.isfinite(value):
+            return float(value)
+        case str() if len(value) <= MAXIMUM_TEXT and value.isprintable():
+            return value
+        case Table():
+            return value
+    raise ModelFileError(
+        f"{key} is {_shown(value)}. Give a finite number (integers to 2**63 - 1), a text of printable characters, or a "
+        "table { x = [...], y = [...] }."
+    )
+
+
+def _shown(value: Any) -> str:
+    """A value as the file writes it, shortened."""
+    words = {True: "true", False: "false"}
+    shown = words[value] if isinstance(value, bool) else repr(value)
+    return shown if len(shown) <= 60 else f"{shown[:57]}..."

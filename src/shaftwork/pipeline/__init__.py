@@ -1,0 +1,1 @@
+"""The way from a network to its motion: what users hold in their hands."""

@@ -1,0 +1,317 @@
+"""A compiled network and its simulation."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+
+from shaftwork.codegen.arrays import BoundArrays
+from shaftwork.codegen.elements import Array
+from shaftwork.codegen.model import CompiledModel
+from shaftwork.codegen.observer import ModelObserver
+from shaftwork.codegen.operating import initial_state, steady_state
+from shaftwork.components.laws import breakpoints, pieces_degree
+from shaftwork.core.errors import ParameterError, SimulationError
+from shaftwork.integrate import choice
+from shaftwork.integrate.problem import LinearInputs, Problem
+from shaftwork.network.netlist import Netlist, Placed
+from shaftwork.network.templates import Kind
+from shaftwork.reduction.form import StateForm
+from shaftwork.results.solution import Solution
+
+OUTPUTS = 1001
+"""Output times when the user gives none."""
+NOMINAL = 1e-3
+"""Absolute tolerance as a fraction of the relative one, for a speed of 1 rad/s (m/s, V)."""
+EngineName = Literal["auto", "scipy", "heyoka", "sundials", "exact"]
+OutputTimes = int | Sequence[float] | Array | Literal["steps"] | None
+Rebuild = Callable[[Netlist], "Model"]
+
+
+@dataclass(frozen=True, eq=False)
+class _Prepared:
+    """Everything that depends on the parameter vector alone, made once for a run of equal calls."""
+
+    p: Array
+    bound: BoundArrays
+    rhs: Callable[[float, Array], Array]
+    breakpoints: tuple[float, ...]
+    symbolic: Any
+    linear: LinearInputs | None
+    atol: Array
+    engines: dict[tuple[float, ...], tuple[str, str]]
+
+
+class Model(CompiledModel):
+    """A network as a fast function of time, states and parameters, ready to be simulated again and again.
+
+    Args:
+        form: the state form.
+        netlist: what it was made of.
+        rebuild: makes the model of a changed netlist; used where a new parameter value changes the structure.
+    """
+
+    def __init__(self, form: StateForm, netlist: Netlist, rebuild: Rebuild) -> None:
+        super().__init__(form)
+        self.netlist, self._rebuild = netlist, rebuild
+        self._prepared: tuple[bytes, _Prepared] | None = None
+        self._variants: dict[tuple[tuple[str, float], ...], Model] = {}
+
+    @property
+    def name(self) -> str:
+        return self.netlist.name
+
+    def simulate(
+        self,
+        t_end: float,
+        *,
+        t_start: float = 0.0,
+        rtol: float = 1e-8,
+        atol: float | Sequence[float] | None = None,
+        t_eval: OutputTimes = None,
+        engine: EngineName = "auto",
+        initial: Mapping[str, float] | None = None,
+        parameters: Mapping[str, float] | None = None,
+        max_steps: int = 10_000_000,
+    ) -> Solution:
+        """Integrate the motion.
+
+        Args:
+            t_end: end of the motion, s.
+            t_start: its start, s.
+            rtol: relative tolerance.
+            atol: absolute tolerance, one for all states or one for each; by default rtol times a small speed, and times
+                the torque that belongs to it.
+            t_eval: output times, or their number (by default 1001 over the run), or "steps" for the engine's own.
+            engine: "auto" takes the best one and says why in `Solution.why`.
+            initial: start values of speeds ("J1.omega"), twists ("shaft.phi_rel") or torques; what is not given is zero.
+            parameters: values that differ from the network's, "part.parameter" to value in SI; nothing is recompiled
+                unless a value changes the structure (a damping that was exactly zero).
+            max_steps: give up after this many steps.
+
+        Raises:
+            ParameterError: an argument is out of its range.
+            SimulationError: the integration failed; says when, in which state and why.
+            MissingExtraError: the engine asked for is not installed.
+        """
+        if parameters and self._changes_structure(parameters):
+            options = {"t_start": t_start, "rtol": rtol, "atol": atol, "t_eval": t_eval, "initial": initial}
+            return self._variant(parameters).simulate(t_end, engine=engine, max_steps=max_steps, **options)  # type: ignore[arg-type]
+        prepared = self._prepare(self.defaults if not parameters else self._vector(parameters))
+        span = _span(t_start, t_end, rtol)
+        x0 = np.zeros(len(self.states)) if not initial else initial_state(prepared.bound, initial, span[0])
+        problem = self._problem(prepared, span, x0, rtol, atol, t_eval, max_steps)
+        if not len(self.states):
+            raise SimulationError(f"'{self.name}' has no states: nothing moves freely. Add an inertia or a spring.")
+        name, why = self._engine(prepared, problem, engine)
+        trajectory, name, why = choice.solve(problem, engine=name, why=why)
+        return Solution(
+            name=self.name,
+            t=trajectory.t,
+            x=trajectory.x,
+            states=self.states,
+            engine=name,
+            why=why,
+            statistics=trajectory.statistics,
+            dense=trajectory.dense,
+            observer=ModelObserver(prepared.bound),
+        )
+
+    def steady_state(
+        self,
+        t: float = math.inf,
+        *,
+        initial: Mapping[str, float] | None = None,
+        parameters: Mapping[str, float] | None = None,
+    ) -> dict[str, float]:
+        """The steady operation that the drive runs to, as start values for `simulate`.
+
+        Args:
+            t: time at which the sources are read; by default after their last breakpoint.
+            initial: where the search starts; by default at rest.
+            parameters: values that differ from the network's.
+
+        Raises:
+            SimulationError: nothing comes to rest or to a steady speed.
+        """
+        if parameters and self._changes_structure(parameters):
+            return self._variant(parameters).steady_state(t, initial=initial)
+        prepared = self._prepare(self.defaults if not parameters else self._vector(parameters))
+        when = t if math.isfinite(t) else max((0.0, *prepared.breakpoints)) + 1.0
+        start = initial_state(prepared.bound, initial or {}, when)
+        return dict(zip(self.states, steady_state(prepared.bound, start, when).tolist(), strict=True))
+
+    def _engine(self, prepared: _Prepared, problem: Problem, engine: str) -> tuple[str, str]:
+        if engine != "auto":
+            return engine, "asked for"
+        key = (problem.t0, problem.t_end, problem.rtol)
+        if key not in prepared.engines:
+            prepared.engines[key] = choice.choose(problem)
+        return prepared.engines[key]
+
+    def _problem(
+        self,
+        prepared: _Prepared,
+        span: tuple[float, float],
+        x0: Array,
+        rtol: float,
+        atol: float | Sequence[float] | None,
+        t_eval: OutputTimes,
+        max_steps: int,
+    ) -> Problem:
+        bound = prepared.bound
+        inside = tuple(time for time in prepared.breakpoints if span[0] < time < span[1])
+        jumps = bound.part.B1.nnz > 0
+
+        def jump(t: float, x: Array) -> Array:
+            return bound.jump(math.nextafter(t, -math.inf), t, x)
+
+        return Problem(
+            rhs=prepared.rhs,
+            jacobian=bound.jacobian,
+            x0=x0,
+            t0=span[0],
+            t_end=span[1],
+            names=self.states,
+            atol=rtol * prepared.atol if atol is None else np.broadcast_to(np.asarray(atol, float), x0.shape),
+            rtol=rtol,
+            breakpoints=inside,
+            jump=jump if jumps else None,
+            t_eval=_output_times(t_eval, *span),
+            linear=prepared.linear,
+            symbolic=prepared.symbolic,
+            max_steps=max_steps,
+        )
+
+    def _prepare(self, p: Array) -> _Prepared:
+        key = p.tobytes()
+        if self._prepared is None or self._prepared[0] != key:
+            bound = self.bind(p)
+            rhs = bound.rhs if self.scalar is None else self.scalar.bind(p)
+            program = self._program
+            made = _Prepared(
+                p=p,
+                bound=bound,
+                rhs=rhs,
+                breakpoints=self._breakpoints(p),
+                symbolic=None if program is None else program.bind(p),
+                linear=self._linear_inputs(bound, rhs),
+                atol=NOMINAL * self._nominal(bound),
+                engines={},
+            )
+            self._prepared = (key, made)
+        return self._prepared[1]
+
+    @cached_property
+    def _program(self) -> Any:
+        """The heyoka program, where there are rows and heyoka is installed."""
+        if self.rows is None or not choice.available("heyoka"):
+            return None
+        from shaftwork.codegen.heyoka import build
+        from shaftwork.components.laws import t as time
+
+        return build(self.rows.states, time, self.rows.parameters, self.rows.rates)
+
+    def _laws_of_time(self) -> list[tuple[int, Any]]:
+        branches = self.form.graph.branches
+        kinds = (Kind.LAW, Kind.THROUGH_SOURCE, Kind.ACROSS_SOURCE)
+        return [(b.index, b.template.law) for b in branches if b.template.kind in kinds]
+
+    def _breakpoints(self, p: Array) -> tuple[float, ...]:
+        graph, times = self.form.graph, set()
+        for index, law in self._laws_of_time():
+            places = graph.part_of(index).parameters
+            values = {s: float(p[places[s.name]]) for s in graph.branches[index].template.symbols}
+            times.update(breakpoints(law, values))
+        return tuple(sorted(times))
+
+    def _linear_inputs(self, bound: BoundArrays, rhs: Callable[[float, Array], Array]) -> LinearInputs | None:
+        """The linear form, where the network is linear and its inputs are at most linear in time between breakpoints."""
+        if not self.linear or any(pieces_degree(law) is None for _, law in self._laws_of_time()):
+            return None
+        rest = np.zeros(len(self.states))
+        return LinearInputs(bound.jacobian(0.0, rest).tocsr(), lambda t: rhs(t, rest))
+
+    def _nominal(self, bound: BoundArrays) -> Array:
+        """The size of each state at a speed of one: stores of torque by their impedance sqrt(stiffness * inertia)."""
+        coefficients, form = bound.part.coefficients, self.form
+        inertias = coefficients[list(form.across_states)]
+        typical = float(np.median(inertias)) if inertias.size else 1.0
+        torques = np.sqrt(coefficients[list(form.through_states)] * typical)
+        return np.concatenate([np.ones(len(inertias)), torques, np.ones(len(form.integrals))])
+
+    def _changes_structure(self, parameters: Mapping[str, float]) -> bool:
+        frozen = {symbol.name for expression in self.form.tree.frozen for symbol in expression.free_symbols}
+        zeros = frozenset(self.form.graph.zeros)
+        return any(name in zeros or name in frozen or value == 0 for name, value in parameters.items())
+
+    def _vector(self, parameters: Mapping[str, float]) -> Array:
+        checked = {name: self._checked(name, value) for name, value in parameters.items()}
+        return self.vector(checked)
+
+    def _checked(self, name: str, value: Any) -> float:
+        """A new parameter value in SI and within its bounds."""
+        owner, _, parameter = name.rpartition(".")
+        placed = next((item for item in self.netlist.placed if item.part.name == owner), None)
+        if placed is None or parameter not in placed.part.declared:
+            known = tuple(self.parameters) if placed is None else tuple(f"{owner}.{key}" for key in placed.part.declared)
+            raise ParameterError(f"There is no parameter '{name}'. There are: {', '.join(known) or 'none'}.")
+        number, objection = placed.part.declared[parameter].magnitude(value)
+        if objection is not None:
+            raise ParameterError(f"{type(placed.part).__name__} '{owner}': {parameter} = {value!r} {objection}.")
+        return float(number)
+
+    def _variant(self, parameters: Mapping[str, float]) -> Model:
+        """The model of the same network with other values where these change its structure."""
+        checked = {name: self._checked(name, value) for name, value in parameters.items()}
+        key = tuple(sorted(checked.items()))
+        if key not in self._variants:
+            self._variants[key] = self._rebuild(_replaced(self.netlist, checked))
+        return self._variants[key]
+
+
+def _replaced(netlist: Netlist, values: Mapping[str, float]) -> Netlist:
+    """The netlist with parameters "part.name" replaced."""
+    by_part: dict[str, dict[str, float]] = {}
+    for name, value in values.items():
+        owner, _, parameter = name.rpartition(".")
+        by_part.setdefault(owner, {})[parameter] = value
+    placed = tuple(
+        Placed(dataclasses.replace(item.part, **by_part[item.part.name]), item.nodes)
+        if item.part.name in by_part
+        else item
+        for item in netlist.placed
+    )
+    return Netlist(netlist.name, placed)
+
+
+def _span(t_start: float, t_end: float, rtol: float) -> tuple[float, float]:
+    start, end = float(t_start), float(t_end)
+    if not (math.isfinite(start) and math.isfinite(end) and end > start):
+        raise ParameterError(f"t_end = {t_end} must be a finite time after t_start = {t_start}.")
+    if not 0 < rtol < 1:
+        raise ParameterError(f"rtol = {rtol} must lie between 0 and 1; 1e-8 is a good choice.")
+    return start, end
+
+
+def _output_times(t_eval: OutputTimes, start: float, end: float) -> Array | None:
+    if isinstance(t_eval, str):
+        if t_eval != "steps":
+            raise ParameterError(f"t_eval = '{t_eval}' must be times, their number, or 'steps'.")
+        return None
+    if t_eval is None or isinstance(t_eval, (int, np.integer)):
+        count = OUTPUTS if t_eval is None else int(t_eval)
+        if count < 2:
+            raise ParameterError(f"t_eval = {count} output times are too few; give at least 2.")
+        return np.linspace(start, end, count)
+    times = np.asarray(t_eval, dtype=float)
+    good = times.ndim == 1 and times.size > 0 and bool(np.isfinite(times).all())
+    if not good or times[0] < start or times[-1] > end or (np.diff(times) <= 0).any():
+        raise ParameterError(f"t_eval must hold strictly increasing times between {start:g} and {end:g} s.")
+    return times

@@ -1,0 +1,111 @@
+"""The network with its verbs: check, equations, compile, simulate, save and load."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Self
+
+from shaftwork.core.errors import NetworkError, NetworkWarning, Problem, SignalError
+from shaftwork.equations.kirchhoff import kirchhoff
+from shaftwork.equations.records import Equations
+from shaftwork.network.builder import NetworkBuilder
+from shaftwork.network.graph import CircuitGraph
+from shaftwork.network.netlist import Netlist
+from shaftwork.network.storage import read_netlist, write_netlist
+from shaftwork.pipeline.model import Model
+from shaftwork.reduction.diagnosis import diagnose
+from shaftwork.reduction.form import StateForm, state_form
+from shaftwork.results.solution import Solution
+
+
+class Network(NetworkBuilder):
+    """A drive train: parts joined at nodes.
+
+    >>> import shaftwork as sw
+    >>> net = sw.Network("two masses")
+    >>> _ = net.add(sw.TorqueSource("motor", tau=10.0), "rotor")
+    >>> _ = net.add(sw.Inertia("J1", J=2.0), "rotor")
+    >>> _ = net.add(sw.Spring("shaft", c=1e4, d=1.0), "rotor", "wheel")
+    >>> _ = net.add(sw.Inertia("J2", J=3.0), "wheel")
+    >>> round(float(net.simulate(t_end=1.0)["J1.omega"][-1]), 2)
+    2.0
+    """
+
+    def check(self) -> tuple[Problem, ...]:
+        """Everything that is wrong with the network or worth saying about it, in the order of the parts. Never raises."""
+        return diagnose(self.netlist())[2]
+
+    def equations(self) -> Equations:
+        """Kirchhoff's node and loop equations, laws, states and what was eliminated.
+
+        Raises:
+            NetworkError: the network cannot be assembled; lists every reason.
+        """
+        return kirchhoff(_sound(self.netlist()))
+
+    def compile(self, *, angles: Sequence[str] = ()) -> Model:
+        """The fast model.
+
+        Args:
+            angles: parts whose angle (position, flux linkage) is recorded, besides those that a law reads.
+
+        Raises:
+            NetworkError: the network cannot be assembled; lists every reason.
+        """
+        return _compiled(self.netlist(), tuple(angles))
+
+    def simulate(self, t_end: float, *, angles: Sequence[str] = (), **options: Any) -> Solution:
+        """Compile and integrate; the options are those of `Model.simulate`."""
+        return self.compile(angles=angles).simulate(t_end, **options)
+
+    def save(self, path: str | Path) -> None:
+        """Write the network to a text file from which `load` makes the same network.
+
+        Raises:
+            ModelFileError: a part or a law has no text form.
+        """
+        write_netlist(self.netlist(), path)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a network from a text file. Nothing in the file is executed.
+
+        Raises:
+            ModelFileError: the file cannot be read as a network; says where and why.
+        """
+        netlist = read_netlist(path)
+        made = cls(netlist.name)
+        for placed in netlist.placed:
+            made.add(placed.part, *placed.nodes)
+        return made
+
+
+def _sound(netlist: Netlist) -> StateForm:
+    """The state form of a network without errors; warnings are issued."""
+    _, form, problems = diagnose(netlist)
+    if errors := tuple(problem for problem in problems if problem.severity == "error"):
+        raise NetworkError(f"'{netlist.name}' cannot be assembled", errors)
+    for problem in problems:
+        if problem.severity == "warning":
+            warnings.warn(str(problem), NetworkWarning, stacklevel=4)
+    assert form is not None
+    return form
+
+
+def _compiled(netlist: Netlist, angles: tuple[str, ...]) -> Model:
+    form = _sound(netlist)
+    if angles:
+        form = state_form(form.graph, tuple(_branch_of(form.graph, name) for name in angles))
+    return Model(form, netlist, lambda changed: _compiled(changed, angles))
+
+
+def _branch_of(graph: CircuitGraph, name: str) -> int:
+    """The branch whose across variable is integrated for the angle of a part."""
+    part = next((part for part in graph.parts if part.name == name), None)
+    branches = () if part is None else tuple(k for k in part.branches if not graph.branches[k].terms)
+    if not branches:
+        known = ", ".join(part.name for part in graph.parts)
+        raise SignalError(f"There is no angle of '{name}'. The parts are: {known}.")
+    return branches[0]

@@ -1,0 +1,41 @@
+"""What a solution needs to know of its model: plain arrays by name, no symbols."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Observer(Protocol):
+    """Recovers quantities of parts and nodes from states."""
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Every quantity that can be read, "part.quantity" or "node.quantity", and its unit."""
+        ...
+
+    def signal(self, name: str, t: Array, x: Array) -> Array:
+        """(k,) a quantity at times t (k,) with states x (k, n)."""
+        ...
+
+    def powers(self, t: Array, x: Array) -> tuple[dict[str, Array], dict[str, Array], dict[str, Array]]:
+        """By part, at times t (k,) with states x (k, n): stored energy in J, lost power in W, supplied power in W."""
+        ...
+
+
+class Dense(Protocol):
+    """The states between the output times."""
+
+    @property
+    def steps(self) -> Array:
+        """(s,) ends of the integration steps; between two of them the states are smooth."""
+        ...
+
+    def __call__(self, times: Array) -> Array:
+        """(k, n) states at times (k,)."""
+        ...

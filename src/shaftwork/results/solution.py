@@ -1,0 +1,148 @@
+"""The result of a simulation: quantities by part, energy balance, statistics, export."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from shaftwork.core.errors import MissingExtraError, SignalError
+from shaftwork.results.energy import EnergyBalance, energy_balance
+from shaftwork.results.observer import Array, Dense, Observer
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A motion.
+
+    Args:
+        name: title of the network.
+        t: (k,) output times, s.
+        x: (k, n) states at these times.
+        states: n state names.
+        engine: the engine that solved it.
+        why: why this engine was taken.
+        statistics: counts of the solver: steps, right-hand sides, ...
+        dense: states (k, n) at any times (k,) within the run; knows the ends of the integration steps.
+        observer: recovers quantities from states.
+        events: (time, part, from, to) of every change of mode.
+    """
+
+    name: str
+    t: Array
+    x: Array
+    states: tuple[str, ...]
+    engine: str
+    why: str
+    statistics: Mapping[str, int]
+    dense: Dense
+    observer: Observer
+    events: tuple[tuple[float, str, str, str], ...] = ()
+
+    @property
+    def steps(self) -> Array:
+        """(s,) ends of the integration steps."""
+        return self.dense.steps
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Every quantity that can be read."""
+        return tuple(self.observer.units)
+
+    def __getitem__(self, name: str) -> Array:
+        """(k,) a quantity at the output times, such as "shaft.tau".
+
+        Raises:
+            SignalError: there is no such quantity; the message lists what the part has.
+        """
+        return self.observer.signal(self._known(name), self.t, self.x)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.observer.units
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.observer.units)
+
+    def at(self, t: Sequence[float] | Array) -> Solution:
+        """The same motion at other times, from the solver's dense output.
+
+        Raises:
+            SignalError: a time lies outside the run.
+        """
+        times = np.atleast_1d(np.asarray(t, dtype=float))
+        first, last = self.steps[0], self.steps[-1]
+        if not (np.isfinite(times).all() and first <= times.min() and times.max() <= last):
+            raise SignalError(f"The run goes from t = {first:g} s to {last:g} s; asked for {times.min()} to {times.max()}.")
+        fields = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        return Solution(**(fields | {"t": times, "x": self.dense(times)}))
+
+    @cached_property
+    def energy(self) -> EnergyBalance:
+        """The energy balance over the run."""
+        return energy_balance(self.observer, self.dense, self.steps)
+
+    @property
+    def energy_residual(self) -> float:
+        """What the energy balance leaves unexplained, as a fraction of the work done."""
+        return self.energy.residual
+
+    def to_pandas(self, *names: str) -> pandas.DataFrame:
+        """A table over time of the named quantities, by default of all (extra `data`)."""
+        frame = _require("pandas", "data", "Solution.to_pandas()")
+        columns = {name: self[name] for name in names or self.names}
+        return frame.DataFrame(columns, index=frame.Index(self.t, name="t"))  # type: ignore[no-any-return]
+
+    def to_xarray(self, *names: str) -> xarray.Dataset:
+        """A data set over time of the named quantities, by default of all, with units (extra `data`)."""
+        library = _require("xarray", "data", "Solution.to_xarray()")
+        units = self.observer.units
+        data = {name: ("t", self[name], {"units": units[name]}) for name in names or self.names}
+        time = ("t", self.t, {"units": "s"})
+        return library.Dataset(  # type: ignore[no-any-return]
+            data, coords={"t": time}, attrs={"title": self.name, "engine": self.engine, "why": self.why}
+        )
+
+    def plot(self, *names: str) -> Figure:
+        """Curves over time, one axis for each unit (extra `plot`)."""
+        from shaftwork.results.plotting import plot_signals
+
+        return plot_signals(self, tuple(self._known(name) for name in names or self.states))
+
+    def _known(self, name: str) -> str:
+        units = self.observer.units
+        if name in units:
+            return name
+        owner, _, quantity = name.rpartition(".")
+        if own := [other for other in units if other.rpartition(".")[0] == owner]:
+            hint = f"'{owner}' has: {', '.join(own)}."
+            if quantity in ("phi", "s", "psi"):
+                hint += f" An angle is recorded when asked for: simulate(angles=['{owner}'])."
+        else:
+            owners = tuple(dict.fromkeys(other.rpartition(".")[0] for other in units))
+            close = get_close_matches(owner, owners, n=3) or owners[:12]
+            hint = f"There is no part or node '{owner}'. Close to it: {', '.join(close)}."
+        raise SignalError(f"No quantity '{name}' in '{self.name}'. {hint}")
+
+    def __repr__(self) -> str:
+        return (
+            f"<Solution of '{self.name}': {len(self.t)} times from {self.t[0]:g} to {self.t[-1]:g} s, "
+            f"{len(self.states)} states, engine {self.engine}>"
+        )
+
+
+def _require(library: str, extra: str, purpose: str) -> Any:
+    from importlib import import_module
+
+    try:
+        return import_module(library)
+    except ImportError:
+        raise MissingExtraError(library, extra, purpose) from None
