@@ -7,6 +7,7 @@ import math
 import pickle
 import subprocess
 import sys
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -46,7 +47,7 @@ def test_one_number_and_an_array_give_the_same_value(x: list[float], data: st.Da
     # numpy's compiled formula may fuse a multiplication and an addition: a few roundings of the largest value
     y = data.draw(st.lists(FLOATS, min_size=len(x), max_size=len(x)))
     value = sympy.lambdify(t, Table(x, y)(t))
-    places = np.array([*x, *(0.5 * (a + b) for a, b in zip(x, x[1:], strict=False)), x[0] - 1, x[-1] + 1])
+    places = np.array([*x, *(0.5 * (a + b) for a, b in pairwise(x)), x[0] - 1, x[-1] + 1])
     np.testing.assert_allclose(value(places), [value(float(p)) for p in places], rtol=1e-12, atol=1e-9)
 
 
@@ -241,7 +242,7 @@ def test_a_law_of_degree_one_is_a_line_on_each_piece(law: sympy.Expr) -> None:
     # second difference zero to rounding: 1e-12 of values of order 10
     value = sympy.lambdify(t, law)
     ends = (-3.0, *breakpoints(law), 9.0)
-    for left, right in zip(ends, ends[1:], strict=False):
+    for left, right in pairwise(ends):
         a, b, c = (float(value(left + share * (right - left))) for share in (0.25, 0.5, 0.75))
         assert a - 2 * b + c == pytest.approx(0, abs=1e-11)
 

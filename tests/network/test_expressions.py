@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import builtins
+import json
 import os
 import re
-import resource
+import subprocess
+import sys
 from itertools import product
 
 import pytest
 import sympy
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import HealthCheck, assume, given, reject, settings
 from hypothesis import strategies as st
 
 from shaftwork.components.laws import SYMBOLS, Ramp, Step, Table, omega, phi, t, v
@@ -57,7 +59,7 @@ def test_every_expression_in_the_grammar_reads_back_as_itself(data: st.DataObjec
     try:
         expression = data.draw(EXPRESSIONS)
     except TypeError:  # sympy refuses to compare imaginary numbers
-        assume(False)
+        reject()
     assume(grammar.fault_of(expression) is None and not expression.has(sympy.I))
     assume(expression.is_extended_real is not False or expression.free_symbols)
     try:
@@ -68,6 +70,24 @@ def test_every_expression_in_the_grammar_reads_back_as_itself(data: st.DataObjec
         raise
     assert parse(text) == expression
     assert write(parse(text)) == text
+
+
+def _texts(inner: st.SearchStrategy[str]) -> st.SearchStrategy[str]:
+    call = st.builds("{}({})".format, st.sampled_from(["sin", "sqrt", "Abs", "log", "Heaviside", "sign"]), inner)
+    pair = st.builds("({} {} {})".format, inner, st.sampled_from(["+", "-", "*", "/", "**"]), inner)
+    case = st.builds("Piecewise(({}, t < {}), ({}, True))".format, inner, st.sampled_from(["1", "omega"]), inner)
+    extreme = st.builds("{}({}, {})".format, st.sampled_from(["Max", "Min", "atan2"]), inner, inner)
+    return st.one_of(call, pair, case, extreme)
+
+
+@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.filter_too_much])
+@given(st.recursive(st.sampled_from(["t", "-omega", "2", "1/3", "0.1", "pi", "1e-3"]), _texts, max_leaves=8))
+def test_what_was_read_can_be_written(text: str) -> None:
+    try:
+        expression = parse(text)
+    except ModelFileError:
+        reject()
+    assert parse(write(expression)) == expression
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False))
@@ -194,7 +214,7 @@ def test_no_code_runs_from_a_text(text: str, monkeypatch: pytest.MonkeyPatch) ->
         ("Table([0, 1])", 1, "wrong table"),
         ("Table(t, t)", 7, "needs a list"),
         ("(" * 31 + "t" + ")" * 31, 31, "deeper than 30"),
-        ("**".join("t" * 40), 93, "deeper than 30"),
+        ("**".join("t" * 40), 92, "deeper than 30"),
         ("+".join("t" * 600), 1001, "more than 1000"),
         ("Max(" + ", ".join(["t", "v"] * 9) + ")", 1, "It takes 1 to 16"),
         ("Max(t, v) + " * 8 + "Max(t, v)", 97, "more than 16"),
@@ -211,20 +231,44 @@ def test_a_wrong_text_ends_in_an_error_that_points_at_it(text: str, place: int |
     assert line[caret.index("^") :].strip() == text[place - 1 :][:30].strip()
 
 
+SLOW = {
+    "a sum of powers": "+".join(f"t**{i}" for i in range(2, 200)),
+    "a wide maximum": f"Max({', '.join(f't*{i} + omega**{i}' for i in range(1, 17))})",
+    "a deep maximum": "Max(" * 8 + "t" + "".join(f", omega**{i} - t)" for i in range(8)),
+    "a deep sine": "sin(" * 29 + "t" + ")" * 29,
+    "a tower of powers": "**".join(["t", "omega", "v"] * 9),
+    "a deep absolute value": "Abs(" * 28 + "t" + "".join(f"*omega - {i})" for i in range(28)),
+    "many conditions": f"Piecewise((t, {' or '.join(f't*{i} < omega' for i in range(1, 140))}), (1, True))",
+    "many cases": f"Piecewise({', '.join(f'({i}, t + omega < {i})' for i in range(90))})",
+    "a product of sums": "*".join(f"(t + {i})" for i in range(1, 150)),
+    "a product of roots": "*".join(f"sqrt({10**39 + i})" for i in range(1, 150)),
+    "a sum of fractions": "+".join(f"t/{10**12 + i}" for i in range(1, 150)),
+}
+
+
+TIMED = """
+import json, sys, time
+from shaftwork.core.errors import ModelFileError
+from shaftwork.network.expressions import parse
+for kind, text in json.load(sys.stdin).items():
+    before = time.process_time()
+    try:
+        parse(text)
+        end = "read"
+    except ModelFileError:
+        end = "refused"
+    print(json.dumps([kind, end, time.process_time() - before]))
+"""
+
+
 def test_no_text_within_the_limits_takes_long() -> None:
-    # 2 s of CPU is the promise for one hostile file; these are the slowest shapes that the limits let pass
-    powers = [f"t*{i} + omega**{i}" for i in range(1, 17)]
-    nested = "t"
-    for _ in range(8):
-        nested = f"Max({nested}, omega*{nested})" if len(nested) < 60 else f"Max({nested}, omega)"
-    texts = ["+".join(f"t**{i}" for i in range(2, 300)), f"Max({', '.join(powers)})", "sin(" * 29 + "t" + ")" * 29]
-    for text in [*texts, nested]:
-        used = resource.getrusage(resource.RUSAGE_SELF).ru_utime
-        try:
-            parse(text)
-        except ModelFileError:
-            pass
-        assert resource.getrusage(resource.RUSAGE_SELF).ru_utime - used < 2
+    # in a process of its own, where no coverage is measured; the CPU time is promised to users
+    done = subprocess.run(
+        [sys.executable, "-c", TIMED], input=json.dumps(SLOW), capture_output=True, text=True, check=True
+    )
+    rows = [json.loads(line) for line in done.stdout.splitlines()]
+    assert [kind for kind, _, _ in rows] == list(SLOW)
+    assert [(kind, seconds) for kind, _, seconds in rows if seconds > 2] == []
 
 
 @pytest.mark.parametrize(

@@ -69,14 +69,21 @@ class BoundArrays:
         slope = slope + sparse.csr_array((integral, (by_integral, states)), shape=size)
         return sparse.csc_array(part.A + part.B @ slope)
 
-    def jump(self, before: float, after: float, x: Array) -> Array:
-        """The states after a jump of the inputs between two times (impulses through rigid joints)."""
+    def impulse(self, t: float, x: Array, before: float | None = None) -> Array:
+        """The states after the inputs have jumped (impulses through rigid joints).
+
+        Args:
+            t: time after the jump.
+            x: (n,) states before it.
+            before: time before it; without it all inputs were zero.
+        """
         if not self._has_slopes:
             return x
-        inputs = self.program.inputs
-        zero = np.zeros(inputs.outputs)
-        step = inputs.values(after, zero, x, self.p) - inputs.values(before, zero, x, self.p)
-        return x + self.part.B1 @ (step * inputs.of_time)
+        inputs, zero = self.program.inputs, np.zeros(self.program.inputs.outputs)
+        step = inputs.values(t, zero, x, self.p)
+        if before is not None:
+            step = step - inputs.values(before, zero, x, self.p)
+        return np.asarray(x + self.part.B1 @ (step * inputs.of_time))
 
 
 def _column(mask: Any, like: Array) -> Any:

@@ -121,7 +121,7 @@ def _crossing(sign: Any, switch: Any, index: int) -> Any:
     """The event that a switch leaves the side that its sign, par[index], says."""
     import heyoka
 
-    def turn(integrator: Any, direction: int) -> bool:
+    def turn(integrator: Any, _direction: int) -> bool:
         integrator.pars[index] = -integrator.pars[index]
         return True
 

@@ -10,14 +10,16 @@ from typing import Any
 import heyoka
 import sympy
 from sympy.functions.elementary.piecewise import ExprCondPair
-from sympy.logic.boolalg import And, BooleanFalse, BooleanTrue, ITE, Not, Or, Xor
+from sympy.logic.boolalg import ITE, And, BooleanFalse, BooleanTrue, Not, Or, Xor
 
 from shaftwork.core.errors import CompileError
 
 SAME_NAME: dict[Any, Callable[..., Any]] = {
     getattr(sympy, name): getattr(heyoka, name)
-    for name in ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh")
-    + ("atanh", "exp", "log", "erf", "erfc")
+    for name in (
+        *("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh"),
+        *("exp", "log", "erf", "erfc"),
+    )
 }
 RECIPROCALS: dict[Any, Callable[[Any], Any]] = {
     sympy.sec: heyoka.cos,
@@ -46,9 +48,7 @@ class Translator:
         parameters: parameter symbols; they become heyoka.par[0], heyoka.par[1], ...
     """
 
-    def __init__(
-        self, states: Sequence[sympy.Symbol], time: sympy.Symbol, parameters: Sequence[sympy.Symbol]
-    ) -> None:
+    def __init__(self, states: Sequence[sympy.Symbol], time: sympy.Symbol, parameters: Sequence[sympy.Symbol]) -> None:
         self.variables = tuple(heyoka.expression(f"x{index}") for index in range(len(states)))
         self.switches: list[Any] = []
         self.conditions: list[str] = []
@@ -72,11 +72,11 @@ class Translator:
     def _translate(self, node: sympy.Basic) -> Any:
         kind = node.func
         if kind in SAME_NAME:
-            return SAME_NAME[kind](*self._arguments(node))
+            return SAME_NAME[kind](*self.arguments(node))
         if kind in RECIPROCALS:
-            return 1.0 / RECIPROCALS[kind](*self._arguments(node))
+            return 1.0 / RECIPROCALS[kind](*self.arguments(node))
         if kind in COMPARISONS:
-            return COMPARISONS[kind](self._sign(node.args[0] - node.args[1]), heyoka.expression(0.0))  # type: ignore[operator]
+            return COMPARISONS[kind](self.sign(node.args[0] - node.args[1]), heyoka.expression(0.0))
         if kind in SHAPES:
             return SHAPES[kind](self, node)
         if isinstance(node, sympy.Number | sympy.NumberSymbol) and math.isfinite(float(node)):
@@ -86,13 +86,14 @@ class Translator:
         if isinstance(node, sympy.Symbol):
             raise CompileError(f"The symbol {node} is neither a state nor a parameter of this model.")
         raise CompileError(
-            f"The heyoka engine has no counterpart of {kind.__name__} in {node}. Use engine='scipy' or engine='sundials'."
+            f"The heyoka engine has no counterpart of {kind.__name__} in {node}. "
+            "Use engine='scipy' or engine='sundials'."
         )
 
-    def _arguments(self, node: sympy.Basic) -> list[Any]:
+    def arguments(self, node: sympy.Basic) -> list[Any]:
         return [self.expression(argument) for argument in node.args]
 
-    def _product(self, node: sympy.Mul) -> Any:
+    def product(self, node: sympy.Mul) -> Any:
         above: list[Any] = []
         below: list[Any] = []
         for factor in node.args:
@@ -101,7 +102,7 @@ class Translator:
         upper = heyoka.prod(above) if above else heyoka.expression(1.0)
         return upper / heyoka.prod(below) if below else upper
 
-    def _power(self, node: sympy.Pow) -> Any:
+    def power(self, node: sympy.Pow) -> Any:
         base, exponent = self.expression(node.base), node.exp
         if exponent == sympy.S.Half:
             return heyoka.sqrt(base)
@@ -109,10 +110,10 @@ class Translator:
             return 1.0 / self.expression(node.base**-exponent)
         return base ** self.expression(exponent)
 
-    def _sign(self, switch: sympy.Expr) -> Any:
+    def sign(self, switch: sympy.Expr) -> Any:
         """The sign of an expression: -1, 0 or 1; a parameter that an event changes where the sign may change."""
         if switch.could_extract_minus_sign():
-            return -self._sign(-switch)
+            return -self.sign(-switch)
         if switch not in self._signs:
             value = self.expression(switch)
             zero, one = heyoka.expression(0.0), heyoka.expression(1.0)
@@ -125,24 +126,24 @@ class Translator:
             self._signs[switch] = sign
         return self._signs[switch]
 
-    def _heaviside(self, node: sympy.Heaviside) -> Any:
-        sign = self._sign(node.args[0])
+    def heaviside(self, node: sympy.Heaviside) -> Any:
+        sign = self.sign(node.args[0])
         at_zero = self.expression(node.args[1])
         return heyoka.select(sign, 0.5 + 0.5 * sign, at_zero)
 
-    def _extreme(self, node: sympy.Max | sympy.Min) -> Any:
+    def extreme(self, node: sympy.Max | sympy.Min) -> Any:
         zero = heyoka.expression(0.0)
         better = heyoka.gt if isinstance(node, sympy.Max) else heyoka.lt
         best, *others = sorted(node.args, key=sympy.default_sort_key)
         result = self.expression(best)
         for other in others:
             # The best so far is itself an extreme: the switch compares with it as a whole.
-            wins = better(self._sign(other - best), zero)
+            wins = better(self.sign(other - best), zero)
             result = heyoka.select(wins, self.expression(other), result)
             best = node.func(best, other)
         return result
 
-    def _piecewise(self, node: sympy.Piecewise) -> Any:
+    def piecewise(self, node: sympy.Piecewise) -> Any:
         pairs: list[ExprCondPair] = list(node.args)
         result = self.expression(pairs[-1].expr)
         if pairs[-1].cond != sympy.true:
@@ -151,10 +152,10 @@ class Translator:
             result = heyoka.select(self.expression(pair.cond), self.expression(pair.expr), result)
         return result
 
-    def _choice(self, node: ITE) -> Any:
-        return heyoka.select(*self._arguments(node))
+    def choice(self, node: ITE) -> Any:
+        return heyoka.select(*self.arguments(node))
 
-    def _negation(self, node: Not) -> Any:
+    def negation(self, node: Not) -> Any:
         return heyoka.eq(self.expression(node.args[0]), heyoka.expression(0.0))
 
     def _table(self, node: Any) -> Any:
@@ -171,27 +172,27 @@ class Translator:
             if first == last:
                 return segments[first]
             middle = (first + last) // 2
-            beyond = heyoka.gte(self._sign(argument - xs[middle]), zero)
+            beyond = heyoka.gte(self.sign(argument - xs[middle]), zero)
             return heyoka.select(beyond, choose(middle + 1, last), choose(first, middle))
 
         return choose(0, len(xs))
 
 
 SHAPES: dict[Any, Callable[[Translator, Any], Any]] = {
-    sympy.Add: lambda translator, node: heyoka.sum(translator._arguments(node)),
-    sympy.Mul: Translator._product,
-    sympy.Pow: Translator._power,
-    sympy.sign: lambda translator, node: translator._sign(node.args[0]),
-    sympy.Abs: lambda translator, node: translator._sign(node.args[0]) * translator.expression(node.args[0]),
-    sympy.Heaviside: Translator._heaviside,
-    sympy.Max: Translator._extreme,
-    sympy.Min: Translator._extreme,
-    sympy.Piecewise: Translator._piecewise,
-    ITE: Translator._choice,
-    Not: Translator._negation,
-    And: lambda translator, node: heyoka.logical_and(translator._arguments(node)),
-    Or: lambda translator, node: heyoka.logical_or(translator._arguments(node)),
-    Xor: lambda translator, node: reduce(heyoka.neq, translator._arguments(node)),
-    BooleanTrue: lambda translator, node: heyoka.expression(1.0),
-    BooleanFalse: lambda translator, node: heyoka.expression(0.0),
+    sympy.Add: lambda translator, node: heyoka.sum(translator.arguments(node)),
+    sympy.Mul: Translator.product,
+    sympy.Pow: Translator.power,
+    sympy.sign: lambda translator, node: translator.sign(node.args[0]),
+    sympy.Abs: lambda translator, node: translator.sign(node.args[0]) * translator.expression(node.args[0]),
+    sympy.Heaviside: Translator.heaviside,
+    sympy.Max: Translator.extreme,
+    sympy.Min: Translator.extreme,
+    sympy.Piecewise: Translator.piecewise,
+    ITE: Translator.choice,
+    Not: Translator.negation,
+    And: lambda translator, node: heyoka.logical_and(translator.arguments(node)),
+    Or: lambda translator, node: heyoka.logical_or(translator.arguments(node)),
+    Xor: lambda translator, node: reduce(heyoka.neq, translator.arguments(node)),
+    BooleanTrue: lambda *_: heyoka.expression(1.0),
+    BooleanFalse: lambda *_: heyoka.expression(0.0),
 }

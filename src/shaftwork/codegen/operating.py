@@ -20,8 +20,9 @@ CONSISTENT = 1e-9
 def initial_state(bound: BoundArrays, given: Mapping[str, float], t0: float) -> Array:
     """The states at the start: at rest and untwisted except for what is given.
 
-    A value may be given for any speed or twist, also of a part whose store is dependent. What it leaves open is filled with
-    the smallest possible motion.
+    Rest is that before the sources come on: where a prescribed speed is there from the start, its impulse has been given to
+    the inertias joined to it rigidly. A value may be given for any speed or twist, also of a part whose store is dependent;
+    what it leaves open is filled with the smallest possible motion.
 
     Args:
         bound: the array program.
@@ -34,7 +35,7 @@ def initial_state(bound: BoundArrays, given: Mapping[str, float], t0: float) -> 
     """
     names = [state.name for state in bound.program.form.states]
     place = {name: k for k, name in enumerate(names)}
-    x = np.zeros(len(names))
+    x = bound.impulse(t0, np.zeros(len(names)))
     for name, value in given.items():
         if not np.isfinite(value):
             raise ParameterError(f"The start value of '{name}' is {value}; it must be a finite number.")

@@ -1,0 +1,1 @@
+"""Engines behind one protocol: arrays and functions in, trajectories out."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.modal import find_modes
 from shaftwork.integrate.pieces import Piece, both_sides, failure, pieces, start_of_piece
 from shaftwork.integrate.problem import Array, LinearInputs, Problem, Trajectory
+from shaftwork.integrate.stiffness import balance, norm, scale_by
 
 # Intervals of the engine's own output grid, which no accuracy depends on.
 OWN_INTERVALS = 500
@@ -29,8 +31,8 @@ STRAIGHT = 1e-7
 def solve(problem: Problem) -> Trajectory:
     """Propagate x' = A x + u(t), u a straight line in each piece, from output to output without a step error.
 
-    Law: a dense A with well-conditioned modes is solved mode by mode. Otherwise, with z = (x, s, 1) and z' = M z, where M holds A and the two coefficients of u, z(t + h) = exp(M h) z(t). A may be
-    singular, defective or stiff.
+    Law: a small A with well-conditioned modes is solved mode by mode. Otherwise, with z = (x, s, 1) and z' = M z, where
+    M holds A and the two coefficients of u, z(t + h) = exp(M h) z(t). A may be singular, defective or stiff.
 
     Raises:
         SimulationError: the system is not linear, its forcing is not a straight line, or the motion is unbounded.
@@ -40,7 +42,7 @@ def solve(problem: Problem) -> Trajectory:
     """
     if problem.linear is None:
         raise SimulationError("The exact engine needs a linear system, and this one is not. Use engine='auto'.")
-    system = _System(problem.linear, prefers_dense(problem))
+    system = _System(problem.linear, dense_form=prefers_dense(problem, problem.linear))
     x = np.asarray(problem.x0, dtype=float)
     spans: list[_Span] = []
     for piece in pieces(problem):
@@ -60,14 +62,14 @@ def solve(problem: Problem) -> Trajectory:
     return Trajectory(t, states, dense, {"steps": dense.steps.size - 1})
 
 
-def prefers_dense(problem: Problem) -> bool:
+def prefers_dense(problem: Problem, linear: LinearInputs) -> bool:
     """Whether a dense exponential of A costs less than products of the sparse A with vectors."""
-    return _dense_cost(problem) <= _sparse_cost(problem)
+    return _dense_cost(problem) <= _sparse_cost(problem, linear)
 
 
-def cost(problem: Problem) -> float:
+def cost(problem: Problem, linear: LinearInputs) -> float:
     """About how many seconds the exact engine takes for a linear problem."""
-    return min(_dense_cost(problem), _sparse_cost(problem))
+    return min(_dense_cost(problem), _sparse_cost(problem, linear))
 
 
 def _dense_cost(problem: Problem) -> float:
@@ -75,11 +77,10 @@ def _dense_cost(problem: Problem) -> float:
     return float(n) ** 3 * 30 * (1 + len(problem.breakpoints)) / DENSE_RATE + intervals * n**2 / DENSE_RATE
 
 
-def _sparse_cost(problem: Problem) -> float:
-    assert problem.linear is not None
-    matrix = sparse.csr_array(problem.linear.A)
+def _sparse_cost(problem: Problem, linear: LinearInputs) -> float:
+    matrix = sparse.csr_array(linear.A)
     scale = balance(matrix)
-    reach = _norm(_scaled(matrix, scale)) * (problem.t_end - problem.t0)
+    reach = norm(scale_by(matrix, scale)) * (problem.t_end - problem.t0)
     products = TAYLOR_PRODUCTS * reach + 20 * _size(problem)[1]
     return float(products * (SPARSE_CALL + matrix.nnz / SPARSE_RATE))
 
@@ -88,39 +89,15 @@ def _size(problem: Problem) -> tuple[int, int]:
     return problem.x0.size + 2, OWN_INTERVALS if problem.t_eval is None else problem.t_eval.size
 
 
-def balance(matrix: Any, sweeps: int = 8) -> Array:
-    """Diagonal d (n,) for which d^-1 A d has rows and columns of about equal size; speeds and torques differ by 10^6.
-
-    Source: Osborne, On pre-conditioning of matrices, 1960. Powers of two, so the scaling itself does not round.
-    """
-    size = abs(sparse.csr_array(matrix))
-    scale = np.ones(matrix.shape[0])
-    for _ in range(sweeps):
-        rows = (size @ scale) / scale
-        columns = (size.T @ (1 / scale)) * scale
-        both = (rows > 0) & (columns > 0)
-        # Half of the full correction: all entries move at once, and the full one would overshoot.
-        scale[both] *= (rows[both] / columns[both]) ** 0.25
-    return np.asarray(2.0 ** np.round(np.log2(scale)))
-
-
-def _scaled(matrix: Any, scale: Array) -> Any:
-    return sparse.diags_array(1 / scale) @ matrix @ sparse.diags_array(scale)
-
-
-def _norm(matrix: Any) -> float:
-    return float(abs(matrix).sum(axis=0).max()) if matrix.shape[0] else 0.0
-
-
 class _System:
     """The matrix of a problem in scaled coordinates x / scale, and its modes where they are of use."""
 
-    def __init__(self, linear: LinearInputs, dense_form: bool) -> None:
+    def __init__(self, linear: LinearInputs, *, dense_form: bool) -> None:
         matrix = sparse.csr_array(linear.A)
         self.forcing = linear.forcing
         self.dense_form = dense_form
         self.scale = balance(matrix)
-        self.matrix = _scaled(matrix, self.scale)
+        self.matrix = scale_by(matrix, self.scale)
         self.modes = find_modes(self.matrix.toarray()) if dense_form else None
 
 
@@ -238,30 +215,26 @@ def _equal_steps(times: Array) -> list[tuple[int, int]]:
     steps = np.diff(times)
     changes = np.flatnonzero(np.abs(np.diff(steps)) > 4 * np.spacing(np.abs(times).max())) + 1
     edges = [0, *changes.tolist(), steps.size]
-    return [(first, last - first) for first, last in zip(edges[:-1], edges[1:], strict=True)]
+    return [(first, last - first) for first, last in pairwise(edges)]
 
 
 def _propagator(system: _System, level: Array, slope: Array) -> _Propagator:
     scale, matrix = system.scale, system.matrix
     # A common factor of all states brings the forcing to the size of the matrix.
     largest = max(np.abs(level / scale).max(initial=0.0), np.abs(slope / scale).max(initial=0.0))
-    norm = _norm(matrix)
-    if largest > 0 and norm > 0:
-        scale = scale * 2.0 ** np.ceil(np.log2(largest / norm))
+    size = norm(matrix)
+    if largest > 0 and size > 0:
+        scale = scale * 2.0 ** np.ceil(np.log2(largest / size))
     forcing = np.column_stack([slope / scale, level / scale])
     clock = sparse.csr_array(np.array([[0.0, 1.0], [0.0, 0.0]]))
     augmented = sparse.block_array([[matrix, sparse.csr_array(forcing)], [None, clock]], format="csr")
     return _Propagator(augmented.toarray() if system.dense_form else augmented, scale, system.dense_form)
 
 
-def _straight_line(
-    problem: Problem, forcing: Callable[[float], Array], piece: Piece
-) -> tuple[Array, Array]:
+def _straight_line(problem: Problem, forcing: Callable[[float], Array], piece: Piece) -> tuple[Array, Array]:
     """Level at the start of a piece and slope of u, from values strictly inside the piece."""
     length = piece.end - piece.start
-    early, middle, late = (
-        np.asarray(forcing(piece.start + part * length), dtype=float) for part in (0.25, 0.5, 0.75)
-    )
+    early, middle, late = (np.asarray(forcing(piece.start + part * length), dtype=float) for part in (0.25, 0.5, 0.75))
     bend = np.abs(middle - (early + late) / 2)
     if (bend > STRAIGHT * (np.abs(early) + np.abs(late)).max(initial=0.0)).any():
         name = problem.names[int(np.argmax(bend))]

@@ -126,7 +126,7 @@ class _GridRecorder:
         kept = found[: len(self._rows) - self._filled]
         self._rows[self._filled : self._filled + len(kept)] = kept
         self._filled += len(found)
-        return _outcome(outcome, watch, self._filled == self._grid.size), steps
+        return _outcome(outcome, watch, arrived=self._filled == self._grid.size), steps
 
 
 class _SegmentRecorder:
@@ -142,11 +142,11 @@ class _SegmentRecorder:
         )
         if segment is not None:
             self.segments.append(segment)
-        return _outcome(outcome, watch, integrator.time == self._end), steps
+        return _outcome(outcome, watch, arrived=integrator.time == self._end), steps
 
 
-def _outcome(outcome: Any, watch: Watch | None, arrived: bool) -> str:
-    """Name of heyoka's outcome; a watch that stops the last step of all has not stopped the run unless it has a reason."""
+def _outcome(outcome: Any, watch: Watch | None, *, arrived: bool) -> str:
+    """Name of heyoka's outcome; a watch that stops the very last step has stopped the run only if it has a reason."""
     failed = watch is not None and watch.reason is not None
     return "time_limit" if arrived and not failed else str(outcome.name)
 

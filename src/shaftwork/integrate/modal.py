@@ -65,4 +65,4 @@ def _integrals(z: Complex) -> tuple[Complex, Complex]:
         series = 1.0 + series * near / term
     twice[small] = series / 2.0
     once[small] = 1.0 + near * twice[small]
-    return once, twice
+    return once.astype(complex), twice.astype(complex)

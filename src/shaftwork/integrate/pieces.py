@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from shaftwork.core.errors import SimulationError
-from shaftwork.integrate.problem import Array, Problem
+from shaftwork.integrate.problem import Array, DaeProblem, Problem
 
 
 @dataclass(frozen=True)
@@ -29,13 +31,49 @@ class Piece:
         return min(max(time, float(np.nextafter(self.start, self.end))), float(np.nextafter(self.end, self.start)))
 
 
-def pieces(problem: Problem) -> tuple[Piece, ...]:
+class GuardedFunctions:
+    """Right-hand side and Jacobian of one piece: never evaluated outside it; remembers where one was not finite."""
+
+    def __init__(self, problem: Problem, piece: Piece) -> None:
+        self._problem = problem
+        self._jacobian: Callable[[float, Array], Any] = problem.jacobian or _no_jacobian
+        self._low = piece.inside(piece.start)
+        self._high = piece.inside(piece.end)
+        self.not_finite: tuple[float, Array] | None = None
+
+    def rhs(self, t: float, x: Array) -> Array:
+        derivative = self._problem.rhs(min(max(t, self._low), self._high), x)
+        # The sum is a cheap test that cannot miss a NaN or an infinity. A trial stage that is too bold may meet one
+        # and recover with a smaller step, so it is only remembered here.
+        if not np.isfinite(derivative.sum()):
+            self.not_finite = (t, derivative)
+        return derivative
+
+    def jacobian(self, t: float, x: Array) -> Any:
+        return self._jacobian(min(max(t, self._low), self._high), x)
+
+    def dense_jacobian(self, t: float, x: Array) -> Any:
+        return self.jacobian(t, x).toarray()
+
+    def reason(self, reason: str) -> str:
+        """The solver's reason, with the first equation that was not finite when there was one."""
+        if self.not_finite is None:
+            return reason
+        t, derivative = self.not_finite
+        bad = np.flatnonzero(~np.isfinite(derivative))
+        if bad.size == 0:
+            return reason
+        name = self._problem.names[int(bad[0])]
+        return f"{reason.rstrip('.')}; the derivative of {name!r} was {derivative[bad[0]]} at t = {t:.9g} s"
+
+
+def pieces(problem: Problem | DaeProblem) -> tuple[Piece, ...]:
     """The pieces between the start, the breakpoints and the end of a problem, in order."""
     ends = (problem.t0, *problem.breakpoints, problem.t_end)
-    return tuple(Piece(start, end) for start, end in zip(ends[:-1], ends[1:], strict=True))
+    return tuple(Piece(start, end) for start, end in pairwise(ends))
 
 
-def start_of_piece(problem: Problem, piece: Piece, x: Array) -> Array:
+def start_of_piece(problem: Problem | DaeProblem, piece: Piece, x: Array) -> Array:
     """State (n,) with which a piece starts, from the state at the end of the piece before (or the start state)."""
     if problem.jump is None or piece.start == problem.t0:
         return x
@@ -68,7 +106,11 @@ class PiecewiseDense:
         return states
 
 
-def both_sides(problem: Problem, times: Sequence[Array], states: Sequence[Array]) -> tuple[Array, Array]:
+def _no_jacobian(t: float, x: Array) -> Any:
+    raise NotImplementedError(f"a problem without Jacobian was asked for it at t = {t}, with {x.size} states")
+
+
+def both_sides(problem: Problem | DaeProblem, times: Sequence[Array], states: Sequence[Array]) -> tuple[Array, Array]:
     """Join the step ends of all pieces: (k,) times and (k, n) states.
 
     Where the state is continuous a breakpoint is listed once, where it may jump twice: before and after.
@@ -79,7 +121,7 @@ def both_sides(problem: Problem, times: Sequence[Array], states: Sequence[Array]
     return t, x
 
 
-def failure(problem: Problem, engine: str, t: float, x: Array, reason: str) -> SimulationError:
+def failure(problem: Problem | DaeProblem, engine: str, t: float, x: Array, reason: str) -> SimulationError:
     """The error of a failed run: when, in which state, why, and what to try.
 
     Args:
@@ -103,7 +145,7 @@ def failure(problem: Problem, engine: str, t: float, x: Array, reason: str) -> S
     )
 
 
-def check_finite(problem: Problem, engine: str, t: float, x: Array) -> None:
+def check_finite(problem: Problem | DaeProblem, engine: str, t: float, x: Array) -> None:
     """Raise `SimulationError` when a state (n,) at time t in s is not finite."""
     if not np.isfinite(x).all():
         raise failure(problem, engine, t, x, "the state is not finite")

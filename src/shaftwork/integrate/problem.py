@@ -44,7 +44,7 @@ class Problem:
         t_eval: strictly increasing output times in [t0, t_end], or None for the engine's own steps. At a breakpoint the
             state after the jump is the output.
         linear: the same system in linear form when it is one, else None.
-        symbolic: the same system as a heyoka program bound to its parameters (`codegen.heyoka.BoundProgram`), else None.
+        symbolic: the same system as a heyoka program with its parameters (`codegen.heyoka.BoundProgram`), else None.
         max_steps: an engine gives up, with a reason, after this many steps.
     """
 
@@ -61,6 +61,33 @@ class Problem:
     t_eval: Array | None = None
     linear: LinearInputs | None = None
     symbolic: Any = None
+    max_steps: int = 10_000_000
+
+
+@dataclass(frozen=True)
+class DaeProblem:
+    """An implicit problem residual(t, x, dx/dt) = 0 of index 1 on [t0, t_end]; x holds states and algebraic unknowns.
+
+    Args:
+        residual: (time, x (n,), dx/dt (n,)) to a new (n,) array.
+        x0: (n,) start values; the algebraic ones are a first guess.
+        derivative0: (n,) first guess of dx/dt at the start.
+        algebraic: indices of the unknowns whose derivative does not appear.
+        t0, t_end, names, atol, rtol, breakpoints, jump, t_eval, max_steps: as in `Problem`.
+    """
+
+    residual: Callable[[float, Array, Array], Array]
+    x0: Array
+    derivative0: Array
+    algebraic: tuple[int, ...]
+    t0: float
+    t_end: float
+    names: tuple[str, ...]
+    atol: Array
+    rtol: float = 1e-8
+    breakpoints: tuple[float, ...] = ()
+    jump: Callable[[float, Array], Array] | None = None
+    t_eval: Array | None = None
     max_steps: int = 10_000_000
 
 

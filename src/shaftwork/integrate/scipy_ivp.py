@@ -11,7 +11,15 @@ import numpy as np
 from scipy.integrate import BDF, DOP853, LSODA, OdeSolution, Radau
 
 from shaftwork.core.errors import SimulationError
-from shaftwork.integrate.pieces import Piece, PiecewiseDense, both_sides, failure, pieces, start_of_piece
+from shaftwork.integrate.pieces import (
+    GuardedFunctions,
+    Piece,
+    PiecewiseDense,
+    both_sides,
+    failure,
+    pieces,
+    start_of_piece,
+)
 from shaftwork.integrate.problem import Array, Problem, Trajectory
 
 Method = Literal["DOP853", "Radau", "BDF", "LSODA"]
@@ -20,42 +28,6 @@ METHODS: dict[str, Any] = {"DOP853": DOP853, "Radau": Radau, "BDF": BDF, "LSODA"
 
 # Below this relative tolerance scipy's methods only warn and clip, so it is clipped here without the warning.
 TIGHTEST_RTOL = 100 * np.finfo(float).eps
-
-
-class _Guard:
-    """The right-hand side of one piece, which stays inside the piece and remembers where it was last not finite."""
-
-    def __init__(self, problem: Problem, piece: Piece) -> None:
-        self._problem = problem
-        self._low = piece.inside(piece.start)
-        self._high = piece.inside(piece.end)
-        self.not_finite: tuple[float, Array] | None = None
-
-    def rhs(self, t: float, x: Array) -> Array:
-        derivative = self._problem.rhs(min(max(t, self._low), self._high), x)
-        # The sum is a cheap test that cannot miss a NaN or an infinity. A trial stage that is too bold may meet one
-        # and recover with a smaller step, so it is only remembered here.
-        if not np.isfinite(derivative.sum()):
-            self.not_finite = (t, derivative)
-        return derivative
-
-    def jacobian(self, t: float, x: Array) -> Any:
-        assert self._problem.jacobian is not None
-        return self._problem.jacobian(min(max(t, self._low), self._high), x)
-
-    def dense_jacobian(self, t: float, x: Array) -> Any:
-        return self.jacobian(t, x).toarray()
-
-    def reason(self, reason: str) -> str:
-        """The solver's reason, with the first equation that was not finite when there was one."""
-        if self.not_finite is None:
-            return reason
-        t, derivative = self.not_finite
-        bad = np.flatnonzero(~np.isfinite(derivative))
-        if bad.size == 0:
-            return reason
-        name = self._problem.names[int(bad[0])]
-        return f"{reason.rstrip('.')}; the derivative of {name!r} was {derivative[bad[0]]} at t = {t:.9g} s"
 
 
 @dataclass(frozen=True)
@@ -102,8 +74,9 @@ def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
 
 
 def _piece(problem: Problem, piece: Piece, x: Array, method: Method, max_steps: int) -> _Run:
-    guard = _Guard(problem, piece)
-    times, states, interpolants = [piece.start], [x], []
+    guard = GuardedFunctions(problem, piece)
+    times, states = [piece.start], [x]
+    interpolants: list[Any] = []
     try:
         solver = _solver(problem, piece, x, method, guard)
         while solver.status == "running":
@@ -116,7 +89,7 @@ def _piece(problem: Problem, piece: Piece, x: Array, method: Method, max_steps: 
             if not np.isfinite(solver.y.sum()):
                 raise failure(problem, "scipy", solver.t, solver.y, guard.reason(f"{method}: the state is not finite"))
             if solver.t <= times[-1]:  # LSODA goes on with steps below the spacing of numbers
-                raise failure(problem, "scipy", solver.t, solver.y, guard.reason(f"{method}: the step became too small"))
+                raise failure(problem, "scipy", solver.t, solver.y, f"{method}: the step became too small")
             interpolants.append(solver.dense_output())
             times.append(solver.t)
             states.append(solver.y)
@@ -131,7 +104,7 @@ def _piece(problem: Problem, piece: Piece, x: Array, method: Method, max_steps: 
     return _Run(np.array(times), np.array(states), lambda at: np.asarray(solution(at)).T, counts)
 
 
-def _solver(problem: Problem, piece: Piece, x: Array, method: Method, guard: _Guard) -> Any:
+def _solver(problem: Problem, piece: Piece, x: Array, method: Method, guard: GuardedFunctions) -> Any:
     options: dict[str, Any] = {"rtol": max(problem.rtol, TIGHTEST_RTOL), "atol": problem.atol}
     if method != "DOP853" and problem.jacobian is not None:
         options["jac"] = guard.dense_jacobian if method == "LSODA" else guard.jacobian

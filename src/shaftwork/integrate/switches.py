@@ -48,7 +48,7 @@ def _early_signs(program: Any, integrator: Any, horizon: float) -> Array:
     integrator.state[:] = state
     integrator.pars[:] = parameters
     integrator.reset_cooldowns()
-    return np.sign(values)
+    return np.asarray(np.sign(values))
 
 
 class Watch:
@@ -82,8 +82,9 @@ class Watch:
             suspects = wrong if wrong.any() else np.abs(values) <= np.abs(values).min()
             condition = self._program.conditions[int(np.flatnonzero(suspects)[0])]
             self.reason = (
-                f"from t = {self._before:.9g} s on the motion sticks where the condition {condition} changes: the laws on both sides drive it back "
-                "there. Give the law a smooth transition, such as tanh(omega / 0.01) in place of sign(omega)"
+                f"from t = {self._before:.9g} s on the motion sticks where the condition {condition} changes, because "
+                "the laws on both sides drive it back there. Give the law a smooth transition, such as "
+                "tanh(omega / 0.01) in place of sign(omega)"
             )
             return False
         # A switch that rested at zero and now leaves it needs its sign.

@@ -82,7 +82,10 @@ class _Parser:
         node = self.value()
         if self.now.kind != "end":
             self.fail(self.now, f"does not go on with {self.now.text[:20]!r}", "Write an operator between two values.")
-        return node.expression
+        expression = _settled(node.expression)
+        if fault := fault_of(expression):
+            self.fail(self.tokens[0], fault, "Simplify the expression.")
+        return expression
 
     # --- tokens ---------------------------------------------------------------------------------------------------
 
@@ -230,7 +233,7 @@ class _Parser:
         if len(token.text) > MAXIMUM_DIGITS:
             self.fail(token, f"has a number of more than {MAXIMUM_DIGITS} characters", "17 digits are enough.")
         value, exact = float(token.text), token.text.isdigit()
-        if not math.isfinite(value) or (exact and value >= MAXIMUM_INTEGER):
+        if not math.isfinite(value) or (exact and int(token.text) > MAXIMUM_INTEGER):
             self.fail(token, "has a number that is too large", "Integers reach 1e40, numbers with a point 1.7e308.")
         return _Node(sympy.Integer(int(token.text)) if exact else sympy.Float(value), value)
 
@@ -345,3 +348,17 @@ class _Parser:
             if number is None:
                 self.fail(token, "has symbols that cancel", "Write the number that remains.")
         return _Node(expression, number)
+
+
+def _settled(expression: sympy.Basic) -> sympy.Expr:
+    """The form that no longer changes when it is built again, as it will be when it is written and read."""
+    for _ in range(4):
+        again = _rebuilt(expression)
+        if again == expression:
+            break
+        expression = again
+    return expression
+
+
+def _rebuilt(expression: sympy.Basic) -> sympy.Basic:
+    return expression.func(*map(_rebuilt, expression.args)) if expression.args else expression

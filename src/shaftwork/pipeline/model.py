@@ -105,7 +105,7 @@ class Model(CompiledModel):
             return self._variant(parameters).simulate(t_end, engine=engine, max_steps=max_steps, **options)  # type: ignore[arg-type]
         prepared = self._prepare(self.defaults if not parameters else self._vector(parameters))
         span = _span(t_start, t_end, rtol)
-        x0 = np.zeros(len(self.states)) if not initial else initial_state(prepared.bound, initial, span[0])
+        x0 = initial_state(prepared.bound, initial or {}, span[0])
         problem = self._problem(prepared, span, x0, rtol, atol, t_eval, max_steps)
         if not len(self.states):
             raise SimulationError(f"'{self.name}' has no states: nothing moves freely. Add an inertia or a spring.")
@@ -147,6 +147,12 @@ class Model(CompiledModel):
         start = initial_state(prepared.bound, initial or {}, when)
         return dict(zip(self.states, steady_state(prepared.bound, start, when).tolist(), strict=True))
 
+    def choose_engine(self, t_end: float, *, t_start: float = 0.0, rtol: float = 1e-8) -> tuple[str, str]:
+        """The engine that "auto" takes for a motion, and why."""
+        prepared, span = self._prepare(self.defaults), _span(t_start, t_end, rtol)
+        x0 = initial_state(prepared.bound, {}, t_start)
+        return self._engine(prepared, self._problem(prepared, span, x0, rtol, None, None, 1), "auto")
+
     def _engine(self, prepared: _Prepared, problem: Problem, engine: str) -> tuple[str, str]:
         if engine != "auto":
             return engine, "asked for"
@@ -170,7 +176,7 @@ class Model(CompiledModel):
         jumps = bound.part.B1.nnz > 0
 
         def jump(t: float, x: Array) -> Array:
-            return bound.jump(math.nextafter(t, -math.inf), t, x)
+            return bound.impulse(t, x, before=math.nextafter(t, -math.inf))
 
         return Problem(
             rhs=prepared.rhs,

@@ -1,0 +1,9 @@
+"""The systems of the sources, ready to run: `scenes.crane_start()`, `scenes.shaft_chain(m=40)`; `SCENES` lists them all."""
+
+from __future__ import annotations
+
+from shaftwork.scenes.catalog import SCENES, Scene
+from shaftwork.scenes.crane import crane_start
+from shaftwork.scenes.shaft_chain import shaft_chain
+
+__all__ = ["SCENES", "Scene", "crane_start", "shaft_chain"]

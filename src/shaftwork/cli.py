@@ -1,0 +1,159 @@
+"""The command `shaftwork`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import warnings
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from shaftwork.core.errors import ShaftworkError, SimulationError
+
+if TYPE_CHECKING:
+    from shaftwork.pipeline.network import Network
+    from shaftwork.results.solution import Solution
+    from shaftwork.scenes.catalog import Scene
+
+DONE, FAILED, WRONG_INPUT = 0, 1, 2
+FALLBACK_END = 10.0
+"""End time of a model file when none is given, s."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code: 0 done, 1 the computation failed, 2 the input is wrong."""
+    options = _parser().parse_args(arguments)
+    command: Callable[[argparse.Namespace], None] = options.command
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            command(options)
+        for warning in caught:
+            print(f"warning: {warning.message}", file=sys.stderr)
+    except SimulationError as error:
+        print(f"shaftwork: {error}", file=sys.stderr)
+        return FAILED
+    except (ShaftworkError, OSError) as error:
+        print(f"shaftwork: {error}", file=sys.stderr)
+        return WRONG_INPUT
+    except BrokenPipeError:
+        return DONE
+    return DONE
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="shaftwork", description="Drive trains: Kirchhoff equations, fast models, simulation and LaTeX."
+    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    def command(name: str, run: Callable[[argparse.Namespace], None], text: str, *, model: bool = True) -> argparse.ArgumentParser:
+        made = commands.add_parser(name, help=text, description=text)
+        made.set_defaults(command=run)
+        if model:
+            made.add_argument("model", metavar="SCENE|FILE.toml", help="a ready scene or a model file")
+        return made
+
+    command("scenes", _scenes, "the ready scenes, a line each with the source", model=False)
+    run = command("run", _run, "simulate: a table on the screen, plots and CSV in DIR")
+    run.add_argument("--out", metavar="DIR", type=Path, help="folder for plots and CSV")
+    run.add_argument("--t-end", metavar="S", type=float, help="end of the motion in s")
+    run.add_argument("--rtol", type=float, default=1e-8, help="relative tolerance (default %(default)g)")
+    run.add_argument("--engine", default="auto", choices=("auto", "scipy", "heyoka", "sundials", "exact"))
+    latex = command("latex", _latex, "print the equations as LaTeX")
+    latex.add_argument("--form", choices=("kirchhoff", "state", "second-order"), help="which equations (default: all)")
+    latex.add_argument("--values", action="store_true", help="numbers instead of symbols")
+    latex.add_argument("--document", action="store_true", help="a whole document that pdflatex compiles")
+    command("check", _check, "structure, states, time constants, stiffness, and the engine that auto would take")
+    return parser
+
+
+def _scenes(_: argparse.Namespace) -> None:
+    from shaftwork.scenes import SCENES
+
+    width = max(len(name) for name in SCENES)
+    for scene in SCENES.values():
+        print(f"{scene.name:{width}}  {scene.title} ({scene.source})")
+
+
+def _load(name: str) -> tuple[Network, Scene | None]:
+    from shaftwork.core.errors import ModelFileError
+    from shaftwork.pipeline.network import Network
+    from shaftwork.scenes import SCENES
+
+    if name in SCENES:
+        return SCENES[name](), SCENES[name]
+    if not name.endswith(".toml"):
+        raise ModelFileError(f"'{name}' is neither a scene nor a .toml file. The scenes are: {', '.join(SCENES)}.")
+    return Network.load(name), None
+
+
+def _run(options: argparse.Namespace) -> None:
+    net, scene = _load(options.model)
+    t_end = options.t_end if options.t_end is not None else scene.t_end if scene else FALLBACK_END
+    solution = net.simulate(t_end, rtol=options.rtol, engine=options.engine)
+    signals = scene.signals if scene else _worth_seeing(solution)
+    print(f"{net.name}: {t_end:g} s of motion" + (f" ({scene.source})" if scene else ""))
+    for line in scene.chosen if scene else ():
+        print(f"  chosen: {line}")
+    print(f"engine {solution.engine}: {solution.why}")
+    print(", ".join(f"{count} {name}" for name, count in solution.statistics.items()), end="; ")
+    print(f"energy residual {solution.energy_residual:.1e} of the work done\n")
+    _table(solution, signals)
+    if options.out:
+        _write(solution, signals, options.out)
+
+
+def _worth_seeing(solution: Solution) -> tuple[str, ...]:
+    """The states of a model that no scene comments; the first and last few where there are many."""
+    names = tuple(name for name in solution.states if name in solution)
+    return names if len(names) <= 12 else (*names[:6], *names[-6:])
+
+
+def _table(solution: Solution, signals: Sequence[str]) -> None:
+    width = max(len(name) for name in signals)
+    print(f"{'':{width}}  {'unit':8} {'minimum':>12} {'at s':>8} {'maximum':>12} {'at s':>8} {'mean':>12} {'end':>12}")
+    for name in signals:
+        values, t = solution[name], solution.t
+        low, high = int(values.argmin()), int(values.argmax())
+        mean = float(((values[1:] + values[:-1]) / 2) @ (t[1:] - t[:-1]) / (t[-1] - t[0]))
+        print(
+            f"{name:{width}}  {solution.observer.units[name]:8} {values[low]:12.5g} {t[low]:8.4g} "
+            f"{values[high]:12.5g} {t[high]:8.4g} {mean:12.5g} {values[-1]:12.5g}"
+        )
+
+
+def _write(solution: Solution, signals: Sequence[str], folder: Path) -> None:
+    import numpy as np
+
+    folder.mkdir(parents=True, exist_ok=True)
+    table = folder / "signals.csv"
+    columns = np.column_stack([solution.t, *(solution[name] for name in signals)])
+    header = ",".join(["t [s]", *(f"{name} [{solution.observer.units[name]}]" for name in signals)])
+    np.savetxt(table, columns, delimiter=",", header=header, comments="", fmt="%.12g")
+    picture = folder / "signals.png"
+    solution.plot(*signals).savefig(picture, dpi=150)
+    print(f"\nwritten: {table}, {picture}")
+
+
+def _latex(options: argparse.Namespace) -> None:
+    net, _ = _load(options.model)
+    equations = net.equations()
+    if options.document:
+        print(equations.document(values=options.values))
+    elif options.form:
+        print(equations.latex(form=options.form, values=options.values))
+    else:
+        print(equations.latex(values=options.values))
+
+
+def _check(options: argparse.Namespace) -> None:
+    from shaftwork.pipeline.report import structure_report
+
+    net, scene = _load(options.model)
+    print(structure_report(net, scene.t_end if scene else FALLBACK_END))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

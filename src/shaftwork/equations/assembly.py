@@ -1,0 +1,206 @@
+"""The terms of every equation, row by row: balances, loops, laws, couplings and the state form.
+
+Nothing is multiplied out: a row is a left side and groups of terms under a common factor, as it will be printed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+from sympy import Add, Expr, Integer, Mul, Symbol, cse
+
+from shaftwork.components.branches import ACROSS, INTEGRAL
+from shaftwork.equations.quantities import Flow, Quantities, rate_of
+from shaftwork.network.graph import GROUND
+from shaftwork.network.templates import Kind
+from shaftwork.reduction.form import StateForm
+from shaftwork.reduction.gains import simplified
+
+Terms = tuple[Expr, ...]
+
+
+class Group(NamedTuple):
+    """A common factor and the terms that it multiplies."""
+
+    factor: Expr
+    terms: Terms
+
+
+class Sides(NamedTuple):
+    """Left side and right side of a row."""
+
+    left: Expr
+    groups: tuple[Group, ...]
+
+
+def sides(left: Expr, terms: Iterable[Expr]) -> Sides:
+    """A row without a common factor; terms that raise the left side come first."""
+    kept = [term for term in terms if term != 0]
+    falling = [term for term in kept if term.could_extract_minus_sign()]
+    rising = [term for term in kept if not term.could_extract_minus_sign()]
+    return Sides(left, (Group(Integer(1), (*rising, *falling)),))
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly:
+    """Makes the rows of a state form.
+
+    Args:
+        form: the state form.
+    """
+
+    form: StateForm
+
+    @cached_property
+    def quantities(self) -> Quantities:
+        return Quantities(self.form.graph)
+
+    def ends(self, branch: int) -> tuple[int, int]:
+        made = self.form.graph.branches[branch]
+        return made.plus, made.minus
+
+    @cached_property
+    def at_node(self) -> tuple[tuple[Flow | int, ...], ...]:
+        """For each node the flows, across stores and couplings that touch it, in the order of the parts."""
+        found: list[dict[Flow | int, None]] = [{} for _ in self.form.graph.nodes]
+        for branch in self.form.graph.branches:
+            item = self.quantities.flow_of.get(branch.index, branch.index)
+            touched = [node for _, plus, minus in branch.terms for node in (plus, minus)]
+            for node in touched or (branch.plus, branch.minus):
+                if node != GROUND:
+                    found[node][item] = None
+        return tuple(tuple(items) for items in found)
+
+    def balance(self, node: int) -> Sides:
+        """Stores of the node against everything that drives or loads it."""
+        own: list[Expr] = []
+        terms: list[Expr] = []
+        for item in self.at_node[node]:
+            if isinstance(item, Flow):
+                terms.append((1 if item.minus == node else -1) * item.sign * self.quantities.through(item))
+            elif self.ends(item) == (node, GROUND):
+                own.append(self.quantities.law(item))
+            else:
+                terms.append(-Add(*(gain * self.stored(item) for gain in self.incidence(item, node))))
+        speed = rate_of(self.quantities.node(node))
+        return sides(Mul(Add(*own), speed) if own else Integer(0), terms)
+
+    def incidence(self, branch: int, node: int) -> Iterator[Expr]:
+        """Factors with which a branch takes its through variable from a node."""
+        made = self.form.graph.branches[branch]
+        for coefficient, plus, minus in made.terms or ((Integer(1), made.plus, made.minus),):
+            for end, sign in ((plus, 1), (minus, -1)):
+                if end == node:
+                    yield sign * self.form.graph.in_network_symbols(coefficient, made)
+
+    def stored(self, branch: int) -> Expr:
+        """The through variable of an across store or of a coupling."""
+        if self.form.graph.branches[branch].terms:
+            return self.quantities.multiplier(branch)
+        across = self.quantities.across(self.ends(branch))
+        sign = -1 if across.could_extract_minus_sign() else 1
+        return sign * self.quantities.law(branch) * rate_of(sign * across)
+
+    def loop(self, link: int) -> Sides:
+        """Across variable of a link as the sum over the tree branches of its loop."""
+        return sides(self.quantities.across(self.ends(link)), self.around(link))
+
+    def around(self, link: int) -> Terms:
+        """The terms of a link's loop."""
+        return self.across_sum(self.form.tree.loops[link].items())
+
+    def across_sum(self, row: Iterable[tuple[int, object]]) -> Terms:
+        """Across variables of tree branches times their factors; couplings have none."""
+        branches = self.form.graph.branches
+        return tuple(
+            simplified(gain) * self.quantities.across(self.ends(tree)) for tree, gain in row if not branches[tree].terms
+        )
+
+    def coupling(self, branch: int) -> Sides:
+        """What an ideal coupling imposes on the speeds of its nodes."""
+        made = self.form.graph.branches[branch]
+        pairs = [(self.form.graph.in_network_symbols(factor, made), ends) for factor, *ends in made.terms]
+        terms = [factor * self.quantities.across((ends[0], ends[1])) for factor, ends in pairs]
+        left = [term for term in terms if not term.could_extract_minus_sign()]
+        return sides(Add(*left), (-term for term in terms if term.could_extract_minus_sign()))
+
+    def law_of_flow(self, flow: Flow) -> Sides:
+        """A flow's through variable by the laws of its branches."""
+        terms = (flow.sign * self.through_law(branch) for branch in flow.branches)
+        return sides(self.quantities.through(flow), terms)
+
+    def through_law(self, branch: int, across: Expr | None = None) -> Expr:
+        """The through variable of a branch in terms of what is across it."""
+        kind, law = self.form.graph.branches[branch].template.kind, self.quantities.law(branch)
+        if kind is Kind.THROUGH_STORE:
+            return self.quantities.store(branch)
+        across = self.quantities.across(self.ends(branch)) if across is None else across
+        if kind is Kind.CONDUCTANCE:
+            return law * across
+        return law.xreplace({ACROSS: across, INTEGRAL: self._integrals.get(branch, INTEGRAL)})
+
+    def law_of_store(self, branch: int) -> Sides:
+        """A compliance's law: its through variable changes with what is across it."""
+        stiffness, rate = self.quantities.law(branch), rate_of(self.quantities.store(branch))
+        across = self.quantities.across(self.ends(branch))
+        if stiffness.is_Pow and stiffness.exp == -1:
+            return sides(stiffness.base * rate, (across,))
+        return sides(rate, (stiffness * across,))
+
+    def law_of_source(self, branch: int) -> Sides:
+        """A prescribed across variable."""
+        return sides(self.quantities.across(self.ends(branch)), (self.quantities.law(branch),))
+
+    @cached_property
+    def _integrals(self) -> dict[int, Symbol]:
+        return {
+            state.branch: Symbol(state.name, real=True) for state in self.form.states if state.kind == "integral"
+        }
+
+    @cached_property
+    def cutsets(self) -> dict[int, tuple[tuple[int, Expr], ...]]:
+        """For each tree branch the links of its cutset with their factors, in the order of the branch table."""
+        found: dict[int, list[tuple[int, Expr]]] = {}
+        for link in sorted(self.form.tree.loops):
+            for tree, gain in self.form.tree.loops[link].items():
+                found.setdefault(tree, []).append((link, simplified(gain)))
+        return {tree: tuple(members) for tree, members in found.items()}
+
+    @cached_property
+    def lumped(self) -> frozenset[int]:
+        """Links that are printed by their flow's symbol: laws and sources whose flow lies wholly outside the tree."""
+        links = self.form.tree.loops
+        return frozenset(
+            branch
+            for law in self.form.laws
+            for branch in self.quantities.flow_of[law].branches
+            if all(sibling in links for sibling in self.quantities.flow_of[law].branches)
+        )
+
+    def out_of(self, tree: int, left_out: Collection[int] = ()) -> Terms:
+        """Through variables that drive a tree branch: minus those of the links in its cutset."""
+        terms: dict[Flow | int, Expr] = {}
+        for link, gain in self.cutsets.get(tree, ()):
+            if link in left_out:
+                continue
+            flow = self.quantities.flow_of.get(link)
+            if flow is not None and link in self.lumped:
+                terms[flow] = -gain * flow.sign * self.quantities.through(flow)
+            elif flow is None:
+                terms[link] = -gain * self.stored(link)
+            else:
+                terms[link] = -gain * self.through_law(link, Add(*self.around(link)))
+        return tuple(terms.values())
+
+    def shared_factors(self, law: Expr, names: Iterator[Symbol]) -> tuple[tuple[tuple[Symbol, Expr], ...], Expr]:
+        """A long law with the sums that occur in it more than once put under names of their own, such as a slip."""
+        found, (rest,) = cse(law, symbols=names, order="none")
+        kept = [(symbol, part) for symbol, part in found if part.is_Add]
+        spared = {symbol: part for symbol, part in found if not part.is_Add}
+        for symbol, part in reversed(spared.items()):
+            kept = [(own, value.xreplace({symbol: part})) for own, value in kept]
+            rest = rest.xreplace({symbol: part})
+        return tuple(kept), rest

@@ -1,0 +1,241 @@
+"""How a symbol is printed: its letter, its subscript from the part's name, and no two symbols alike."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import count
+
+from sympy import Symbol
+
+from shaftwork.core.domains import ELECTRICAL, Quantity
+from shaftwork.equations.quantities import Quantities
+from shaftwork.network.graph import GraphPart
+from shaftwork.network.templates import Kind
+from shaftwork.reduction.form import StateForm
+
+INDEX_OPENS, INDEX_CLOSES = "\ue000", "\ue001"
+"""Marks around the number at the end of a subscript, so that rows that differ by it alone are recognised; never printed."""
+
+ESCAPES = {
+    "\\": r"\backslash ",
+    "{": r"\{",
+    "}": r"\}",
+    "_": r"\_",
+    "%": r"\%",
+    "&": r"\&",
+    "#": r"\#",
+    "$": r"\$",
+    "^": r"\wedge ",
+    "~": r"\sim ",
+    " ": r"\ ",
+    "-": r"\text{-}",
+    "'": r"\text{'}",
+}
+WORDS = {
+    "omega": "angular speed",
+    "tau": "torque",
+    "phi": "angle",
+    "v": "speed",
+    "f": "force",
+    "s": "position",
+    "u": "voltage",
+    "i": "current",
+    "psi": "flux linkage",
+}
+"""The quantities of the domains in words."""
+GREEK = (
+    "alpha beta gamma delta epsilon zeta eta theta iota kappa lamda mu nu xi pi rho sigma tau upsilon phi chi psi omega"
+).split()
+
+
+@dataclass(frozen=True)
+class Letter:
+    """A symbol before its part's subscript is added.
+
+    Args:
+        name: name of the sympy symbol.
+        base: the letter in LaTeX.
+        mark: subscript of its own, before that of the part.
+        unit: SI unit.
+        meaning: a few words for the nomenclature.
+        parameter: whether it is a parameter, with a value.
+    """
+
+    name: str
+    base: str
+    mark: str
+    unit: str
+    meaning: str
+    parameter: bool = False
+
+    def printed(self, subscript: str) -> str:
+        """The symbol in LaTeX."""
+        subscripts = ",".join(text for text in (self.mark, subscript) if text)
+        return f"{self.base}_{{{subscripts}}}" if subscripts else self.base
+
+
+@dataclass(frozen=True)
+class Named:
+    """A part or node and the letters that bear its name."""
+
+    name: str
+    letters: tuple[Letter, ...]
+    chosen: str | None
+    shortable: tuple[str, ...]
+
+    def subscript(self, style: int) -> str:
+        """The subscript: as short as it may be (0), the whole name (1), the name and a number (2, 3, ...)."""
+        if self.chosen is not None and style == 0:
+            return self.chosen if not re.fullmatch(r"[A-Za-z]{2,}", self.chosen) else rf"\mathrm{{{self.chosen}}}"
+        stem, index = split_index(self.name)
+        if style == 0 and (stem.rstrip("_") in self.shortable or (index and len(stem) <= 1)):
+            return _index(index)
+        if style == 0 and stem[:1] in self.shortable and stem[1:2] == "_" and len(stem) > 2:
+            stem = stem[2:]
+        text = ",".join(part for part in (f"\\mathrm{{{escaped(stem)}}}" if stem else "", _index(index)) if part)
+        return text if style < 2 else f"{text},({style})"
+
+
+def _index(digits: str) -> str:
+    return f"{INDEX_OPENS}{digits}{INDEX_CLOSES}" if digits else ""
+
+
+def split_index(name: str) -> tuple[str, str]:
+    """A name as its stem and the digits at its end."""
+    stem = name.rstrip("0123456789")
+    return stem, name[len(stem) :]
+
+
+def escaped(name: str) -> str:
+    """Any text as LaTeX that compiles inside `\\mathrm`: signs are escaped, accents dropped, the rest is named."""
+    return "".join(_escape(character) for character in unicodedata.normalize("NFKC", name))
+
+
+def _escape(character: str) -> str:
+    if character in ESCAPES:
+        return ESCAPES[character]
+    if character.isascii() and character.isprintable():
+        return character
+    words = unicodedata.name(character, "").split()
+    if words[:2] == ["GREEK", "SMALL"] and words[-1].lower() in GREEK:
+        return "o" if words[-1] == "OMICRON" else f"\\{words[-1].lower().replace('lamda', 'lambda')} "
+    plain = "".join(c for c in unicodedata.normalize("NFKD", character) if c.isascii() and c.isalnum())
+    return plain or f"U{ord(character):04X}"
+
+
+def notation(form: StateForm, quantities: Quantities) -> tuple[Mapping[str, str], tuple[Letter, ...]]:
+    """LaTeX of every symbol by name, and the letters in the order of the parts, for the nomenclature.
+
+    Parts of one class whose names differ by a number are printed in one style, so that they stay a series.
+    """
+    bearers = (*_parts(form, quantities), *_nodes(quantities))
+    series: dict[tuple[str, str], list[Named]] = {}
+    for family, bearer in bearers:
+        series.setdefault((family, split_index(bearer.name)[0]), []).append(bearer)
+    printed: dict[str, str] = {}
+    taken: set[str] = {"t"}  # only asked for membership, so its order does not matter
+    for members in series.values():
+        for style in count():
+            made = {
+                letter.name: letter.printed(member.subscript(style)) for member in members for letter in member.letters
+            }
+            if taken.isdisjoint(made.values()) and len({*made.values()}) == len(made):
+                break
+        printed.update(made)
+        taken.update(made.values())
+    return printed, tuple(letter for _, bearer in bearers for letter in bearer.letters)
+
+
+def _parts(form: StateForm, quantities: Quantities) -> Iterator[tuple[str, Named]]:
+    graph = form.graph
+    own: dict[int, list[Letter]] = {number: [] for number in range(len(graph.parts))}
+    for number, letter in _quantity_letters(form, quantities):
+        own[number].append(letter)
+    for number, part in enumerate(graph.parts):
+        letters = _distinct((*_parameters(part), *own[number]))
+        shortable = (*part.component.declared, *(letter.base for letter in letters))
+        yield type(part.component).__name__, Named(part.name, letters, part.component.symbol, shortable)
+
+
+def _parameters(part: GraphPart) -> Iterator[Letter]:
+    for name in part.parameters:
+        declared = part.component.declared[name]
+        base, _, mark = declared.latex.partition("_")
+        mark = mark[1:-1] if mark.startswith("{") and mark.endswith("}") else mark
+        yield Letter(
+            f"{part.name}.{name}", _upright(base), _upright(mark), declared.unit, declared.meaning, parameter=True
+        )
+
+
+def _upright(text: str) -> str:
+    return rf"\mathrm{{{text}}}" if re.fullmatch(r"[A-Za-z]{2,}", text) else text
+
+
+def _quantity_letters(form: StateForm, quantities: Quantities) -> Iterator[tuple[int, Letter]]:
+    """The quantities that are named after a part, with the number of the part."""
+    graph = quantities.graph
+    for node, branch in quantities.owners.items():
+        domain, part = graph.domains[node], graph.branches[branch].part
+        yield part, _letter(quantities.node(node), domain.across)
+        yield part, _letter(quantities.angle(node), domain.integral)
+    for ends, pair in quantities.pairs.items():
+        quantity = quantities.domain(ends).across
+        sign = "" if quantity is ELECTRICAL.across else r"\Delta "
+        letter = _letter(pair.symbol, quantity, _mark(pair.label))
+        yield (
+            pair.part,
+            replace(letter, base=sign + letter.base, meaning=f"{letter.meaning} across" if sign else letter.meaning),
+        )
+    for flow in quantities.flows:
+        quantity, several = quantities.domain((flow.plus, flow.minus)).through, len(flow.branches) > 1
+        yield flow.part, _letter(quantities.through(flow), quantity, _mark(flow.label))
+        for index in flow.branches:
+            template = graph.branches[index].template
+            if several and template.kind is Kind.THROUGH_STORE:
+                yield flow.part, _letter(quantities.store(index), quantity, _mark(template.label, quantity))
+    for branch in graph.branches:
+        if branch.terms:
+            quantity = quantities.multiplier_quantity(branch.index)
+            yield branch.part, _letter(quantities.multiplier(branch.index), quantity, _mark(branch.template.label))
+    for state in form.states:
+        if state.kind == "integral":
+            part = graph.branches[state.branch].part
+            yield part, Letter(state.name, state.latex, "", state.unit, WORDS[state.name.rsplit(".", 1)[1]])
+
+
+def _letter(symbol: Symbol, quantity: Quantity, mark: str = "") -> Letter:
+    return Letter(symbol.name, quantity.latex, mark, quantity.unit, WORDS[quantity.name])
+
+
+def _mark(label: str, quantity: Quantity | None = None) -> str:
+    """A branch's label as a subscript: "tau_c" of a torque is c."""
+    if quantity is not None and label.startswith(f"{quantity.name}_"):
+        label = label[len(quantity.name) + 1 :]
+    return label if len(label) == 1 else f"\\mathrm{{{escaped(label)}}}" if label else ""
+
+
+def _distinct(letters: Iterable[Letter]) -> tuple[Letter, ...]:
+    """The letters of one part, each symbol once; a parameter that looks like a variable gets the subscript 0."""
+    kept: dict[str, Letter] = {}
+    for letter in letters:
+        kept.setdefault(letter.name, letter)
+    variables = {letter.printed("") for letter in kept.values() if not letter.parameter}
+    return tuple(
+        replace(letter, mark=f"{letter.mark}0") if letter.parameter and letter.printed("") in variables else letter
+        for letter in kept.values()
+    )
+
+
+def _nodes(quantities: Quantities) -> Iterator[tuple[str, Named]]:
+    """Nodes whose speed is named after no part."""
+    for number, name in enumerate(quantities.graph.nodes):
+        if number not in quantities.owners:
+            domain = quantities.graph.domains[number]
+            letters = (
+                _letter(quantities.node(number), domain.across),
+                _letter(quantities.angle(number), domain.integral),
+            )
+            yield f"node of {domain.name}", Named(name, letters, None, ())

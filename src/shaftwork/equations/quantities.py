@@ -1,0 +1,221 @@
+"""Which sympy symbol stands for which quantity of a network: node speeds, speeds across parts, torques, angles.
+
+Symbols carry the names under which results are read ("J1.omega", "shaft.tau"), so that an equation and a signal that share a
+name share a sign: the torque of a source is the one that it gives to its node, that of a spring goes from node a to node b.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+from sympy import Expr, Integer, Symbol
+
+from shaftwork.core.domains import ELECTRICAL, Domain, Quantity
+from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
+from shaftwork.network.templates import Kind
+from shaftwork.reduction.form import branch_name
+
+Ends = tuple[int, int]
+
+
+def rate_of(symbol: Symbol) -> Symbol:
+    """The symbol of a quantity's time derivative."""
+    return Symbol(f"der({symbol.name})", real=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Flow:
+    """What a part lets through between two nodes: its parallel branches together, under one symbol.
+
+    Args:
+        part: place of the part in the part table.
+        branches: the branches, all from `plus` to `minus`.
+        plus: number of the node that gives.
+        minus: number of the node that takes.
+        sign: 1 where the symbol is what `plus` gives, -1 where it is what `plus` receives (sources).
+        label: tells the flows of a part apart; empty where it has only one.
+    """
+
+    part: int
+    branches: tuple[int, ...]
+    plus: int
+    minus: int
+    sign: int
+    label: str
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """The across variable between two nodes, named after the first part that joins them.
+
+    Args:
+        part: place of the part in the part table.
+        symbol: the across variable.
+        label: tells the pairs of a part apart; empty where it has only one.
+    """
+
+    part: int
+    symbol: Symbol
+    label: str
+
+
+@dataclass(frozen=True, eq=False)
+class Quantities:
+    """The symbols of a network's quantities, made when first asked for.
+
+    Args:
+        graph: the circuit graph.
+    """
+
+    graph: CircuitGraph
+
+    @cached_property
+    def flows(self) -> tuple[Flow, ...]:
+        """Every flow of every part, in the order of the parts."""
+        return tuple(flow for number in range(len(self.graph.parts)) for flow in self._flows_of(number))
+
+    @cached_property
+    def flow_of(self) -> dict[int, Flow]:
+        """The flow that a branch belongs to; across stores and couplings belong to none."""
+        return {branch: flow for flow in self.flows for branch in flow.branches}
+
+    def domain(self, ends: Ends) -> Domain:
+        """The domain of a pair of nodes."""
+        return self.graph.domains[max(ends)]
+
+    def law(self, branch: int) -> Expr:
+        """Coefficient or law of a branch in the parameters of the network."""
+        made = self.graph.branches[branch]
+        return self.graph.in_network_symbols(made.template.law, made)
+
+    def node(self, number: int) -> Expr:
+        """The across variable of a node: that of the store or source which joins it to the reference, else its own."""
+        return Integer(0) if number == GROUND else self._nodes[number]
+
+    def across(self, ends: Ends) -> Expr:
+        """The across variable between two nodes."""
+        plus, minus = ends
+        if ends in self.pairs:
+            return self.pairs[ends].symbol
+        if (minus, plus) in self.pairs:
+            return -self.pairs[minus, plus].symbol
+        return self.node(plus) - self.node(minus)
+
+    def angle(self, number: int) -> Symbol:
+        """The angle, position or flux linkage of a node: the integral of its across variable."""
+        quantity = self.graph.domains[number].integral
+        owner = self.owners.get(number)
+        name = f"{quantity.name}({self.graph.nodes[number]})"
+        return Symbol(name if owner is None else f"{self.graph.part_of(owner).name}.{quantity.name}", real=True)
+
+    def through(self, flow: Flow) -> Symbol:
+        """The through variable of a flow: the state, where it is a lone store, or a parameter, where that is all its law."""
+        first = self.graph.branches[flow.branches[0]]
+        if len(flow.branches) == 1:
+            if first.template.kind is Kind.THROUGH_STORE:
+                return self.store(first.index)
+            law = flow.sign * self.law(first.index)
+            if law.is_Symbol and first.template.kind is Kind.THROUGH_SOURCE and law.name in self.graph.parameters:
+                return law
+        return self._named(flow.part, self.domain((flow.plus, flow.minus)).through, flow.label)
+
+    def store(self, branch: int) -> Symbol:
+        """The through variable of a through store alone, without the loss beside it."""
+        return Symbol(branch_name(self.graph, self.graph.branches[branch]), real=True)
+
+    def multiplier(self, branch: int) -> Symbol:
+        """The through variable of a coupling: a term of coefficient r takes r times it from its node."""
+        made = self.graph.branches[branch]
+        several = sum(bool(self.graph.branches[k].terms) for k in self.graph.parts[made.part].branches) > 1
+        label = self._label(made) if several else ""
+        return self._named(made.part, self.multiplier_quantity(branch), label)
+
+    def multiplier_quantity(self, branch: int) -> Quantity:
+        """What a coupling's through variable is: that of its first term of coefficient 1 or -1."""
+        terms = self.graph.branches[branch].terms
+        unit = [term for term in terms if abs(term[0]) == 1]
+        _, plus, minus = (unit or terms)[0]
+        return self.domain((plus, minus)).through
+
+    @cached_property
+    def owners(self) -> dict[int, int]:
+        """For a node the branch to the reference whose across variable is its own: a source, else the first store."""
+        found: dict[int, int] = {}
+        for branch in self._defining:
+            if branch.minus == GROUND:
+                found.setdefault(branch.plus, branch.index)
+        return found
+
+    @cached_property
+    def _defining(self) -> tuple[GraphBranch, ...]:
+        kinds = (Kind.ACROSS_SOURCE, Kind.ACROSS_STORE)
+        return tuple(branch for kind in kinds for branch in self.graph.branches if branch.template.kind is kind)
+
+    @cached_property
+    def _nodes(self) -> tuple[Symbol, ...]:
+        return tuple(self._node_symbol(number) for number in range(len(self.graph.nodes)))
+
+    def _node_symbol(self, number: int) -> Symbol:
+        if number in self.owners:
+            return self._defined(self.graph.branches[self.owners[number]])
+        return Symbol(f"{self.graph.domains[number].across.name}({self.graph.nodes[number]})", real=True)
+
+    @cached_property
+    def pairs(self) -> dict[Ends, Pair]:
+        """The across variables between two nodes that have a symbol, by their ends."""
+        found: dict[Ends, Pair] = {}
+        for branch in self._defining:
+            ends = (branch.plus, branch.minus)
+            if branch.minus != GROUND and ends not in found and ends[::-1] not in found:
+                found[ends] = Pair(branch.part, self._defined(branch), "")
+        for flow in self.flows:
+            ends = (flow.plus, flow.minus)
+            if GROUND not in ends and ends not in found and ends[::-1] not in found:
+                quantity = self.domain(ends).across
+                suffix = "" if self.domain(ends) is ELECTRICAL else "_rel"
+                label = f"{quantity.name}{suffix}" + (f"_{flow.label}" if flow.label else "")
+                symbol = Symbol(f"{self.graph.parts[flow.part].name}.{label}", real=True)
+                found[ends] = Pair(flow.part, symbol, flow.label)
+        return found
+
+    def _defined(self, branch: GraphBranch) -> Symbol:
+        """The symbol of the across variable that a store or a source defines."""
+        law = self.law(branch.index)
+        if branch.template.kind is Kind.ACROSS_SOURCE and law.is_Symbol and law.name in self.graph.parameters:
+            return law
+        return self._named(branch.part, self.domain((branch.plus, branch.minus)).across, "")
+
+    def _named(self, part: int, quantity: Quantity, label: str) -> Symbol:
+        """ "part.quantity", unless a parameter of the part has taken that name."""
+        owner = self.graph.parts[part].name
+        ending = f"_{label}" if label else ""
+        name = f"{owner}.{quantity.name}{ending}"
+        return Symbol(f"{quantity.name}{ending}({owner})" if name in self.graph.parameters else name, real=True)
+
+    def _flows_of(self, number: int) -> Iterator[Flow]:
+        part = self.graph.parts[number]
+        together: dict[Ends, list[int]] = {}
+        for index in part.branches:
+            branch = self.graph.branches[index]
+            if branch.template.kind not in (Kind.COUPLING, Kind.ACROSS_STORE):
+                together.setdefault((branch.plus, branch.minus), []).append(index)
+        for (plus, minus), branches in together.items():
+            label = self._label(self.graph.branches[branches[0]]) if len(together) > 1 else ""
+            yield Flow(number, tuple(branches), plus, minus, self._sign(part, branches), label)
+
+    def _sign(self, part: GraphPart, branches: list[int]) -> int:
+        """The sign of the signal of the same name, so that both mean the same torque."""
+        templates = [self.graph.branches[index].template for index in branches]
+        if any(template.kind is Kind.THROUGH_STORE for template in templates):
+            return 1
+        signals = part.component.signals().values()
+        return next((s.sign for s in signals if s.kind == "through" and s.ends == templates[0].ends), 1)
+
+    def _label(self, branch: GraphBranch) -> str:
+        template, siblings = branch.template, self.graph.parts[branch.part].branches
+        if template.label:
+            return template.label
+        own = [symbol.name for symbol in template.symbols]
+        return own[0] if len(own) == 1 else str(siblings.index(branch.index) + 1)

@@ -1,0 +1,168 @@
+"""The state form solved row by row: rates of the states, and speeds of nodes without a store.
+
+Coupled unknowns are solved together while that stays readable; beyond, a row keeps all its unknowns on the left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import networkx as nx
+from sympy import Add, Expr, Integer, together
+
+from shaftwork.components.laws import t as TIME
+from shaftwork.equations.assembly import Assembly, Group, Sides, Terms
+from shaftwork.equations.quantities import rate_of
+from shaftwork.network.templates import Kind
+from shaftwork.reduction.rows import LARGEST_BLOCK, solve_blocks
+
+Matrix = Mapping[tuple[int, int], Expr]
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """Linear equations for some unknowns.
+
+    Args:
+        unknowns: branch numbers, in order.
+        matrix: the nonzero entries by row and column.
+        right: the terms of a row's right side.
+        symbol: what an unknown is called.
+    """
+
+    unknowns: tuple[int, ...]
+    matrix: Matrix
+    right: Callable[[int], Terms]
+    symbol: Callable[[int], Expr]
+
+    @cached_property
+    def blocks(self) -> dict[int, tuple[int, ...]]:
+        """For each unknown all those that it is coupled with."""
+        links: nx.Graph[int] = nx.Graph()
+        links.add_nodes_from(self.unknowns)
+        links.add_edges_from(self.matrix)
+        blocks = (tuple(sorted(block)) for block in nx.connected_components(links))
+        return {unknown: block for block in blocks for unknown in block}
+
+    def solved(self, unknown: int) -> bool:
+        """Whether the unknown's row stands alone on its left side."""
+        return len(self.blocks[unknown]) <= LARGEST_BLOCK
+
+    def row(self, unknown: int) -> Sides:
+        """The equation of an unknown, solved where its block is small."""
+        block = self.blocks[unknown]
+        if not self.solved(unknown):
+            left = (self.matrix[unknown, other] * self.symbol(other) for other in block if (unknown, other) in self.matrix)
+            return Sides(Add(*left), (Group(Integer(1), self.right(unknown)),))
+        factors = self._inverse_row(block, block.index(unknown))
+        groups = (Group(factor, self.right(other)) for factor, other in zip(factors, block, strict=True))
+        return Sides(self.symbol(unknown), tuple(group for group in groups if group.factor != 0 and group.terms))
+
+    def _inverse_row(self, block: Sequence[int], place: int) -> tuple[Expr, ...]:
+        matrix = {key: entry for key, entry in self.matrix.items() if key[0] in block}
+        units = ({other: Integer(int(other == one)) for other in block} for one in block)
+        return tuple(together(solve_blocks(matrix, block, unit)[place]) for unit in units)
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """The three systems of a state form: speeds, torques, and speeds without a store."""
+
+    assembly: Assembly
+
+    @cached_property
+    def speeds(self) -> System:
+        """d(across)/dt of the tree's stores: referred inertias times accelerations."""
+        form = self.assembly.form
+        matrix = self._congruence(form.across_states, form.dependent_across)
+
+        def right(tree: int) -> Terms:
+            driven = self.assembly.out_of(tree, left_out=form.dependent_across)
+            return (*driven, *self._prescribed_inertia(tree))
+
+        def symbol(tree: int) -> Expr:
+            return rate_of(self.assembly.quantities.across(self.assembly.ends(tree)))
+
+        return System(form.across_states, matrix, right, symbol)
+
+    @cached_property
+    def torques(self) -> System:
+        """d(through)/dt of the links' stores: compliances times torque rates."""
+        assembly, form = self.assembly, self.assembly.form
+        matrix: dict[tuple[int, int], Expr] = {
+            (link, link): 1 / assembly.quantities.law(link) for link in form.through_states
+        }
+        for tree in form.dependent_through:
+            members = [(link, gain) for link, gain in assembly.cutsets.get(tree, ()) if (link, link) in matrix]
+            _add_products(matrix, members, 1 / assembly.quantities.law(tree))
+
+        def right(link: int) -> Terms:
+            return (*assembly.around_known(link), *self._forced_twist(link))
+
+        def symbol(link: int) -> Expr:
+            return rate_of(assembly.quantities.store(link))
+
+        return System(form.through_states, matrix, right, symbol)
+
+    @cached_property
+    def algebraic(self) -> System:
+        """Across variables of conductances between nodes without a store."""
+        assembly, form = self.assembly, self.assembly.form
+        matrix = self._congruence(form.tree_conductances, form.link_conductances)
+
+        def right(tree: int) -> Terms:
+            terms = list(assembly.out_of(tree, left_out=form.link_conductances))
+            for link, gain in assembly.cutsets.get(tree, ()):
+                if link in form.link_conductances:
+                    drive = Add(*assembly.around(link, without=form.tree_conductances))
+                    terms.append(-gain * assembly.quantities.law(link) * drive)
+            return tuple(term for term in terms if term != 0)
+
+        def symbol(tree: int) -> Expr:
+            return assembly.quantities.across(assembly.ends(tree))
+
+        return System(form.tree_conductances, matrix, right, symbol)
+
+    def _congruence(self, unknowns: tuple[int, ...], links: tuple[int, ...]) -> Matrix:
+        """Coefficients of tree branches plus those of links referred to them."""
+        quantities = self.assembly.quantities
+        matrix: dict[tuple[int, int], Expr] = {(tree, tree): quantities.law(tree) for tree in unknowns}
+        for link in links:
+            loop = self.assembly.factors(link)
+            _add_products(matrix, [(tree, gain) for tree, gain in loop if (tree, tree) in matrix], quantities.law(link))
+        return matrix
+
+    def _prescribed_inertia(self, tree: int) -> Terms:
+        """What a prescribed acceleration asks of an inertia that is geared to it and to the unknown."""
+        assembly = self.assembly
+        terms: list[Expr] = []
+        for link, gain in assembly.cutsets.get(tree, ()):
+            if link in assembly.form.dependent_across:
+                for source, factor in assembly.factors(link):
+                    if source in assembly.form.across_sources:
+                        rate = assembly.quantities.law(source).diff(TIME)
+                        terms.append(-gain * assembly.quantities.law(link) * factor * rate)
+        return tuple(term for term in terms if term != 0)
+
+    def _forced_twist(self, link: int) -> Terms:
+        """What a source's changing torque adds to the twist of a spring in series with it."""
+        assembly = self.assembly
+        terms: list[Expr] = []
+        for tree, gain in assembly.factors(link):
+            if assembly.form.graph.branches[tree].template.kind is Kind.THROUGH_STORE:
+                compliance = 1 / assembly.quantities.law(tree)
+                for source, factor in assembly.cutsets.get(tree, ()):
+                    if source not in assembly.form.through_states:
+                        rate = assembly.quantities.law(source).diff(TIME)
+                        terms.append(-gain * compliance * factor * rate)
+        return tuple(term for term in terms if term != 0)
+
+
+def _add_products(
+    matrix: dict[tuple[int, int], Expr], members: Sequence[tuple[int, Expr]], coefficient: Expr
+) -> None:
+    for first, gain in members:
+        for second, other in members:
+            matrix[first, second] = matrix.get((first, second), Integer(0)) + gain * coefficient * other

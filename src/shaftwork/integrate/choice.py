@@ -1,0 +1,145 @@
+"""The engines by name, and which one suits a problem."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+from dataclasses import dataclass
+
+from shaftwork.core.errors import MissingExtraError, ParameterError
+from shaftwork.integrate.problem import Engine, Problem, Trajectory
+
+
+@dataclass(frozen=True)
+class EngineEntry:
+    """Where an engine lives.
+
+    Args:
+        function: "module:function".
+        purpose: what it is for, half a sentence.
+        library: module it needs beyond numpy and scipy, or None.
+        distribution: name of that library for pip.
+        extra: the extra that brings it.
+        options: keyword arguments of the function.
+    """
+
+    function: str
+    purpose: str
+    library: str | None = None
+    distribution: str = ""
+    extra: str = ""
+    options: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def installed(self) -> bool:
+        """Whether the library it needs can be imported."""
+        return self.library is None or importlib.util.find_spec(self.library) is not None
+
+
+ENGINES: dict[str, EngineEntry] = {
+    "exact": EngineEntry("shaftwork.integrate.exact:solve", "linear systems, without a step error"),
+    "heyoka": EngineEntry(
+        "shaftwork.integrate.heyoka_taylor:solve", "smooth and piecewise laws, compiled", "heyoka", "heyoka", "fast"
+    ),
+    "sundials": EngineEntry(
+        "shaftwork.integrate.sundials:solve", "stiff systems", "sksundae", "scikit-sundae", "stiff"
+    ),
+    "scipy": EngineEntry("shaftwork.integrate.scipy_ivp:solve", "everything that is not stiff"),
+    "scipy-radau": EngineEntry("shaftwork.integrate.scipy_ivp:solve", "stiff systems", options=(("method", "Radau"),)),
+}
+
+# The exact engine is taken up to this estimate of its time; an adaptive one may then be the faster.
+LONGEST_EXACT = 10.0
+# Times of one step in s, measured at a few states on one core; only their ratios matter.
+HEYOKA_STEP_PER_STATE, DOP853_STEP = 2e-7, 2e-4
+CVODE_STEP, RADAU_STEP = 5e-5, 2e-3
+# Explicit methods are stable up to about this product of step and decay rate; an implicit one takes about so many steps
+# for a transient and for a radian of an oscillation at rtol 1e-8.
+STABLE, TRANSIENT_STEPS, STEPS_PER_RADIAN = 5.0, 300.0, 20.0
+
+
+def choose(problem: Problem) -> tuple[str, str]:
+    """The engine that suits a problem, and why, in one sentence.
+
+    It looks at eigenvalues at a few states (milliseconds), so keep the answer where many similar problems are solved.
+    """
+    if problem.linear is not None:
+        from shaftwork.integrate.exact import cost
+
+        seconds = cost(problem, problem.linear)
+        if seconds <= LONGEST_EXACT:
+            return "exact", "The system is linear with inputs of straight pieces, so it is propagated exactly."
+    compiled = problem.symbolic is not None and ENGINES["heyoka"].installed
+    stiff = _stiff(problem, compiled=compiled)
+    if stiff is not None:
+        return stiff
+    if compiled:
+        return "heyoka", "The system is not stiff and its equations are compiled, so Taylor series are the fastest."
+    reason = "its equations are not compiled" if ENGINES["heyoka"].installed else "heyoka is not installed"
+    return "scipy", f"The system is not stiff and {reason}, so scipy's DOP853 is taken."
+
+
+def available(name: str) -> bool:
+    """Whether the engine of this name can be used here."""
+    return ENGINES[name].installed
+
+
+def solve(problem: Problem, engine: str = "auto", why: str | None = None) -> tuple[Trajectory, str, str]:
+    """Solve a problem with an engine by name, or with the one that suits it.
+
+    Args:
+        problem: what to solve.
+        engine: "auto" or a key of `ENGINES`.
+        why: the reason of an earlier `choose`, where its answer is used again.
+
+    Returns:
+        The trajectory, the name of the engine and why it was taken.
+
+    Raises:
+        ParameterError: no engine has this name.
+        MissingExtraError: the engine's library is not installed.
+        SimulationError: the engine failed.
+    """
+    name, reason = choose(problem) if engine == "auto" else (engine, f"The engine {engine!r} was asked for.")
+    return load(name)(problem), name, why or reason
+
+
+def load(name: str) -> Engine:
+    """The function of an engine.
+
+    Raises:
+        ParameterError: no engine has this name.
+        MissingExtraError: the engine's library is not installed.
+    """
+    entry = ENGINES.get(name)
+    if entry is None:
+        raise ParameterError(f"There is no engine {name!r}. Take one of: auto, {', '.join(ENGINES)}.")
+    if not entry.installed:
+        raise MissingExtraError(entry.distribution, entry.extra, f"engine={name!r}")
+    module, function = entry.function.split(":")
+    run = getattr(importlib.import_module(module), function)
+    options = dict(entry.options)
+
+    def engine(problem: Problem) -> Trajectory:
+        trajectory: Trajectory = run(problem, **options)
+        return trajectory
+
+    return engine
+
+
+def _stiff(problem: Problem, *, compiled: bool) -> tuple[str, str] | None:
+    """The implicit engine and why, where it costs less than the explicit one."""
+    from shaftwork.integrate.stiffness import rates
+
+    found = rates(problem)
+    duration = problem.t_end - problem.t0
+    stable_steps = found.decay * duration / STABLE
+    implicit_steps = TRANSIENT_STEPS * (1 + len(problem.breakpoints)) + STEPS_PER_RADIAN * found.oscillation * duration
+    name = "sundials" if ENGINES["sundials"].installed else "scipy-radau"
+    explicit = stable_steps * (HEYOKA_STEP_PER_STATE * problem.x0.size if compiled else DOP853_STEP)
+    if explicit <= implicit_steps * (CVODE_STEP if name == "sundials" else RADAU_STEP):
+        return None
+    return name, (
+        f"The system is stiff: its fastest decay ({found.decay:.3g} 1/s) would force an explicit method to about "
+        f"{stable_steps:.2g} steps, and an implicit one needs about {implicit_steps:.2g}."
+    )

@@ -1,0 +1,102 @@
+"""How fast a system decays and oscillates: what decides between explicit and implicit engines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from shaftwork.integrate.pieces import pieces
+from shaftwork.integrate.problem import Array, Problem
+
+# Up to here all eigenvalues are computed; beyond, norms of the balanced Jacobian bound them.
+LARGEST_EIGENVALUES = 200
+# A few starts of pieces are looked at, not all: every piece of a pulsed input looks alike.
+MOST_PIECES = 4
+
+
+@dataclass(frozen=True)
+class Rates:
+    """The fastest motions of a system.
+
+    Args:
+        decay: largest rate of a motion that decays rather than oscillates, 1/s.
+        oscillation: largest angular frequency of a motion that oscillates, rad/s.
+    """
+
+    decay: float
+    oscillation: float
+
+
+def rates(problem: Problem) -> Rates:
+    """Fastest decay and oscillation at the start of a problem and at a few states that it may soon reach."""
+    found = [_rates_of(matrix) for matrix in _jacobians(problem)]
+    return Rates(
+        max((rate.decay for rate in found), default=0.0), max((rate.oscillation for rate in found), default=0.0)
+    )
+
+
+def _jacobians(problem: Problem) -> Iterator[Any]:
+    if problem.jacobian is None:
+        return
+    for piece in pieces(problem)[:MOST_PIECES]:
+        time = piece.inside(piece.start)
+        matrix = sparse.csc_array(problem.jacobian(time, problem.x0))
+        yield matrix
+        # One linearly implicit Euler step is stable however stiff the system is, and leads to where it goes.
+        moved = _implicit_step(problem, time, matrix, 0.1 * (piece.end - piece.start))
+        if moved is not None:
+            yield sparse.csc_array(problem.jacobian(time, moved))
+
+
+def _implicit_step(problem: Problem, time: float, matrix: Any, step: float) -> Array | None:
+    derivative = problem.rhs(time, problem.x0)
+    try:
+        factors = splu(sparse.csc_matrix(sparse.eye_array(problem.x0.size) - step * matrix))
+    except RuntimeError:  # exactly singular: a growing motion has just this rate
+        return None
+    moved = problem.x0 + np.asarray(factors.solve(step * derivative))
+    return moved if np.isfinite(moved).all() else None
+
+
+def _rates_of(matrix: Any) -> Rates:
+    if not np.isfinite(matrix.data).all():
+        return Rates(0.0, 0.0)
+    if matrix.shape[0] <= LARGEST_EIGENVALUES:
+        values = np.linalg.eigvals(matrix.toarray())
+        damped = np.abs(values.real) > np.abs(values.imag)
+        decay = np.max(-values.real, initial=0.0, where=damped)
+        return Rates(float(decay), float(np.max(np.abs(values.imag), initial=0.0, where=~damped)))
+    scale = balance(matrix)
+    scaled = scale_by(matrix, scale)
+    return Rates(norm((scaled + scaled.T) / 2), norm((scaled - scaled.T) / 2))
+
+
+def balance(matrix: Any, sweeps: int = 8) -> Array:
+    """Diagonal d (n,) for which d^-1 A d has rows and columns of about equal size; speeds and torques differ by 10^6.
+
+    Source: Osborne, On pre-conditioning of matrices, 1960. Powers of two, so the scaling itself does not round.
+    """
+    size = abs(sparse.csr_array(matrix))
+    scale = np.ones(matrix.shape[0])
+    for _ in range(sweeps):
+        rows = (size @ scale) / scale
+        columns = (size.T @ (1 / scale)) * scale
+        both = (rows > 0) & (columns > 0)
+        # Half of the full correction: all entries move at once, and the full one would overshoot.
+        scale[both] *= (rows[both] / columns[both]) ** 0.25
+    return np.asarray(2.0 ** np.round(np.log2(scale)))
+
+
+def scale_by(matrix: Any, scale: Array) -> Any:
+    """d^-1 A d for a sparse A and the diagonal d (n,)."""
+    return sparse.diags_array(1 / scale) @ matrix @ sparse.diags_array(scale)
+
+
+def norm(matrix: Any) -> float:
+    """Largest column sum of a sparse matrix: a bound of its eigenvalues."""
+    return float(abs(matrix).sum(axis=0).max(initial=0.0))

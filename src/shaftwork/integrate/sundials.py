@@ -1,0 +1,243 @@
+"""The engine for stiff systems and for implicit equations: CVODE and IDA of SUNDIALS."""
+
+from __future__ import annotations
+
+import importlib.util
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+from scipy import sparse
+from scipy.interpolate import BarycentricInterpolator
+
+from shaftwork.core.errors import MissingExtraError
+from shaftwork.integrate.pieces import (
+    GuardedFunctions,
+    Piece,
+    PiecewiseDense,
+    both_sides,
+    check_finite,
+    failure,
+    pieces,
+    start_of_piece,
+)
+from shaftwork.integrate.problem import Array, DaeProblem, Problem, Trajectory
+
+Method = Literal["BDF", "Adams"]
+
+# SUNDIALS interpolates inside a step by a polynomial of at most this degree.
+DEGREES = {"BDF": 5, "Adams": 12}
+# Up to here a dense factorisation beats SuperLU. A band solver is not used: the binding passes its Jacobian as a full
+# matrix, which costs more than the factorisation saves.
+LARGEST_DENSE = 100
+
+# From a piece and its start state to (SUNDIALS solver, consistent start state, text of a failure from its reason).
+Opener = Callable[[Piece, Array], tuple[Any, Array, Callable[[str], str]]]
+
+
+def solve(problem: Problem, method: Method = "BDF") -> Trajectory:
+    """Integrate with CVODE.
+
+    Dense output is made by a second, identical run when it is first asked for.
+
+    Args:
+        problem: what to solve.
+        method: "BDF" for stiff systems, "Adams" for smooth motion that is not.
+
+    Raises:
+        MissingExtraError: scikit-sundae is not installed.
+        SimulationError: SUNDIALS gave up, with its reason.
+
+    Source: Hindmarsh and others, SUNDIALS: suite of nonlinear and differential/algebraic equation solvers, 2005.
+    """
+    _require("engine='sundials'")
+    return _trajectory(problem, lambda piece, x: _open_cvode(problem, piece, x, method), DEGREES[method])
+
+
+def solve_dae(problem: DaeProblem) -> Trajectory:
+    """Integrate an implicit problem with IDA, from consistent initial values that IDA finds at every piece's start.
+
+    Raises:
+        MissingExtraError: scikit-sundae is not installed.
+        SimulationError: SUNDIALS gave up, with its reason.
+
+    Source: as `solve`.
+    """
+    _require("A nonlinear algebraic loop")
+    return _trajectory(problem, lambda piece, x: _open_ida(problem, piece, x), DEGREES["BDF"])
+
+
+def _require(purpose: str) -> None:
+    if importlib.util.find_spec("sksundae") is None:
+        raise MissingExtraError("scikit-sundae", "stiff", purpose)
+
+
+def _open_cvode(problem: Problem, piece: Piece, x: Array, method: Method) -> tuple[Any, Array, Callable[[str], str]]:
+    from sksundae.cvode import CVODE
+
+    guard = GuardedFunctions(problem, piece)
+
+    def rhs(t: float, y: Array, derivative: Array) -> None:
+        derivative[:] = guard.rhs(t, y)
+
+    options: dict[str, Any] = {"method": method, "rtol": problem.rtol, "atol": problem.atol}
+    if problem.jacobian is not None:
+        options |= _linear_solver(guard, piece, x)
+    with warnings.catch_warnings():
+        # It says that the pattern is only used as a pattern, since the Jacobian is given.
+        warnings.filterwarnings("ignore", message="Custom sparse Jacobian")
+        solver = CVODE(rhs, **options)
+    solver.init_step(piece.start, x)
+    return solver, x, guard.reason
+
+
+def _linear_solver(guard: GuardedFunctions, piece: Piece, x: Array) -> dict[str, Any]:
+    if x.size <= LARGEST_DENSE:
+
+        def fill_dense(t: float, y: Array, _: Array, full: Array) -> None:
+            full[:] = guard.dense_jacobian(t, y)
+
+        return {"linsolver": "dense", "jacfn": fill_dense}
+    pattern = sparse.csc_array(guard.jacobian(piece.start, x)).copy()
+    pattern.sort_indices()
+    pattern.data[:] = 1.0
+    rows, columns = pattern.indices, np.repeat(np.arange(x.size), np.diff(pattern.indptr))
+
+    def fill_sparse(t: float, y: Array, _: Array, data: Array) -> None:
+        data[:] = guard.jacobian(t, y).tocsr()[rows, columns]
+
+    return {"linsolver": "sparse", "sparsity": pattern, "jacfn": fill_sparse}
+
+
+def _open_ida(problem: DaeProblem, piece: Piece, x: Array) -> tuple[Any, Array, Callable[[str], str]]:
+    from sksundae.ida import IDA
+
+    def residual(t: float, y: Array, derivative: Array, found: Array) -> None:
+        found[:] = problem.residual(piece.inside(t), y, derivative)
+
+    solver = IDA(
+        residual,
+        rtol=problem.rtol,
+        atol=problem.atol,
+        algebraic_idx=list(problem.algebraic),
+        calc_initcond="yp0",
+        calc_init_dt=1e-3 * (piece.end - piece.start),
+    )
+    start = solver.init_step(piece.start, x, problem.derivative0)
+    if not start.success:
+        raise failure(problem, "sundials", piece.start, x, f"IDA found no consistent initial values: {start.message}")
+    return solver, start.y.copy(), str
+
+
+@dataclass(frozen=True)
+class _Step:
+    """One step: its ends in s, the state (n,) at its end, the states (k, n) at the times asked for inside it."""
+
+    start: float
+    end: float
+    state: Array
+    inside: Array
+
+
+def _march(
+    problem: Problem | DaeProblem, open_solver: Opener, ask: Callable[[float, float], Array]
+) -> list[tuple[Array, list[_Step]]]:
+    """All steps of each piece, behind the piece's start state; `ask` gives the times wanted in a step."""
+    x = np.asarray(problem.x0, dtype=float)
+    found: list[tuple[Array, list[_Step]]] = []
+    left = problem.max_steps
+    for piece in pieces(problem):
+        solver, x, explain = open_solver(piece, start_of_piece(problem, piece, x))
+        found.append((x, []))
+        t = piece.start
+        while t < piece.end:
+            if left <= 0:
+                raise failure(problem, "sundials", t, x, f"{problem.max_steps} steps were not enough")
+            with np.errstate(all="ignore"):
+                result = solver.step(piece.end, method="onestep", tstop=piece.end)
+            if not result.success:
+                raise failure(problem, "sundials", t, x, explain(str(result.message)))
+            end, x = float(result.t), result.y.copy()
+            check_finite(problem, "sundials", end, x)
+            if end <= t:
+                raise failure(problem, "sundials", t, x, "the step became too small")
+            asked = ask(t, end)
+            inside = np.array([solver.step(time).y.copy() if time < end else x for time in asked])
+            if asked.size and asked[0] < end:
+                solver.step(end)  # after an interpolation SUNDIALS gives the end of the step once more
+            found[-1][1].append(_Step(t, end, x, inside.reshape(asked.size, x.size)))
+            t, left = end, left - 1
+    return found
+
+
+def _trajectory(problem: Problem | DaeProblem, open_solver: Opener, degree: int) -> Trajectory:
+    dense = _Replay(problem, open_solver, degree)
+    if problem.t_eval is None:
+        t, states = both_sides(problem, *dense.step_ends)
+        return Trajectory(t, states, dense, {"steps": dense.steps.size - 1})
+    times = np.asarray(problem.t_eval, dtype=float)
+    rows: list[Array] = []
+    steps = 0
+
+    def ask(start: float, end: float) -> Array:
+        # An output at the end of a step is read there, except at a breakpoint: the next piece starts with it.
+        side: Literal["left", "right"] = "left" if end in problem.breakpoints else "right"
+        return times[np.searchsorted(times, start, side="right") : np.searchsorted(times, end, side=side)]
+
+    for piece, (start, marched) in zip(pieces(problem), _march(problem, open_solver, ask), strict=True):
+        if piece.start in times:
+            rows.append(start[None, :])
+        rows.extend(step.inside for step in marched)
+        steps += len(marched)
+    return Trajectory(times, np.concatenate(rows), dense, {"steps": steps})
+
+
+class _Replay:
+    """Dense output that runs the problem again when it is first asked, and keeps each step's own polynomial."""
+
+    def __init__(self, problem: Problem | DaeProblem, open_solver: Opener, degree: int) -> None:
+        self._problem = problem
+        self._open = open_solver
+        # Chebyshev points of [0, 1] with both ends: the interpolation inside a step is exact and well conditioned.
+        self._points = (1 - np.cos(np.pi * np.arange(degree + 1) / degree)) / 2
+
+    @cached_property
+    def _found(self) -> list[tuple[Array, list[_Step]]]:
+        return _march(self._problem, self._open, lambda start, end: start + (end - start) * self._points[1:-1])
+
+    @cached_property
+    def _dense(self) -> PiecewiseDense:
+        parts, starts = [], []
+        for state, steps in self._found:
+            before = state
+            for step in steps:
+                nodes = np.vstack([before, step.inside, step.state])
+                parts.append(_polynomial(step.start, step.end, self._points, nodes))
+                starts.append(step.start)
+                before = step.state
+        ends = np.array([*starts, self._problem.t_end])
+        return PiecewiseDense(np.array(starts), tuple(parts), ends, self._problem.x0.size)
+
+    @property
+    def step_ends(self) -> tuple[list[Array], list[Array]]:
+        """Times and states at the step ends of each piece."""
+        times = [np.array([steps[0].start, *(step.end for step in steps)]) for _, steps in self._found]
+        states = [np.vstack([start, *(step.state for step in steps)]) for start, steps in self._found]
+        return times, states
+
+    @property
+    def steps(self) -> Array:
+        return self._dense.steps
+
+    def __call__(self, times: Array) -> Array:
+        return self._dense(times)
+
+
+def _polynomial(start: float, end: float, points: Array, nodes: Array) -> Callable[[Array], Array]:
+    def evaluate(times: Array) -> Array:
+        return np.asarray(BarycentricInterpolator(points, nodes)((times - start) / (end - start)))
+
+    return evaluate

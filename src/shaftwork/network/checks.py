@@ -1,0 +1,406 @@
+"""Checks of a network before its equations are made: what is typed wrong, and what is not joined to anything.
+
+Nothing here raises. What cannot be used is replaced or left out, so that the later stages run and every problem of a
+network is reported together.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import reprlib
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import networkx as nx
+import sympy
+from sympy.core.function import AppliedUndef
+
+from shaftwork.components.base import Component
+from shaftwork.components.branches import ACROSS, INTEGRAL
+from shaftwork.components.laws import SYMBOLS, t
+from shaftwork.core.domains import Domain
+from shaftwork.core.errors import Problem
+from shaftwork.network.graph import GROUND, CircuitGraph, resolve
+from shaftwork.network.netlist import REFERENCE, Netlist, Placed
+from shaftwork.network.templates import BranchTemplate, Kind, make_template, substitution
+
+LEFT_OUT = ("node name", "node count", "wrong domain", "no effect", "component")
+"""Kinds of problems whose part is left out of what is examined further."""
+
+_READS: Mapping[Kind, frozenset[sympy.Symbol]] = {
+    Kind.ACROSS_SOURCE: frozenset({t}),
+    Kind.THROUGH_SOURCE: frozenset({t}),
+    Kind.LAW: frozenset({t, ACROSS, INTEGRAL}),
+}
+"""What the laws of a kind may depend on besides parameters; those not listed depend on parameters alone."""
+
+Train = tuple[int, ...]
+"""Numbers of the parts that hang together."""
+
+
+def title(part: Component) -> str:
+    """A part as messages name it: "Gear 'stage 1'"."""
+    return f"{type(part).__name__} '{part.name}'"
+
+
+def listed(names: Sequence[str], most: int = 6) -> str:
+    """Names in quotes; of many, the first few and the number of the others."""
+    shown = [f"'{name}'" for name in names[:most]]
+    return ", ".join(shown) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
+def at_nodes(names: Sequence[str]) -> str:
+    """Nodes as messages name them: "nodes 'rotor', 'wheel'"."""
+    return f"node{'s' * (len(names) > 1)} {listed(names)}" if names else "no node"
+
+
+class Spelling:
+    """Node names that may stand for another by a slip: one letter too many, missing or wrong, other case or spaces."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._names = names
+
+    @cached_property
+    def _by_variant(self) -> dict[str, list[str]]:
+        made: dict[str, list[str]] = {}
+        for name in self._names:
+            for variant in _variants(name):
+                made.setdefault(variant, []).append(name)
+        return made
+
+    def suggestion(self, names: Sequence[str]) -> str:
+        """A question in parentheses for the first of the names that is like another node, else nothing."""
+        own = frozenset(names)
+        for name, variant in ((name, variant) for name in names for variant in _variants(name)):
+            for other in self._by_variant.get(variant, ()):
+                if other not in own and _digits(other) == _digits(name):  # n1 and n2 are two nodes, not a slip
+                    return f" (did you mean node '{other}'?)"
+        return ""
+
+
+def _digits(name: str) -> str:
+    return "".join(filter(str.isdigit, name))
+
+
+def _variants(name: str) -> tuple[str, ...]:
+    """The name without case and spaces, and all that come of it when one letter is left out."""
+    plain = "".join(filter(str.isalnum, name.lower()))
+    short = len(plain) - len(_digits(plain)) < 4
+    return (plain, *(() if short else (plain[:k] + plain[k + 1 :] for k in range(len(plain)))))
+
+
+class _Fault(NamedTuple):
+    """What is wrong with the law given for a parameter."""
+
+    parameter: str
+    what: str
+    hint: str
+
+
+def declaration_problems(netlist: Netlist) -> tuple[Problem, ...]:
+    """What is wrong with names, nodes, parameters and laws as they were typed."""
+    return examine(netlist)[1]
+
+
+def examine(netlist: Netlist) -> tuple[Netlist, tuple[Problem, ...]]:
+    """Check every part by itself and against the names and nodes before it.
+
+    Args:
+        netlist: any netlist.
+
+    Returns:
+        A netlist that `build_graph` accepts (bad values replaced, bad parts left out, equal names told apart), and all
+        problems in the order of the parts.
+    """
+    work = _Examination()
+    for placed in netlist.placed:
+        work.take(placed)
+    if not netlist.placed:
+        work.report("empty network", f"'{netlist.name}' has no parts.", "Add parts: net.add(part, 'node').")
+    return Netlist(netlist.name, tuple(work.kept)), tuple(work.problems)
+
+
+class _Examination:
+    """Goes through the parts in order and remembers names, nodes and domains."""
+
+    def __init__(self) -> None:
+        self.problems: list[Problem] = []
+        self.kept: list[Placed] = []
+        self._named: dict[str, str] = {}
+        self._domains: dict[str, tuple[Domain, str]] = {}
+        self._dotted: dict[str, None] = {}
+        self._faults: dict[Any, tuple[_Fault, ...]] = {}
+
+    def report(self, kind: str, message: str, hint: str, placed: Placed | None = None) -> None:
+        """Put down an error, with the part and the nodes that it concerns."""
+        parts = (str(placed.part.name),) if placed else ()
+        nodes = tuple(node for node in placed.nodes if isinstance(node, str) and node) if placed else ()
+        self.problems.append(Problem(kind, message, hint, parts, tuple(dict.fromkeys(nodes))))
+
+    def take(self, placed: Placed) -> None:
+        """Check one part and keep it if the rest can be examined with it."""
+        renamed = Placed(self._with_name(placed), placed.nodes)
+        fits = self._stands(renamed)
+        sound = self._with_values(renamed)
+        if fits and sound is not None:
+            self.kept.append(Placed(sound, placed.nodes))
+
+    def _with_name(self, placed: Placed) -> Component:
+        """The part under a name that no other part has."""
+        part, name = placed.part, placed.part.name
+        if not isinstance(name, str) or not name.strip():
+            self.report("part name", f"{title(part)} has no name.", "Give it a text that no other part has.", placed)
+        elif name == REFERENCE:
+            hint = "Rename the part; a Ground part may be called 'frame'."
+            self.report("part name", f"{title(part)}: the name '{REFERENCE}' stands for the frame.", hint, placed)
+        elif "." in name:
+            hint = f"A dot joins part and quantity, as in 'shaft.tau': write '{name.replace('.', '_')}'."
+            self.report("part name", f"{title(part)} has a dot in its name.", hint, placed)
+        elif name in self._named:
+            message = f"{title(part)} at {at_nodes(placed.nodes)} has the name of {self._named[name]}."
+            self.report("duplicate name", message, f"Rename one of them, for example '{name}_2'.", placed)
+        free, count = str(name) if str(name).strip() else "unnamed", 1
+        while free in self._named:
+            count += 1
+            free = f"{name} ({count})"
+        self._named[free] = f"{title(part)} at {at_nodes(placed.nodes)}"
+        return part if free == name else dataclasses.replace(part, name=free)
+
+    def _stands(self, placed: Placed) -> bool:
+        """Whether the part stands at nodes that suit its ports."""
+        part, nodes, before = placed.part, placed.nodes, len(self.problems)
+        if strange := [node for node in nodes if not isinstance(node, str) or not node.strip()]:
+            hint = "A node is named by a text such as 'rotor'."
+            self.report("node name", f"{title(part)}: {reprlib.repr(strange[0])} is no node.", hint, placed)
+            return False
+        for node in nodes:
+            if "." in node and node not in self._dotted:
+                self._dotted[node] = None
+                hint = f"A dot marks the nodes inside a part: write '{node.replace('.', '_')}'."
+                message = f"{title(part)} stands at node '{node}', which has a dot in its name."
+                self.problems.append(Problem("dotted node name", message, hint, (part.name,), (node,)))
+        self._check_count(placed)
+        self._check_domains(placed)
+        if len(self.problems) == before or self.problems[-1].kind == "dotted node name":
+            self._check_effect(placed)
+        return not any(problem.kind in LEFT_OUT for problem in self.problems[before:])
+
+    def _check_count(self, placed: Placed) -> None:
+        part, count = placed.part, len(placed.nodes)
+        needed = max((k for k, port in enumerate(part.ports, 1) if not port.optional), default=0)
+        if needed <= count <= len(part.ports):
+            return
+        ports = ", ".join(f"{port.name} (may be left out)" if port.optional else port.name for port in part.ports)
+        pattern = ", ".join(f"'node {port.name}'" for port in part.ports)
+        self.report(
+            "node count",
+            f"{title(part)} is given {at_nodes(placed.nodes)}, but its ports are: {ports}.",
+            f"Write net.add(part, {pattern}).",
+            placed,
+        )
+
+    def _check_domains(self, placed: Placed) -> None:
+        for port, node in zip(placed.part.ports, placed.nodes, strict=False):
+            if port.domain is None or node == REFERENCE:
+                continue
+            domain, first = self._domains.setdefault(node, (port.domain, title(placed.part)))
+            if domain != port.domain:
+                self.report(
+                    "wrong domain",
+                    f"{title(placed.part)} needs a node of {port.domain.name} at its port {port.name}, but "
+                    f"node '{node}' belongs to {domain.name} since {first} stands there.",
+                    f"Choose another node, or a part for {domain.name}; Drum, Wheel and DCMachine join the domains.",
+                    placed,
+                )
+
+    def _check_effect(self, placed: Placed) -> None:
+        part = placed.part
+        held = {*placed.nodes, *(REFERENCE for _ in part.ports[len(placed.nodes) :])}
+        single = len(part.ports) == 1
+        if len(held) == 1 and not (single and (REFERENCE not in held or part.ports[0].domain is None)):
+            (node,) = held
+            message = (
+                f"{title(part)} {'stands' if single else 'begins and ends'} at node '{node}' and does nothing there."
+            )
+            hint = "Move it to a node that can move." if single else "Join one of its ends to another node."
+            self.report("no effect", message, hint, placed)
+
+    def _with_values(self, placed: Placed) -> Component | None:
+        """The part with values that can be used in place of those that cannot; None if it yields no branches."""
+        part = placed.part
+        try:
+            resolved, objections = resolve(placed)
+            for name, given, objection in objections:
+                self._report_value(placed, name, given, objection)
+            faults = self._faults_of(part, resolved.values)
+        except Exception as error:  # noqa: BLE001 - a component written by a user may raise anything
+            message = f"{title(part)}: its laws cannot be made ({type(error).__name__}: {error})."
+            self.report("component", message, "Correct its branches() or the law that it is given.", placed)
+            return None
+        for name, what, hint in faults:
+            kind = "law" if name else "component"
+            self.report(kind, f"{title(part)}: {f'{name} ' if name else ''}{what}.", hint, placed)
+        if any(not fault.parameter for fault in faults):
+            return None
+        usable: dict[str, Any] = {fault.parameter: 1.0 for fault in faults}
+        return dataclasses.replace(part, **usable) if faults else part
+
+    def _report_value(self, placed: Placed, name: str, given: Any, objection: str) -> None:
+        part, declared = placed.part, placed.part.declared[name]
+        kind = "wrong unit" if hasattr(given, "dimensionality") else "parameter"
+        unit = "as a pure number" if declared.unit == "1" else f"in {declared.unit}"
+        bounds = f", {declared.bounds}" if declared.bounds else ""
+        shown = "" if kind == "wrong unit" else f" = {reprlib.repr(given)}"
+        hint = f"Give the {declared.meaning} {unit}{bounds}."
+        self.report(kind, f"{title(part)}: {name}{shown} {objection}.", hint, placed)
+
+    def _faults_of(self, part: Component, values: Mapping[str, Any]) -> tuple[_Fault, ...]:
+        """Faults of the laws, found once for parts that have the same."""
+        odd = tuple(
+            _Fault(name, f"is a {type(value).__name__}, not a number or a law", "Give a number, a Table or a formula.")
+            for name, value in values.items()
+            if not isinstance(value, float) and (not isinstance(value, sympy.Expr) or value.is_Matrix)
+        )
+        if odd:
+            return odd
+        key = (type(part), tuple(bool(value) if isinstance(value, float) else value for value in values.values()))
+        if key not in self._faults:
+            self._faults[key] = tuple(_law_faults(part, values))
+        return self._faults[key]
+
+
+def _law_faults(part: Component, values: Mapping[str, Any]) -> Iterator[_Fault]:
+    """What the laws of a part read that they may not, first as given, then in the branches that they end in."""
+    laws = {name: value for name, value in values.items() if not isinstance(value, float)}
+    faults = tuple(fault for name, law in laws.items() if (fault := _fault_of_law(part, name, law)))
+    yield from faults
+    sound = {**values, **dict.fromkeys((fault.parameter for fault in faults), 1.0)}
+    for template in make_template(part, sound).branches:
+        if not (strange := _strange_symbols(template)):
+            _check_ends(part, template)
+        elif template.kind is Kind.ACROSS_SOURCE and strange <= {ACROSS, INTEGRAL}:
+            for name in (name for name, law in laws.items() if law.free_symbols - {t}):
+                read = ", ".join(sorted(symbol.name for symbol in laws[name].free_symbols - {t}))
+                hint = "A source that prescribes it must know it: write the law in t, or use a source of torque."
+                yield _Fault(name, f"reads {read}, but may depend on time t alone", hint)
+        else:
+            names = ", ".join(sorted(symbol.name for symbol in strange))
+            yield _Fault("", f"a branch law depends on {names}", "Use the parameters p.name, ACROSS, INTEGRAL and t.")
+
+
+def _fault_of_law(part: Component, name: str, law: sympy.Expr) -> _Fault | None:
+    if law.has(sympy.nan, sympy.oo, -sympy.oo, sympy.zoo, sympy.I):
+        return _Fault(name, f"= {law} is not a finite real law", "Remove what is infinite, undefined or imaginary.")
+    if unknown := sorted(str(call.func) for call in law.atoms(AppliedUndef)):
+        return _Fault(name, f"contains the unknown function {unknown[0]}", "Use a Table or a function of sympy.")
+    readable = (t, *substitution(part))
+    strange = sorted(law.free_symbols - set(readable), key=str)
+    if not strange:
+        return None
+    symbol, able = strange[0], ", ".join(str(symbol) for symbol in readable)
+    if symbol in SYMBOLS:
+        what, hint = f"reads {symbol}, which belongs to another domain", f"This part can read {able}."
+    elif symbol.name in {known.name for known in SYMBOLS}:
+        what = f"contains a symbol {symbol} of your own, which is not Shaftwork's"
+        hint = f"Take the symbols from the package (shaftwork.{symbol}); this part can read {able}."
+    else:
+        what = f"contains the symbol {symbol}, which has no value"
+        hint = f"Put its number in; this part can read {able}."
+    return _Fault(name, what, hint)
+
+
+def _strange_symbols(template: BranchTemplate) -> set[sympy.Symbol]:
+    found = template.law.free_symbols.union(*(coefficient.free_symbols for coefficient, _, _ in template.terms))
+    return set(found - {*template.symbols} - _READS.get(template.kind, frozenset()))
+
+
+def _check_ends(part: Component, template: BranchTemplate) -> None:
+    ports = {None, *(port.name for port in (*part.ports, *part.inner))}
+    ends = [*template.ends, *(end for _, plus, minus in template.terms for end in (plus, minus))]
+    if strange := [end for end in ends if end not in ports]:
+        raise ValueError(f"a branch ends at {strange[0]!r}, which is no port")
+
+
+def connection_problems(graph: CircuitGraph) -> tuple[Problem, ...]:
+    """Parts, ends and whole trains that are not joined to the rest."""
+    ends: list[list[tuple[int, str]]] = [[] for _ in graph.nodes]
+    for number, part in enumerate(graph.parts):
+        for port in part.component.ports:
+            if (node := part.nodes[port.name]) != GROUND:
+                ends[node].append((number, port.name))
+    spelling = Spelling(graph.nodes)
+    trains = _trains(ends)
+    single = [train[0] for train in trains if len(train) == 1]
+    floating = [k for k in single if not any(_is_complete(graph, k, node) for node in _port_nodes(graph, (k,)))]
+    problems = [_floating_part(graph, number, spelling) for number in floating]
+    alone = {*floating}
+    for node, found in enumerate(ends):
+        if len(found) == 1 and found[0][0] not in alone and not _is_complete(graph, found[0][0], node):
+            problems.append(_loose_end(graph, *found[0], node, spelling))
+    joined = [train for train in trains if train[0] not in alone]
+    main = max(joined, key=len, default=())
+    problems += [_separate_train(graph, train, main, spelling) for train in joined if train is not main]
+    return tuple(problems)
+
+
+def _trains(ends: list[list[tuple[int, str]]]) -> list[Train]:
+    """The parts that hang together by nodes other than the frame; those that stand at the frame alone are left out."""
+    joints: nx.Graph[int] = nx.Graph()
+    joints.add_nodes_from(number for found in ends for number, _ in found)
+    joints.add_edges_from((found[0][0], number) for found in ends for number, _ in found[1:])
+    return sorted(tuple(sorted(train)) for train in nx.connected_components(joints))
+
+
+def _is_complete(graph: CircuitGraph, number: int, node: int) -> bool:
+    """Whether a part needs no other at a node: it has an inertia there, or a law whose torque is judged later."""
+    for index in graph.parts[number].branches:
+        branch = graph.branches[index]
+        kind, ends = branch.template.kind, (branch.plus, branch.minus)
+        is_law = kind in (Kind.THROUGH_SOURCE, Kind.LAW)
+        if node in ends and (is_law or (kind is Kind.ACROSS_STORE and GROUND in ends)):
+            return True
+    return False
+
+
+def _port_nodes(graph: CircuitGraph, numbers: Train) -> tuple[int, ...]:
+    parts = (graph.parts[number] for number in numbers)
+    nodes = (part.nodes[port.name] for part in parts for port in part.component.ports)
+    return tuple(dict.fromkeys(node for node in nodes if node != GROUND))
+
+
+def _floating_part(graph: CircuitGraph, number: int, spelling: Spelling) -> Problem:
+    part = graph.parts[number]
+    nodes = tuple(graph.nodes[node] for node in _port_nodes(graph, (number,)))
+    return Problem(
+        "floating part",
+        f"{title(part.component)} at {at_nodes(nodes)} shares no node with any other part.",
+        f"Join it to the train{spelling.suggestion(nodes)}, or remove it.",
+        (part.name,),
+        nodes,
+    )
+
+
+def _loose_end(graph: CircuitGraph, number: int, port: str, node: int, spelling: Spelling) -> Problem:
+    part, name = graph.parts[number], graph.nodes[node]
+    return Problem(
+        "loose end",
+        f"node '{name}': only {title(part.component)} ends there, with its port {port}, so it can carry no load.",
+        f"Join another part to '{name}'{spelling.suggestion((name,))}, or remove '{part.name}'.",
+        (part.name,),
+        (name,),
+    )
+
+
+def _separate_train(graph: CircuitGraph, train: Train, main: Train, spelling: Spelling) -> Problem:
+    names = tuple(graph.parts[number].name for number in train)
+    nodes = tuple(graph.nodes[node] for node in _port_nodes(graph, train))
+    others = tuple(graph.parts[number].name for number in main)
+    return Problem(
+        "separate train",
+        f"{listed(names)} at {at_nodes(nodes)} share{'s' * (len(names) == 1)} no node with {listed(others, most=3)}.",
+        f"Join the two{spelling.suggestion(nodes)}, or simulate them as two networks.",
+        names,
+        nodes,
+        "warning",
+    )

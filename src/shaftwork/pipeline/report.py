@@ -1,0 +1,65 @@
+"""What `shaftwork check` says of a network before anything is simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from shaftwork.codegen.elements import Array
+from shaftwork.pipeline.model import Model
+from shaftwork.pipeline.network import Network
+
+LARGEST_DENSE = 1500
+"""States up to which all eigenvalues are computed."""
+
+
+def structure_report(net: Network, t_end: float) -> str:
+    """Structure, states, time constants, stiffness, and the engine that "auto" would take, as text.
+
+    Args:
+        net: the network.
+        t_end: end of the motion that the engine is chosen for, s.
+
+    Raises:
+        NetworkError: the network cannot be assembled; lists every reason.
+    """
+    return "\n".join(_lines(net, net.compile(), t_end))
+
+
+def _lines(net: Network, model: Model, t_end: float) -> Iterator[str]:
+    graph = model.form.graph
+    yield f"{net.name}: {len(graph.parts)} parts, {len(graph.nodes)} nodes, {len(graph.branches)} branches"
+    for problem in net.check():
+        yield f"  {problem.severity}: {problem}"
+    if graph.zeros:
+        yield f"left out, being zero: {_some(graph.zeros)}"
+    yield f"states ({len(model.states)}): {_some(model.states)}"
+    dependent = [graph.part_of(k).name for k in (*model.form.dependent_across, *model.form.dependent_through)]
+    if dependent:
+        yield f"eliminated stores ({len(dependent)}): {_some(dependent)}"
+    cost = model.cost()
+    yield f"right-hand side: {cost.form} code, {cost.total} operations; {cost.entries} entries in the linear part"
+    if 0 < len(model.states) <= LARGEST_DENSE:
+        yield from _time_constants(np.linalg.eigvals(model.jacobian(0.0, np.zeros(len(model.states))).toarray()))
+    if model.states:
+        name, why = model.choose_engine(t_end)
+        yield f"engine for {t_end:g} s: {name}, {why}"
+
+
+def _time_constants(eigenvalues: Array) -> Iterator[str]:
+    size = np.abs(eigenvalues)
+    moving = eigenvalues[size > 1e-9 * size.max()] if size.max() else eigenvalues[:0]
+    swings = np.unique(np.round(np.abs(moving.imag[moving.imag > 1e-9 * np.abs(moving)]) / (2 * np.pi), 12))
+    decays = np.sort(-1 / moving.real[moving.real < -1e-12 * np.abs(moving)])
+    if swings.size:
+        yield f"natural frequencies at rest ({swings.size}): {_some([f'{f:.5g}' for f in swings])} Hz"
+    if decays.size:
+        yield f"time constants at rest: {decays[0]:.3g} s to {decays[-1]:.3g} s, stiffness ratio {decays[-1] / decays[0]:.3g}"
+    if (moving.real > 1e-9 * np.abs(moving)).any():
+        yield f"unstable at rest: grows within {1 / moving.real.max():.3g} s (a motor's starting curve does this)"
+
+
+def _some(names: Sequence[object], most: int = 12) -> str:
+    listed = [str(name) for name in names]
+    return ", ".join(listed if len(listed) <= most else [*listed[: most - 1], "...", listed[-1]])

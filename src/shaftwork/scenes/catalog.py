@@ -1,0 +1,44 @@
+"""What a ready scene is, and the list of all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from shaftwork.pipeline.network import Network
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A system from the literature, ready to run.
+
+    Args:
+        name: name on the command line.
+        title: one line.
+        source: author, equation or section.
+        build: makes the network; its keyword arguments vary the scene.
+        t_end: end of the motion, s.
+        signals: the quantities worth looking at.
+        chosen: what the source does not print and how it was chosen.
+    """
+
+    name: str
+    title: str
+    source: str
+    build: Callable[..., Network]
+    t_end: float
+    signals: tuple[str, ...]
+    chosen: tuple[str, ...] = ()
+
+    def __call__(self, **options: Any) -> Network:
+        return self.build(**options)
+
+
+SCENES: dict[str, Scene] = {}
+
+
+def enter(scene: Scene) -> Scene:
+    """Put a scene on the list."""
+    SCENES[scene.name] = scene
+    return scene
