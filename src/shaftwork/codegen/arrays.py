@@ -9,7 +9,9 @@ from scipy import sparse
 
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.inputs import Inputs
+from shaftwork.codegen.loops import LoopSolver
 from shaftwork.codegen.matrices import LinearPart, MatrixAssembly
+from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
 
 
@@ -17,19 +19,21 @@ class ArrayProgram:
     """Right-hand side, Jacobian and recovery of every branch quantity, for any parameter vector.
 
     Args:
-        form: a state form without algebraic loops.
+        form: the state form.
     """
 
     def __init__(self, form: StateForm) -> None:
-        laws = form.outputs
         self.form = form
-        self.assembly = MatrixAssembly(form, laws)
-        self.inputs = Inputs(form, self.assembly.inputs.tolist(), laws)
-        self._reading = self.inputs.reading()
+        self.assembly = MatrixAssembly(form, form.outputs)
+        order = self.assembly.inputs.tolist()
+        self.inputs = Inputs(form, order, form.outputs)
+        self.reading = self.inputs.reading()
+        self.loop_places = np.array([order.index(branch) for branch in form.loop_laws], dtype=np.intp)
+        self.loop_in_tree = np.array([branch in form.tree.tree[Kind.LAW] for branch in form.loop_laws], dtype=bool)
 
     def bind(self, p: Array) -> BoundArrays:
         """The program with its matrices made for one parameter vector."""
-        return BoundArrays(self, np.array(p, dtype=float), self.assembly(p))
+        return BoundArrays(self, np.array(p, dtype=float), self.assembly(np.asarray(p, dtype=float)))
 
 
 class BoundArrays:
@@ -38,30 +42,47 @@ class BoundArrays:
     def __init__(self, program: ArrayProgram, p: Array, part: LinearPart) -> None:
         self.program, self.p, self.part = program, p, part
         self._has_slopes = bool(part.B1.nnz)
+        loops = program.loop_places
+        self.loops = LoopSolver(program.inputs, part, loops, program.loop_in_tree, self.p) if loops.size else None
 
     def values(self, t: Any, x: Array) -> tuple[Array, Array]:
         """Outputs y and inputs u at states x, (n,) or (n, k) with t (k,)."""
         inputs, part = self.program.inputs, self.part
-        zero = np.zeros((inputs.outputs, *x.shape[1:]))
+        if self.loops is not None:
+            return self._values_with_loops(self.loops, t, x)
         y = part.C @ x
-        if part.D.nnz:  # only inputs that depend on time alone reach the outputs, otherwise there is an algebraic loop
-            first = inputs.values(t, zero, x, self.p)
-            y = y + part.D @ (first * _column(inputs.of_time, x))
+        if part.D.nnz:  # only inputs of time alone reach the outputs: else there is a loop
+            first = inputs.values(t, np.zeros((inputs.outputs, *x.shape[1:])), x, self.p)
+            y = y + part.D @ _times(inputs.of_time, first)
         return y, inputs.values(t, y, x, self.p)
+
+    def _values_with_loops(self, loops: LoopSolver, t: Any, x: Array) -> tuple[Array, Array]:
+        if x.ndim == 1:
+            return loops.inputs_at(t, x, loops.solve(t, x))[:2]
+        columns = [self._values_with_loops(loops, time, state) for time, state in zip(t, x.T, strict=True)]
+        y, u = zip(*columns, strict=True)
+        return np.array(y).T, np.array(u).T
 
     def rhs(self, t: Any, x: Array) -> Array:
         """x' at time t, (n,); or (n, k) for states (n, k) at times (k,)."""
         y, u = self.values(t, x)
+        return self.rates(t, x, y, u)
+
+    def rates(self, t: Any, x: Array, y: Array, u: Array) -> Array:
+        """x' from the states and the inputs that go with them."""
         rate: Array = self.part.A @ x + self.part.B @ u
         if self._has_slopes:
-            rate = rate + self.part.B1 @ self.program.inputs.time_slopes(t, y, x, self.p)
+            slopes = self.program.inputs.time_slopes(t, y, x, self.p)
+            rate = rate + self.part.B1 @ _times(self.program.inputs.of_time, slopes)
         return rate
 
     def jacobian(self, t: float, x: Array) -> Any:
         """d rhs / d x as scipy.sparse.csc_array (n, n)."""
+        if self.loops is not None:
+            return self.loops.jacobian(t, x)
         inputs, part = self.program.inputs, self.part
         y, _ = self.values(t, x)
-        by_output, outputs, by_integral, states = self.program._reading
+        by_output, outputs, by_integral, states = self.program.reading
         across = inputs.across_slopes(t, y, x, self.p)[by_output]
         integral = inputs.integral_slopes(t, y, x, self.p)[by_integral]
         size = (inputs.size, inputs.states)
@@ -86,5 +107,6 @@ class BoundArrays:
         return np.asarray(x + self.part.B1 @ (step * inputs.of_time))
 
 
-def _column(mask: Any, like: Array) -> Any:
-    return mask.reshape(-1, *([1] * (like.ndim - 1)))
+def _times(mask: Array, values: Array) -> Array:
+    """Values (m,) or (m, k) where the mask (m,) holds, else zero."""
+    return np.asarray((mask * values.T).T)

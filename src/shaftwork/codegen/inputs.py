@@ -51,7 +51,7 @@ class Inputs:
         self._groups = tuple(self._group(made, place, output, integral) for made in groups_of(form.graph, order))
         self.of_time = np.ones(self.size, dtype=bool)
         for group in self._groups:
-            if group.outputs.size or group.integrals.size:
+            if group.made_of.template.kind is Kind.LAW:
                 self.of_time[group.inputs] = False
 
     @staticmethod

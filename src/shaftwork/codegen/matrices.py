@@ -19,6 +19,7 @@ from scipy.sparse.csgraph import connected_components
 
 from shaftwork.codegen.elements import Coefficients, loop_matrix
 from shaftwork.core.errors import CompileError
+from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
 
 Array = NDArray[np.float64]
@@ -34,6 +35,8 @@ class LinearPart:
         A: (n, n); B: (n, m); B1: (n, m); C: (k, n); D: (k, m), with n states, m inputs, k outputs y.
         conductance_x: (tree conductances, n) their across variables from the states.
         conductance_u: (tree conductances, m) the same from the inputs.
+        tree_law_x: (tree laws, n) what the cutsets of the laws in the tree leave for their through variables.
+        tree_law_u: (tree laws, m) the same from the inputs.
         loops: F (branches, branches).
         coefficients: (branches,) capacities, stiffnesses and conductances.
     """
@@ -45,6 +48,8 @@ class LinearPart:
     D: Any
     conductance_x: Any
     conductance_u: Any
+    tree_law_x: Any
+    tree_law_u: Any
     loops: Any
     coefficients: Array
 
@@ -62,7 +67,7 @@ class MatrixAssembly:
         self.outputs = np.array(outputs, dtype=np.intp)
         self.coefficients = Coefficients(form.graph)
         self.loops = loop_matrix(form)
-        self.inputs = np.array([*form.laws, *form.across_sources], dtype=np.intp)
+        self.inputs = np.array([*form.laws, *form.across_inputs], dtype=np.intp)
 
     def __call__(self, p: Array) -> LinearPart:
         """Assemble for the parameter vector p.
@@ -94,6 +99,9 @@ class MatrixAssembly:
         l_x = to_torque @ (blocks.across_x("L") + blocks.F("G", "L").T @ g_x)
         l_u = to_torque @ (blocks.across_u("L") + blocks.F("G", "L").T @ g_u)
         l_du = -to_torque @ blocks.F("S", "L").T @ S @ blocks.F("S", "W") @ blocks.input("W")
+        # through variables that the cutsets of tree laws ask of them
+        t_x = -(blocks.F("T", "R") @ r_x + blocks.F("T", "L") @ blocks.pick("L"))
+        t_u = -(blocks.F("T", "R") @ r_u + blocks.F("T", "W") @ blocks.input("W"))
         C, D = blocks.output_rows(self.outputs, g_x, g_u)
         z_x, z_u = blocks.integral_rows(self.outputs, C, D)
         return LinearPart(
@@ -104,6 +112,8 @@ class MatrixAssembly:
             D=D,
             conductance_x=sparse.csr_array(g_x),
             conductance_u=sparse.csr_array(g_u),
+            tree_law_x=sparse.csr_array(t_x),
+            tree_law_u=sparse.csr_array(t_u),
             loops=F,
             coefficients=k,
         )
@@ -155,7 +165,8 @@ class _Blocks:
         groups = {
             "C": form.across_states,
             "L": form.through_states,
-            "E": form.across_sources,
+            "E": form.across_inputs,
+            "T": form.tree.tree[Kind.LAW],
             "G": form.tree_conductances,
             "R": form.link_conductances,
             "K": form.dependent_across,

@@ -32,10 +32,9 @@ class History:
     def _inputs(self) -> tuple[Array, Array, Array]:
         """u, its derivative by time alone, and x', each (., k)."""
         y, u = self.bound.values(self.t, self.x)
-        slopes = self.bound.program.inputs.time_slopes(self.t, y, self.x, self.bound.p)
-        part = self.bound.part
-        rate = part.A @ self.x + part.B @ u + part.B1 @ slopes
-        return u, slopes, rate
+        inputs = self.bound.program.inputs
+        slopes = inputs.of_time[:, None] * inputs.time_slopes(self.t, y, self.x, self.bound.p)
+        return u, slopes, self.bound.rates(self.t, self.x, y, u)
 
     @cached_property
     def across(self) -> Array:
@@ -46,7 +45,7 @@ class History:
         tree = np.zeros((len(form.graph.branches), len(self.t)))
         first, last = len(form.across_states), len(form.across_states) + len(form.through_states)
         tree[list(form.across_states)] = self.x[:first]
-        tree[list(form.across_sources)] = u[laws:]
+        tree[list(form.across_inputs)] = u[laws:]
         tree[list(form.tree_conductances)] = part.conductance_x @ self.x + part.conductance_u @ u
         if series := list(form.dependent_through):
             rates = np.zeros_like(tree)
@@ -70,7 +69,7 @@ class History:
         if dependent := list(form.dependent_across):
             rates = np.zeros_like(links)
             rates[list(form.across_states)] = rate[:first]
-            rates[list(form.across_sources)] = slopes[laws:]
+            rates[list(form.across_inputs)] = slopes[laws:]
             links[dependent] = part.coefficients[dependent][:, None] * (part.loops.T @ rates)[dependent]
         return np.asarray(links - part.loops @ links)
 

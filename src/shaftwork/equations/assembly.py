@@ -5,7 +5,7 @@ Nothing is multiplied out: a row is a left side and groups of terms under a comm
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -17,7 +17,7 @@ from shaftwork.equations.quantities import Flow, Quantities, rate_of
 from shaftwork.network.graph import GROUND
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.gains import simplified
+from shaftwork.reduction.gains import Number, simplified
 
 Terms = tuple[Expr, ...]
 
@@ -37,11 +37,27 @@ class Sides(NamedTuple):
 
 
 def sides(left: Expr, terms: Iterable[Expr]) -> Sides:
-    """A row without a common factor; terms that raise the left side come first."""
-    kept = [term for term in terms if term != 0]
-    falling = [term for term in kept if term.could_extract_minus_sign()]
-    rising = [term for term in kept if not term.could_extract_minus_sign()]
-    return Sides(left, (Group(Integer(1), (*rising, *falling)),))
+    """A row without a common factor."""
+    return Sides(tidy(left), (Group(Integer(1), rising_first(terms)),))
+
+
+def rising_first(terms: Iterable[Expr]) -> Terms:
+    """The terms that are not zero, those with a plus sign first, else in their order."""
+    kept = [tidy(term) for term in terms if term != 0]
+    return tuple(sorted(kept, key=lambda term: bool(term.could_extract_minus_sign())))
+
+
+def tidy(expression: Expr) -> Expr:
+    """The expression with sums of negative terms inside products turned round: -(-1 - i) x is (1 + i) x."""
+    if not (expression.is_Add or expression.is_Mul):
+        return expression
+    parts = [tidy(part) for part in expression.args]
+    if expression.is_Add:
+        return Add(*parts)
+    turned = [part.is_Add and all(term.could_extract_minus_sign() for term in part.args) for part in parts]
+    if not any(turned):
+        return Mul(*parts)
+    return Mul((-1) ** sum(turned), *(-part if turn else part for part, turn in zip(parts, turned, strict=True)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,15 +124,24 @@ class Assembly:
         """Across variable of a link as the sum over the tree branches of its loop."""
         return sides(self.quantities.across(self.ends(link)), self.around(link))
 
-    def around(self, link: int) -> Terms:
-        """The terms of a link's loop."""
-        return self.across_sum(self.form.tree.loops[link].items())
+    def kind(self, branch: int) -> Kind:
+        """What the law of a branch is."""
+        return self.form.graph.branches[branch].template.kind
 
-    def across_sum(self, row: Iterable[tuple[int, object]]) -> Terms:
-        """Across variables of tree branches times their factors; couplings have none."""
-        branches = self.form.graph.branches
+    def factors(self, link: int) -> tuple[tuple[int, Expr], ...]:
+        """The tree branches of a link's loop with their factors, without couplings, which have nothing across."""
+        return self.referred(self.form.tree.loops[link])
+
+    def referred(self, row: Mapping[int, Number]) -> tuple[tuple[int, Expr], ...]:
+        """A sum of tree branches as pairs of branch and factor, without couplings."""
+        return tuple((tree, simplified(gain)) for tree, gain in row.items() if self.kind(tree) is not Kind.COUPLING)
+
+    def around(self, link: int, without: Kind | None = None) -> Terms:
+        """The across variables in a link's loop, but for those of a kind."""
         return tuple(
-            simplified(gain) * self.quantities.across(self.ends(tree)) for tree, gain in row if not branches[tree].terms
+            gain * self.quantities.across(self.ends(tree))
+            for tree, gain in self.factors(link)
+            if self.kind(tree) is not without
         )
 
     def coupling(self, branch: int) -> Sides:
@@ -127,9 +152,9 @@ class Assembly:
         left = [term for term in terms if not term.could_extract_minus_sign()]
         return sides(Add(*left), (-term for term in terms if term.could_extract_minus_sign()))
 
-    def law_of_flow(self, flow: Flow) -> Sides:
+    def law_of_flow(self, flow: Flow, across: Expr | None = None) -> Sides:
         """A flow's through variable by the laws of its branches."""
-        terms = (flow.sign * self.through_law(branch) for branch in flow.branches)
+        terms = (flow.sign * self.through_law(branch, across) for branch in flow.branches)
         return sides(self.quantities.through(flow), terms)
 
     def through_law(self, branch: int, across: Expr | None = None) -> Expr:
@@ -140,7 +165,7 @@ class Assembly:
         across = self.quantities.across(self.ends(branch)) if across is None else across
         if kind is Kind.CONDUCTANCE:
             return law * across
-        return law.xreplace({ACROSS: across, INTEGRAL: self._integrals.get(branch, INTEGRAL)})
+        return law.xreplace({ACROSS: across, INTEGRAL: self.integral(branch)})
 
     def law_of_store(self, branch: int) -> Sides:
         """A compliance's law: its through variable changes with what is across it."""
@@ -153,6 +178,10 @@ class Assembly:
     def law_of_source(self, branch: int) -> Sides:
         """A prescribed across variable."""
         return sides(self.quantities.across(self.ends(branch)), (self.quantities.law(branch),))
+
+    def integral(self, branch: int) -> Symbol:
+        """The state that integrates the across variable of a branch."""
+        return self._integrals.get(branch, INTEGRAL)
 
     @cached_property
     def _integrals(self) -> dict[int, Symbol]:
@@ -172,19 +201,21 @@ class Assembly:
     @cached_property
     def lumped(self) -> frozenset[int]:
         """Links that are printed by their flow's symbol: laws and sources whose flow lies wholly outside the tree."""
-        links = self.form.tree.loops
-        return frozenset(
-            branch
-            for law in self.form.laws
-            for branch in self.quantities.flow_of[law].branches
-            if all(sibling in links for sibling in self.quantities.flow_of[law].branches)
-        )
+        flows = dict.fromkeys(self.quantities.flow_of[law] for law in self.form.laws)
+        return frozenset(branch for flow in flows if all(map(self._known, flow.branches)) for branch in flow.branches)
 
-    def out_of(self, tree: int, left_out: Collection[int] = ()) -> Terms:
+    def _known(self, branch: int) -> bool:
+        """Whether a branch is a link that shares no unknown with the conductances of the tree."""
+        if branch not in self.form.tree.loops:
+            return False
+        coupled = any(self.kind(tree) is Kind.CONDUCTANCE for tree in self.form.tree.loops[branch])
+        return self.kind(branch) is not Kind.CONDUCTANCE or not coupled
+
+    def out_of(self, tree: int, left_out: Kind | None = None) -> Terms:
         """Through variables that drive a tree branch: minus those of the links in its cutset."""
         terms: dict[Flow | int, Expr] = {}
         for link, gain in self.cutsets.get(tree, ()):
-            if link in left_out:
+            if self.kind(link) is left_out:
                 continue
             flow = self.quantities.flow_of.get(link)
             if flow is not None and link in self.lumped:

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import networkx as nx
-from sympy import Add, Expr, Integer, together
+from sympy import Add, Expr, Integer, count_ops, together
 
 from shaftwork.components.laws import t as TIME
-from shaftwork.equations.assembly import Assembly, Group, Sides, Terms
+from shaftwork.equations.assembly import Assembly, Group, Sides, Terms, rising_first, sides
 from shaftwork.equations.quantities import rate_of
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.rows import LARGEST_BLOCK, solve_blocks
@@ -55,12 +55,16 @@ class System:
         block = self.blocks[unknown]
         if not self.solved(unknown):
             left = (self.matrix[unknown, other] * self.symbol(other) for other in block if (unknown, other) in self.matrix)
-            return Sides(Add(*left), (Group(Integer(1), self.right(unknown)),))
+            return sides(Add(*left), self.right(unknown))
         factors = self._inverse_row(block, block.index(unknown))
-        groups = (Group(factor, self.right(other)) for factor, other in zip(factors, block, strict=True))
+        groups = (Group(factor, rising_first(self.right(other))) for factor, other in zip(factors, block, strict=True))
         return Sides(self.symbol(unknown), tuple(group for group in groups if group.factor != 0 and group.terms))
 
     def _inverse_row(self, block: Sequence[int], place: int) -> tuple[Expr, ...]:
+        if len(block) == 1:
+            (only,) = block
+            factor = 1 / self.matrix[only, only]
+            return (min(factor, together(factor), key=count_ops),)
         matrix = {key: entry for key, entry in self.matrix.items() if key[0] in block}
         units = ({other: Integer(int(other == one)) for other in block} for one in block)
         return tuple(together(solve_blocks(matrix, block, unit)[place]) for unit in units)
@@ -79,7 +83,7 @@ class Solution:
         matrix = self._congruence(form.across_states, form.dependent_across)
 
         def right(tree: int) -> Terms:
-            driven = self.assembly.out_of(tree, left_out=form.dependent_across)
+            driven = self.assembly.out_of(tree, left_out=Kind.ACROSS_STORE)
             return (*driven, *self._prescribed_inertia(tree))
 
         def symbol(tree: int) -> Expr:
@@ -99,7 +103,7 @@ class Solution:
             _add_products(matrix, members, 1 / assembly.quantities.law(tree))
 
         def right(link: int) -> Terms:
-            return (*assembly.around_known(link), *self._forced_twist(link))
+            return (*assembly.around(link, without=Kind.THROUGH_STORE), *self._forced_twist(link))
 
         def symbol(link: int) -> Expr:
             return rate_of(assembly.quantities.store(link))
@@ -113,10 +117,10 @@ class Solution:
         matrix = self._congruence(form.tree_conductances, form.link_conductances)
 
         def right(tree: int) -> Terms:
-            terms = list(assembly.out_of(tree, left_out=form.link_conductances))
+            terms = list(assembly.out_of(tree, left_out=Kind.CONDUCTANCE))
             for link, gain in assembly.cutsets.get(tree, ()):
-                if link in form.link_conductances:
-                    drive = Add(*assembly.around(link, without=form.tree_conductances))
+                if assembly.kind(link) is Kind.CONDUCTANCE:
+                    drive = Add(*assembly.around(link, without=Kind.CONDUCTANCE))
                     terms.append(-gain * assembly.quantities.law(link) * drive)
             return tuple(term for term in terms if term != 0)
 
@@ -139,9 +143,9 @@ class Solution:
         assembly = self.assembly
         terms: list[Expr] = []
         for link, gain in assembly.cutsets.get(tree, ()):
-            if link in assembly.form.dependent_across:
+            if assembly.kind(link) is Kind.ACROSS_STORE:
                 for source, factor in assembly.factors(link):
-                    if source in assembly.form.across_sources:
+                    if assembly.kind(source) is Kind.ACROSS_SOURCE:
                         rate = assembly.quantities.law(source).diff(TIME)
                         terms.append(-gain * assembly.quantities.law(link) * factor * rate)
         return tuple(term for term in terms if term != 0)
@@ -151,10 +155,10 @@ class Solution:
         assembly = self.assembly
         terms: list[Expr] = []
         for tree, gain in assembly.factors(link):
-            if assembly.form.graph.branches[tree].template.kind is Kind.THROUGH_STORE:
+            if assembly.kind(tree) is Kind.THROUGH_STORE:
                 compliance = 1 / assembly.quantities.law(tree)
                 for source, factor in assembly.cutsets.get(tree, ()):
-                    if source not in assembly.form.through_states:
+                    if assembly.kind(source) is not Kind.THROUGH_STORE:
                         rate = assembly.quantities.law(source).diff(TIME)
                         terms.append(-gain * compliance * factor * rate)
         return tuple(term for term in terms if term != 0)

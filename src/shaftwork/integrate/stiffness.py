@@ -34,10 +34,8 @@ class Rates:
 
 def rates(problem: Problem) -> Rates:
     """Fastest decay and oscillation at the start of a problem and at a few states that it may soon reach."""
-    found = [_rates_of(matrix) for matrix in _jacobians(problem)]
-    return Rates(
-        max((rate.decay for rate in found), default=0.0), max((rate.oscillation for rate in found), default=0.0)
-    )
+    found = [Rates(0.0, 0.0), *(_rates_of(matrix) for matrix in _jacobians(problem))]
+    return Rates(max(rate.decay for rate in found), max(rate.oscillation for rate in found))
 
 
 def _jacobians(problem: Problem) -> Iterator[Any]:

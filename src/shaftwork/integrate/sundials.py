@@ -237,7 +237,11 @@ class _Replay:
 
 
 def _polynomial(start: float, end: float, points: Array, nodes: Array) -> Callable[[Array], Array]:
+    weights = (-1.0) ** np.arange(points.size)
+    weights[[0, -1]] /= 2
+
     def evaluate(times: Array) -> Array:
-        return np.asarray(BarycentricInterpolator(points, nodes)((times - start) / (end - start)))
+        # With its weights given, scipy does not draw a random order of the points.
+        return np.asarray(BarycentricInterpolator(points, nodes, wi=weights)((times - start) / (end - start)))
 
     return evaluate

@@ -72,8 +72,9 @@ class Spelling:
     def suggestion(self, names: Sequence[str]) -> str:
         """A question in parentheses for the first of the names that is like another node, else nothing."""
         own = frozenset(names)
-        for name, variant in ((name, variant) for name in names for variant in _variants(name)):
-            for other in self._by_variant.get(variant, ()):
+        for name in names:
+            likes = (other for variant in _variants(name) for other in self._by_variant.get(variant, ()))
+            for other in likes:
                 if other not in own and _digits(other) == _digits(name):  # n1 and n2 are two nodes, not a slip
                     return f" (did you mean node '{other}'?)"
         return ""
@@ -99,7 +100,7 @@ class _Fault(NamedTuple):
 
 
 def declaration_problems(netlist: Netlist) -> tuple[Problem, ...]:
-    """What is wrong with names, nodes, parameters and laws as they were typed."""
+    """What is wrong with names, nodes, parameters and laws as they were typed: the problems of `examine`."""
     return examine(netlist)[1]
 
 
@@ -174,17 +175,17 @@ class _Examination:
             hint = "A node is named by a text such as 'rotor'."
             self.report("node name", f"{title(part)}: {reprlib.repr(strange[0])} is no node.", hint, placed)
             return False
-        for node in nodes:
-            if "." in node and node not in self._dotted:
-                self._dotted[node] = None
-                hint = f"A dot marks the nodes inside a part: write '{node.replace('.', '_')}'."
-                message = f"{title(part)} stands at node '{node}', which has a dot in its name."
-                self.problems.append(Problem("dotted node name", message, hint, (part.name,), (node,)))
         self._check_count(placed)
         self._check_domains(placed)
-        if len(self.problems) == before or self.problems[-1].kind == "dotted node name":
+        if len(self.problems) == before:
             self._check_effect(placed)
-        return not any(problem.kind in LEFT_OUT for problem in self.problems[before:])
+        fits = len(self.problems) == before
+        for node in (node for node in nodes if "." in node and node not in self._dotted):
+            self._dotted[node] = None
+            hint = f"A dot marks the nodes inside a part: write '{node.replace('.', '_')}'."
+            message = f"{title(part)} stands at node '{node}', which has a dot in its name."
+            self.problems.append(Problem("dotted node name", message, hint, (part.name,), (node,)))
+        return fits
 
     def _check_count(self, placed: Placed) -> None:
         part, count = placed.part, len(placed.nodes)
@@ -193,12 +194,8 @@ class _Examination:
             return
         ports = ", ".join(f"{port.name} (may be left out)" if port.optional else port.name for port in part.ports)
         pattern = ", ".join(f"'node {port.name}'" for port in part.ports)
-        self.report(
-            "node count",
-            f"{title(part)} is given {at_nodes(placed.nodes)}, but its ports are: {ports}.",
-            f"Write net.add(part, {pattern}).",
-            placed,
-        )
+        message = f"{title(part)} is given {at_nodes(placed.nodes)}, but its ports are: {ports}."
+        self.report("node count", message, f"Write net.add(part, {pattern}).", placed)
 
     def _check_domains(self, placed: Placed) -> None:
         for port, node in zip(placed.part.ports, placed.nodes, strict=False):
@@ -208,9 +205,9 @@ class _Examination:
             if domain != port.domain:
                 self.report(
                     "wrong domain",
-                    f"{title(placed.part)} needs a node of {port.domain.name} at its port {port.name}, but "
+                    f"{title(placed.part)}: its port {port.name} is for the domain {port.domain.name}, but "
                     f"node '{node}' belongs to {domain.name} since {first} stands there.",
-                    f"Choose another node, or a part for {domain.name}; Drum, Wheel and DCMachine join the domains.",
+                    f"Choose another node, or a part for {domain.name}; Drum, Wheel and DCMachine join domains.",
                     placed,
                 )
 
@@ -220,9 +217,8 @@ class _Examination:
         single = len(part.ports) == 1
         if len(held) == 1 and not (single and (REFERENCE not in held or part.ports[0].domain is None)):
             (node,) = held
-            message = (
-                f"{title(part)} {'stands' if single else 'begins and ends'} at node '{node}' and does nothing there."
-            )
+            stands = "stands" if single else "begins and ends"
+            message = f"{title(part)} {stands} at node '{node}' and does nothing there."
             hint = "Move it to a node that can move." if single else "Join one of its ends to another node."
             self.report("no effect", message, hint, placed)
 
@@ -250,9 +246,8 @@ class _Examination:
         part, declared = placed.part, placed.part.declared[name]
         kind = "wrong unit" if hasattr(given, "dimensionality") else "parameter"
         unit = "as a pure number" if declared.unit == "1" else f"in {declared.unit}"
-        bounds = f", {declared.bounds}" if declared.bounds else ""
         shown = "" if kind == "wrong unit" else f" = {reprlib.repr(given)}"
-        hint = f"Give the {declared.meaning} {unit}{bounds}."
+        hint = f"Give the {declared.meaning} {unit}{f', {declared.bounds}' if declared.bounds else ''}."
         self.report(kind, f"{title(part)}: {name}{shown} {objection}.", hint, placed)
 
     def _faults_of(self, part: Component, values: Mapping[str, Any]) -> tuple[_Fault, ...]:
@@ -282,32 +277,32 @@ def _law_faults(part: Component, values: Mapping[str, Any]) -> Iterator[_Fault]:
         elif template.kind is Kind.ACROSS_SOURCE and strange <= {ACROSS, INTEGRAL}:
             for name in (name for name, law in laws.items() if law.free_symbols - {t}):
                 read = ", ".join(sorted(symbol.name for symbol in laws[name].free_symbols - {t}))
-                hint = "A source that prescribes it must know it: write the law in t, or use a source of torque."
+                hint = (
+                    "A source that prescribes it must know it: write the law in t, or use a source of torque or force."
+                )
                 yield _Fault(name, f"reads {read}, but may depend on time t alone", hint)
         else:
-            names = ", ".join(sorted(symbol.name for symbol in strange))
-            yield _Fault("", f"a branch law depends on {names}", "Use the parameters p.name, ACROSS, INTEGRAL and t.")
+            yield _Fault("", f"a branch law depends on {min(map(str, strange))}", "Use p.name, ACROSS, INTEGRAL and t.")
 
 
 def _fault_of_law(part: Component, name: str, law: sympy.Expr) -> _Fault | None:
     if law.has(sympy.nan, sympy.oo, -sympy.oo, sympy.zoo, sympy.I):
-        return _Fault(name, f"= {law} is not a finite real law", "Remove what is infinite, undefined or imaginary.")
+        return _Fault(
+            name, f"= {str(law)[:60]} is not a finite real law", "Remove what is infinite, undefined or imaginary."
+        )
     if unknown := sorted(str(call.func) for call in law.atoms(AppliedUndef)):
         return _Fault(name, f"contains the unknown function {unknown[0]}", "Use a Table or a function of sympy.")
     readable = (t, *substitution(part))
     strange = sorted(law.free_symbols - set(readable), key=str)
     if not strange:
         return None
-    symbol, able = strange[0], ", ".join(str(symbol) for symbol in readable)
+    symbol, able = strange[0], f"this part can read {', '.join(str(symbol) for symbol in readable)}"
     if symbol in SYMBOLS:
-        what, hint = f"reads {symbol}, which belongs to another domain", f"This part can read {able}."
-    elif symbol.name in {known.name for known in SYMBOLS}:
+        return _Fault(name, f"reads {symbol}, which belongs to another domain", f"Note that {able}.")
+    if symbol.name in {known.name for known in SYMBOLS}:
         what = f"contains a symbol {symbol} of your own, which is not Shaftwork's"
-        hint = f"Take the symbols from the package (shaftwork.{symbol}); this part can read {able}."
-    else:
-        what = f"contains the symbol {symbol}, which has no value"
-        hint = f"Put its number in; this part can read {able}."
-    return _Fault(name, what, hint)
+        return _Fault(name, what, f"Take the symbols from the package (shaftwork.{symbol}); {able}.")
+    return _Fault(name, f"contains the symbol {symbol}, which has no value", f"Put its number in; {able}.")
 
 
 def _strange_symbols(template: BranchTemplate) -> set[sympy.Symbol]:
@@ -354,8 +349,7 @@ def _trains(ends: list[list[tuple[int, str]]]) -> list[Train]:
 
 def _is_complete(graph: CircuitGraph, number: int, node: int) -> bool:
     """Whether a part needs no other at a node: it has an inertia there, or a law whose torque is judged later."""
-    for index in graph.parts[number].branches:
-        branch = graph.branches[index]
+    for branch in (graph.branches[index] for index in graph.parts[number].branches):
         kind, ends = branch.template.kind, (branch.plus, branch.minus)
         is_law = kind in (Kind.THROUGH_SOURCE, Kind.LAW)
         if node in ends and (is_law or (kind is Kind.ACROSS_STORE and GROUND in ends)):
@@ -395,10 +389,10 @@ def _loose_end(graph: CircuitGraph, number: int, port: str, node: int, spelling:
 def _separate_train(graph: CircuitGraph, train: Train, main: Train, spelling: Spelling) -> Problem:
     names = tuple(graph.parts[number].name for number in train)
     nodes = tuple(graph.nodes[node] for node in _port_nodes(graph, train))
-    others = tuple(graph.parts[number].name for number in main)
+    others = listed(tuple(graph.parts[number].name for number in main), most=3)
     return Problem(
         "separate train",
-        f"{listed(names)} at {at_nodes(nodes)} share{'s' * (len(names) == 1)} no node with {listed(others, most=3)}.",
+        f"{listed(names)} at {at_nodes(nodes)} share{'s' * (len(names) == 1)} no node with {others}.",
         f"Join the two{spelling.suggestion(nodes)}, or simulate them as two networks.",
         names,
         nodes,

@@ -9,12 +9,15 @@ from typing import Any
 from sympy import Expr
 
 from shaftwork.components import REGISTRY, Component, Table
-from shaftwork.components.laws import SYMBOLS
 from shaftwork.core.errors import ModelFileError, ParameterError
 from shaftwork.network import expressions, textfile
 from shaftwork.network.expression_reader import parse
+from shaftwork.network.grammar import tokens_of
 from shaftwork.network.netlist import Netlist, Placed
 from shaftwork.network.textfile import ModelText, PartText
+
+MAXIMUM_LAW_WORDS = 4000
+"""Numbers, names and signs of all laws of a file together, some 400 laws: more take longer to read than anyone waits."""
 
 
 def write_netlist(netlist: Netlist, path: str | Path) -> None:
@@ -34,7 +37,16 @@ def read_netlist(path: str | Path) -> Netlist:
         ModelFileError: the file is no model; says where and what would be right.
     """
     model = textfile.read(Path(path))
+    laws = [value for part in model.parts for value in part.parameters.values() if isinstance(value, str)]
+    words = 0
     try:
+        for law in laws:
+            words += len(tokens_of(law))
+            if words > MAXIMUM_LAW_WORDS:
+                raise ModelFileError(
+                    f"The laws of the file have more than {MAXIMUM_LAW_WORDS} words together ({len(laws)} laws). "
+                    f"Give curves as tables, or build the network in Python."
+                )
         return Netlist(model.name, tuple(_placed(part) for part in model.parts))
     except ModelFileError as error:
         raise ModelFileError(f"{path}: {error}") from None
@@ -84,6 +96,6 @@ def _read(part: PartText, cls: type[Component], name: str, value: Any) -> Any:
             f"{', '.join(key for key, declared in cls.declared.items() if declared.law) or 'none'}."
         )
     try:
-        return parse(value, {symbol.name: symbol for symbol in SYMBOLS})
+        return parse(value)
     except ModelFileError as error:
         raise ModelFileError(f"Part '{part.name}', {name}: {error}") from None

@@ -23,6 +23,7 @@ from shaftwork.integrate.problem import LinearInputs, Problem
 from shaftwork.network.netlist import Netlist, Placed
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
+from shaftwork.pipeline.implicit import solve_loops
 from shaftwork.results.solution import Solution
 
 OUTPUTS = 1001
@@ -107,10 +108,13 @@ class Model(CompiledModel):
         span = _span(t_start, t_end, rtol)
         x0 = initial_state(prepared.bound, initial or {}, span[0])
         problem = self._problem(prepared, span, x0, rtol, atol, t_eval, max_steps)
-        if not len(self.states):
+        if not self.states:
             raise SimulationError(f"'{self.name}' has no states: nothing moves freely. Add an inertia or a spring.")
-        name, why = self._engine(prepared, problem, engine)
-        trajectory, name, why = choice.solve(problem, engine=name, why=why)
+        if self.form.loop_laws and engine in ("auto", "sundials"):
+            trajectory, name, why = solve_loops(prepared.bound, problem)
+        else:
+            name, why = self._engine(prepared, problem, engine)
+            trajectory, name, why = choice.solve(problem, engine=name, why=why)
         return Solution(
             name=self.name,
             t=trajectory.t,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 from shaftwork.core.errors import NetworkError, NetworkWarning, Problem, SignalError
 from shaftwork.equations.kirchhoff import kirchhoff
@@ -18,6 +18,9 @@ from shaftwork.pipeline.model import Model
 from shaftwork.reduction.diagnosis import diagnose
 from shaftwork.reduction.form import StateForm, state_form
 from shaftwork.results.solution import Solution
+
+LOOP = "algebraic loop"
+"""The kind of problem that `algebraic_loops="solve"` accepts."""
 
 
 class Network(NetworkBuilder):
@@ -45,20 +48,29 @@ class Network(NetworkBuilder):
         """
         return kirchhoff(_sound(self.netlist()))
 
-    def compile(self, *, angles: Sequence[str] = ()) -> Model:
+    def compile(self, *, angles: Sequence[str] = (), algebraic_loops: Literal["refuse", "solve"] = "refuse") -> Model:
         """The fast model.
 
         Args:
             angles: parts whose angle (position, flux linkage) is recorded, besides those that a law reads.
+            algebraic_loops: a nonlinear law at a massless node is refused with its name, or solved together with the
+                motion (slower, and the solution need not be the only one).
 
         Raises:
             NetworkError: the network cannot be assembled; lists every reason.
         """
-        return _compiled(self.netlist(), tuple(angles))
+        return _compiled(self.netlist(), tuple(angles), LOOP if algebraic_loops == "solve" else "")
 
-    def simulate(self, t_end: float, *, angles: Sequence[str] = (), **options: Any) -> Solution:
-        """Compile and integrate; the options are those of `Model.simulate`."""
-        return self.compile(angles=angles).simulate(t_end, **options)
+    def simulate(
+        self,
+        t_end: float,
+        *,
+        angles: Sequence[str] = (),
+        algebraic_loops: Literal["refuse", "solve"] = "refuse",
+        **options: Any,
+    ) -> Solution:
+        """Compile and integrate; the options are those of `compile` and of `Model.simulate`."""
+        return self.compile(angles=angles, algebraic_loops=algebraic_loops).simulate(t_end, **options)
 
     def save(self, path: str | Path) -> None:
         """Write the network to a text file from which `load` makes the same network.
@@ -82,10 +94,10 @@ class Network(NetworkBuilder):
         return made
 
 
-def _sound(netlist: Netlist) -> StateForm:
-    """The state form of a network without errors; warnings are issued."""
+def _sound(netlist: Netlist, accepted: str = "") -> StateForm:
+    """The state form of a network without errors but for an accepted kind; warnings are issued."""
     _, form, problems = diagnose(netlist)
-    if errors := tuple(problem for problem in problems if problem.severity == "error"):
+    if errors := tuple(found for found in problems if found.severity == "error" and found.kind != accepted):
         raise NetworkError(f"'{netlist.name}' cannot be assembled", errors)
     for problem in problems:
         if problem.severity == "warning":
@@ -94,11 +106,11 @@ def _sound(netlist: Netlist) -> StateForm:
     return form
 
 
-def _compiled(netlist: Netlist, angles: tuple[str, ...]) -> Model:
-    form = _sound(netlist)
+def _compiled(netlist: Netlist, angles: tuple[str, ...], accepted: str) -> Model:
+    form = _sound(netlist, accepted)
     if angles:
         form = state_form(form.graph, tuple(_branch_of(form.graph, name) for name in angles))
-    return Model(form, netlist, lambda changed: _compiled(changed, angles))
+    return Model(form, netlist, lambda changed: _compiled(changed, angles, accepted))
 
 
 def _branch_of(graph: CircuitGraph, name: str) -> int:

@@ -1,4 +1,4 @@
-"""What is wrong with the equations of a network, in drive-train words: read off the normal tree, then off the values."""
+"""What is wrong with the equations of a network, in drive-train words, from the normal tree and from the values."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ from typing import Any
 import networkx as nx
 import numpy as np
 import sympy
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
 from shaftwork.components.branches import ACROSS
 from shaftwork.components.laws import InterpolationSlope, breakpoints, t
@@ -31,7 +29,10 @@ SINGULAR = 1e-13
 
 _LACKING = ("floating part", "loose end", "massless node", "algebraic loop", "undetermined speed", "separate train")
 """Kinds that say that something is missing at a node; each is said only where none before it says so already."""
-_OF_VALUES = ("locked gear loop", "redundant coupling", "fixed ratios", "cancelling values", "extreme ratios")
+_OF_VALUES = (
+    *("locked gear loop", "blocked speed source", "blocked voltage source"),
+    *("redundant coupling", "fixed ratios", "cancelling values", "extreme ratios"),
+)
 """Kinds that depend on values: not said of parts whose values are replaced."""
 
 
@@ -42,15 +43,24 @@ class _Words:
     across: str
     through: str
     store: str
+    spring: str
     loss: str
     remedy: str
 
 
 _WORDS = {
-    "rotation": _Words("speed", "torque", "inertia", "damper", "an Inertia, or a Damper to the frame"),
-    "translation": _Words("speed", "force", "mass", "damper", "a Mass, or a TranslationalDamper to the frame"),
-    "electrical": _Words("voltage", "current", "capacitor", "resistor", "a Resistor or a Capacitor to ground"),
+    "rotation": _Words("speed", "torque", "inertia", "spring", "damper", "an Inertia, or a Damper to the frame"),
+    "translation": _Words(
+        "speed", "force", "mass", "spring", "damper", "a Mass, or a TranslationalDamper to the frame"
+    ),
+    "electrical": _Words(
+        "voltage", "current", "capacitor", "inductor", "resistor", "a Resistor or a Capacitor to ground"
+    ),
 }
+
+
+def _words(domain: Domain) -> _Words:
+    return _WORDS.get(domain.name, _WORDS["rotation"])
 
 
 def diagnose(netlist: Netlist) -> tuple[CircuitGraph | None, StateForm | None, tuple[Problem, ...]]:
@@ -80,7 +90,7 @@ def diagnose(netlist: Netlist) -> tuple[CircuitGraph | None, StateForm | None, t
 
 
 def _causes(typed: Sequence[Problem], found: Sequence[Problem]) -> Iterator[Problem]:
-    """The problems without those that only follow from others: from a part left out, a value replaced, a missing end."""
+    """The problems without those that follow from others: from a part left out, a value replaced, a missing end."""
     replaced = {part for problem in typed if problem.kind not in LEFT_OUT for part in problem.parts}
     covered = {node for problem in typed if problem.kind in LEFT_OUT for node in problem.nodes}
     follows = {k for k, problem in enumerate(found) if problem.kind in _LACKING and covered & {*problem.nodes}}
@@ -99,8 +109,7 @@ def structural_problems(form: StateForm) -> tuple[Problem, ...]:
     return (
         *view.prescribed_twice(),
         *view.massless(),
-        *view.implicit_in_the_tree(),
-        *view.implicit_beside_losses(),
+        *view.implicit(),
         *view.undetermined(),
         *view.locked(),
         *view.jumping(),
@@ -133,8 +142,9 @@ class _View:
 
     def titles(self, branches: Iterable[int]) -> str:
         """Parts with their classes, joined as in "A, B and C"."""
-        names = tuple(dict.fromkeys(title(self.graph.part_of(branch).component) for branch in branches))
-        return _joined(names)
+        names = list(dict.fromkeys(title(self.graph.part_of(branch).component) for branch in branches))
+        shown = names if len(names) <= 8 else [*names[:7], f"{len(names) - 7} more"]
+        return " and ".join(filter(None, (", ".join(shown[:-1]), shown[-1])))
 
     def nodes(self, numbers: Iterable[int]) -> tuple[str, ...]:
         """Names of the nodes that the user has named; of those inside a part only where there are no others."""
@@ -143,16 +153,14 @@ class _View:
 
     def ends(self, branches: Iterable[int]) -> tuple[str, ...]:
         """The nodes at the ends of branches."""
-        found = (ends_of(self.graph.branches[branch]) for branch in branches)
-        return self.nodes(node for ends in found for _, plus, minus in ends for node in (plus, minus))
-
-    def domain(self, branch: int) -> Domain:
-        made = self.graph.branches[branch]
-        nodes = (node for _, plus, minus in ends_of(made) for node in (plus, minus) if node != GROUND)
-        return self.graph.domains[next(nodes)]
+        found = (edge for branch in branches for edge in ends_of(self.graph.branches[branch]))
+        return self.nodes(node for _, plus, minus in found for node in (plus, minus))
 
     def words(self, branch: int) -> _Words:
-        return _WORDS[self.domain(branch).name]
+        """The words of the domain in which a branch lies."""
+        ends = ends_of(self.graph.branches[branch])
+        nodes = (node for _, plus, minus in ends for node in (plus, minus) if node != GROUND)
+        return next((_words(self.graph.domains[node]) for node in nodes), _WORDS["rotation"])
 
     def prescribed_twice(self) -> Iterator[Problem]:
         """Sources of speed or voltage that others in their loop contradict."""
@@ -160,16 +168,17 @@ class _View:
             loop = self.tree.loops[source]
             others = [branch for branch in loop if self.kind(branch) is Kind.ACROSS_SOURCE]
             rigid = [branch for branch in loop if self.kind(branch) is Kind.COUPLING]
-            across, name = self.words(source).across, title(self.graph.part_of(source).component)
+            words, name = self.words(source), title(self.graph.part_of(source).component)
             where, through = at_nodes(self.ends([source])), f" through {self.titles(rigid)}" if rigid else ""
+            between = f"put a {words.spring} or a {words.loss} between the two"
             if others:
-                kind = f"two {across} sources"
-                message = f"{name} at {where} prescribes a {across} that {self.titles(others)} prescribes already{through}."
-                hint = "Keep one of them, or put a spring, a damper or a resistor between the two."
+                kind, first = f"two {words.across} sources", self.titles(others)
+                message = f"{name} at {where} prescribes a {words.across} that {first} prescribes already{through}."
+                hint = f"Keep one of them, or {between}."
             else:
-                kind = f"blocked {across} source"
-                message = f"{name} prescribes the {across} of {where}, which is held at zero{through}."
-                hint = "Remove the source or what holds the node, or put a spring, a damper or a resistor between the two."
+                kind = f"blocked {words.across} source"
+                message = f"{name} prescribes the {words.across} of {where}, which is held at zero{through}."
+                hint = f"Remove the source or what holds the node, or {between}."
             yield Problem(kind, message, hint, self.parts([source, *others, *rigid]), self.ends([source, *others]))
 
     def massless(self) -> Iterator[Problem]:
@@ -178,42 +187,27 @@ class _View:
             words, sources = self.words(source), [source, *self.cutsets[source]]
             nodes = self.nodes(self.moved[source]) or self.ends([source])
             message = (
-                f"{at_nodes(nodes)} {'have' if len(nodes) > 1 else 'has'} no {words.store}, no {words.loss} and no spring: "
-                f"nothing answers the {words.through} of {self.titles(sources)}."
+                f"{at_nodes(nodes)} {'have' if len(nodes) > 1 else 'has'} no {words.store}, no {words.loss} and "
+                f"no {words.spring}: nothing answers the {words.through} of {self.titles(sources)}."
             )
             hint = f"Give {'one of them' if len(nodes) > 1 else 'it'} {words.remedy}{self.spelling.suggestion(nodes)}."
             yield Problem("massless node", message, hint, self.parts(sources), nodes)
 
-    def implicit_in_the_tree(self) -> Iterator[Problem]:
-        """Laws that alone decide the speed of a massless node."""
-        for law in self.tree.tree[Kind.LAW]:
-            words = self.words(law)
-            nodes = self.nodes(node for node in self.moved[law] if node in self._ends_of(law)) or self.ends([law])
-            message = (
-                f"{at_nodes(nodes)} has no {words.store} and no {words.loss}, so its {words.across} would have to be found "
-                f"from the nonlinear law of {self.titles([law])} backwards, at every instant."
-            )
-            hint = f"Give the node {words.remedy}; a small value will do{self.spelling.suggestion(nodes)}."
-            yield Problem("algebraic loop", message, hint, self.parts([law]), nodes)
-
-    def _ends_of(self, branch: int) -> tuple[int, int]:
-        made = self.graph.branches[branch]
-        return made.plus, made.minus
-
-    def implicit_beside_losses(self) -> Iterator[Problem]:
-        """Laws whose own torque decides, through dampers alone, the speed that they depend on."""
-        for law in self.tree.links[Kind.LAW]:
-            losses = [branch for branch in self.tree.loops[law] if self.kind(branch) is Kind.CONDUCTANCE]
-            if not losses or not self.graph.branches[law].template.law.has(ACROSS):
+    def implicit(self) -> Iterator[Problem]:
+        """Laws whose torque decides, alone or through dampers, the speed that they depend on."""
+        for law in sorted((*self.tree.tree[Kind.LAW], *self.tree.links[Kind.LAW])):
+            branch, words = self.graph.branches[law], self.words(law)
+            losses = [other for other in self.tree.loops.get(law, ()) if self.kind(other) is Kind.CONDUCTANCE]
+            if law in self.tree.loops and not (losses and branch.template.law.has(ACROSS)):
                 continue
-            words, ends = self.words(law), self._ends_of(law)
-            moved = [node for branch in losses for node in self.moved[branch]]
-            nodes = self.nodes(node for node in moved if node in ends) or self.nodes(moved)
+            moved = [node for other in losses or [law] for node in self.moved[other]]
+            nodes = self.nodes(node for node in moved if node in (branch.plus, branch.minus)) or self.nodes(moved)
+            beside = f"beside {self.titles(losses)}, " if losses else ""
             message = (
-                f"{at_nodes(nodes)} has no {words.store}: the {words.through} of {self.titles([law])} and the {words.across} "
-                f"that {self.titles(losses)} then allows determine each other."
+                f"{at_nodes(nodes)} has no {words.store}: {beside}the {words.through} of {self.titles([law])} and the "
+                f"{words.across} that it depends on determine each other, a nonlinear equation at every instant."
             )
-            hint = f"Give the node {'an' if words.store[0] in 'aeiou' else 'a'} {words.store}; a small value will do."
+            hint = f"Give the node some {words.store}, however small{self.spelling.suggestion(nodes)}."
             yield Problem("algebraic loop", message, hint, self.parts([law, *losses]), nodes)
 
     def undetermined(self) -> Iterator[Problem]:
@@ -238,7 +232,7 @@ class _View:
     def _undetermined_group(self, members: Sequence[int], at: Sequence[int]) -> Problem:
         parts, nodes = [self.graph.parts[number] for number in at], self.nodes(members)
         domain = self.graph.domains[members[0]]
-        words, names = _WORDS[domain.name], tuple(part.name for part in parts)
+        words, names = _words(domain), tuple(part.name for part in parts)
         many = len(nodes) > 1
         if domain.name == "electrical":
             message = f"the circuit at {at_nodes(nodes)} ({listed(names)}) is joined to ground nowhere."
@@ -251,3 +245,159 @@ class _View:
         )
         hint = f"Give {'one of the nodes' if many else 'the node'} {words.remedy}, or a Ground."
         return Problem("undetermined speed", message, hint, names, nodes)
+
+    def locked(self) -> Iterator[Problem]:
+        """Loops of couplings whose ratios agree at standstill only."""
+        routes: nx.Graph[int] = nx.Graph()
+        done = 0
+        for closing, nodes in self.tree.locked:
+            for branch in self.graph.branches[done:closing]:
+                column = column_of(self.graph, branch) if branch.terms else {}
+                routes.add_edges_from(((a, b) for a, b in pairwise(column) if not routes.has_edge(a, b)), branch=branch)
+            done = closing
+            paths = [
+                nx.shortest_path(routes, nodes[0], node) for node in nodes[1:] if nx.has_path(routes, nodes[0], node)
+            ]
+            around = [routes.edges[step]["branch"] for path in paths for step in pairwise(path)]
+            loop = [*(branch.index for branch in around), closing]
+            where = self.nodes(nodes)
+            message = (
+                f"{self.titles(loop)} close a loop between {at_nodes(where)}"
+                f"{self._two_ratios(paths, routes, closing)}. Only standstill satisfies all: these nodes are locked."
+            )
+            hint = "Make the ratios around the loop agree, or put a spring into one of its shafts."
+            yield Problem("locked gear loop", message, hint, self.parts(loop), where, "warning")
+
+    def _two_ratios(self, paths: Sequence[Sequence[int]], routes: Any, closing: int) -> str:
+        """What either way around a loop makes of the speeds of two nodes, where every coupling on it joins just two."""
+        if len(paths) != 1:
+            return ""
+        path, others = paths[0], [routes.edges[step]["branch"] for step in pairwise(paths[0])]
+        first, last = path[0], path[-1]
+        columns = [column_of(self.graph, branch) for branch in (*others, self.graph.branches[closing])]
+        if any(len(column) != 2 for column in columns):
+            return ""
+        steps = zip((*pairwise(path), (first, last)), columns, strict=True)
+        *ratios, direct = (-value_of(column[b]) / value_of(column[a]) for (a, b), column in steps)
+        across = self.graph.domains[first].across.name
+        a, b = (f"{across}('{self.graph.nodes[node]}')" for node in (first, last))
+        names = self.titles(branch.index for branch in others)
+        return f": {a} = {math.prod(ratios):.10g} {b} by {names}, but {direct:.10g} {b} by {self.titles([closing])}"
+
+    def jumping(self) -> Iterator[Problem]:
+        """Prescribed speeds that jump although an inertia is joined to them rigidly."""
+        joined: dict[int, list[int]] = {}
+        for store in self.tree.links[Kind.ACROSS_STORE]:
+            for source in self.tree.loops[store]:
+                if self.kind(source) is Kind.ACROSS_SOURCE:
+                    joined.setdefault(source, []).append(store)
+        for source, stores in joined.items():
+            if times := _jumps(self.graph.branches[source].template.law):
+                words = self.words(source)
+                message = (
+                    f"{self.titles([source])} jumps at t = {times[0]:g} s, but {self.titles(stores)} "
+                    f"{'is' if len(stores) == 1 else 'are'} rigidly joined to it: the {words.through} is an impulse."
+                )
+                hint = "The impulse is computed exactly; use a Ramp if the change takes time in the machine."
+                parts = self.parts([source, *stores])
+                yield Problem("jumping source", message, hint, parts, self.ends([source]), "warning")
+
+    def redundant(self) -> Iterator[Problem]:
+        """Couplings that repeat what others say."""
+        for branch in self.tree.redundant:
+            others = [other for other in self.tree.loops[branch] if self.kind(other) is Kind.COUPLING]
+            by = f"{self.titles(others)} already" if others else "the frame already"
+            message = f"{self.titles([branch])} asks for nothing that is not held by {by}."
+            hint = "This is allowed; how rigid ways share the load is open, and this part is taken to carry none."
+            parts = self.parts([branch, *others])
+            yield Problem("redundant coupling", message, hint, parts, self.ends([branch]), "note")
+
+    def fixed_ratios(self) -> Iterator[Problem]:
+        """Ratios whose values decide the structure of the equations."""
+        found = {symbol.name for expression in self.tree.frozen for symbol in expression.free_symbols}
+        names = tuple(name for name in self.graph.parameters if name in found)
+        if names:
+            parts = tuple(dict.fromkeys(name.rsplit(".", 1)[0] for name in names))
+            message = f"the values of {listed(names)} match in a closed loop and decide which equations there are."
+            hint = "Another value needs a new assembly: build the network with it and compile again."
+            yield Problem("fixed ratios", message, hint, parts, (), "note")
+
+
+def _jumps(law: sympy.Expr) -> tuple[float, ...]:
+    """Times after the start at which a law of time jumps: the step over it does not shrink with the distance."""
+    if not law.has(sympy.Piecewise, sympy.Heaviside, sympy.sign, InterpolationSlope):
+        return ()
+    times = tuple(time for time in breakpoints(law) if time > 0)
+    gaps = [after - before for before, after in pairwise((0.0, *times))]
+
+    def step(time: float, reach: float) -> float:
+        before, after = (law.xreplace({t: sympy.Float(time + side)}) for side in (-reach, reach))
+        return abs(float(after) - float(before)) if before.is_comparable and after.is_comparable else 0.0
+
+    reach = 1e-3 * min(gaps, default=1.0)
+    return tuple(time for time in times if step(time, reach / 64) > 0.5 * step(time, reach) > 0)
+
+
+def numeric_problems(form: StateForm) -> tuple[Problem, ...]:
+    """Values that cancel each other or lie outside what a computer can represent, although the structure is sound."""
+    graph, loops = form.graph, form.tree.loops
+    gains = ((link, entry) for link, loop in loops.items() for entry in loop.values() if isinstance(entry, Gain))
+    if wild := sorted({link for link, gain in gains if not (math.isfinite(gain.value) and gain.value)}):
+        return (_extreme(graph, (branch for link in wild for branch in (link, *loops[link]))),)
+    groups = ((form.tree_conductances, form.link_conductances), (form.across_states, form.dependent_across))
+    return tuple(problem for own, beside in groups for problem in _cancelling(form, own, beside))
+
+
+def _extreme(graph: CircuitGraph, branches: Iterable[int]) -> Problem:
+    members = (branch for branch in branches if graph.branches[branch].terms)
+    names = tuple(dict.fromkeys(graph.part_of(branch).name for branch in members))
+    message = f"the ratios of {listed(names)} multiply to a number that is no longer finite or no longer above zero."
+    return Problem("extreme ratios", message, "Check their units and powers of ten.", names)
+
+
+def _cancelling(form: StateForm, own: Sequence[int], beside: Sequence[int]) -> Iterator[Problem]:
+    """Coupled conductances (or inertias) of which a negative one cancels others, block by block."""
+    values = _coefficients(form.graph, (*own, *beside))
+    if all(value > 0 for value in values.values()):
+        return  # positive values cannot cancel
+    blocks: nx.Graph[int] = nx.Graph()
+    blocks.add_nodes_from(own)
+    members = frozenset(own)
+    blocks.add_edges_from((tree, link) for link in beside for tree in form.tree.loops[link] if tree in members)
+    for found in nx.connected_components(blocks):
+        trees, links = sorted(found & members), sorted(found - members)
+        loops = [[value_of(form.tree.loops[link].get(tree, 0)) for link in links] for tree in trees]
+        F = np.array(loops, dtype=float).reshape(len(trees), len(links))
+        matrix = np.diag([values[tree] for tree in trees]) + F * [values[link] for link in links] @ F.T
+        if min(values[branch] for branch in found) <= 0 and _is_singular(matrix):
+            yield _cancelling_block(_View(form), (*trees, *links))
+
+
+def _coefficients(graph: CircuitGraph, branches: Iterable[int]) -> dict[int, float]:
+    made: dict[int, Any] = {}
+    values: dict[int, float] = {}
+    for index in branches:
+        template, part = graph.branches[index].template, graph.part_of(index)
+        if id(template) not in made:
+            made[id(template)] = sympy.lambdify(template.symbols, template.law, "math")
+        numbers = (graph.parameters[f"{part.name}.{symbol.name}"] for symbol in template.symbols)
+        values[index] = float(made[id(template)](*numbers))
+    return values
+
+
+def _is_singular(block: Any) -> bool:
+    if not np.isfinite(block).all():
+        return True
+    scale = 1 / np.sqrt(np.abs(np.diag(block)) + np.finfo(float).tiny)
+    return not 1 / np.linalg.cond(block * scale[:, None] * scale[None, :]) > SINGULAR
+
+
+def _cancelling_block(view: _View, branches: Sequence[int]) -> Problem:
+    moved = (node for branch in branches for node in view.moved.get(branch, ()))
+    nodes, words = view.nodes(moved) or view.ends(branches), view.words(branches[0])
+    message = (
+        f"the values of {view.titles(branches)} at {at_nodes(nodes)} cancel each other, "
+        f"so that no {words.across} follows from a {words.through} there."
+    )
+    hint = f"Change one of the values, or give a node {words.remedy}."
+    return Problem("cancelling values", message, hint, view.parts(branches), nodes)

@@ -53,6 +53,22 @@ class StateForm:
         return self.tree.tree[Kind.ACROSS_SOURCE]
 
     @property
+    def across_inputs(self) -> tuple[int, ...]:
+        """The inputs e: prescribed across variables, and those of tree laws, which an algebraic loop determines."""
+        return self.across_sources + self.tree.tree[Kind.LAW]
+
+    @cached_property
+    def loop_laws(self) -> tuple[int, ...]:
+        """Nonlinear laws whose across and through variables determine each other at a massless node.
+
+        These are the laws in the tree, and those links in whose loop a tree conductance stands: its across variable depends
+        on the law's own through variable. All other laws read states and inputs of time alone.
+        """
+        conductances = frozenset(self.tree_conductances)
+        links = (link for link in self.tree.links[Kind.LAW] if not conductances.isdisjoint(self.tree.loops[link]))
+        return (*self.tree.tree[Kind.LAW], *links)
+
+    @property
     def across_states(self) -> tuple[int, ...]:
         return self.tree.tree[Kind.ACROSS_STORE]
 
@@ -86,13 +102,15 @@ class StateForm:
     @cached_property
     def integrals(self) -> tuple[int, ...]:
         """Branches whose integrated across variable is read by a law or asked for: each adds a state."""
-        read = (index for index in self.laws if self.graph.branches[index].template.has_integral)
+        laws = (*self.laws, *self.tree.tree[Kind.LAW])
+        read = (index for index in laws if self.graph.branches[index].template.has_integral)
         return tuple(dict.fromkeys((*read, *self.angles)))
 
     @cached_property
     def outputs(self) -> tuple[int, ...]:
         """Branches whose across variable is read: by a nonlinear law or by an integral."""
-        return tuple(dict.fromkeys((*self.tree.links[Kind.LAW], *self.integrals)))
+        laws = (*self.tree.links[Kind.LAW], *self.tree.tree[Kind.LAW])
+        return tuple(dict.fromkeys((*laws, *self.integrals)))
 
     @cached_property
     def states(self) -> tuple[State, ...]:

@@ -23,7 +23,7 @@ LARGEST_BLOCK = 3
 
 
 class BlockTooLargeError(Exception):
-    """More unknowns are coupled than are solved symbolically."""
+    """The rows have no closed form that anyone would read."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +49,10 @@ def explicit_rows(form: StateForm) -> Rows:
     """Solve the state form for the rates.
 
     Raises:
-        BlockTooLargeError: more than `LARGEST_BLOCK` unknowns are coupled.
+        BlockTooLargeError: more than `LARGEST_BLOCK` unknowns are coupled, or they are coupled by nonlinear laws.
     """
+    if form.loop_laws:
+        raise BlockTooLargeError
     return _Solution(form).rows()
 
 

@@ -1,0 +1,227 @@
+"""Kirchhoff's equations of a network as records: balances at nodes, speeds around loops, laws, states."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cached_property, partial
+
+from sympy import Add, Expr, Symbol
+
+from shaftwork.equations.assembly import Assembly, Sides, sides
+from shaftwork.equations.quantities import Flow, rate_of
+from shaftwork.equations.records import (
+    CouplingEquation,
+    Eliminated,
+    Equations,
+    LawEquation,
+    LoopEquation,
+    NodeEquation,
+    StateEquation,
+)
+from shaftwork.equations.solution import Solution
+from shaftwork.network.graph import GROUND
+from shaftwork.network.templates import Kind
+from shaftwork.reduction.form import StateForm, branch_name
+from shaftwork.reduction.gains import Number
+
+Origin = tuple[tuple[str, ...], tuple[int, ...], tuple[str, ...]]
+
+
+def kirchhoff(form: StateForm) -> Equations:
+    """The equations of a network. Rows become sympy expressions when they are read, not before.
+
+    Source: Popenda 2019, (1)-(4).
+    """
+    writer = _Writer(form)
+    return Equations(
+        form,
+        writer.assembly,
+        tuple(writer.nodes()),
+        tuple(writer.loops()),
+        tuple(writer.laws()),
+        tuple(writer.couplings()),
+        tuple(writer.states()),
+        tuple(writer.eliminated()),
+        tuple(writer.notes()),
+    )
+
+
+class _Writer:
+    """Makes the records; all sympy work is put off by partial application."""
+
+    def __init__(self, form: StateForm) -> None:
+        self.form, self.graph = form, form.graph
+        self.assembly = Assembly(form)
+        self.solution = Solution(self.assembly)
+
+    def origin(self, branches: Iterable[int], nodes: Iterable[int] = ()) -> Origin:
+        """Parts, branches and nodes of a row, each once, in the order of the network."""
+        kept = tuple(sorted(set(branches)))
+        made = [self.graph.branches[index] for index in kept]
+        touched = {*nodes, *(node for item in made for node in (item.plus, item.minus))}
+        touched.update(node for item in made for _, plus, minus in item.terms for node in (plus, minus))
+        parts = dict.fromkeys(self.graph.parts[item.part].name for item in made)
+        return tuple(parts), kept, tuple(self.graph.nodes[node] for node in sorted(touched - {GROUND}))
+
+    def part(self, branch: int) -> str:
+        return self.graph.part_of(branch).name
+
+    def nodes(self) -> Iterator[NodeEquation]:
+        for number, name in enumerate(self.graph.nodes):
+            items = self.assembly.at_node[number]
+            branches = [k for item in items for k in (item.branches if isinstance(item, Flow) else (item,))]
+            parts, kept, _ = self.origin(branches)
+            make, taken = partial(self.assembly.balance, number), partial(self._taken, number, kept)
+            yield NodeEquation(parts, kept, (name,), make, name, taken)
+
+    def _taken(self, node: int, branches: tuple[int, ...]) -> Mapping[int, Expr]:
+        return {branch: Add(*self.assembly.incidence(branch, node)) for branch in branches}
+
+    def loops(self) -> Iterator[LoopEquation]:
+        for link in sorted(self.form.tree.loops):
+            if self.assembly.kind(link) is not Kind.COUPLING:
+                origin = self.origin((link, *self.form.tree.loops[link]))
+                yield LoopEquation(
+                    *origin, partial(self.assembly.loop, link), link, partial(self.assembly.factors, link)
+                )
+
+    def laws(self) -> Iterator[LawEquation]:
+        for flow in self.assembly.quantities.flows:
+            kinds = {self.assembly.kind(branch) for branch in flow.branches}
+            if kinds != {Kind.ACROSS_SOURCE}:
+                yield LawEquation(*self.origin(flow.branches), partial(self.assembly.law_of_flow, flow))
+            for branch in flow.branches:
+                if self.assembly.kind(branch) is Kind.THROUGH_STORE:
+                    yield LawEquation(*self.origin((branch,)), partial(self.assembly.law_of_store, branch))
+                elif self.assembly.kind(branch) is Kind.ACROSS_SOURCE:
+                    yield LawEquation(*self.origin((branch,)), partial(self.assembly.law_of_source, branch))
+
+    def couplings(self) -> Iterator[CouplingEquation]:
+        for branch in self.graph.branches:
+            if branch.terms:
+                yield CouplingEquation(*self.origin((branch.index,)), partial(self.assembly.coupling, branch.index))
+
+    def states(self) -> Iterator[StateEquation]:
+        makers = {"across": self._speed_row, "through": self._torque_row, "integral": self._integral_row}
+        solved = {"across": self._speed_solved, "through": self._torque_solved, "integral": lambda _: True}
+        for state in self.form.states:
+            make, explicit = partial(makers[state.kind], state.branch), partial(solved[state.kind], state.branch)
+            symbol = Symbol(state.name, real=True)
+            yield StateEquation(*self.origin((state.branch,)), make, state.name, symbol, state.unit, explicit)
+
+    def _speed_row(self, branch: int) -> Sides:
+        return self.solution.speeds.row(branch)
+
+    def _speed_solved(self, branch: int) -> bool:
+        return self.solution.speeds.solved(branch)
+
+    def _torque_row(self, branch: int) -> Sides:
+        return self.solution.torques.row(branch)
+
+    def _torque_solved(self, branch: int) -> bool:
+        return self.solution.torques.solved(branch)
+
+    def _integral_row(self, branch: int) -> Sides:
+        link = branch in self.form.tree.loops
+        terms = self.assembly.around(branch) if link else (self.assembly.quantities.across(self.assembly.ends(branch)),)
+        return sides(rate_of(self.assembly.integral(branch)), terms)
+
+    def eliminated(self) -> Iterator[Eliminated]:
+        yield from self._dependent_speeds()
+        for branch in self.form.dependent_through:
+            make = partial(self._carried, self.assembly.quantities.store, branch)
+            name = branch_name(self.graph, self.graph.branches[branch])
+            yield Eliminated(*self._cutset(branch), make, name, self._series(branch), "torque")
+        for branch in self.form.tree_conductances:
+            made = self.graph.branches[branch]
+            where = " and ".join(self.graph.node_name(node) for node in (made.plus, made.minus) if node != GROUND)
+            why = f"no store at {where} fixes the speed across {self.part(branch)}; it follows from the balance"
+            make = partial(self.solution.algebraic.row, branch)
+            yield Eliminated(*self._cutset(branch), make, f"across {self.part(branch)}", why, "algebraic")
+        yield from self._reactions()
+
+    def _dependent_speeds(self) -> Iterator[Eliminated]:
+        """Speeds of nodes that follow from others through couplings."""
+        owners = self.assembly.quantities.owners
+        for number, row in enumerate(self.form.tree.potentials):
+            owner = owners.get(number)
+            if row is None or owner in self._tree_stores or not self._tied(row):
+                continue
+            make = partial(self._follows, number)
+            yield Eliminated(*self._origin_of_speed(number, row), make, *self._why_speed(number, row), "speed")
+
+    @cached_property
+    def _tree_stores(self) -> frozenset[int]:
+        return frozenset((*self.form.across_states, *self.form.across_sources))
+
+    def _tied(self, row: Mapping[int, Number]) -> bool:
+        """Whether couplings take part in a node's speed; else the loops say all about it."""
+        return not row or any(self.assembly.kind(tree) is Kind.COUPLING for tree in row)
+
+    def _origin_of_speed(self, node: int, row: Mapping[int, Number]) -> Origin:
+        owner = self.assembly.quantities.owners.get(node)
+        return self.origin((*row, *(() if owner is None else (owner,))), (node,))
+
+    def _why_speed(self, node: int, row: Mapping[int, Number]) -> tuple[str, str]:
+        couplings = _listed(self.part(tree) for tree in row if self.assembly.kind(tree) is Kind.COUPLING)
+        free = [self.part(tree) for tree in row if self.assembly.kind(tree) is not Kind.COUPLING]
+        owner = self.assembly.quantities.owners.get(node)
+        what = f"node {self.graph.nodes[node]}"
+        if owner is not None:
+            part = self.graph.part_of(owner)
+            what = f"{type(part.component).__name__.lower()} {part.name}"
+        if not free:
+            return what, f"{what} is held at rest by {couplings}"
+        return what, f"{what} is rigidly tied to {_listed(free)} by {couplings}"
+
+    def _follows(self, node: int) -> Sides:
+        row = self.form.tree.potentials[node] or {}
+        speeds = ((gain, self.assembly.quantities.across(self.assembly.ends(tree))) for tree, gain in self.assembly.referred(row))
+        return sides(self.assembly.quantities.node(node), (speed * gain for speed, gain in speeds))
+
+    def _reactions(self) -> Iterator[Eliminated]:
+        for branch in self.form.tree.tree[Kind.COUPLING]:
+            make = partial(self._carried, self.assembly.quantities.multiplier, branch)
+            why = f"{self.part(branch)} is ideal: it takes whatever the balance asks"
+            yield Eliminated(*self._cutset(branch), make, f"reaction of {self.part(branch)}", why, "reaction")
+        for branch in self.form.across_sources:
+            why = f"{self.part(branch)} supplies whatever its prescribed value takes"
+            make = partial(self._supplied, branch)
+            yield Eliminated(*self._cutset(branch), make, f"reaction of {self.part(branch)}", why, "reaction")
+
+    def _cutset(self, branch: int) -> Origin:
+        return self.origin((branch, *(link for link, _ in self.assembly.cutsets.get(branch, ()))))
+
+    def _carried(self, symbol: Callable[[int], Expr], branch: int) -> Sides:
+        return sides(symbol(branch), self.assembly.out_of(branch))
+
+    def _supplied(self, branch: int) -> Sides:
+        flow = self.assembly.quantities.flow_of[branch]
+        return sides(self.assembly.quantities.through(flow), (flow.sign * term for term in self.assembly.out_of(branch)))
+
+    def _series(self, branch: int) -> str:
+        members = [link for link, _ in self.assembly.cutsets.get(branch, ())]
+        others = _listed(self.part(link) for link in members)
+        part = self.graph.part_of(branch)
+        kind = type(part.component).__name__.lower()
+        return f"{kind} {part.name} is in series with {others}" if members else f"{kind} {part.name} carries nothing"
+
+    def notes(self) -> Iterator[str]:
+        tree = self.form.tree
+        if self.graph.zeros:
+            yield f"Exactly zero and therefore left out: {', '.join(self.graph.zeros)}."
+        for branch in tree.redundant:
+            yield f"{self.part(branch)} says what other couplings have said already; its reaction is undetermined."
+        for branch, nodes in tree.locked:
+            names = ", ".join(self.graph.nodes[node] for node in nodes)
+            yield f"{self.part(branch)} closes a loop of couplings of unequal ratio and holds {names} at rest."
+        if tree.frozen:
+            yield "Ratios cancel for the given values; other ratios change the structure of these equations."
+
+
+def _listed(names: Iterable[str]) -> str:
+    """Names in a sentence: "a, b and c"; "c others" where there are many."""
+    kept = list(dict.fromkeys(names))
+    if len(kept) > 6:
+        kept = [*kept[:4], f"{len(kept) - 4} others"]
+    return " and ".join(filter(None, (", ".join(kept[:-1]), kept[-1]))) if kept else "nothing"

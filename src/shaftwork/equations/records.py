@@ -1,0 +1,234 @@
+"""The equations of a network as records: each row knows its parts, branches and nodes, and becomes sympy when read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal
+
+from sympy import Add, Eq, Expr, Symbol
+
+from shaftwork.equations.assembly import Assembly, Group, Sides
+from shaftwork.equations.notation import Letter, notation
+from shaftwork.reduction.form import StateForm
+
+if TYPE_CHECKING:
+    from shaftwork.equations.second_order import SecondOrder
+
+Form = Literal["kirchhoff", "state", "second-order"]
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One equation and where it comes from.
+
+    Args:
+        parts: names of the parts that take part, in the order of the network.
+        branches: their branches.
+        nodes: names of the nodes concerned.
+        make: makes both sides; called when the row is first read.
+    """
+
+    parts: tuple[str, ...]
+    branches: tuple[int, ...]
+    nodes: tuple[str, ...]
+    make: Callable[[], Sides]
+
+    @cached_property
+    def sides(self) -> Sides:
+        """Left side, and the groups of terms on the right, as they are printed."""
+        return self.make()
+
+    @property
+    def left(self) -> Expr:
+        return self.sides.left
+
+    @property
+    def groups(self) -> tuple[Group, ...]:
+        return self.sides.groups
+
+    @cached_property
+    def right(self) -> Expr:
+        """The right side as one expression."""
+        return Add(*(factor * Add(*terms) for factor, terms in self.groups))
+
+    @property
+    def equation(self) -> Eq:
+        """Left side = right side."""
+        return Eq(self.left, self.right, evaluate=False)
+
+    @property
+    def expression(self) -> Expr:
+        """Right side less left side; zero where the equation holds."""
+        return self.right - self.left
+
+    @property
+    def trivial(self) -> bool:
+        """Whether both sides are the same symbol, so that there is nothing to print."""
+        return bool(self.expression == 0)
+
+
+@dataclass(frozen=True, eq=False)
+class NodeEquation(Row):
+    """The balance at a node. `expression` is the sum of all that it receives, which is zero (Popenda 2019, (1)-(3)).
+
+    Args:
+        node: name of the node.
+        taken: makes `coefficients`.
+    """
+
+    node: str
+    taken: Callable[[], Mapping[int, Expr]]
+
+    @cached_property
+    def coefficients(self) -> Mapping[int, Expr]:
+        """For each branch the factor with which it takes its through variable from the node: 1, -1 or a ratio."""
+        return self.taken()
+
+
+@dataclass(frozen=True, eq=False)
+class LoopEquation(Row):
+    """Speed around the fundamental loop of a link (Popenda 2019, (4)).
+
+    Args:
+        link: the link's branch number.
+        summed: makes `coefficients`.
+    """
+
+    link: int
+    summed: Callable[[], tuple[tuple[int, Expr], ...]]
+
+    @cached_property
+    def coefficients(self) -> Mapping[int, Expr]:
+        """For each tree branch of the loop the factor with which its across variable enters."""
+        return dict(self.summed())
+
+
+@dataclass(frozen=True, eq=False)
+class LawEquation(Row):
+    """The law of a branch, or of the parallel branches of one part; that of an across store stands in its node's balance."""
+
+
+@dataclass(frozen=True, eq=False)
+class CouplingEquation(Row):
+    """What an ideal coupling imposes on the speeds of its nodes."""
+
+
+@dataclass(frozen=True, eq=False)
+class StateEquation(Row):
+    """The rate of a state.
+
+    Args:
+        name: name of the state.
+        symbol: its symbol.
+        unit: its SI unit.
+        solved: makes `explicit`.
+    """
+
+    name: str
+    symbol: Symbol
+    unit: str
+    solved: Callable[[], bool]
+
+    @cached_property
+    def explicit(self) -> bool:
+        """False where more rates are coupled than are solved symbolically; the left side then holds them all."""
+        return self.solved()
+
+    @property
+    def rate(self) -> Expr:
+        """d(state)/dt, where the row is explicit; else what the coupled rates on the left side sum up to."""
+        return self.right
+
+
+@dataclass(frozen=True, eq=False)
+class Eliminated(Row):
+    """A quantity that is no state although it might have been, or is algebraic, and how it follows.
+
+    Args:
+        what: name of the quantity.
+        why: the reason in words.
+        kind: "speed" (of a geared store or node), "torque" (of a store in series), "algebraic" or "reaction".
+    """
+
+    what: str
+    why: str
+    kind: Literal["speed", "torque", "algebraic", "reaction"]
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """Kirchhoff's equations of a network and what becomes of them.
+
+    Args:
+        form: the state form that they are written from.
+        assembly: makes the terms.
+        nodes: balance at every node.
+        loops: speed around every fundamental loop.
+        laws: constitutive laws.
+        couplings: what ideal couplings impose.
+        states: rates of the states.
+        eliminated: dependent stores, speeds without a store, reactions of couplings and prescribed speeds.
+        notes: what was left out or decided by numerical values, in words.
+    """
+
+    form: StateForm
+    assembly: Assembly
+    nodes: tuple[NodeEquation, ...]
+    loops: tuple[LoopEquation, ...]
+    laws: tuple[LawEquation, ...]
+    couplings: tuple[CouplingEquation, ...]
+    states: tuple[StateEquation, ...]
+    eliminated: tuple[Eliminated, ...]
+    notes: tuple[str, ...]
+
+    @cached_property
+    def _notation(self) -> tuple[Mapping[str, str], tuple[Letter, ...]]:
+        return notation(self.form, self.assembly.quantities)
+
+    @property
+    def letters(self) -> tuple[Letter, ...]:
+        """Every symbol with its unit and meaning, in the order of the parts."""
+        return self._notation[1]
+
+    @property
+    def symbol_names(self) -> Mapping[str, str]:
+        """LaTeX of every symbol by the symbol's name."""
+        return self._notation[0]
+
+    @cached_property
+    def second_order(self) -> SecondOrder:
+        """M phi'' + D phi' + K phi = T of a mechanical network.
+
+        Raises:
+            CompileError: the network has electrical nodes.
+        """
+        from shaftwork.equations.second_order import second_order
+
+        return second_order(self.form.graph)
+
+    def latex(self, form: Form | None = None, *, values: bool = False) -> str:
+        """The equations as the body of a LaTeX document (needs amsmath), or for a notebook cell.
+
+        Args:
+            form: "kirchhoff" (balances, loops, laws), "state" (explicit rates) or "second-order"; by default the first two.
+            values: print the parameters' values instead of their symbols.
+
+        Raises:
+            CompileError: second-order form of a network with electrical nodes.
+        """
+        from shaftwork.equations.report import body
+
+        return body(self, form, values=values)
+
+    def document(self, *, values: bool = False) -> str:
+        """A complete LaTeX document: all forms, the states with their units, and the nomenclature with the values."""
+        from shaftwork.equations.report import document
+
+        return document(self, values=values)
+
+    def _repr_latex_(self) -> str:
+        from shaftwork.equations.report import notebook
+
+        return notebook(self)

@@ -1,0 +1,82 @@
+"""Networks with algebraic loops: the implicit system of states and loop unknowns, solved by IDA."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shaftwork.codegen.arrays import BoundArrays
+from shaftwork.codegen.elements import Array
+from shaftwork.core.errors import SimulationError
+from shaftwork.integrate import choice
+from shaftwork.integrate.problem import DaeProblem, DenseOutput, Problem, Trajectory
+
+WHY = "Laws at massless nodes determine torque and speed together, so the implicit system is solved."
+
+
+@dataclass(frozen=True)
+class _States:
+    """The first columns of a dense output."""
+
+    whole: DenseOutput
+    count: int
+
+    @property
+    def steps(self) -> Array:
+        return self.whole.steps
+
+    def __call__(self, times: Array) -> Array:
+        return self.whole(times)[:, : self.count]
+
+
+def solve_loops(bound: BoundArrays, problem: Problem) -> tuple[Trajectory, str, str]:
+    """Solve a problem whose model has algebraic loops: with IDA, or with scipy and Newton's method where it is missing.
+
+    Raises:
+        SimulationError: the loops have no solution at the start, or the engine failed.
+    """
+    assert bound.loops is not None
+    loops, states = bound.loops, len(problem.x0)
+    start = loops.solve(problem.t0, problem.x0)
+    if not np.isfinite(start).all():
+        names = [bound.program.form.graph.part_of(branch).name for branch in bound.program.form.loop_laws]
+        raise SimulationError(
+            f"No torque and speed satisfy the laws of {', '.join(names)} at the start (t = {problem.t0:g} s). "
+            f"Give their node an inertia, or start nearer to the operating point."
+        )
+    if not choice.available("sundials"):
+        return choice.solve(problem, "scipy-radau", WHY)
+
+    def residual(t: float, z: Array, rate: Array) -> Array:
+        x, a = z[:states], z[states:]
+        y, u, _ = loops.inputs_at(t, x, a)
+        left, _ = loops.residual(t, x, a)
+        return np.concatenate([rate[:states] - bound.rates(t, x, y, u), left])
+
+    def jump(t: float, z: Array) -> Array:
+        x = z[:states] if problem.jump is None else problem.jump(t, z[:states])
+        return np.concatenate([x, loops.solve(t, x)])
+
+    from shaftwork.integrate.sundials import solve_dae
+
+    size = float(np.abs(start).max()) or 1.0
+    found = solve_dae(
+        DaeProblem(
+            residual=residual,
+            x0=np.concatenate([problem.x0, start]),
+            derivative0=np.concatenate([bound.rhs(problem.t0, problem.x0), np.zeros_like(start)]),
+            algebraic=tuple(range(states, states + len(start))),
+            t0=problem.t0,
+            t_end=problem.t_end,
+            names=(*problem.names, *(f"loop {k + 1}" for k in range(len(start)))),
+            atol=np.concatenate([problem.atol, np.full(len(start), problem.rtol * size)]),
+            rtol=problem.rtol,
+            breakpoints=problem.breakpoints,
+            jump=jump,
+            t_eval=problem.t_eval,
+            max_steps=problem.max_steps,
+        )
+    )
+    loops.start_from(start)
+    return Trajectory(found.t, found.x[:, :states], _States(found.dense, states), found.statistics), "sundials", WHY

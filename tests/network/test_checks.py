@@ -1,0 +1,271 @@
+"""Each slip in a network that can be seen before its equations are made is said in the words of its author."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy
+
+from shaftwork.components import electrical, laws, machines, rotation, sources, translation
+from shaftwork.components.base import Component, Port
+from shaftwork.components.branches import ACROSS, AcrossStore, Branch, ThroughLaw
+from shaftwork.core.errors import Problem
+from shaftwork.network.checks import Spelling, connection_problems, declaration_problems, examine
+from shaftwork.network.graph import build_graph
+from shaftwork.network.netlist import Netlist, Placed
+
+ROTOR = Placed(rotation.Inertia("J1", J=1.0), ("rotor",))
+SHAFT = Placed(rotation.Spring("shaft", c=1e3, d=1.0), ("rotor", "wheel"))
+WHEEL = Placed(rotation.Inertia("J2", J=1.0), ("wheel",))
+TRAIN = (ROTOR, SHAFT, WHEEL)
+
+
+def netlist(*further: tuple[Component, tuple[Any, ...]]) -> Netlist:
+    """A sound train of two inertias with further parts."""
+    return Netlist("train", (*TRAIN, *(Placed(part, nodes) for part, nodes in further)))
+
+
+def typed(part: Component, *nodes: Any) -> Problem:
+    """The only problem that a part brings to the train as it is typed."""
+    (problem,) = declaration_problems(netlist((part, nodes)))
+    return problem
+
+
+def joined(*further: tuple[Component, tuple[str, ...]]) -> tuple[Problem, ...]:
+    """The problems of connection of the train with further parts."""
+    return connection_problems(build_graph(netlist(*further)))
+
+
+def test_a_sound_network_has_no_problems() -> None:
+    assert declaration_problems(netlist()) == ()
+    assert joined() == ()
+
+
+def test_a_network_without_parts_is_said_to_be_empty() -> None:
+    (problem,) = declaration_problems(Netlist("bare", ()))
+    assert str(problem) == "empty network: 'bare' has no parts. Add parts: net.add(part, 'node')."
+
+
+def test_equal_names_are_said_with_both_places() -> None:
+    problem = typed(rotation.Damper("shaft", d=1.0), "wheel")
+    assert problem.message == "Damper 'shaft' at node 'wheel' has the name of Spring 'shaft' at nodes 'rotor', 'wheel'."
+    assert "'shaft_2'" in problem.hint
+    assert (problem.kind, problem.parts, problem.nodes) == ("duplicate name", ("shaft",), ("wheel",))
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("", "has no name"), (" ", "has no name"), ("ground", "stands for the frame"), ("a.b", "has a dot in its name")],
+)
+def test_a_part_that_cannot_be_named_is_said(name: str, words: str) -> None:
+    problem = typed(rotation.Inertia(name, J=1.0), "wheel")
+    assert problem.kind == "part name"
+    assert words in problem.message
+
+
+@pytest.mark.parametrize(("node", "kind"), [("", "node name"), (3, "node name"), ("a.b", "dotted node name")])
+def test_a_node_that_cannot_be_named_is_said(node: Any, kind: str) -> None:
+    problem = typed(rotation.Inertia("J3", J=1.0), node)
+    assert problem.kind == kind
+    assert "Inertia 'J3'" in problem.message
+
+
+@pytest.mark.parametrize("nodes", [("rotor",), ("rotor", "wheel", "one more"), ()])
+def test_a_wrong_number_of_nodes_is_said_with_the_ports(nodes: tuple[str, ...]) -> None:
+    problem = typed(rotation.Gear("g", ratio=2.0), *nodes)
+    assert problem.kind == "node count"
+    assert problem.message.endswith("but its ports are: a, b.")
+    assert problem.hint == "Write net.add(part, 'node a', 'node b')."
+
+
+def test_an_optional_port_may_be_left_out() -> None:
+    assert declaration_problems(netlist((rotation.Damper("bearing", d=1.0), ("rotor",)))) == ()
+
+
+def test_a_node_of_another_domain_is_said_with_the_part_that_came_first() -> None:
+    problem = typed(electrical.Resistor("R", R=1.0), "rotor", "ground")
+    assert problem.kind == "wrong domain"
+    assert "domain electrical, but node 'rotor' belongs to rotation since Inertia 'J1' stands there" in problem.message
+
+
+@pytest.mark.parametrize(
+    ("part", "nodes"),
+    [
+        (rotation.Spring("s", c=1.0), ("rotor", "rotor")),
+        (rotation.Damper("d", d=1.0), ("ground",)),
+        (rotation.Inertia("J3", J=1.0), ("ground",)),
+        (electrical.VoltageSource("u", voltage=1.0), ("ground", "ground")),
+    ],
+)
+def test_a_part_with_all_ends_at_one_node_does_nothing(part: Component, nodes: tuple[str, ...]) -> None:
+    problem = typed(part, *nodes)
+    assert problem.kind == "no effect"
+    assert f"'{part.name}'" in problem.message
+    assert problem.message.endswith(f"at node '{nodes[0]}' and does nothing there.")
+
+
+def test_a_machine_with_its_terminals_joined_is_allowed() -> None:
+    assert declaration_problems(netlist((machines.DCMachine("m", k=1.0, R=1.0), ("ground", "ground", "rotor")))) == ()
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        (-1.0, "J = -1.0 must be at least 0"),
+        (float("nan"), "J = nan must be a finite number"),
+        (float("inf"), "J = inf must be a finite number"),
+        ("heavy", "must be a number, not str 'heavy'"),
+        (None, "must be a number, not NoneType"),
+        (1j, "must be a number, not complex"),
+        ([1.0, 2.0], "must be a number, not list"),
+        (np.zeros(3), "must be a number, not ndarray"),
+    ],
+)
+def test_a_bad_value_is_said_with_unit_and_bounds(value: Any, words: str) -> None:
+    problem = typed(rotation.Inertia("J3", J=value), "wheel")
+    assert words in problem.message
+    assert (problem.kind, problem.hint) == ("parameter", "Give the moment of inertia in kg*m^2, at least 0.")
+    assert (problem.parts, problem.nodes) == (("J3",), ("wheel",))
+
+
+@dataclass
+class Length:
+    """What pint gives for a length, as far as a parameter looks at it."""
+
+    units: str = "meter"
+    dimensionality: str = "[length]"
+
+    def to(self, unit: str) -> SimpleNamespace:
+        raise ValueError(f"cannot convert to {unit}")
+
+
+def test_a_wrong_unit_is_said_with_the_right_one() -> None:
+    problem = typed(rotation.Inertia("J3", J=Length()), "wheel")  # type: ignore[arg-type]
+    assert problem.kind == "wrong unit"
+    assert "is given in 'meter', but needs kg*m^2" in problem.message
+
+
+@pytest.mark.parametrize(
+    ("law", "words"),
+    [
+        (laws.v, "reads v, which belongs to another domain"),
+        (sympy.Symbol("omega"), "contains a symbol omega of your own"),
+        (sympy.Symbol("k") * laws.t, "contains the symbol k, which has no value"),
+        (sympy.Function("f")(laws.t), "contains the unknown function f"),
+        (sympy.I * laws.t, "is not a finite real law"),
+        (laws.t < 1, "is a StrictLessThan, not a number or a law"),
+        (sympy.Matrix([laws.t, 1]), "not a number or a law"),
+    ],
+)
+def test_a_law_that_cannot_be_evaluated_is_said(law: Any, words: str) -> None:
+    problem = typed(sources.TorqueSource("motor", tau=law), "rotor")
+    assert problem.kind == "law"
+    assert words in problem.message
+    assert "TorqueSource 'motor': tau" in problem.message
+
+
+@pytest.mark.parametrize("law", [laws.omega, laws.phi * laws.t])
+def test_a_prescribed_speed_may_depend_on_time_alone(law: sympy.Expr) -> None:
+    problem = typed(sources.SpeedSource("drive", omega=law), "rotor")
+    assert "may depend on time t alone" in problem.message
+    assert problem.kind == "law"
+
+
+def test_laws_of_time_speed_angle_and_tables_are_allowed() -> None:
+    law = laws.Step(3.0, 1.0) - laws.omega * laws.Table([0, 1], [0, 1])(laws.omega) + sympy.sin(laws.phi)
+    parts = (sources.TorqueSource("a", tau=law), sources.TorqueSource("b", tau=laws.Table([0, 1], [0, 1])))
+    assert declaration_problems(netlist(*((part, ("rotor",)) for part in parts))) == ()
+
+
+@dataclass(frozen=True)
+class Odd(Component):
+    """A component of a user, with an error in it."""
+
+    kind: str = "raises"
+    ports = (Port("a"),)
+
+    def branches(self, p: Any) -> Iterator[Branch]:  # noqa: ARG002
+        if self.kind == "raises":
+            raise ZeroDivisionError("no teeth")
+        if self.kind == "ends":
+            yield ThroughLaw(ACROSS, ("a", "nowhere"))
+        yield AcrossStore(laws.t)
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [("raises", "no teeth"), ("ends", "'nowhere', which is no port"), ("of time", "a branch law depends on t")],
+)
+def test_an_error_in_a_users_component_is_said_and_not_raised(kind: str, words: str) -> None:
+    problem = typed(Odd("odd", kind=kind), "rotor")
+    assert problem.kind == "component"
+    assert words in problem.message
+
+
+def test_all_slips_are_reported_together_and_the_rest_can_be_assembled() -> None:
+    broken = netlist(
+        (rotation.Inertia("J1", J=float("nan")), ("wheel",)),
+        (rotation.Gear("g", ratio=0.0), ("rotor", "out", "more")),
+        (sources.TorqueSource("motor", tau=laws.v), ("rotor",)),
+        (electrical.Resistor("R", R=-1.0), ("rotor", "ground")),
+    )
+    repaired, problems = examine(broken)
+    kinds = ["duplicate name", "parameter", "node count", "parameter", "law", "wrong domain", "parameter"]
+    assert [problem.kind for problem in problems] == kinds
+    assert [placed.part.name for placed in repaired.placed] == ["J1", "shaft", "J2", "J1 (2)", "motor"]
+    assert len(build_graph(repaired).branches) == 6  # J1, spring and damping, J2, J1 (2), motor
+
+
+def test_a_loose_end_is_said_with_the_node_that_may_be_meant() -> None:
+    (problem,) = joined((rotation.Spring("line", c=1.0), ("rotor", "whel")))
+    assert problem.message == "node 'whel': only Spring 'line' ends there, with its port b, so it can carry no load."
+    assert problem.hint == "Join another part to 'whel' (did you mean node 'wheel'?), or remove 'line'."
+    assert (problem.kind, problem.parts, problem.nodes) == ("loose end", ("line",), ("whel",))
+
+
+def test_the_third_port_of_a_planetary_gear_is_a_loose_end() -> None:
+    (problem,) = joined((rotation.PlanetaryGear("p", ratio=2.0), ("rotor", "wheel", "ring")))
+    assert "only PlanetaryGear 'p' ends there, with its port ring" in problem.message
+
+
+def test_a_floating_part_is_said_once() -> None:
+    (problem,) = joined((rotation.Spring("adrift", c=1.0), ("x", "y")))
+    assert problem.message == "Spring 'adrift' at nodes 'x', 'y' shares no node with any other part."
+    assert (problem.kind, problem.parts, problem.nodes) == ("floating part", ("adrift",), ("x", "y"))
+
+
+@pytest.mark.parametrize(
+    ("part", "nodes"),
+    [
+        (rotation.Damper("d", d=1.0), ("x",)),
+        (rotation.Ground("wall"), ("x",)),
+        (sources.SpeedSource("w", omega=1.0), ("x",)),
+        (machines.DCMachine("m", k=1.0, R=1.0), ("x", "y", "z")),
+    ],
+)
+def test_a_part_alone_at_its_nodes_floats(part: Component, nodes: tuple[str, ...]) -> None:
+    assert [problem.kind for problem in joined((part, nodes))] == ["floating part"]
+
+
+def test_two_trains_in_one_network_are_a_warning() -> None:
+    (problem,) = joined((translation.Mass("m1", m=1.0), ("car",)), (translation.TranslationalDamper("d", d=1.0), ("car",)))
+    assert problem.message == "'m1', 'd' at node 'car' share no node with 'J1', 'shaft', 'J2'."
+    assert (problem.kind, problem.severity) == ("separate train", "warning")
+
+
+def test_an_inertia_alone_is_a_train() -> None:
+    assert connection_problems(build_graph(Netlist("one", (ROTOR,)))) == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "like"),
+    [("whel", "wheel"), ("wheell", "wheel"), ("wehel", "wheel"), ("Wheel ", "wheel"), ("out-put", "output"), ("n2", "")],
+)
+def test_a_slip_of_one_letter_is_recognised_and_another_number_is_not(name: str, like: str) -> None:
+    suggestion = Spelling(["wheel", "output", "n1", name]).suggestion([name])
+    assert suggestion == (f" (did you mean node '{like}'?)" if like else "")

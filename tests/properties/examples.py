@@ -1,0 +1,67 @@
+"""How many random networks are tried, and how a list of pieces becomes a network of the library.
+
+``SHAFTWORK_EXAMPLES`` sets the number for the main comparison (500 by default); every other property takes a share of
+it. The examples are the same in every run: a red test must mean a change of the code, not of the dice.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+from hypothesis import HealthCheck, settings
+from numpy.typing import NDArray
+
+from shaftwork import Model, Network, NetworkWarning
+from shaftwork.components import REGISTRY
+from tests.reference.mna import Piece
+
+EXAMPLES = int(os.environ.get("SHAFTWORK_EXAMPLES", "500"))
+Array = NDArray[np.float64]
+
+
+def share_of_examples(share: float = 1.0) -> settings:
+    """Hypothesis settings for a property that is tried on this share of the examples."""
+    return settings(
+        max_examples=max(5, round(share * EXAMPLES)),
+        deadline=None,
+        database=None,
+        derandomize=True,
+        suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_base_example],
+    )
+
+
+def network_of(pieces: Iterable[Piece], name: str = "random train") -> Network:
+    """The network of the library for the pieces that the referee reads."""
+    net = Network(name)
+    for piece in pieces:
+        net.add(REGISTRY[piece.type](piece.name, **piece.values), *piece.nodes)
+    return net
+
+
+def compiled(net: Network | Iterable[Piece]) -> Model:
+    """The model; a circuit beside the train is worth a warning to a user, but is meant here."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NetworkWarning)
+        return (net if isinstance(net, Network) else network_of(net)).compile()
+
+
+def quantity_of(name: str) -> str:
+    """The quantity of a signal ("gear.tau_a" is a tau), to compare errors with the size of what they are errors of."""
+    return name.rpartition(".")[2].partition("_")[0]
+
+
+def assert_equal_signals(found: Mapping[str, Array], wanted: Mapping[str, Array], tolerance: float) -> None:
+    """Equal within a fraction of the largest value that any signal of the same quantity takes."""
+    largest: dict[str, float] = {}
+    for name, values in wanted.items():
+        largest[quantity_of(name)] = max(largest.get(quantity_of(name), 0.0), float(np.abs(values).max()))
+    errors = {name: np.abs(found[name] - values).max() for name, values in wanted.items()}
+    wrong = {
+        name: f"{error:.3g} of {largest[quantity_of(name)]:.3g}"
+        for name, error in errors.items()
+        if not error <= tolerance * largest[quantity_of(name)] + 1e-300
+    }
+    assert not wrong, wrong
