@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import ClassVar
 
 import heyoka
 import numpy as np
@@ -12,6 +11,7 @@ import sympy
 from sympy import Abs, Eq, Heaviside, Max, Min, Ne, Piecewise, Rational, sign
 
 from shaftwork.codegen.heyoka import build
+from shaftwork.components.laws import Table
 from shaftwork.core.errors import CompileError, MissingExtraError
 from shaftwork.integrate import heyoka_taylor, scipy_ivp
 from shaftwork.integrate.problem import Problem
@@ -19,21 +19,14 @@ from shaftwork.integrate.problem import Problem
 x, v, t, a, b = sympy.symbols("x v t a b", real=True)
 
 
-class Curve(sympy.Function):
-    xs: ClassVar = (-1.5, -0.5, 0.25, 1.0, 1.25)
-    ys: ClassVar = (2.0, -1.0, 0.5, 0.75, -3.0)
-
-
-def curve_value(position):
-    return np.interp(position, Curve.xs, Curve.ys)
+XS, YS = (-1.5, -0.5, 0.25, 1.0, 1.25), (2.0, -1.0, 0.5, 0.75, -3.0)
+CURVE = Table(XS, YS)
 
 
 def evaluate(expression, state, time, parameters):
     """The translated expression at one point, its switches set as an engine sets them."""
     program = build((x, v), t, (a, b), (sympy.sympify(expression), sympy.Integer(0)))
-    values = np.concatenate([parameters, np.zeros(len(program.switches))])
-    if program.switches:
-        values[2:] = np.sign(program.switch_values(time, np.array(state), values))
+    values = np.concatenate([parameters, program.switch_signs(time, np.array(state), np.array(parameters))])
     compiled = heyoka.cfunc(list(program.rows), vars=list(program.variables))
     return float(compiled(np.array(state), pars=values[: compiled.nparams], time=time)[0])
 
@@ -77,13 +70,21 @@ def test_a_translated_expression_has_sympys_value(expression):
 
 def test_a_table_is_interpolated_and_constant_beyond_its_ends():
     for state, time, parameters in points():
-        found = evaluate(Curve(x + v) * 2, state, time, parameters)
-        assert found == pytest.approx(2 * curve_value(state.sum()), rel=1e-13)
-    for knot, value in zip(Curve.xs, Curve.ys, strict=True):
-        assert evaluate(Curve(x), [knot, 0.0], 0.0, [1.0, 1.0]) == pytest.approx(value, rel=1e-13)
+        found = evaluate(CURVE(x + v) * 2, state, time, parameters)
+        assert found == pytest.approx(2 * np.interp(state.sum(), XS, YS), rel=1e-13)
+    for knot, value in zip(XS, YS, strict=True):
+        assert evaluate(CURVE(x), [knot, 0.0], 0.0, [1.0, 1.0]) == pytest.approx(value, rel=1e-13)
 
 
-@pytest.mark.parametrize("row", [Abs(x), Heaviside(x, 2), Heaviside(x), sign(x), Max(x, 0), Piecewise((1, x <= 0), (2, True))])
+def test_the_slope_of_a_table_is_that_of_its_segment():
+    slope = CURVE(x).diff(x)
+    for position, expected in ((-2.0, 0.0), (-1.0, -3.0), (0.0, 2.0), (1.1, -15.0), (2.0, 0.0)):
+        assert evaluate(slope, [position, 0.0], 0.0, [1.0, 1.0]) == pytest.approx(expected, rel=1e-13)
+
+
+@pytest.mark.parametrize(
+    "row", [Abs(x), Heaviside(x, 2), Heaviside(x), sign(x), Max(x, 0), Piecewise((1, x <= 0), (2, True))]
+)
 def test_a_switch_at_exactly_zero_has_sympys_value_there(row):
     assert evaluate(row, [0.0, 1.0], 0.0, [1.0, 1.0]) == float(row.subs(x, 0))
 
@@ -120,8 +121,7 @@ def test_without_heyoka_the_extra_is_named(monkeypatch):
 def problem(rows, start, end, parameters=(), values=(), **options) -> Problem:
     states = (x, v)[: len(rows)]
     rows = tuple(map(sympy.sympify, rows))
-    modules = [{"Curve": curve_value}, "numpy"]
-    function = sympy.lambdify((t, states, parameters), list(rows), modules)
+    function = sympy.lambdify((t, states, parameters), list(rows))
     return Problem(
         rhs=lambda time, state: np.array(function(time, state, values), dtype=float),
         jacobian=None,
@@ -140,8 +140,12 @@ def problem(rows, start, end, parameters=(), values=(), **options) -> Problem:
 KINKED = {
     "a stop and a friction that is square": ((v, -100 * Max(x - 0.1, 0) - v * Abs(v) + 1 - x), (0.0, 0.0), ()),
     "a twist that leaves zero slowly": ((v, -x * Abs(x) - Max(x - 0.01, 0) + t**2), (0.0, 0.0), ()),
-    "an input in pieces": ((v, -x + Piecewise((1, t <= 1), (sympy.cos(3 * t), t < 2), (-0.5, True))), (0, 0), (1.0, 2.0)),
-    "a table of the state": ((v, Curve(x) - x), (-2.0, 1.0), ()),
+    "an input in pieces": (
+        (v, -x + Piecewise((1, t <= 1), (sympy.cos(3 * t), t < 2), (-0.5, True))),
+        (0, 0),
+        (1.0, 2.0),
+    ),
+    "a table of the state": ((v, CURVE(x) - x), (-2.0, 1.0), ()),
     "a nested maximum": ((v, Max(0.05 - v, -0.2, x) - 2 * x), (0.3, 0.0), ()),
 }  # fmt: skip
 
@@ -159,7 +163,9 @@ def test_a_step_never_crosses_a_kink(name):
 
 def test_a_body_that_slides_to_and_fro_changes_its_friction_at_every_turn():
     # x'' = -x - 0.1 sign(x'): half cycles about -0.1 and 0.1, each amplitude 0.2 less than the one before.
-    run = heyoka_taylor.solve(replace(problem((v, -x - sign(v) / 10), (1.05, 0.0), 4 * np.pi), t_eval=np.arange(5) * np.pi))
+    run = heyoka_taylor.solve(
+        replace(problem((v, -x - sign(v) / 10), (1.05, 0.0), 4 * np.pi), t_eval=np.arange(5) * np.pi)
+    )
     assert np.allclose(run.x[:, 0], [1.05, -0.85, 0.65, -0.45, 0.25], rtol=0, atol=1e-12)
 
 
@@ -172,7 +178,9 @@ def test_new_parameters_and_start_states_compile_nothing(monkeypatch):
     program = build((x, v), t, (a, b), (v, -a * x - b * Abs(v) * v))
     made = []
     original = heyoka.taylor_adaptive
-    monkeypatch.setattr(heyoka, "taylor_adaptive", lambda *args, **options: made.append(1) or original(*args, **options))
+    monkeypatch.setattr(
+        heyoka, "taylor_adaptive", lambda *args, **options: made.append(1) or original(*args, **options)
+    )
     ends = []
     for stiffness in (1.0, 4.0, 1.0):
         values = np.array([stiffness, 0.3])
@@ -188,4 +196,3 @@ def test_a_large_system_is_compiled_compactly():
     rows = tuple(states[i - 1] - 2 * states[i] for i in range(len(states)))
     assert build(states, t, (), rows).integrator(1e-10).compact_mode
     assert not build(states[:2], t, (), (states[1], -states[0])).integrator(1e-10).compact_mode
-

@@ -26,7 +26,7 @@ class Case:
 
 
 def make_case(matrix: Array, before: Array, after: Array, kick: Array, start: Array) -> Case:
-    """x' = A x + before (after from `STEP_TIME` on, when `kick` is added to the state); A regular and diagonalisable."""
+    """X' = A x + before (after from `STEP_TIME` on, when `kick` is added to x); A regular, diagonalisable."""
     values, vectors = np.linalg.eig(matrix)
     inverse = np.linalg.inv(vectors)
 

@@ -37,9 +37,7 @@ def test_a_stiff_problem_goes_to_an_implicit_engine(oscillator, monkeypatch, ins
     if not installed:
         monkeypatch.setattr("importlib.util.find_spec", lambda _name: None)
     matrix = sparse.csc_array(np.array([[-1e8, 1.0], [0.0, -1.0]]))
-    stiff = replace(
-        oscillator.problem, linear=None, rhs=lambda _t, x: matrix @ x, jacobian=lambda _t, _x: matrix
-    )
+    stiff = replace(oscillator.problem, linear=None, rhs=lambda _t, x: matrix @ x, jacobian=lambda _t, _x: matrix)
     engine, why = choice.choose(stiff)
     assert engine == ("sundials" if installed else "scipy-radau")
     assert "fastest decay (1e+08 1/s)" in why
@@ -86,7 +84,9 @@ def test_a_remembered_reason_is_passed_on(oscillator):
 
 
 def test_the_protocol_loads_no_numerical_library():
-    code = "import shaftwork.integrate.problem, sys; print([m for m in ('scipy', 'heyoka', 'sympy') if m in sys.modules])"
+    code = (
+        "import shaftwork.integrate.problem, sys; print([m for m in ('scipy', 'heyoka', 'sympy') if m in sys.modules])"
+    )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"
 

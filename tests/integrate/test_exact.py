@@ -33,7 +33,9 @@ def linear_problem(matrix, forcing, start, times, **options) -> Problem:
 def chain(n, stiffness, times, damping=0.0) -> Problem:
     """Inertias of 1 kg m2 in a row, a torque of 1 N m on the first: speeds, then spring torques."""
     difference = sparse.diags_array([np.ones(n - 1), -np.ones(n - 1)], offsets=[0, 1], shape=(n - 1, n))
-    matrix = sparse.block_array([[-damping * (difference.T @ difference), -difference.T], [stiffness * difference, None]])
+    matrix = sparse.block_array(
+        [[-damping * (difference.T @ difference), -difference.T], [stiffness * difference, None]]
+    )
     torque = np.eye(1, 2 * n - 1)[0]
     return linear_problem(matrix, lambda _t: torque, np.zeros(2 * n - 1), times)
 

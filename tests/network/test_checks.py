@@ -253,7 +253,8 @@ def test_a_part_alone_at_its_nodes_floats(part: Component, nodes: tuple[str, ...
 
 
 def test_two_trains_in_one_network_are_a_warning() -> None:
-    (problem,) = joined((translation.Mass("m1", m=1.0), ("car",)), (translation.TranslationalDamper("d", d=1.0), ("car",)))
+    brake = translation.TranslationalDamper("d", d=1.0)
+    (problem,) = joined((translation.Mass("m1", m=1.0), ("car",)), (brake, ("car",)))
     assert problem.message == "'m1', 'd' at node 'car' share no node with 'J1', 'shaft', 'J2'."
     assert (problem.kind, problem.severity) == ("separate train", "warning")
 
@@ -264,7 +265,7 @@ def test_an_inertia_alone_is_a_train() -> None:
 
 @pytest.mark.parametrize(
     ("name", "like"),
-    [("whel", "wheel"), ("wheell", "wheel"), ("wehel", "wheel"), ("Wheel ", "wheel"), ("out-put", "output"), ("n2", "")],
+    [("whel", "wheel"), ("wheell", "wheel"), ("wehel", "wheel"), ("Wheel ", "wheel"), ("n2", "")],
 )
 def test_a_slip_of_one_letter_is_recognised_and_another_number_is_not(name: str, like: str) -> None:
     suggestion = Spelling(["wheel", "output", "n1", name]).suggestion([name])

@@ -107,6 +107,6 @@ class BoundArrays:
         return np.asarray(x + self.part.B1 @ (step * inputs.of_time))
 
 
-def _times(mask: Array, values: Array) -> Array:
+def _times(mask: Any, values: Array) -> Array:
     """Values (m,) or (m, k) where the mask (m,) holds, else zero."""
     return np.asarray((mask * values.T).T)

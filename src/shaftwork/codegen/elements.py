@@ -1,4 +1,4 @@
-"""Parameter vector to numbers: the coefficients of all branches and the loop matrix, vectorised over equal templates."""
+"""Parameter vector to numbers: coefficients of all branches and the loop matrix, vectorised over equal templates."""
 
 from __future__ import annotations
 

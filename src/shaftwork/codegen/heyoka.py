@@ -57,6 +57,17 @@ class HeyokaProgram:
         values: Array = compiled(x, pars=parameters[: compiled.nparams], time=t)
         return values
 
+    def switch_signs(self, t: float, x: Array, parameters: Array) -> Array:
+        """Signs of the switches (k,) at time t in s, state x (n,) and the model's own parameters (p,)."""
+        signs = np.zeros(len(self.switches))
+        # A switch may depend on the sign of an earlier one: the maximum of three compares with the maximum of two.
+        for _ in range(len(self.switches)):
+            found = np.sign(self.switch_values(t, x, np.concatenate([parameters, signs])))
+            if np.array_equal(found, signs):
+                break
+            signs = found
+        return signs
+
     def bind(self, parameters: Array) -> BoundProgram:
         """The program with its parameter vector (p,): what `integrate.problem.Problem.symbolic` takes."""
         return BoundProgram(self, np.array(parameters, dtype=float))

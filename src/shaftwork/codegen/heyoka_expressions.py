@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import reduce
+from itertools import pairwise
 from typing import Any
 
 import heyoka
@@ -12,6 +13,7 @@ import sympy
 from sympy.functions.elementary.piecewise import ExprCondPair
 from sympy.logic.boolalg import ITE, And, BooleanFalse, BooleanTrue, Not, Or, Xor
 
+from shaftwork.components.laws import Interpolation, InterpolationSlope
 from shaftwork.core.errors import CompileError
 
 SAME_NAME: dict[Any, Callable[..., Any]] = {
@@ -81,8 +83,6 @@ class Translator:
             return SHAPES[kind](self, node)
         if isinstance(node, sympy.Number | sympy.NumberSymbol) and math.isfinite(float(node)):
             return heyoka.expression(float(node))
-        if hasattr(node, "xs") and hasattr(node, "ys"):
-            return self._table(node)
         if isinstance(node, sympy.Symbol):
             raise CompileError(f"The symbol {node} is neither a state nor a parameter of this model.")
         raise CompileError(
@@ -158,15 +158,21 @@ class Translator:
     def negation(self, node: Not) -> Any:
         return heyoka.eq(self.expression(node.args[0]), heyoka.expression(0.0))
 
-    def _table(self, node: Any) -> Any:
-        """Linear interpolation by a balanced tree of decisions, constant beyond the ends."""
-        argument = node.args[0]
-        position, zero = self.expression(argument), heyoka.expression(0.0)
-        xs, ys = tuple(map(float, node.xs)), tuple(map(float, node.ys))
-        segments: list[Any] = [heyoka.expression(ys[0])]
-        for left, right, low, high in zip(xs[:-1], xs[1:], ys[:-1], ys[1:], strict=True):
-            segments.append(low + (high - low) / (right - left) * (position - left))
-        segments.append(heyoka.expression(ys[-1]))
+    def interpolation(self, node: Interpolation) -> Any:
+        """Straight lines between the points of a table, constant beyond its ends."""
+        position = self.expression(node.args[0])
+        lines = [
+            low + slope * (position - left) for left, low, slope in zip(node.xs, node.ys, _slopes(node), strict=False)
+        ]
+        return self._segment(node, [heyoka.expression(node.ys[0]), *lines, heyoka.expression(node.ys[-1])])
+
+    def interpolation_slope(self, node: InterpolationSlope) -> Any:
+        """The slope of each straight line of a table, zero beyond its ends."""
+        return self._segment(node, [heyoka.expression(slope) for slope in (0.0, *_slopes(node), 0.0)])
+
+    def _segment(self, node: Any, segments: list[Any]) -> Any:
+        """The segment of a table in which its argument lies, by a balanced tree of decisions."""
+        argument, xs, zero = node.args[0], node.xs, heyoka.expression(0.0)
 
         def choose(first: int, last: int) -> Any:
             if first == last:
@@ -176,6 +182,11 @@ class Translator:
             return heyoka.select(beyond, choose(middle + 1, last), choose(first, middle))
 
         return choose(0, len(xs))
+
+
+def _slopes(node: Any) -> tuple[float, ...]:
+    points = pairwise(zip(node.xs, node.ys, strict=True))
+    return tuple((high - low) / (right - left) for (left, low), (right, high) in points)
 
 
 SHAPES: dict[Any, Callable[[Translator, Any], Any]] = {
@@ -189,6 +200,8 @@ SHAPES: dict[Any, Callable[[Translator, Any], Any]] = {
     sympy.Min: Translator.extreme,
     sympy.Piecewise: Translator.piecewise,
     ITE: Translator.choice,
+    Interpolation: Translator.interpolation,
+    InterpolationSlope: Translator.interpolation_slope,
     Not: Translator.negation,
     And: lambda translator, node: heyoka.logical_and(translator.arguments(node)),
     Or: lambda translator, node: heyoka.logical_or(translator.arguments(node)),

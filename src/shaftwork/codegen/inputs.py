@@ -21,7 +21,7 @@ Function = Callable[..., Any]
 
 @dataclass(frozen=True, eq=False)
 class _Group:
-    """The inputs of one template: where they stand in u, where their across variable stands in y, their integral in x."""
+    """The inputs of one template: where they stand in u, their across variables in y, their integrals in x."""
 
     made_of: TemplateGroup
     inputs: Index
@@ -74,7 +74,7 @@ class Inputs:
         )
 
     def values(self, t: Any, y: Array, x: Array, p: Array) -> Array:
-        """u at time t from the outputs y and the states x; with t (k,) and y, x of shape (., k) the result is (m, k)."""
+        """u (m,) at time t from outputs y and states x; with t (k,), y (outputs, k) and x (n, k) it is (m, k)."""
         return self._evaluate(lambda group: group.value, t, y, x, p)
 
     def time_slopes(self, t: Any, y: Array, x: Array, p: Array) -> Array:

@@ -14,9 +14,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
-from shaftwork.codegen.elements import Array
+from shaftwork.codegen.elements import Array, Index
 from shaftwork.codegen.inputs import Inputs
 from shaftwork.codegen.matrices import LinearPart
 
@@ -35,7 +36,7 @@ class LoopSolver:
         p: parameter vector.
     """
 
-    def __init__(self, inputs: Inputs, part: LinearPart, places: Array, in_tree: Array, p: Array) -> None:
+    def __init__(self, inputs: Inputs, part: LinearPart, places: Index, in_tree: NDArray[np.bool_], p: Array) -> None:
         self._inputs, self._part, self._p = inputs, part, p
         self.places, self._tree = places, in_tree
         self._by_output, self._outputs, self._by_integral, self._integrals = inputs.reading()
@@ -91,7 +92,7 @@ class LoopSolver:
         return left, size + np.finfo(float).tiny
 
     def slopes(self, t: float, x: Array, a: Array) -> tuple[Array, Array]:
-        """Derivatives of the residual by a (loops, loops), and of all inputs u by the states, loops included, (m, n)."""
+        """The residual by a (loops, loops), and all inputs u by the states through the loops (m, n)."""
         inputs = self._inputs
         y, _, _ = self.inputs_at(t, x, a)
         reads = np.zeros((inputs.size, inputs.outputs))

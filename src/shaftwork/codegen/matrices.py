@@ -2,14 +2,15 @@
 
     x' = A x + B u + B1 u',    y = C x + D u,    u = (w, e)
 
-with w the through variables of the nonlinear laws and sources, e the prescribed across variables, y the across variables
-that the laws and the integrals read. The equations are those of `reduction.form`.
+with w the through variables of the nonlinear laws and sources, e the prescribed across variables, y the across
+variables that the laws and the integrals read. The equations are those of `reduction.form`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -136,7 +137,7 @@ class MatrixAssembly:
         order = np.argsort(label, kind="stable")
         starts = np.searchsorted(label[order], np.arange(count + 1))
         rows, columns, data = [], [], []
-        for first, last in zip(starts[:-1], starts[1:], strict=True):
+        for first, last in pairwise(starts):
             members = order[first:last]
             block = matrix[members][:, members].toarray()
             scale = 1 / np.sqrt(np.abs(np.diag(block)) + np.finfo(float).tiny)

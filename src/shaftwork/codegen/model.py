@@ -57,7 +57,7 @@ class CompiledModel:
 
     @cached_property
     def rows(self) -> Rows | None:
-        """The state equations as expressions, or None where the network is too large or too closely coupled for them."""
+        """The state equations as expressions, or None where the network is too large or too closely coupled."""
         if len(self.states) > SCALAR_STATES:
             return None
         try:

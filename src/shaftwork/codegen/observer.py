@@ -44,9 +44,7 @@ class ModelObserver:
     @cached_property
     def units(self) -> Mapping[str, str]:
         """Every quantity that can be read and its unit; where a part and a node share a name, the part's is meant."""
-        units = {
-            f"{name}": domain.across.unit for name, domain in zip(self._nodes, self._graph.domains, strict=True)
-        }
+        units = {f"{name}": domain.across.unit for name, domain in zip(self._nodes, self._graph.domains, strict=True)}
         units |= {name: _unit(signal) for name, (_, signal) in self._signals.items()}
         units |= {s.name: s.unit for s in self._bound.program.form.states if s.kind == "integral"}
         units |= {f"{part.name}.power": "W" for part in self._graph.parts}

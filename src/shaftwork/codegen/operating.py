@@ -20,9 +20,9 @@ CONSISTENT = 1e-9
 def initial_state(bound: BoundArrays, given: Mapping[str, float], t0: float) -> Array:
     """The states at the start: at rest and untwisted except for what is given.
 
-    Rest is that before the sources come on: where a prescribed speed is there from the start, its impulse has been given to
-    the inertias joined to it rigidly. A value may be given for any speed or twist, also of a part whose store is dependent;
-    what it leaves open is filled with the smallest possible motion.
+    Rest is that before the sources come on: where a prescribed speed is there from the start, its impulse has been
+    given to the inertias joined to it rigidly. A value may be given for any speed or twist, also of a part whose store
+    is dependent; what it leaves open is filled with the smallest possible motion.
 
     Args:
         bound: the array program.
@@ -68,16 +68,16 @@ def _fill(
     for name, asked, got in zip(given, wanted, reached, strict=True):
         if abs(got - asked) > CONSISTENT * scale:
             raise ParameterError(
-                f"The start value {name} = {asked:g} contradicts the others: what is rigidly joined to it makes it {got:g}. "
-                f"Give one value for each rigid group. The states are: {', '.join(names)}."
+                f"The start value {name} = {asked:g} contradicts the others: what is rigidly joined to it makes it "
+                f"{got:g}. Give one value for each rigid group. The states are: {', '.join(names)}."
             )
 
 
 def steady_state(bound: BoundArrays, start: Array, t: float, *, tolerance: float = 1e-12, limit: int = 500) -> Array:
     """States at which nothing changes, reached from a start the way the drive itself would reach it.
 
-    Law: implicit Euler steps (I/h - J) dx = rhs, whose step h grows as the rates fall: at first the motion of the drive, so
-    that of several steady states the one it runs to is found, and in the end Newton's method.
+    Law: implicit Euler steps (I/h - J) dx = rhs, whose step h grows as the rates fall: at first the motion of the
+    drive, so that of several steady states the one it runs to is found, and in the end Newton's method.
 
     Raises:
         SimulationError: the rates do not vanish; the message names the state that keeps changing.
@@ -93,7 +93,7 @@ def steady_state(bound: BoundArrays, start: Array, t: float, *, tolerance: float
             return x
         step = _solve(sparse.csc_array(identity / h - bound.jacobian(t, x)), rate)
         new = bound.rhs(t, x + step)
-        ratio = np.linalg.norm(rate) / max(float(np.linalg.norm(new)), np.finfo(float).tiny)
+        ratio = float(np.linalg.norm(rate) / max(float(np.linalg.norm(new)), np.finfo(float).tiny))
         if not np.isfinite(new).all():
             h *= 0.1
             continue

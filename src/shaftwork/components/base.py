@@ -10,7 +10,7 @@ from types import SimpleNamespace
 from typing import Any, ClassVar, Literal, TypeVar, dataclass_transform
 
 from shaftwork.components.branches import Branch, End
-from shaftwork.core.domains import ROTATION, Domain
+from shaftwork.core.domains import ELECTRICAL, ROTATION, Domain
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import Parameter, parameter
 
@@ -96,7 +96,7 @@ def _explain_wrong_arguments(made: type[Component]) -> None:
     plain: Callable[..., None] = made.__init__
     signature = inspect.signature(plain)
 
-    def __init__(self: Component, *args: Any, **kwargs: Any) -> None:
+    def __init__(self: Component, *args: Any, **kwargs: Any) -> None:  # noqa: N807
         try:
             signature.bind(self, *args, **kwargs)
         except TypeError as error:
@@ -115,34 +115,46 @@ def _explain_wrong_arguments(made: type[Component]) -> None:
 
 
 def default_signals(part: Component) -> dict[str, Signal]:
-    """Signals by the ports: one port gives (omega, tau), two of one domain (omega_rel, tau), more a pair for each port."""
-    ports = part.ports
-    if any(port.domain is None for port in ports):
-        return {"reaction": Signal("through", (ports[0].name, None), None)}
-    sign = 1 if part.role in ("store", "coupling") or len(ports) > 1 else -1
-    if len(ports) == 1:
-        domain, ends = ports[0].domain, (ports[0].name, None)
-        return {
-            domain.across.name: Signal("across", ends, domain),
-            domain.through.name: Signal("through", ends, domain, sign),
-        }
-    if len(ports) == 2 and part.role != "coupling":
-        domain, pair = ports[0].domain, (ports[0].name, ports[1].name)
-        suffix = "" if domain.name == "electrical" else "_rel"
-        signals = {
-            domain.through.name: Signal("through", pair, domain, -1 if part.role == "source" else 1),
-            domain.across.name + suffix: Signal("across", pair, domain),
-        }
-        if part.role == "store" and domain.name != "electrical":
-            signals[domain.integral.name + suffix] = Signal("twist", pair, domain)
-            signals[domain.through.name + "_c"] = Signal("store", pair, domain)
-        return signals
+    """Signals by ports: one port gives (omega, tau), two of one domain (omega_rel, tau), more a pair for each port."""
+    domains = {port.domain for port in part.ports}
+    if None in domains:
+        return {"reaction": Signal("through", (part.ports[0].name, None), None)}
+    if len(part.ports) == 1:
+        return _one_port(part)
+    if len(part.ports) == 2 and len(domains) == 1 and part.role != "coupling":
+        return _two_port(part)
     several: dict[str, Signal] = {}
-    for port in ports:
-        ends = (port.name, None)
-        several[f"{port.domain.across.name}_{port.name}"] = Signal("across", ends, port.domain)
-        several[f"{port.domain.through.name}_{port.name}"] = Signal("through", ends, port.domain)
+    for port in part.ports:
+        domain, ends = port.domain or ROTATION, (port.name, None)
+        several[f"{domain.across.name}_{port.name}"] = Signal("across", ends, domain)
+        several[f"{domain.through.name}_{port.name}"] = Signal("through", ends, domain)
     return several
+
+
+def _one_port(part: Component) -> dict[str, Signal]:
+    """A store shows what it takes in, a source or load what it gives to its node."""
+    port = part.ports[0]
+    domain, ends = port.domain or ROTATION, (port.name, None)
+    sign = 1 if part.role == "store" else -1
+    return {
+        domain.across.name: Signal("across", ends, domain),
+        domain.through.name: Signal("through", ends, domain, sign),
+    }
+
+
+def _two_port(part: Component) -> dict[str, Signal]:
+    """A part between two nodes shows what a gives to b, a source what it gives to a."""
+    first, second = part.ports
+    domain, pair = first.domain or ROTATION, (first.name, second.name)
+    suffix = "" if domain is ELECTRICAL else "_rel"
+    signals = {
+        domain.through.name: Signal("through", pair, domain, -1 if part.role == "source" else 1),
+        domain.across.name + suffix: Signal("across", pair, domain),
+    }
+    if part.role == "store" and domain is not ELECTRICAL:
+        signals[domain.integral.name + suffix] = Signal("twist", pair, domain)
+        signals[domain.through.name + "_c"] = Signal("store", pair, domain)
+    return signals
 
 
 def symbols_of(values: Mapping[str, Any]) -> SimpleNamespace:

@@ -1,7 +1,7 @@
 """The closed set of branch laws: everything a component can be made of.
 
-A branch runs from its first end to its second; its through variable is what the first node gives to the branch, its across
-variable is the first node's value less the second's. Power through * across is therefore absorbed by the branch.
+A branch runs from its first end to its second; its through variable is what the first node gives to the branch, its
+across variable is the first node's value less the second's. Power through * across is therefore absorbed by the branch.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class AcrossLaw:
 
 @dataclass(frozen=True)
 class IdealCoupling:
-    """Sum of coefficient * across over the terms is zero, power conserving: gear, drum, electrical machine, rigid joint.
+    """Sum of coefficient * across over the terms is zero, power conserving: gear, drum, machine, rigid joint.
 
     Every term is (coefficient, first end, second end); the through variable of a term is coefficient * lambda with one
     lambda for the coupling, so that the powers of the terms sum to zero.

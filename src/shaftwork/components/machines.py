@@ -38,7 +38,7 @@ class KlossMotor(Component):
 
 @component
 class DCMachine(Component):
-    """A direct-current machine with its armature circuit between p and n, and its rotor (without inertia) at node rotor.
+    """A direct-current machine: armature circuit between p and n, rotor (without inertia) at node rotor.
 
     Law: u = k omega + R i + L di/dt, tau = k i; k is both the torque constant and the back-EMF constant.
     Analogue: an ideal transformer between the electrical and the rotational domain.

@@ -63,13 +63,13 @@ class Damper(Component):
 class Ground(Component):
     """The frame: holds its node at rest (in a circuit: at zero potential).
 
-    Law: omega = 0. Analogue: the reference node. The signal tau is the torque that the node gives to the frame.
+    Law: omega = 0. Analogue: the reference node. The signal reaction is the torque that the node gives to it.
     """
 
     role: ClassVar[Role] = "coupling"
     ports: ClassVar = (Port("a", None),)
 
-    def branches(self, p: Any) -> Iterator[Branch]:
+    def branches(self, p: Any) -> Iterator[Branch]:  # noqa: ARG002
         yield IdealCoupling(((Integer(1), "a", None),))
 
 
@@ -92,7 +92,7 @@ class Gear(Component):
 class PlanetaryGear(Component):
     """An ideal planetary gear.
 
-    Law: omega_sun + ratio omega_ring = (1 + ratio) omega_carrier (Willis). Analogue: an ideal three-winding transformer.
+    Law: omega_sun + ratio omega_ring = (1 + ratio) omega_carrier (Willis). Analogue: a three-winding transformer.
     """
 
     ratio: float = parameter("1", "teeth of the ring over teeth of the sun", above=0)

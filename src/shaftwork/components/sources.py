@@ -1,4 +1,4 @@
-"""Sources: prescribed torque, force and speed as a number, a table over time or an expression of time, speed and angle."""
+"""Sources: torque, force and speed as a number, a table over time or an expression of time, speed and angle."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ class TranslationalSpring(Component):
 
 @component
 class TranslationalDamper(Component):
-    """Viscous friction between two nodes, or between a node and the frame. Law: f = d v_rel. Analogue: conductance d."""
+    """Viscous friction between two nodes, or a node and the frame. Law: f = d v_rel. Analogue: conductance d."""
 
     d: float = parameter("N*s/m", "damping", at_least=0)
 

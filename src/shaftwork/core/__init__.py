@@ -1,0 +1,1 @@
+"""What every stage knows: domains, parameters, errors."""

@@ -1,4 +1,4 @@
-"""The three physical domains and the names of their quantities (mobility analogy: speed is across, torque is through)."""
+"""The three physical domains and their quantities (mobility analogy: speed is across, torque is through)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Declared parameters: unit, bounds, default and meaning are data, from which checks, docs and LaTeX tables are made."""
+"""Declared parameters: unit, bounds, default and meaning are data that checks, docs and LaTeX tables are made from."""
 
 from __future__ import annotations
 
@@ -67,10 +67,10 @@ class Parameter:
         return f"must be {self.bounds}" if outside else None
 
     def magnitude(self, value: Any) -> tuple[Any, str | None]:
-        """The value in SI as a float (or, for a law, the expression itself), and the objection to it if there is one."""
+        """The value in SI as a float (for a law also the expression itself), and the objection to it if there is one."""
         if hasattr(value, "dimensionality") and hasattr(value, "to"):
             return self._from_quantity(value)
-        if isinstance(value, bool) or isinstance(value, (str, bytes, complex)) or value is None:
+        if value is None or isinstance(value, (bool, str, bytes, complex)):
             return value, f"must be a number{' or a law' if self.law else ''}, not {type(value).__name__} {value!r}"
         try:
             number = float(value)
@@ -83,7 +83,7 @@ class Parameter:
     def _from_quantity(self, value: Any) -> tuple[Any, str | None]:
         try:
             number = float(value.to("dimensionless" if self.unit == "1" else self.unit.replace("*", " * ")).magnitude)
-        except Exception as error:  # pint raises its own classes, which must not be imported here
+        except Exception as error:  # noqa: BLE001 (pint has its own classes, which must not be imported here)
             return value, f"is given in '{value.units}', but needs {self.unit} ({error})"
         return number, self.objection(number)
 

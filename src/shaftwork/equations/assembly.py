@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
-from sympy import Add, Expr, Integer, Mul, Symbol, cse
+from sympy import Add, Expr, Integer, Mul, Symbol
 
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.equations.quantities import Flow, Quantities, rate_of
@@ -225,13 +225,3 @@ class Assembly:
             else:
                 terms[link] = -gain * self.through_law(link, Add(*self.around(link)))
         return tuple(terms.values())
-
-    def shared_factors(self, law: Expr, names: Iterator[Symbol]) -> tuple[tuple[tuple[Symbol, Expr], ...], Expr]:
-        """A long law with the sums that occur in it more than once put under names of their own, such as a slip."""
-        found, (rest,) = cse(law, symbols=names, order="none")
-        kept = [(symbol, part) for symbol, part in found if part.is_Add]
-        spared = {symbol: part for symbol, part in found if not part.is_Add}
-        for symbol, part in reversed(spared.items()):
-            kept = [(own, value.xreplace({symbol: part})) for own, value in kept]
-            rest = rest.xreplace({symbol: part})
-        return tuple(kept), rest

@@ -126,9 +126,11 @@ def _open_ida(problem: DaeProblem, piece: Piece, x: Array) -> tuple[Any, Array, 
         calc_initcond="yp0",
         calc_init_dt=1e-3 * (piece.end - piece.start),
     )
-    start = solver.init_step(piece.start, x, problem.derivative0)
-    if not start.success:
-        raise failure(problem, "sundials", piece.start, x, f"IDA found no consistent initial values: {start.message}")
+    try:
+        start = solver.init_step(piece.start, x, problem.derivative0)
+    except RuntimeError as error:
+        reason = f"IDA found no consistent initial values ({error})"
+        raise failure(problem, "sundials", piece.start, x, reason) from error
     return solver, start.y.copy(), str
 
 

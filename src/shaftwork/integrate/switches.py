@@ -28,7 +28,8 @@ def settle(program: Any, integrator: Any, horizon: float) -> None:
         horizon: longest trial step in s.
     """
     signs = integrator.pars[program.parameter_count :]
-    signs[:] = np.sign(program.switch_values(integrator.time, integrator.state, integrator.pars))
+    parameters = integrator.pars[: program.parameter_count]
+    signs[:] = program.switch_signs(integrator.time, integrator.state, parameters)
     for _ in range(signs.size):
         zero = signs == 0.0
         if not zero.any():

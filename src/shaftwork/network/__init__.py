@@ -1,0 +1,1 @@
+"""What is connected to what: netlist, graph, checks, text files."""

@@ -33,8 +33,8 @@ class NetworkBuilder:
             The part.
 
         Raises:
-            ShaftworkError: `part` is no component or a node is no text. Everything else that may be wrong with a network
-                is reported together by `check`.
+            ShaftworkError: `part` is no component or a node is no text. Everything else that may be wrong with a
+                network is reported together by `check`.
         """
         if not isinstance(part, Component):
             raise ShaftworkError(

@@ -17,7 +17,7 @@ from shaftwork.network.netlist import Netlist, Placed
 from shaftwork.network.textfile import ModelText, PartText
 
 MAXIMUM_LAW_WORDS = 4000
-"""Numbers, names and signs of all laws of a file together, some 400 laws: more take longer to read than anyone waits."""
+"""Numbers, names and signs of all laws of a file together, some 400 laws: more take too long to read."""
 
 
 def write_netlist(netlist: Netlist, path: str | Path) -> None:

@@ -1,7 +1,7 @@
 """From a component to its branches: one symbolic template for each class and pattern of zeros, shared by all its parts.
 
-A parameter that is exactly zero is put into the laws as the number 0 before anything else is made of them. So a damping of
-zero leaves no branch, a resistance of zero becomes a rigid joint, and neither leaves a trace in equations or code.
+A parameter that is exactly zero is put into the laws as the number 0 before anything else is made of them. So a damping
+of zero leaves no branch, a resistance of zero becomes a rigid joint, and neither leaves a trace in equations or code.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def as_expression(law: Any) -> Expr:
 
 
 def substitution(part: Component) -> dict[Any, Any]:
-    """The names that users write in laws (omega, phi; v, s; u, psi), as the across variable of the branch and its integral."""
+    """The names that users write in laws (omega, phi; v, s; u, psi) as the branch's across variable and its integral."""
     names: dict[Any, Any] = {}
     for domain in DOMAINS:
         if any(port.domain is domain for port in part.ports):

@@ -36,7 +36,7 @@ def solve_loops(bound: BoundArrays, problem: Problem) -> tuple[Trajectory, str, 
     Raises:
         SimulationError: the loops have no solution at the start, or the engine failed.
     """
-    assert bound.loops is not None
+    assert bound.loops is not None  # noqa: S101 (the caller asks only then)
     loops, states = bound.loops, len(problem.x0)
     start = loops.solve(problem.t0, problem.x0)
     if not np.isfinite(start).all():

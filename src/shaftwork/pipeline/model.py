@@ -87,8 +87,8 @@ class Model(CompiledModel):
             t_end: end of the motion, s.
             t_start: its start, s.
             rtol: relative tolerance.
-            atol: absolute tolerance, one for all states or one for each; by default rtol times a small speed, and times
-                the torque that belongs to it.
+            atol: absolute tolerance, one for all states or one for each; by default rtol times a small speed, and
+                times the torque that belongs to it.
             t_eval: output times, or their number (by default 1001 over the run), or "steps" for the engine's own.
             engine: "auto" takes the best one and says why in `Solution.why`.
             initial: start values of speeds ("J1.omega"), twists ("shaft.phi_rel") or torques; what is not given is zero.
@@ -234,7 +234,8 @@ class Model(CompiledModel):
         return [(b.index, b.template.law) for b in branches if b.template.kind in kinds]
 
     def _breakpoints(self, p: Array) -> tuple[float, ...]:
-        graph, times = self.form.graph, set()
+        graph = self.form.graph
+        times: set[float] = set()
         for index, law in self._laws_of_time():
             places = graph.part_of(index).parameters
             values = {s: float(p[places[s.name]]) for s in graph.branches[index].template.symbols}
@@ -242,7 +243,7 @@ class Model(CompiledModel):
         return tuple(sorted(times))
 
     def _linear_inputs(self, bound: BoundArrays, rhs: Callable[[float, Array], Array]) -> LinearInputs | None:
-        """The linear form, where the network is linear and its inputs are at most linear in time between breakpoints."""
+        """The linear form, where the network is linear and its inputs are straight lines between breakpoints."""
         if not self.linear or any(pieces_degree(law) is None for _, law in self._laws_of_time()):
             return None
         rest = np.zeros(len(self.states))
@@ -270,7 +271,9 @@ class Model(CompiledModel):
         owner, _, parameter = name.rpartition(".")
         placed = next((item for item in self.netlist.placed if item.part.name == owner), None)
         if placed is None or parameter not in placed.part.declared:
-            known = tuple(self.parameters) if placed is None else tuple(f"{owner}.{key}" for key in placed.part.declared)
+            known = (
+                tuple(self.parameters) if placed is None else tuple(f"{owner}.{key}" for key in placed.part.declared)
+            )
             raise ParameterError(f"There is no parameter '{name}'. There are: {', '.join(known) or 'none'}.")
         number, objection = placed.part.declared[parameter].magnitude(value)
         if objection is not None:
@@ -288,7 +291,7 @@ class Model(CompiledModel):
 
 def _replaced(netlist: Netlist, values: Mapping[str, float]) -> Netlist:
     """The netlist with parameters "part.name" replaced."""
-    by_part: dict[str, dict[str, float]] = {}
+    by_part: dict[str, dict[str, Any]] = {}
     for name, value in values.items():
         owner, _, parameter = name.rpartition(".")
         by_part.setdefault(owner, {})[parameter] = value

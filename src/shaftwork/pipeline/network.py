@@ -37,7 +37,7 @@ class Network(NetworkBuilder):
     """
 
     def check(self) -> tuple[Problem, ...]:
-        """Everything that is wrong with the network or worth saying about it, in the order of the parts. Never raises."""
+        """Everything that is wrong with the network or worth saying about it. Never raises."""
         return diagnose(self.netlist())[2]
 
     def equations(self) -> Equations:
@@ -102,7 +102,7 @@ def _sound(netlist: Netlist, accepted: str = "") -> StateForm:
     for problem in problems:
         if problem.severity == "warning":
             warnings.warn(str(problem), NetworkWarning, stacklevel=4)
-    assert form is not None
+    assert form is not None  # noqa: S101 (only errors leave no form)
     return form
 
 

@@ -55,7 +55,8 @@ def _time_constants(eigenvalues: Array) -> Iterator[str]:
     if swings.size:
         yield f"natural frequencies at rest ({swings.size}): {_some([f'{f:.5g}' for f in swings])} Hz"
     if decays.size:
-        yield f"time constants at rest: {decays[0]:.3g} s to {decays[-1]:.3g} s, stiffness ratio {decays[-1] / decays[0]:.3g}"
+        ratio = decays[-1] / decays[0]
+        yield f"time constants at rest: {decays[0]:.3g} s to {decays[-1]:.3g} s, stiffness ratio {ratio:.3g}"
     if (moving.real > 1e-9 * np.abs(moving)).any():
         yield f"unstable at rest: grows within {1 / moving.real.max():.3g} s (a motor's starting curve does this)"
 

@@ -1,0 +1,1 @@
+"""Fewer, independent states: normal tree, state form, explicit rows, diagnosis."""

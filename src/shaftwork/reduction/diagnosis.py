@@ -78,13 +78,12 @@ def diagnose(netlist: Netlist) -> tuple[CircuitGraph | None, StateForm | None, t
         return None, None, typed
     graph = build_graph(repaired)
     found = [*connection_problems(graph)]
-    form: StateForm | None = None
     try:
         form = state_form(graph)
         found += [*structural_problems(form), *numeric_problems(form)]
-    except ArithmeticError:
-        found.append(_extreme(graph, (branch.index for branch in graph.branches if branch.terms)))
+    except ArithmeticError:  # of the ratios: nothing else is computed with before the values are judged
         form = None
+        found.append(_extreme(graph, range(len(graph.branches))))
     problems = (*typed, *_causes(typed, found))
     return (None, None, problems) if typed else (graph, form, problems)
 
@@ -349,8 +348,7 @@ def numeric_problems(form: StateForm) -> tuple[Problem, ...]:
 
 
 def _extreme(graph: CircuitGraph, branches: Iterable[int]) -> Problem:
-    members = (branch for branch in branches if graph.branches[branch].terms)
-    names = tuple(dict.fromkeys(graph.part_of(branch).name for branch in members))
+    names = tuple(dict.fromkeys(graph.part_of(branch).name for branch in branches if graph.branches[branch].terms))
     message = f"the ratios of {listed(names)} multiply to a number that is no longer finite or no longer above zero."
     return Problem("extreme ratios", message, "Check their units and powers of ten.", names)
 
@@ -386,10 +384,9 @@ def _coefficients(graph: CircuitGraph, branches: Iterable[int]) -> dict[int, flo
 
 
 def _is_singular(block: Any) -> bool:
-    if not np.isfinite(block).all():
-        return True
     scale = 1 / np.sqrt(np.abs(np.diag(block)) + np.finfo(float).tiny)
-    return not 1 / np.linalg.cond(block * scale[:, None] * scale[None, :]) > SINGULAR
+    scaled = block * scale[:, None] * scale[None, :]
+    return not (np.isfinite(scaled).all() and 1 / np.linalg.cond(scaled) > SINGULAR)
 
 
 def _cancelling_block(view: _View, branches: Sequence[int]) -> Problem:

@@ -1,7 +1,7 @@
 """The state form of a network: which branches are states, inputs and dependent, ready to become rows or matrices.
 
-With C, L the stores that are states (tree capacities, link compliances), G and R the tree and link conductances, w the
-through variables of the nonlinear laws and sources, e the prescribed across variables, and F the loops:
+With C, L the stores that are states (tree capacities, link compliances), G and R the tree and link conductances, w
+the through variables of the nonlinear laws and sources, e the prescribed across variables, and F the loops:
 
     v_R = F_CR' x_C + F_ER' e + F_GR' v_G                                         loops of the link conductances
     (G + F_GR R F_GR') v_G = -F_GR R (F_CR' x_C + F_ER' e) - F_GL x_L - F_GW w    cutsets of the tree conductances
@@ -61,8 +61,8 @@ class StateForm:
     def loop_laws(self) -> tuple[int, ...]:
         """Nonlinear laws whose across and through variables determine each other at a massless node.
 
-        These are the laws in the tree, and those links in whose loop a tree conductance stands: its across variable depends
-        on the law's own through variable. All other laws read states and inputs of time alone.
+        These are the laws in the tree, and those links in whose loop a tree conductance stands: its across variable
+        depends on the law's own through variable. All other laws read states and inputs of time alone.
         """
         conductances = frozenset(self.tree_conductances)
         links = (link for link in self.tree.links[Kind.LAW] if not conductances.isdisjoint(self.tree.loops[link]))
@@ -142,7 +142,9 @@ def _domain(graph: CircuitGraph, branch: GraphBranch) -> Domain:
 
 def _across_state(graph: CircuitGraph, branch: GraphBranch) -> State:
     quantity = _domain(graph, branch).across
-    return State(f"{graph.parts[branch.part].name}.{quantity.name}", branch.index, "across", quantity.unit, quantity.latex)
+    return State(
+        f"{graph.parts[branch.part].name}.{quantity.name}", branch.index, "across", quantity.unit, quantity.latex
+    )
 
 
 def _through_state(graph: CircuitGraph, branch: GraphBranch) -> State:
@@ -152,4 +154,6 @@ def _through_state(graph: CircuitGraph, branch: GraphBranch) -> State:
 
 def _integral_state(graph: CircuitGraph, branch: GraphBranch) -> State:
     quantity = _domain(graph, branch).integral
-    return State(f"{graph.parts[branch.part].name}.{quantity.name}", branch.index, "integral", quantity.unit, quantity.latex)
+    return State(
+        f"{graph.parts[branch.part].name}.{quantity.name}", branch.index, "integral", quantity.unit, quantity.latex
+    )

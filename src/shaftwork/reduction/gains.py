@@ -8,7 +8,7 @@ from typing import Any
 from sympy import Expr, Integer, cancel
 
 CANCELLATION = 1e-10
-"""A difference below this fraction of its terms is zero: ratios are typed to some ten digits (1.2 * 1.5 against 1.8)."""
+"""A difference below this fraction of its terms is zero: ratios are typed to some ten digits (1.2 * 1.5 is 1.8)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

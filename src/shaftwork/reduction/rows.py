@@ -1,7 +1,7 @@
 """The state equations row by row as sympy expressions: for small networks, for reading and for scalar code.
 
-The same equations as in `form`, solved symbolically in blocks of coupled unknowns. A network with a larger block is left to
-the sparse matrices of the array program; both are tested to agree.
+The same equations as in `form`, solved symbolically in blocks of coupled unknowns. A network with a larger block is left
+to the sparse matrices of the array program; both are tested to agree.
 """
 
 from __future__ import annotations
@@ -129,7 +129,9 @@ class _Solution:
         for link in form.dependent_across:
             capacity = self.law(link)
             self._add_products(matrix, link, capacity, frozenset(unknowns))
-            driven = (gain * self.law(tree).diff(TIME) for tree, gain in self.loops[link] if tree in form.across_sources)
+            driven = (
+                gain * self.law(tree).diff(TIME) for tree, gain in self.loops[link] if tree in form.across_sources
+            )
             prescribed = capacity * Add(*driven)
             for tree, gain in self.loops[link]:
                 if tree in right:

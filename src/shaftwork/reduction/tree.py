@@ -2,8 +2,8 @@
 
 Branches are offered to the tree in the order of `Kind`. A branch whose across variable is not yet fixed by the branches
 taken before enters the tree; otherwise it is a link, and its across variable is a sum of the tree's: its loop. An ideal
-coupling takes part as a branch of across value zero whose column of the incidence matrix holds the ratios. Nothing else is
-needed for gears: the loops then have ratios as entries, and the coupling's torque comes out as that of any other branch.
+coupling takes part as a branch of across value zero whose column of the incidence matrix holds the ratios. Nothing else
+is needed for gears: the loops then have ratios as entries, and a coupling's torque comes out as that of any branch.
 
 With v the across and i the through variables, F the matrix of the loops (tree branch by link):
 
@@ -51,7 +51,7 @@ class NormalTree:
 
 
 class _Elimination:
-    """Node values expressed through tree branches and nodes still free; free nodes are counted from 0, branches as ~index."""
+    """Node values through tree branches and nodes still free; free nodes are counted from 0, branches as ~index."""
 
     def __init__(self, nodes: int) -> None:
         self.solved: list[Row | None] = [None] * nodes
@@ -104,7 +104,7 @@ class _Elimination:
 
 
 def column_of(graph: CircuitGraph, branch: GraphBranch) -> Row:
-    """The column of the incidence matrix: node to factor (+1 where the branch leaves, -1 where it enters, or the ratios)."""
+    """The column of the incidence matrix: node to factor (+1 where the branch leaves, -1 where it enters, or ratios)."""
     column: Row = {}
     for coefficient, plus, minus in branch.terms or ((None, branch.plus, branch.minus),):
         factor = 1 if coefficient is None else _gain(graph, branch, coefficient)

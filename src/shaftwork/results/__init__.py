@@ -1,0 +1,1 @@
+"""Questions asked of a motion: quantities by part, energy balance, curves."""

@@ -1,7 +1,7 @@
 """The energy balance of a run: what was stored, supplied and lost, and what is left over (it should be nothing).
 
-Tellegen: the powers of all branches sum to zero at every instant, so stored(t) - stored(0) = supplied - lost. The residual
-measures the error of the integration, independent of any reference.
+Tellegen: the powers of all branches sum to zero at every instant, so stored(t) - stored(0) = supplied - lost. The
+residual measures the error of the integration, independent of any reference.
 """
 
 from __future__ import annotations
@@ -68,9 +68,7 @@ def energy_balance(observer: Observer, dense: Callable[[Array], Array], steps: A
     return EnergyBalance(steps, after, supplied + impulses, lost, work + float(np.abs(after - before).sum()))
 
 
-def _stored_on_both_sides(
-    observer: Observer, dense: Callable[[Array], Array], steps: Array
-) -> tuple[Array, Array]:
+def _stored_on_both_sides(observer: Observer, dense: Callable[[Array], Array], steps: Array) -> tuple[Array, Array]:
     """Stored energy just before and at every time of `steps`; they differ where an input's jump is an impulse."""
     at = _total(observer.powers(steps, dense(steps))[0], len(steps))
     earlier = np.maximum(np.nextafter(steps, -np.inf), steps[0])

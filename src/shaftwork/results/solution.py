@@ -15,7 +15,7 @@ from shaftwork.results.energy import EnergyBalance, energy_balance
 from shaftwork.results.observer import Array, Dense, Observer
 
 if TYPE_CHECKING:
-    import pandas
+    import pandas as pd
     import xarray
     from matplotlib.figure import Figure
 
@@ -81,7 +81,9 @@ class Solution:
         times = np.atleast_1d(np.asarray(t, dtype=float))
         first, last = self.steps[0], self.steps[-1]
         if not (np.isfinite(times).all() and first <= times.min() and times.max() <= last):
-            raise SignalError(f"The run goes from t = {first:g} s to {last:g} s; asked for {times.min()} to {times.max()}.")
+            raise SignalError(
+                f"The run goes from t = {first:g} s to {last:g} s; asked for {times.min()} to {times.max()}."
+            )
         fields = {name: getattr(self, name) for name in self.__dataclass_fields__}
         return Solution(**(fields | {"t": times, "x": self.dense(times)}))
 
@@ -95,11 +97,11 @@ class Solution:
         """What the energy balance leaves unexplained, as a fraction of the work done."""
         return self.energy.residual
 
-    def to_pandas(self, *names: str) -> pandas.DataFrame:
+    def to_pandas(self, *names: str) -> pd.DataFrame:
         """A table over time of the named quantities, by default of all (extra `data`)."""
         frame = _require("pandas", "data", "Solution.to_pandas()")
         columns = {name: self[name] for name in names or self.names}
-        return frame.DataFrame(columns, index=frame.Index(self.t, name="t"))  # type: ignore[no-any-return]
+        return frame.DataFrame(columns, index=frame.Index(self.t, name="t"))
 
     def to_xarray(self, *names: str) -> xarray.Dataset:
         """A data set over time of the named quantities, by default of all, with units (extra `data`)."""

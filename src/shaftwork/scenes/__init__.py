@@ -1,4 +1,4 @@
-"""The systems of the sources, ready to run: `scenes.crane_start()`, `scenes.shaft_chain(m=40)`; `SCENES` lists them all."""
+"""The systems of the sources, ready to run: `crane_start()`, `shaft_chain(m=40)`; `SCENES` lists them all."""
 
 from __future__ import annotations
 

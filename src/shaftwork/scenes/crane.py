@@ -13,7 +13,9 @@ from shaftwork.scenes.catalog import Scene, enter
 SYNCHRONOUS_SPEED = 3000.0  # 1/min: two poles at 50 Hz
 RATED_SPEED, RATED_TORQUE = 2510.0, 3.8  # 1/min and N m, printed for the motor KBF-90 LA 2
 WHEEL_RADIUS = 0.125  # m
-PULL_OUT_TORQUE = 8.0  # N m, chosen: printed only in a figure; with it the start takes about 5 s, as in figures 9 and 10
+PULL_OUT_TORQUE = (
+    8.0  # N m, chosen: printed only in a figure; with it the start takes about 5 s, as in figures 9 and 10
+)
 
 
 def slip_at_pull_out(pull_out_torque: float) -> float:

@@ -1,0 +1,164 @@
+"""What is printed of the equations, and in which order: blocks of lines under headings."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from sympy import Add, Expr, Symbol, preorder_traversal
+
+from shaftwork.core.domains import ELECTRICAL, ROTATION, TRANSLATION
+from shaftwork.equations.assembly import Sides, sides
+from shaftwork.equations.notation import escaped
+from shaftwork.equations.printing import Line, Writer, with_rates
+from shaftwork.equations.quantities import Flow
+from shaftwork.equations.records import Equations, Row
+from shaftwork.network.templates import Kind
+
+AUXILIARY = (r"\sigma", r"\zeta", r"\xi", r"\chi")
+"""Letters for sums that occur more than once in a law, such as a slip."""
+SHORTEST_SHARED = 3
+"""Operations in a sum from which on it is worth a letter of its own."""
+BALANCES = {ROTATION: "torques", TRANSLATION: "forces", ELECTRICAL: "currents"}
+
+
+@dataclass(frozen=True)
+class Block:
+    """Equations under a heading, or a remark where there are none."""
+
+    heading: str
+    lines: tuple[Line, ...]
+    remark: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """Prints the records of a network as blocks.
+
+    Args:
+        equations: the records.
+        values: print the parameters' values instead of their symbols.
+    """
+
+    equations: Equations
+    values: bool
+
+    def kirchhoff(self) -> Iterator[Block]:
+        """Balances, loops, couplings and laws."""
+        equations = self.equations
+        domains = dict.fromkeys(equations.form.graph.domains)
+        balanced = " and ".join(BALANCES[domain] for domain in domains)
+        yield Block(f"Balance of {balanced} at the nodes", tuple(self._lines(equations.nodes)))
+        yield Block("Speeds around the loops", tuple(self._lines(equations.loops)))
+        yield Block("Ideal couplings", tuple(self._lines(equations.couplings)))
+        yield Block("Laws of the parts", tuple(self._laws()))
+
+    def state(self) -> Iterator[Block]:
+        """Rates of the states, what stands in them, and what was eliminated."""
+        rows = self.equations.states
+        implicit = any(not row.explicit for row in rows)
+        remark = "Rates that stand together on a left side are solved numerically." if implicit else ""
+        yield Block("State equations", tuple(self._lines(rows)), remark)
+        algebraic = [row for row in self.equations.eliminated if row.kind == "algebraic"]
+        yield Block("with", (*self._laws_in_states(), *self._lines(algebraic)))
+        dependent = [row for row in self.equations.eliminated if row.kind in ("speed", "torque")]
+        yield Block("Eliminated quantities", tuple(self._explained(dependent)))
+
+    @cached_property
+    def writer(self) -> Writer:
+        names = {**self.equations.symbol_names, **self._auxiliary_names}
+        graph = self.equations.form.graph
+        parameters = {letter.name for letter in self.equations.letters if letter.parameter}
+        order = sorted(names, key=lambda name: name not in parameters)
+        return Writer(with_rates({name: names[name] for name in order}), graph.parameters if self.values else {})
+
+    def _lines(self, rows: Iterable[Row]) -> Iterator[Line]:
+        seen: dict[str, None] = {}
+        for row in rows:
+            if not row.trivial:
+                line = self.writer.line(row.sides)
+                if line.text not in seen:
+                    yield line
+                seen[line.text] = None
+
+    def _explained(self, rows: Iterable[Row]) -> Iterator[Line]:
+        for row in rows:
+            if not row.trivial:
+                yield self.writer.line(row.sides, rf"\text{{({in_text(row.why)})}}")
+
+    def _laws(self) -> Iterator[Line]:
+        for row in self.equations.laws:
+            flow = self.equations.assembly.quantities.flow_of[row.branches[0]]
+            if row.left == self.equations.assembly.quantities.through(flow):
+                yield from self._law(flow, {})
+            elif not row.trivial:
+                yield self.writer.line(row.sides)
+
+    def _laws_in_states(self) -> Iterator[Line]:
+        """Nonlinear laws and sources, in terms of the states."""
+        assembly = self.equations.assembly
+        flows = dict.fromkeys(assembly.quantities.flow_of[branch] for branch in sorted(assembly.lumped))
+        for flow in flows:
+            across = assembly.quantities.across((flow.plus, flow.minus))
+            sign = -1 if across.could_extract_minus_sign() else 1
+            known = sign * Add(*assembly.around(flow.branches[0]))
+            yield from self._law(flow, {} if across == 0 else {sign * across: known})
+
+    def _law(self, flow: Flow, known: Mapping[Expr, Expr]) -> Iterator[Line]:
+        """A flow's law, and the letters in it; nothing where the law is a parameter alone."""
+        symbol = self.equations.assembly.quantities.through(flow)
+        shared, terms = self._split[flow]
+        if terms != (symbol,):
+            yield self.writer.line(sides(symbol, (term.xreplace(known) for term in terms)))
+            for letter, expression in shared:
+                yield self.writer.line(_in_order(letter, expression.xreplace(known)))
+
+    @cached_property
+    def _split(self) -> dict[Flow, tuple[tuple[tuple[Symbol, Expr], ...], tuple[Expr, ...]]]:
+        """For each flow the letters in its law and the terms that contain them."""
+        assembly = self.equations.assembly
+        made = {}
+        for number, flow in enumerate(assembly.quantities.flows):
+            if any(assembly.kind(branch) is Kind.ACROSS_SOURCE for branch in flow.branches):
+                continue
+            ((_, terms),) = assembly.law_of_flow(flow).groups
+            made[flow] = _shared_sums(terms, f"flow {number}")
+        return made
+
+    @cached_property
+    def _auxiliary_names(self) -> dict[str, str]:
+        taken = {*self.equations.symbol_names.values()}  # only asked for membership
+        names: dict[str, str] = {}
+        for flow, (shared, _) in self._split.items():
+            through = self.equations.symbol_names[self.equations.assembly.quantities.through(flow).name]
+            subscript = re.sub(r"^[^_]*", "", through)
+            free = iter(letter + subscript for letter in AUXILIARY if letter + subscript not in taken)
+            names.update({symbol.name: next(free) for symbol, _ in shared})
+        return names
+
+
+def _shared_sums(
+    terms: tuple[Expr, ...], owner: str
+) -> tuple[tuple[tuple[Symbol, Expr], ...], tuple[Expr, ...]]:
+    """Long sums that occur several times in a law, under symbols of their own, and the law with these symbols."""
+    counted = Counter(node for term in terms for node in preorder_traversal(term) if node.is_Add)
+    candidates = [node for node, times in counted.items() if times > 1 and node.count_ops() >= SHORTEST_SHARED]
+    shared: list[tuple[Symbol, Expr]] = []
+    for node in candidates[: len(AUXILIARY) - 1]:
+        letter = Symbol(f"{owner}, sum {len(shared) + 1}", real=True)
+        if sum(term.has(node) for term in terms):
+            terms = tuple(term.xreplace({node: letter}) for term in terms)
+            shared.append((letter, node))
+    return tuple(shared), terms
+
+
+def _in_order(letter: Symbol, expression: Expr) -> Sides:
+    return sides(letter, expression.args if expression.is_Add else (expression,))
+
+
+def in_text(text: str) -> str:
+    """Any text outside formulas: names keep their letters, signs are escaped."""
+    return " ".join(f"${escaped(word)}$" if re.search(r"[^\w.,:;()'-]|_", word, re.ASCII) else word for word in text.split())
