@@ -62,7 +62,9 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--out", metavar="DIR", type=Path, help="folder for plots and CSV")
     run.add_argument("--t-end", metavar="S", type=float, help="end of the motion in s")
     run.add_argument("--rtol", type=float, default=1e-8, help="relative tolerance (default %(default)g)")
-    run.add_argument("--engine", default="auto", choices=("auto", "scipy", "heyoka", "sundials", "exact"))
+    run.add_argument(
+        "--engine", default="auto", choices=("auto", "scipy", "scipy-radau", "heyoka", "sundials", "exact")
+    )
     latex = command("latex", _latex, "print the equations as LaTeX")
     latex.add_argument("--form", choices=("kirchhoff", "state", "second-order"), help="which equations (default: all)")
     latex.add_argument("--values", action="store_true", help="numbers instead of symbols")

@@ -30,7 +30,7 @@ OUTPUTS = 1001
 """Output times when the user gives none."""
 NOMINAL = 1e-3
 """Absolute tolerance as a fraction of the relative one, for a speed of 1 rad/s (m/s, V)."""
-EngineName = Literal["auto", "scipy", "heyoka", "sundials", "exact"]
+EngineName = Literal["auto", "scipy", "scipy-radau", "heyoka", "sundials", "exact"]
 OutputTimes = int | Sequence[float] | Array | Literal["steps"] | None
 Rebuild = Callable[[Netlist], "Model"]
 
