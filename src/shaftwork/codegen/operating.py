@@ -13,6 +13,8 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.observer import ModelObserver
 from shaftwork.core.errors import ParameterError, SignalError, SimulationError
 
+STANDSTILL = 1e-6
+"""A steady state has been reached when the last step changed the states by no more than this fraction."""
 CONSISTENT = 1e-9
 """Two given values contradict each other when they differ by more than this fraction."""
 
@@ -87,9 +89,11 @@ def steady_state(bound: BoundArrays, start: Array, t: float, *, tolerance: float
     rate = bound.rhs(t, x)
     h = 1e-3 / max(1.0, float(np.abs(rate).max()))
     identity = sparse.eye_array(len(x), format="csc")
+    step = np.zeros_like(x)
     for _ in range(limit):
         size = np.abs(bound.part.A) @ np.abs(x) + np.abs(bound.part.B) @ np.abs(bound.values(t, x)[1])
-        if (np.abs(rate) <= tolerance * (size + np.finfo(float).tiny)).all():
+        settled = np.linalg.norm(step) <= STANDSTILL * np.linalg.norm(x)  # a drive that runs away is not steady
+        if settled and (np.abs(rate) <= tolerance * (size + np.finfo(float).tiny)).all():
             return x
         step = _solve(sparse.csc_array(identity / h - bound.jacobian(t, x)), rate)
         new = bound.rhs(t, x + step)

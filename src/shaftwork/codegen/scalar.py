@@ -76,8 +76,8 @@ class ScalarProgram:
 
     @cached_property
     def operations(self) -> dict[str, int]:
-        """Operations of one evaluation after common subexpressions are taken out, by name."""
+        """Operations of one evaluation after common subexpressions are taken out, by name; signs cost nothing."""
         shared, reduced = cse(self._rates)
         total = sum((count_ops(term, visual=True) for term in (*(e for _, e in shared), *reduced)), start=0)
         counts = total.as_coefficients_dict() if total else {}
-        return {str(name).lower(): int(count) for name, count in sorted(counts.items(), key=str)}
+        return {str(name).lower(): int(count) for name, count in sorted(counts.items(), key=str) if str(name) != "NEG"}

@@ -31,7 +31,7 @@ class CoulombLoad(Component):
 
 @component
 class ViscousLoad(Component):
-    """A resistance proportional to speed. Law: torque on the node -d omega. Analogue: conductance d to the reference."""
+    """A resistance proportional to speed. Law: torque on the node -d omega. Analogue: a conductance d to ground."""
 
     d: float = parameter("N*m*s/rad", "resistance per speed", at_least=0)
 

@@ -67,7 +67,7 @@ class Parameter:
         return f"must be {self.bounds}" if outside else None
 
     def magnitude(self, value: Any) -> tuple[Any, str | None]:
-        """The value in SI as a float (for a law also the expression itself), and the objection to it if there is one."""
+        """The value in SI as a float (for a law also the expression itself), and the objection to it, or None."""
         if hasattr(value, "dimensionality") and hasattr(value, "to"):
             return self._from_quantity(value)
         if value is None or isinstance(value, (bool, str, bytes, complex)):

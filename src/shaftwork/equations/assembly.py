@@ -165,7 +165,7 @@ class Assembly:
         across = self.quantities.across(self.ends(branch)) if across is None else across
         if kind is Kind.CONDUCTANCE:
             return law * across
-        return law.xreplace({ACROSS: across, INTEGRAL: self.integral(branch)})
+        return law.xreplace({ACROSS: across, INTEGRAL: self.quantities.integral(branch)})
 
     def law_of_store(self, branch: int) -> Sides:
         """A compliance's law: its through variable changes with what is across it."""
@@ -178,16 +178,6 @@ class Assembly:
     def law_of_source(self, branch: int) -> Sides:
         """A prescribed across variable."""
         return sides(self.quantities.across(self.ends(branch)), (self.quantities.law(branch),))
-
-    def integral(self, branch: int) -> Symbol:
-        """The state that integrates the across variable of a branch."""
-        return self._integrals.get(branch, INTEGRAL)
-
-    @cached_property
-    def _integrals(self) -> dict[int, Symbol]:
-        return {
-            state.branch: Symbol(state.name, real=True) for state in self.form.states if state.kind == "integral"
-        }
 
     @cached_property
     def cutsets(self) -> dict[int, tuple[tuple[int, Expr], ...]]:

@@ -8,18 +8,21 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from sympy import Add, Expr, Symbol, preorder_traversal
+from sympy import Add, Expr, Integer, Symbol, preorder_traversal
 
 from shaftwork.core.domains import ELECTRICAL, ROTATION, TRANSLATION
-from shaftwork.equations.assembly import Sides, sides
-from shaftwork.equations.notation import escaped
-from shaftwork.equations.printing import Line, Writer, with_rates
-from shaftwork.equations.quantities import Flow
+from shaftwork.equations.assembly import Group, Sides, sides, tidy
+from shaftwork.equations.notation import in_text
+from shaftwork.equations.printing import LINE_WIDTH, Line, Writer, printed_width, with_rates
+from shaftwork.equations.quantities import Flow, rate_of
 from shaftwork.equations.records import Equations, Row
+from shaftwork.equations.second_order import SecondOrder
 from shaftwork.network.templates import Kind
 
 AUXILIARY = (r"\sigma", r"\zeta", r"\xi", r"\chi")
 """Letters for sums that occur more than once in a law, such as a slip."""
+LARGEST_MATRIX = 6
+"""Coordinates up to which the second-order form is printed as matrices."""
 SHORTEST_SHARED = 3
 """Operations in a sum from which on it is worth a letter of its own."""
 BALANCES = {ROTATION: "torques", TRANSLATION: "forces", ELECTRICAL: "currents"}
@@ -63,9 +66,45 @@ class Blocks:
         remark = "Rates that stand together on a left side are solved numerically." if implicit else ""
         yield Block("State equations", tuple(self._lines(rows)), remark)
         algebraic = [row for row in self.equations.eliminated if row.kind == "algebraic"]
-        yield Block("with", (*self._laws_in_states(), *self._lines(algebraic)))
+        yield Block("where", (*self._laws_in_states(), *self._lines(algebraic)))
         dependent = [row for row in self.equations.eliminated if row.kind in ("speed", "torque")]
         yield Block("Eliminated quantities", tuple(self._explained(dependent)))
+
+    def second_order(self) -> Iterator[Block]:
+        """M phi'' + D phi' + K phi = T: as matrices where they fit on a page, else row by row."""
+        form = self.equations.second_order
+        size = len(form.coordinates)
+        lines = tuple(self._matrices(form)) if size <= LARGEST_MATRIX else ()
+        if not lines or max(printed_width(line.pieces[0]) for line in lines) > LINE_WIDTH:
+            lines = tuple(self._motion(form, row) for row in range(size))
+        yield Block("Equations of motion", lines)
+        flows = self.equations.assembly.quantities.flows
+        known = [flow for flow in flows if self.equations.assembly.quantities.through(flow) in form.laws]
+        laws = (line for flow in known for line in self._law(flow, form.across))
+        yield Block("where", tuple(laws), r"Angles are counted from the untwisted position.")
+
+    def _matrices(self, form: SecondOrder) -> Iterator[Line]:
+        yield Line(
+            r"\mathbf{M} \, \ddot{\mathbf{q}} + \mathbf{D} \, \dot{\mathbf{q}} + \mathbf{K} \, \mathbf{q}",
+            (r"\mathbf{T}",),
+        )
+        size = range(len(form.coordinates))
+        transposed = " & ".join(map(self.writer.latex, form.coordinates))
+        yield Line(r"\mathbf{q}", (rf"\begin{{bmatrix}} {transposed} \end{{bmatrix}}^{{\mathsf{{T}}}}",))
+        for name, entries in (("M", form.mass), ("D", form.damping), ("K", form.stiffness)):
+            rows = ([entries.get((i, j), Integer(0)) for j in size] for i in size)
+            yield Line(rf"\mathbf{{{name}}}", (self._matrix(rows),))
+        yield Line(r"\mathbf{T}", (self._matrix([force] for force in form.forces),))
+
+    def _matrix(self, rows: Iterable[Iterable[Expr]]) -> str:
+        inner = r" \\ ".join(" & ".join(self.writer.latex(tidy(entry)) for entry in row) for row in rows)
+        return rf"\begin{{bmatrix}} {inner} \end{{bmatrix}}"
+
+    def _motion(self, form: SecondOrder, row: int) -> Line:
+        left = self.writer.pieces((Group(Integer(1), tuple(map(tidy, form.terms(row)))),))
+        force = form.forces[row]
+        right = self.writer.pieces(sides(Integer(0), force.args if force.is_Add else (force,)).groups) or ("0",)
+        return Line("", (*left, f"= {right[0]}", *right[1:]), relation="")
 
     @cached_property
     def writer(self) -> Writer:
@@ -73,7 +112,8 @@ class Blocks:
         graph = self.equations.form.graph
         parameters = {letter.name for letter in self.equations.letters if letter.parameter}
         order = sorted(names, key=lambda name: name not in parameters)
-        return Writer(with_rates({name: names[name] for name in order}), graph.parameters if self.values else {})
+        ordered = with_rates({name: names[name] for name in order})
+        return Writer({**ordered, **_dotted(self.equations)}, graph.parameters if self.values else {})
 
     def _lines(self, rows: Iterable[Row]) -> Iterator[Line]:
         seen: dict[str, None] = {}
@@ -140,9 +180,7 @@ class Blocks:
         return names
 
 
-def _shared_sums(
-    terms: tuple[Expr, ...], owner: str
-) -> tuple[tuple[tuple[Symbol, Expr], ...], tuple[Expr, ...]]:
+def _shared_sums(terms: tuple[Expr, ...], owner: str) -> tuple[tuple[tuple[Symbol, Expr], ...], tuple[Expr, ...]]:
     """Long sums that occur several times in a law, under symbols of their own, and the law with these symbols."""
     counted = Counter(node for term in terms for node in preorder_traversal(term) if node.is_Add)
     candidates = [node for node, times in counted.items() if times > 1 and node.count_ops() >= SHORTEST_SHARED]
@@ -155,10 +193,17 @@ def _shared_sums(
     return tuple(shared), terms
 
 
+def _dotted(equations: Equations) -> dict[str, str]:
+    """Rates of angles and positions with dots, as the second-order form has them."""
+    quantities, names = equations.assembly.quantities, equations.symbol_names
+    dotted: dict[str, str] = {}
+    for angle in map(quantities.angle, range(len(equations.form.graph.nodes))):
+        letter, underscore, subscript = names[angle.name].partition("_")
+        velocity = rate_of(angle)
+        dotted[velocity.name] = rf"\dot{{{letter}}}{underscore}{subscript}"
+        dotted[rate_of(velocity).name] = rf"\ddot{{{letter}}}{underscore}{subscript}"
+    return dotted
+
+
 def _in_order(letter: Symbol, expression: Expr) -> Sides:
     return sides(letter, expression.args if expression.is_Add else (expression,))
-
-
-def in_text(text: str) -> str:
-    """Any text outside formulas: names keep their letters, signs are escaped."""
-    return " ".join(f"${escaped(word)}$" if re.search(r"[^\w.,:;()'-]|_", word, re.ASCII) else word for word in text.split())

@@ -124,7 +124,7 @@ class _Writer:
     def _integral_row(self, branch: int) -> Sides:
         link = branch in self.form.tree.loops
         terms = self.assembly.around(branch) if link else (self.assembly.quantities.across(self.assembly.ends(branch)),)
-        return sides(rate_of(self.assembly.integral(branch)), terms)
+        return sides(rate_of(self.assembly.quantities.integral(branch)), terms)
 
     def eliminated(self) -> Iterator[Eliminated]:
         yield from self._dependent_speeds()
@@ -176,7 +176,10 @@ class _Writer:
 
     def _follows(self, node: int) -> Sides:
         row = self.form.tree.potentials[node] or {}
-        speeds = ((gain, self.assembly.quantities.across(self.assembly.ends(tree))) for tree, gain in self.assembly.referred(row))
+        speeds = (
+            (gain, self.assembly.quantities.across(self.assembly.ends(tree)))
+            for tree, gain in self.assembly.referred(row)
+        )
         return sides(self.assembly.quantities.node(node), (speed * gain for speed, gain in speeds))
 
     def _reactions(self) -> Iterator[Eliminated]:
@@ -197,7 +200,9 @@ class _Writer:
 
     def _supplied(self, branch: int) -> Sides:
         flow = self.assembly.quantities.flow_of[branch]
-        return sides(self.assembly.quantities.through(flow), (flow.sign * term for term in self.assembly.out_of(branch)))
+        return sides(
+            self.assembly.quantities.through(flow), (flow.sign * term for term in self.assembly.out_of(branch))
+        )
 
     def _series(self, branch: int) -> str:
         members = [link for link, _ in self.assembly.cutsets.get(branch, ())]

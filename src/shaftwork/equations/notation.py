@@ -46,6 +46,8 @@ WORDS = {
     "psi": "flux linkage",
 }
 """The quantities of the domains in words."""
+PECULIAR = re.compile(r"[^A-Za-z0-9.,:;()-]")
+"""Characters that are not printed in text as they are."""
 GREEK = (
     "alpha beta gamma delta epsilon zeta eta theta iota kappa lamda mu nu xi pi rho sigma tau upsilon phi chi psi omega"
 ).split()
@@ -62,6 +64,7 @@ class Letter:
         unit: SI unit.
         meaning: a few words for the nomenclature.
         parameter: whether it is a parameter, with a value.
+        owner: name of the part or node that it belongs to.
     """
 
     name: str
@@ -70,6 +73,7 @@ class Letter:
     unit: str
     meaning: str
     parameter: bool = False
+    owner: str = ""
 
     def printed(self, subscript: str) -> str:
         """The symbol in LaTeX."""
@@ -93,8 +97,8 @@ class Named:
         stem, index = split_index(self.name)
         if style == 0 and (stem.rstrip("_") in self.shortable or (index and len(stem) <= 1)):
             return _index(index)
-        if style == 0 and stem[:1] in self.shortable and stem[1:2] == "_" and len(stem) > 2:
-            stem = stem[2:]
+        if style == 0 and not index and stem[:1] in self.shortable and len(stem) == 2:
+            stem = stem[1:]
         text = ",".join(part for part in (f"\\mathrm{{{escaped(stem)}}}" if stem else "", _index(index)) if part)
         return text if style < 2 else f"{text},({style})"
 
@@ -126,6 +130,12 @@ def _escape(character: str) -> str:
     return plain or f"U{ord(character):04X}"
 
 
+def in_text(text: str) -> str:
+    """Any text outside formulas: words with signs that LaTeX reads otherwise are escaped."""
+    words = (f"$\\mathrm{{{escaped(word)}}}$" if re.search(PECULIAR, word) else word for word in text.split(" "))
+    return " ".join(words)
+
+
 def notation(form: StateForm, quantities: Quantities) -> tuple[Mapping[str, str], tuple[Letter, ...]]:
     """LaTeX of every symbol by name, and the letters in the order of the parts, for the nomenclature.
 
@@ -146,7 +156,8 @@ def notation(form: StateForm, quantities: Quantities) -> tuple[Mapping[str, str]
                 break
         printed.update(made)
         taken.update(made.values())
-    return printed, tuple(letter for _, bearer in bearers for letter in bearer.letters)
+    letters = (replace(letter, owner=bearer.name) for _, bearer in bearers for letter in bearer.letters)
+    return printed, tuple(letters)
 
 
 def _parts(form: StateForm, quantities: Quantities) -> Iterator[tuple[str, Named]]:
@@ -171,6 +182,8 @@ def _parameters(part: GraphPart) -> Iterator[Letter]:
 
 
 def _upright(text: str) -> str:
+    if text in GREEK:
+        return f"\\{text}"
     return rf"\mathrm{{{text}}}" if re.fullmatch(r"[A-Za-z]{2,}", text) else text
 
 
@@ -197,6 +210,9 @@ def _quantity_letters(form: StateForm, quantities: Quantities) -> Iterator[tuple
             if several and template.kind is Kind.THROUGH_STORE:
                 yield flow.part, _letter(quantities.store(index), quantity, _mark(template.label, quantity))
     for branch in graph.branches:
+        if branch.template.kind is Kind.ACROSS_SOURCE:
+            domain = quantities.domain((branch.plus, branch.minus))
+            yield branch.part, _letter(quantities.integral(branch.index), domain.integral)
         if branch.terms:
             quantity = quantities.multiplier_quantity(branch.index)
             yield branch.part, _letter(quantities.multiplier(branch.index), quantity, _mark(branch.template.label))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from sympy import Expr, Float, Integer, Symbol
@@ -25,11 +25,12 @@ OPENS, CLOSES = "\ue002", "\ue003"
 
 @dataclass(frozen=True)
 class Line:
-    """A printed equation: left side, and the pieces of the right side between which it may be broken."""
+    """A printed equation: left side, the pieces of the right side between which it may be broken, and a remark."""
 
     left: str
     pieces: tuple[str, ...]
     remark: str = ""
+    relation: str = "="
 
     @property
     def text(self) -> str:
@@ -38,15 +39,21 @@ class Line:
 
     def mapped(self, change: Callable[[str], str]) -> Line:
         """The line with a change made to every piece of it."""
-        return Line(change(self.left), tuple(map(change, self.pieces)), change(self.remark))
+        pieces = tuple(map(change, self.pieces))
+        return replace(self, left=change(self.left), pieces=pieces, remark=change(self.remark))
 
 
 class _Printer(LatexPrinter):  # type: ignore[misc]
     """sympy's printer with numbers as engineers write them."""
 
     def _print_Float(self, number: Float) -> str:
-        mantissa, _, exponent = f"{float(number):.{DIGITS}g}".partition("e")
-        return rf"{mantissa} \cdot 10^{{{int(exponent)}}}" if exponent else mantissa
+        return printed_number(float(number))
+
+
+def printed_number(value: float) -> str:
+    """A number with sensible digits, a power of ten where it is very large or small."""
+    mantissa, _, exponent = f"{value:.{DIGITS}g}".partition("e")
+    return rf"{mantissa} \cdot 10^{{{int(exponent)}}}" if exponent else mantissa
 
 
 class Writer:
@@ -61,7 +68,7 @@ class Writer:
         self._values = {Symbol(name, real=True): _number(value) for name, value in values.items()}
         self._ordered = {Symbol(name, real=True): Symbol(f"{k:07d}", real=True) for k, name in enumerate(names)}
         printed = dict(zip(self._ordered.values(), names.values(), strict=True))
-        self._printer = _Printer({"symbol_names": {**printed, TIME: "t"}})
+        self._printer = _Printer({"symbol_names": {**printed, TIME: "t"}, "mul_symbol": r" \, "})
 
     def latex(self, expression: Expr) -> str:
         """An expression in LaTeX."""
@@ -71,10 +78,13 @@ class Writer:
 
     def line(self, sides: Sides, remark: str = "") -> Line:
         """A row of the equations."""
-        pieces = [piece for group in sides.groups for piece in self._group(group)]
-        if pieces and pieces[0].startswith("+ "):
-            pieces[0] = pieces[0][2:]
-        return Line(self.latex(sides.left), tuple(pieces) or ("0",), remark)
+        pieces = self.pieces(sides.groups)
+        return Line(self.latex(sides.left), pieces or ("0",), remark)
+
+    def pieces(self, groups: Iterable[Group]) -> tuple[str, ...]:
+        """The terms of all groups, each with its sign, the first without a plus."""
+        made = [piece for group in groups for piece in self._group(group)]
+        return (made[0].removeprefix("+ "), *made[1:]) if made else ()
 
     def _group(self, group: Group) -> list[str]:
         """The pieces of a group, each with its sign."""
@@ -89,7 +99,7 @@ class Writer:
 
     def _signed(self, term: Expr) -> str:
         text = self.latex(term)
-        return text.replace("-", "- ", 1) if text.startswith("-") else f"+ {text}"
+        return f"- {text[1:].lstrip()}" if text.startswith("-") else f"+ {text}"
 
 
 def with_rates(names: Mapping[str, str]) -> dict[str, str]:
@@ -114,27 +124,30 @@ def aligned(lines: Sequence[Line]) -> str:
 
 
 def _broken(line: Line) -> list[str]:
-    rows = [[]]
+    """The rows of a line: as many pieces on each as there is room for."""
     room = LINE_WIDTH - printed_width(line.left)
+    rows: list[list[str]] = [[]]
     used = 0.0
     for piece in line.pieces:
         width = printed_width(piece)
         if rows[-1] and used + width > room:
             rows.append([])
-            used = 2.0
+            used = printed_width("xx")
         rows[-1].append(piece)
         used += width
-    remark = rf" \qquad {line.remark}" if line.remark else ""
-    whole = len(rows) == 1
-    texts = [_bracketed(" ".join(row), whole=whole) for row in rows]
-    return [f"{line.left} &= {texts[0]}" + remark * whole] + [
-        rf"&\quad {text}" + remark * (number == len(texts) - 1) for number, text in enumerate(texts[1:], 1)
-    ]
+    texts = [f"{line.left} &{line.relation} {' '.join(rows[0])}", *(rf"&\quad {' '.join(row)}" for row in rows[1:])]
+    if line.remark and used + printed_width(line.remark) > room:
+        texts.append(rf"&\qquad {line.remark}")
+    elif line.remark:
+        texts[-1] += rf" \qquad {line.remark}"
+    return [_bracketed(text, whole=len(rows) == 1) for text in texts]
 
 
 def _bracketed(text: str, *, whole: bool) -> str:
     """Brackets that grow where they stand on one line, and of a fixed size where a line break parts them."""
-    opens, closes = (r"\left(", r"\right)") if whole else (r"\biggl(", r"\biggr)")
+    opens, closes = (r"\left[", r"\right]") if whole else (r"\biggl[", r"\biggr]")
+    if whole and r"\left(" not in text:
+        opens, closes = r"\left(", r"\right)"
     return text.replace(OPENS, opens).replace(CLOSES, closes)
 
 
@@ -147,7 +160,13 @@ def printed_width(latex: str) -> float:
     while match := SUBSCRIPT.search(text):
         small = "x" * round(0.65 * printed_width(match.group(1)))
         text = f"{text[: match.start()]}{small}{text[match.end() :]}"
-    return float(len(re.sub(r"\\(left|right|mathrm|text|operatorname|begin|end|quad|[,;!\s])|[{}&]|\s+", "", COMMAND.sub("x", text))))
+    return float(
+        len(
+            re.sub(
+                r"\\(left|right|mathrm|text|operatorname|begin|end|quad|[,;!\s])|[{}&]|\s+", "", COMMAND.sub("x", text)
+            )
+        )
+    )
 
 
 INNER = r"((?:[^{}]|\{[^{}]*\})*)"

@@ -110,6 +110,11 @@ class Quantities:
         name = f"{quantity.name}({self.graph.nodes[number]})"
         return Symbol(name if owner is None else f"{self.graph.part_of(owner).name}.{quantity.name}", real=True)
 
+    def integral(self, branch: int) -> Symbol:
+        """The integral of what is across a branch: of a law that reads it, or of a prescribed speed."""
+        quantity = self.domain((self.graph.branches[branch].plus, self.graph.branches[branch].minus)).integral
+        return Symbol(f"{self.graph.part_of(branch).name}.{quantity.name}", real=True)
+
     def through(self, flow: Flow) -> Symbol:
         """The through variable of a flow: the state, where it is a lone store, or a parameter, where that is all its law."""
         first = self.graph.branches[flow.branches[0]]

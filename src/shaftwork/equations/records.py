@@ -188,6 +188,11 @@ class Equations:
         return notation(self.form, self.assembly.quantities)
 
     @property
+    def rows(self) -> tuple[Row, ...]:
+        """Every row, in the order in which they are printed."""
+        return (*self.nodes, *self.loops, *self.couplings, *self.laws, *self.states, *self.eliminated)
+
+    @property
     def letters(self) -> tuple[Letter, ...]:
         """Every symbol with its unit and meaning, in the order of the parts."""
         return self._notation[1]

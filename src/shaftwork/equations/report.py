@@ -2,18 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
+from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import ShaftworkError
 from shaftwork.equations.blocks import Block, Blocks
-from shaftwork.equations.notation import INDEX_CLOSES, INDEX_OPENS
+from shaftwork.equations.nomenclature import nomenclature
+from shaftwork.equations.notation import INDEX_CLOSES, INDEX_OPENS, in_text
 from shaftwork.equations.printing import aligned
 from shaftwork.equations.records import Equations, Form
 from shaftwork.equations.series import shortened
 
 
+PREAMBLE = r"""\documentclass[11pt,a4paper]{article}
+\usepackage[T1]{fontenc}
+\usepackage[margin=25mm]{geometry}
+\usepackage{amsmath}
+\usepackage{booktabs}
+\usepackage{longtable}
+\allowdisplaybreaks"""
+BEGIN = r"""\date{}
+\begin{document}
+\maketitle"""
+
+
 def body(equations: Equations, form: Form | None = None, *, values: bool = False) -> str:
     """The blocks of one form, or of Kirchhoff's equations and the state form, each under a paragraph heading."""
     blocks = blocks_of(equations, form, values=values)
-    return "\n".join(f"\\paragraph{{{block.heading}}}\\mbox{{}}\n{_content(block)}" for block in blocks)
+    return "\n".join(("\\allowdisplaybreaks", *map(_paragraph, blocks)))
+
+
+def _paragraph(block: Block) -> str:
+    return f"\\paragraph{{{block.heading}}}\\mbox{{}}\n{_content(block)}"
 
 
 def notebook(equations: Equations) -> str:
@@ -47,3 +67,23 @@ def _content(block: Block) -> str:
     remark = f"{block.remark}\n" if block.remark else ""
     rows = aligned(shortened(block.lines)).replace(INDEX_OPENS, "").replace(INDEX_CLOSES, "")
     return f"{remark}\\begin{{align*}}\n{rows}\n\\end{{align*}}"
+
+
+def document(equations: Equations, *, values: bool = False) -> str:
+    """A LaTeX document that compiles as it is."""
+    mechanical = ELECTRICAL not in equations.form.graph.domains
+    blocks = Blocks(equations, values)
+    sections = {
+        "Kirchhoff's equations": _section(blocks.kirchhoff()),
+        "State form": _section(blocks.state()),
+        "Second-order form": _section(blocks.second_order()) if mechanical else "",
+        "Nomenclature": nomenclature(equations),
+        "Remarks": "\n\n".join(in_text(note) for note in equations.notes),
+    }
+    kept = (f"\\section{{{title}}}\n{text}" for title, text in sections.items() if text)
+    title = in_text(equations.form.graph.name)
+    return "\n".join((PREAMBLE, f"\\title{{{title}}}", BEGIN, *kept, r"\end{document}", ""))
+
+
+def _section(blocks: Iterable[Block]) -> str:
+    return "\n".join(_paragraph(block) for block in blocks if block.lines)

@@ -1,9 +1,10 @@
-"""Series of equal rows: rows that differ by a running number are printed as the first, a general one and the last."""
+"""Series of equal rows: rows that differ by a running number alone are printed as one general row."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from shaftwork.equations.notation import INDEX_CLOSES, INDEX_OPENS
 from shaftwork.equations.printing import Line
@@ -12,12 +13,25 @@ SHORTEST_SERIES = 5
 """Fewer equal rows are printed one by one."""
 INDEX = re.compile(f"{INDEX_OPENS}([0-9]+){INDEX_CLOSES}")
 
-Shape = tuple[str, ...]
-
 
 def shortened(lines: Sequence[Line]) -> tuple[Line, ...]:
-    """The lines with every series printed as first row, general row and last row (Popenda 2019, (2) and (4))."""
-    return tuple(printed for run in runs([line.text for line in lines]) for printed in _printed(lines[run.start : run.stop]))
+    """The lines with every series as one general row and the range of its index (Popenda 2019, (2) and (4))."""
+    gathered = [lines[place] for place in together([line.text for line in lines])]
+    found = (gathered[run.start : run.stop] for run in runs([line.text for line in gathered]))
+    return tuple(line for run in found for line in (run if len(run) < SHORTEST_SERIES else (_general(run),)))
+
+
+def together(texts: Sequence[str]) -> tuple[int, ...]:
+    """The places of the texts, members of long series drawn to the first of them, all else in its order."""
+    families: dict[str, list[int]] = {}
+    for place, text in enumerate(texts):
+        if INDEX.search(text):
+            families.setdefault(INDEX.sub(INDEX_OPENS, text), []).append(place)
+    drawn = {family[0]: family for family in families.values() if len(family) >= SHORTEST_SERIES}
+    following = {place for family in drawn.values() for place in family[1:]}
+    return tuple(
+        member for place in range(len(texts)) if place not in following for member in drawn.get(place, [place])
+    )
 
 
 def runs(texts: Sequence[str]) -> Iterator[range]:
@@ -40,23 +54,17 @@ def _step(before: str, after: str) -> tuple[int, ...] | None:
     return steps if set(steps) <= {0, 1} and any(steps) else None
 
 
-def _printed(run: Sequence[Line]) -> tuple[Line, ...]:
-    if len(run) < SHORTEST_SERIES:
-        return tuple(run)
-    return (run[0], _general(run), run[-1])
-
-
 def _general(run: Sequence[Line]) -> Line:
-    """The row with running number k; the number of its left side is k itself."""
-    second = run[1]
-    rising = _step(run[0].text, second.text) or ()
-    base = next(int(index) for index, rise in zip(INDEX.findall(second.text), rising, strict=True) if rise)
-    last = base + len(run) - 3
+    """The row with running number k; the first number that rises is k itself."""
+    first = run[0]
+    rising = _step(first.text, run[1].text) or ()
+    base = next(int(index) for index, rise in zip(INDEX.findall(first.text), rising, strict=True) if rise)
     steps = iter(rising)
 
     def general(match: re.Match[str]) -> str:
         offset = int(match.group(1)) - base
         return f"k{offset:+d}".removesuffix("+0") if next(steps) else match.group(1)
 
-    line = second.mapped(lambda text: INDEX.sub(general, text))
-    return Line(line.left, line.pieces, rf"\text{{for }} k = {base}, \dots, {last}")
+    line = first.mapped(lambda text: INDEX.sub(general, text))
+    span = rf"\text{{for }} k = {base}, \dots, {base + len(run) - 1}"
+    return replace(line, remark=", ".join(filter(None, (line.remark, span))))

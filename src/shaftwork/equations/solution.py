@@ -54,7 +54,9 @@ class System:
         """The equation of an unknown, solved where its block is small."""
         block = self.blocks[unknown]
         if not self.solved(unknown):
-            left = (self.matrix[unknown, other] * self.symbol(other) for other in block if (unknown, other) in self.matrix)
+            left = (
+                self.matrix[unknown, other] * self.symbol(other) for other in block if (unknown, other) in self.matrix
+            )
             return sides(Add(*left), self.right(unknown))
         factors = self._inverse_row(block, block.index(unknown))
         groups = (Group(factor, rising_first(self.right(other))) for factor, other in zip(factors, block, strict=True))
@@ -164,9 +166,7 @@ class Solution:
         return tuple(term for term in terms if term != 0)
 
 
-def _add_products(
-    matrix: dict[tuple[int, int], Expr], members: Sequence[tuple[int, Expr]], coefficient: Expr
-) -> None:
+def _add_products(matrix: dict[tuple[int, int], Expr], members: Sequence[tuple[int, Expr]], coefficient: Expr) -> None:
     for first, gain in members:
         for second, other in members:
             matrix[first, second] = matrix.get((first, second), Integer(0)) + gain * coefficient * other

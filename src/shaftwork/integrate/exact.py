@@ -188,7 +188,9 @@ def _span(problem: Problem, system: _System, piece: Piece, x: Array) -> _Span:
         start, line = x / scale, (level / scale, slope / scale)
 
         def at(asked: Array) -> Array:
-            return modes.response(start, *line, asked - piece.start) * scale
+            states = modes.response(start, *line, asked - piece.start) * scale
+            states[asked == piece.start] = x  # without the rounding of the way to the modes and back
+            return states
 
         return _Span(times, np.vstack([x, at(times[1:])]), at)
     propagator = _propagator(system, level, slope)

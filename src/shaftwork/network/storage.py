@@ -37,19 +37,23 @@ def read_netlist(path: str | Path) -> Netlist:
         ModelFileError: the file is no model; says where and what would be right.
     """
     model = textfile.read(Path(path))
-    laws = [value for part in model.parts for value in part.parameters.values() if isinstance(value, str)]
-    words = 0
     try:
-        for law in laws:
-            words += len(tokens_of(law))
-            if words > MAXIMUM_LAW_WORDS:
-                raise ModelFileError(
-                    f"The laws of the file have more than {MAXIMUM_LAW_WORDS} words together ({len(laws)} laws). "
-                    f"Give curves as tables, or build the network in Python."
-                )
+        _refuse_endless_laws(model)
         return Netlist(model.name, tuple(_placed(part) for part in model.parts))
     except ModelFileError as error:
         raise ModelFileError(f"{path}: {error}") from None
+
+
+def _refuse_endless_laws(model: ModelText) -> None:
+    laws = [value for part in model.parts for value in part.parameters.values() if isinstance(value, str)]
+    words = 0
+    for law in laws:
+        words += len(tokens_of(law))
+        if words > MAXIMUM_LAW_WORDS:
+            raise ModelFileError(
+                f"The laws of the file have more than {MAXIMUM_LAW_WORDS} words together ({len(laws)} laws). "
+                f"Give curves as tables, or build the network in Python."
+            )
 
 
 def _part_text(placed: Placed) -> PartText:

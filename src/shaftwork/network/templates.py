@@ -83,7 +83,7 @@ def as_expression(law: Any) -> Expr:
 
 
 def substitution(part: Component) -> dict[Any, Any]:
-    """The names that users write in laws (omega, phi; v, s; u, psi) as the branch's across variable and its integral."""
+    """The names that users write in laws (omega, phi; v, s; u, psi): the branch's across variable and its integral."""
     names: dict[Any, Any] = {}
     for domain in DOMAINS:
         if any(port.domain is domain for port in part.ports):

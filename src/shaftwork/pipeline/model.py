@@ -22,8 +22,8 @@ from shaftwork.integrate import choice
 from shaftwork.integrate.problem import LinearInputs, Problem
 from shaftwork.network.netlist import Netlist, Placed
 from shaftwork.network.templates import Kind
-from shaftwork.reduction.form import StateForm
 from shaftwork.pipeline.implicit import solve_loops
+from shaftwork.reduction.form import StateForm
 from shaftwork.results.solution import Solution
 
 OUTPUTS = 1001
@@ -91,7 +91,7 @@ class Model(CompiledModel):
                 times the torque that belongs to it.
             t_eval: output times, or their number (by default 1001 over the run), or "steps" for the engine's own.
             engine: "auto" takes the best one and says why in `Solution.why`.
-            initial: start values of speeds ("J1.omega"), twists ("shaft.phi_rel") or torques; what is not given is zero.
+            initial: start values of speeds ("J1.omega"), twists ("shaft.phi_rel") or torques; the rest is zero.
             parameters: values that differ from the network's, "part.parameter" to value in SI; nothing is recompiled
                 unless a value changes the structure (a damping that was exactly zero).
             max_steps: give up after this many steps.

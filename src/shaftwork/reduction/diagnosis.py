@@ -169,7 +169,7 @@ class _View:
             rigid = [branch for branch in loop if self.kind(branch) is Kind.COUPLING]
             words, name = self.words(source), title(self.graph.part_of(source).component)
             where, through = at_nodes(self.ends([source])), f" through {self.titles(rigid)}" if rigid else ""
-            between = f"put a {words.spring} or a {words.loss} between the two"
+            between = f"put a {words.loss} or {words.spring} between the two"
             if others:
                 kind, first = f"two {words.across} sources", self.titles(others)
                 message = f"{name} at {where} prescribes a {words.across} that {first} prescribes already{through}."
@@ -254,34 +254,34 @@ class _View:
                 column = column_of(self.graph, branch) if branch.terms else {}
                 routes.add_edges_from(((a, b) for a, b in pairwise(column) if not routes.has_edge(a, b)), branch=branch)
             done = closing
-            paths = [
-                nx.shortest_path(routes, nodes[0], node) for node in nodes[1:] if nx.has_path(routes, nodes[0], node)
-            ]
+            routes.add_nodes_from(nodes)
+            paths = [nx.shortest_path(routes, nodes[0], b) for b in nodes[1:] if nx.has_path(routes, nodes[0], b)]
             around = [routes.edges[step]["branch"] for path in paths for step in pairwise(path)]
             loop = [*(branch.index for branch in around), closing]
-            where = self.nodes(nodes)
+            where = self.nodes(node for node in nodes if not self._moves(node))
             message = (
-                f"{self.titles(loop)} close a loop between {at_nodes(where)}"
-                f"{self._two_ratios(paths, routes, closing)}. Only standstill satisfies all: these nodes are locked."
+                f"{self.titles(loop)} close a loop{self._two_ratios(paths, routes, closing)}: this is possible only "
+                f"while {at_nodes(where)} {'stand' if len(where) > 1 else 'stands'} still, locked."
             )
             hint = "Make the ratios around the loop agree, or put a spring into one of its shafts."
             yield Problem("locked gear loop", message, hint, self.parts(loop), where, "warning")
 
+    def _moves(self, node: int) -> bool:
+        return any(self.kind(branch) is not Kind.COUPLING for branch in self.tree.potentials[node] or ())
+
     def _two_ratios(self, paths: Sequence[Sequence[int]], routes: Any, closing: int) -> str:
         """What either way around a loop makes of the speeds of two nodes, where every coupling on it joins just two."""
-        if len(paths) != 1:
-            return ""
-        path, others = paths[0], [routes.edges[step]["branch"] for step in pairwise(paths[0])]
-        first, last = path[0], path[-1]
+        others = [routes.edges[step]["branch"] for path in paths for step in pairwise(path)]
         columns = [column_of(self.graph, branch) for branch in (*others, self.graph.branches[closing])]
-        if any(len(column) != 2 for column in columns):
+        if len(paths) != 1 or any(len(column) != 2 for column in columns):
             return ""
-        steps = zip((*pairwise(path), (first, last)), columns, strict=True)
+        first, last = paths[0][0], paths[0][-1]
+        steps = zip((*pairwise(paths[0]), (first, last)), columns, strict=True)
         *ratios, direct = (-value_of(column[b]) / value_of(column[a]) for (a, b), column in steps)
         across = self.graph.domains[first].across.name
         a, b = (f"{across}('{self.graph.nodes[node]}')" for node in (first, last))
         names = self.titles(branch.index for branch in others)
-        return f": {a} = {math.prod(ratios):.10g} {b} by {names}, but {direct:.10g} {b} by {self.titles([closing])}"
+        return f" with {a} = {math.prod(ratios):.10g} {b} by {names}, but {direct:.10g} {b} by {self.titles([closing])}"
 
     def jumping(self) -> Iterator[Problem]:
         """Prescribed speeds that jump although an inertia is joined to them rigidly."""

@@ -1,7 +1,7 @@
 """The state form of a network: which branches are states, inputs and dependent, ready to become rows or matrices.
 
-With C, L the stores that are states (tree capacities, link compliances), G and R the tree and link conductances, w
-the through variables of the nonlinear laws and sources, e the prescribed across variables, and F the loops:
+With C, L the stores that are states (tree capacities, link compliances), G and R the tree and link conductances, w the
+through variables of the nonlinear laws and sources, e the prescribed across variables, F the loops:
 
     v_R = F_CR' x_C + F_ER' e + F_GR' v_G                                         loops of the link conductances
     (G + F_GR R F_GR') v_G = -F_GR R (F_CR' x_C + F_ER' e) - F_GL x_L - F_GW w    cutsets of the tree conductances

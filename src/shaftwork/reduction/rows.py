@@ -1,7 +1,7 @@
 """The state equations row by row as sympy expressions: for small networks, for reading and for scalar code.
 
-The same equations as in `form`, solved symbolically in blocks of coupled unknowns. A network with a larger block is left
-to the sparse matrices of the array program; both are tested to agree.
+The same equations as in `form`, solved symbolically in blocks of coupled unknowns. A network with a larger block is
+left to the sparse matrices of the array program; both are tested to agree.
 """
 
 from __future__ import annotations

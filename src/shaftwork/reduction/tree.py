@@ -104,7 +104,7 @@ class _Elimination:
 
 
 def column_of(graph: CircuitGraph, branch: GraphBranch) -> Row:
-    """The column of the incidence matrix: node to factor (+1 where the branch leaves, -1 where it enters, or ratios)."""
+    """The column of the incidence matrix: node to factor (+1 where the branch leaves, -1 where it enters, ratios)."""
     column: Row = {}
     for coefficient, plus, minus in branch.terms or ((None, branch.plus, branch.minus),):
         factor = 1 if coefficient is None else _gain(graph, branch, coefficient)

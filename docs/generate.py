@@ -1,0 +1,215 @@
+"""Makes what the pages show from the code: outputs of their examples, tables of components, help texts.
+
+    python docs/generate.py             writes README.md and docs/*.md anew where something has changed
+
+A page is Markdown. Its `python` blocks run from top to bottom in one namespace and in an empty folder; a `text`, `toml`
+or `latex` block right after one holds what it printed. A `console` block holds command lines after "$ " and what they
+print. Between `<!-- made: name -->` and `<!-- end -->` stands what the function of this name in `MADE` returns.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import inspect
+import io
+import math
+import os
+import re
+import shlex
+import sys
+import tempfile
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+from shaftwork.cli import main as command_line
+from shaftwork.components import REGISTRY, Component, Port
+from shaftwork.core.parameters import Parameter
+from shaftwork.scenes import SCENES
+
+ROOT = Path(__file__).parents[1]
+PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+
+BLOCK = re.compile(r"^```(?P<language>\w+)\n(?P<body>.*?)^```$", re.MULTILINE | re.DOTALL)
+MADE_PART = re.compile(r"(?P<start><!-- made: (?P<name>[\w ]+) -->\n).*?(?P<end><!-- end -->)", re.DOTALL)
+OUTPUT = ("text", "toml", "latex")
+"""Languages of the blocks that hold what the block before them printed."""
+FAMILIES = ("rotation", "translation", "sources", "loads", "machines", "electrical")
+"""The modules of components in the order in which they are shown."""
+NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+NOISE, TOLERANCE = 1e-9, 0.02
+"""Numbers below the first are rounding; others may differ by this fraction from one machine and library to the next."""
+
+
+def remade(page: Path, text: str) -> str:
+    """The text of a page with everything in it that is made from the code made anew.
+
+    Args:
+        page: its file, for messages.
+        text: the page as it stands.
+
+    Raises:
+        ValueError: an example prints something that the page does not show.
+        Exception: whatever an example raises.
+    """
+    text = MADE_PART.sub(lambda match: f"{match['start']}{MADE[match['name']]()}{match['end']}", text)
+    # components that a page defines are forgotten after it
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder), mock.patch.dict(REGISTRY):
+        return "".join(_executed(page, text))
+
+
+def _executed(page: Path, text: str) -> Iterator[str]:
+    """The page piece by piece, with the outputs of its blocks replaced."""
+    namespace: dict[str, Any] = {"__name__": "__main__"}
+    place, printed = 0, ""
+    for match in BLOCK.finditer(text):
+        between, language, body = text[place : match.start()], match["language"], match["body"]
+        if printed and (between.strip() or language not in OUTPUT):
+            line = text.count("\n", 0, place)
+            raise ValueError(f"{page.name}:{line}: the example prints {printed[:60]!r}, which is not shown.")
+        if printed:
+            body, printed = printed, ""
+        elif language == "python":
+            printed = _run(body, page, text.count("\n", 0, match.start("body")), namespace)
+        elif language == "console":
+            body = "".join(f"{line}\n{_answer(line)}" for line in body.splitlines() if line.startswith("$ "))
+        yield f"{between}```{language}\n{body}```"
+        place = match.end()
+    if printed:
+        raise ValueError(f"{page.name}: the last example prints {printed[:60]!r}, which is not shown.")
+    yield text[place:]
+
+
+def _run(code: str, page: Path, line: int, namespace: dict[str, Any]) -> str:
+    """What an example prints; empty lines before it make line numbers in tracebacks those of the page."""
+    output = io.StringIO()
+    program = compile("\n" * line + code, str(page), "exec", dont_inherit=True)
+    with contextlib.redirect_stdout(output), warnings.catch_warnings():
+        warnings.simplefilter("error")
+        exec(program, namespace)  # noqa: S102 - the examples of this repository
+    return output.getvalue()
+
+
+def _answer(line: str) -> str:
+    """What a command line prints, errors included."""
+    program, *arguments = shlex.split(line.removeprefix("$ "))
+    if program != "shaftwork":
+        raise ValueError(f"'{line}': only the command shaftwork is run here.")
+    output = io.StringIO()
+    with (
+        mock.patch.dict(os.environ, COLUMNS="100", NO_COLOR="1"),
+        contextlib.redirect_stdout(output),
+        contextlib.redirect_stderr(output),
+        contextlib.suppress(SystemExit),
+    ):
+        command_line(arguments)
+    return output.getvalue()
+
+
+def same(old: str, new: str) -> bool:
+    """Whether two texts agree in all words, and in all numbers as far as another machine would print them."""
+    words, others = old.split(), new.split()
+    return len(words) == len(others) and all(map(_same_word, words, others))
+
+
+def _same_word(old: str, new: str) -> bool:
+    if old == new:
+        return True
+    numbers, others = NUMBER.findall(old), NUMBER.findall(new)
+    if not numbers or NUMBER.sub("#", old) != NUMBER.sub("#", new):
+        return False
+    return all(_same_number(float(a), float(b)) for a, b in zip(numbers, others, strict=True))
+
+
+def _same_number(old: float, new: float) -> bool:
+    return max(abs(old), abs(new)) < NOISE or math.isclose(old, new, rel_tol=TOLERANCE)
+
+
+def components() -> dict[str, type[Component]]:
+    """The components of the package by name, family by family; the registry also holds those of users."""
+    own = ((name, cls) for name, cls in REGISTRY.items() if cls.__module__.startswith("shaftwork."))
+    return dict(sorted(own, key=lambda item: FAMILIES.index(item[1].__module__.rpartition(".")[2])))
+
+
+def component_table() -> str:
+    """One table of all components, a line for each parameter."""
+    rows = ["| component | ports | parameter | unit | bound | default | meaning |", "|---|---|---|---|---|---|---|"]
+    for name, cls in components().items():
+        declared = tuple(cls.declared.values()) or (None,)
+        for number, item in enumerate(declared):
+            head = (f"`{name}`", _ports(cls)) if number == 0 else ("", "")
+            rows.append(f"| {' | '.join((*head, *_cells(item)))} |")
+    return "\n".join(rows) + "\n"
+
+
+def _ports(cls: type[Component]) -> str:
+    return ", ".join(f"{port.name} (optional)" if port.optional else port.name for port in cls.ports)
+
+
+def _cells(item: Parameter | None) -> tuple[str, ...]:
+    if item is None:
+        return ("", "", "", "", "")
+    default = "required" if item.required else f"{item.default:g}"
+    meaning = f"{item.meaning} (law)" if item.law else item.meaning
+    return (f"`{item.name}`", item.unit, item.bounds, default, meaning)
+
+
+def component_pages() -> str:
+    """A section for each component: what it is, its law, ports, parameters and quantities."""
+    texts: list[str] = []
+    family = ""
+    for name, cls in components().items():
+        if cls.__module__ != family:
+            family = cls.__module__
+            module = sys.modules[family]
+            texts.append(f"## {family.rpartition('.')[2].capitalize()}\n\n{(module.__doc__ or '').splitlines()[0]}\n")
+        texts.append(f"### {name}\n\n{_described(cls)}")
+    return "\n".join(texts)
+
+
+def _described(cls: type[Component]) -> str:
+    domains = ", ".join(_port(port) for port in cls.ports)
+    dummy = cls("part", **{item.name: 1.0 for item in cls.declared.values() if item.required})
+    quantities = ", ".join(f"`{name}`" for name in dummy.signals())
+    text = f"{inspect.cleandoc(cls.__doc__ or '')}\n\nPorts: {domains}. Quantities: {quantities}.\n"
+    if not cls.declared:
+        return text
+    rows = "".join(f"| {' | '.join(_cells(item))} |\n" for item in cls.declared.values())
+    return f"{text}\n| parameter | unit | bound | default | meaning |\n|---|---|---|---|---|\n{rows}"
+
+
+def _port(port: Port) -> str:
+    domain = port.domain.name if port.domain else "any domain"
+    return f"{port.name} ({domain}, optional)" if port.optional else f"{port.name} ({domain})"
+
+
+def scene_table() -> str:
+    """The scenes with their sources and what was chosen."""
+    rows = (
+        f"| `{scene.name}` | {scene.title} | {scene.source} | {'; '.join(scene.chosen)} |\n"
+        for scene in SCENES.values()
+    )
+    return "| scene | what | source | chosen, because not printed there |\n|---|---|---|---|\n" + "".join(rows)
+
+
+MADE: dict[str, Callable[[], str]] = {
+    "component table": component_table,
+    "component pages": component_pages,
+    "scene table": scene_table,
+}
+
+
+def main() -> None:
+    """Write every page anew that differs from what the code makes of it."""
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        made = remade(page, text)
+        if not same(text, made):
+            page.write_text(made, encoding="utf-8")
+            sys.stdout.write(f"written: {page.relative_to(ROOT)}\n")
+
+
+if __name__ == "__main__":
+    main()

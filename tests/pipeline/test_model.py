@@ -1,0 +1,267 @@
+"""Model.simulate: engines, outputs, start values, parameters, steady operation, failures."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import sympy
+
+import shaftwork as sw
+from tests.reference.crane import Crane, shaft_torque
+
+ENGINES = ("heyoka", "scipy", "scipy-radau", "sundials")
+
+
+def crane(**shaft: float) -> sw.Network:
+    net = sw.Network("crane travel")
+    net.add(sw.KlossMotor("motor", tau_k=9.6, s_k=0.25, n_sync=3000, ratio=35.5, efficiency=0.95), "rotor")
+    net.add(sw.Inertia("J1", J=27.35), "rotor")
+    net.add(sw.Spring("shaft", **{"c": 24206.0, "d": 14.0, **shaft}), "rotor", "wheel")
+    net.add(sw.Inertia("J2", J=62.5), "wheel")
+    net.add(sw.CoulombLoad("load", tau=22.4), "wheel")
+    return net
+
+
+def two_masses(**source: object) -> sw.Network:
+    net = sw.Network("two masses")
+    net.add(sw.TorqueSource("motor", **{"tau": 10.0, **source}), "rotor")
+    net.add(sw.Inertia("J1", J=2.0), "rotor")
+    net.add(sw.Spring("shaft", c=1e4, d=1.0), "rotor", "wheel")
+    net.add(sw.Inertia("J2", J=3.0), "wheel")
+    return net
+
+
+def test_auto_solves_the_crane_to_1e_8_of_the_largest_torque_at_rtol_1e_9() -> None:
+    sol = sw.scenes.crane_start().simulate(t_end=6.5, rtol=1e-9, t_eval=651)
+    truth = shaft_torque(Crane(tau_k=8.0, s_k=sw.scenes.crane.slip_at_pull_out(8.0)), sol.t)
+    assert np.abs(sol["shaft.tau"] - truth).max() < 1e-8 * np.abs(truth).max()
+    assert sol.energy_residual < 1e-8
+    assert sol.engine == "heyoka"
+    assert "Taylor" in sol.why
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_every_engine_agrees_with_the_hand_typed_crane(engine: str) -> None:
+    sol = crane().simulate(t_end=1.0, rtol=1e-9, t_eval=101, engine=engine)
+    truth = shaft_torque(Crane(tau_k=9.6, s_k=0.25), sol.t)
+    # the error of an adaptive engine may exceed rtol by a factor that grows with the number of steps
+    assert np.abs(sol["shaft.tau"] - truth).max() < 1e-6 * np.abs(truth).max()
+    assert sol.energy_residual < 1e-6
+
+
+def test_a_linear_train_is_propagated_exactly_through_steps_and_ramps() -> None:
+    law = sw.Step(10.0, start=0.1) + sw.Ramp(-4.0, duration=0.2, start=0.3)
+    net = two_masses(tau=law)
+    exact = net.simulate(t_end=1.0, t_eval=101)
+    assert exact.engine == "exact"
+    adaptive = net.simulate(t_end=1.0, t_eval=101, engine="scipy", rtol=1e-12)
+    for name in ("J1.omega", "shaft.tau", "motor.tau"):
+        # the adaptive engine's own error at rtol 1e-12
+        assert np.abs(exact[name] - adaptive[name]).max() < 1e-9 * np.abs(exact[name]).max()
+
+
+def test_momentum_is_the_integral_of_the_torque() -> None:
+    sol = two_masses(tau=sw.Table([0.0, 0.5, 1.0], [0.0, 8.0, 0.0])).simulate(t_end=1.0, t_eval=[0.0, 0.5, 1.0])
+    momentum = 2.0 * sol["J1.omega"] + 3.0 * sol["J2.omega"]
+    assert momentum == pytest.approx([0.0, 2.0, 4.0], abs=1e-12)  # rounding of the exact propagation
+
+
+def test_output_times_are_those_asked_for() -> None:
+    model = two_masses().compile()
+    assert len(model.simulate(1.0).t) == 1001
+    assert model.simulate(1.0, t_eval=11).t == pytest.approx(np.linspace(0, 1, 11))
+    assert model.simulate(1.0, t_eval=[0.25, 0.5]).t.tolist() == [0.25, 0.5]
+    steps = model.simulate(1.0, t_eval="steps", engine="scipy")
+    assert steps.t.tolist() == steps.steps.tolist()
+    assert model.simulate(2.0, t_start=1.0).t[0] == 1.0
+
+
+def test_dense_output_agrees_with_output_times() -> None:
+    model = crane().compile()
+    for engine in ENGINES:
+        coarse = model.simulate(1.0, rtol=1e-9, engine=engine, t_eval=[0.0, 1.0])
+        fine = model.simulate(1.0, rtol=1e-9, engine=engine, t_eval=201)
+        # dense output is as accurate as the steps, not as exact as they are equal
+        assert np.abs(coarse.at(fine.t)["shaft.tau"] - fine["shaft.tau"]).max() < 1e-6 * np.abs(fine["shaft.tau"]).max()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"t_end": 0.0}, "after t_start"),
+        ({"t_end": math.nan}, "finite time"),
+        ({"t_end": 1.0, "rtol": 0.0}, "rtol"),
+        ({"t_end": 1.0, "t_eval": 1}, "at least 2"),
+        ({"t_end": 1.0, "t_eval": [0.5, 0.4]}, "strictly increasing"),
+        ({"t_end": 1.0, "t_eval": [0.5, 2.0]}, "between 0 and 1"),
+        ({"t_end": 1.0, "t_eval": "all"}, "'steps'"),
+        ({"t_end": 1.0, "engine": "euler"}, "scipy"),
+        ({"t_end": 1.0, "parameters": {"shaft.k": 1.0}}, "shaft.c"),
+        ({"t_end": 1.0, "parameters": {"axle.c": 1.0}}, "shaft.c"),
+        ({"t_end": 1.0, "parameters": {"shaft.c": -1.0}}, "at least 0"),
+        ({"t_end": 1.0, "parameters": {"shaft.c": math.nan}}, "finite"),
+        ({"t_end": 1.0, "initial": {"J1.omega": math.inf}}, "finite"),
+    ],
+)
+def test_a_wrong_argument_is_named_with_what_would_be_right(arguments: dict[str, object], words: str) -> None:
+    with pytest.raises(sw.ParameterError, match=words):
+        two_masses().simulate(**arguments)
+
+
+def test_changed_parameters_give_the_same_motion_as_a_new_network() -> None:
+    model = crane().compile()
+    for changed in ({"shaft.c": 3e4}, {"shaft.d": 0.0}, {"shaft.c": 3e4, "J1.J": 20.0}):
+        built = crane()
+        shaft = {key.split(".")[1]: value for key, value in changed.items() if key.startswith("shaft")}
+        built = crane(**shaft)
+        if "J1.J" in changed:
+            built = sw.Network("crane travel")
+            built.add(sw.KlossMotor("motor", tau_k=9.6, s_k=0.25, n_sync=3000, ratio=35.5, efficiency=0.95), "rotor")
+            built.add(sw.Inertia("J1", J=20.0), "rotor")
+            built.add(sw.Spring("shaft", c=3e4, d=14.0), "rotor", "wheel")
+            built.add(sw.Inertia("J2", J=62.5), "wheel")
+            built.add(sw.CoulombLoad("load", tau=22.4), "wheel")
+        one = model.simulate(1.0, parameters=changed, engine="scipy", t_eval=11)
+        two = built.simulate(1.0, engine="scipy", t_eval=11)
+        # the same code with the same numbers: equal to the last bits
+        assert one["shaft.tau"] == pytest.approx(two["shaft.tau"], rel=1e-12, abs=1e-9)
+
+
+def test_changed_parameters_do_not_compile_again() -> None:
+    model = crane().compile()
+    model.simulate(0.1)
+    program = model._program
+    model.simulate(0.1, parameters={"shaft.c": 3e4})
+    assert model._program is program
+
+
+def test_a_damping_that_was_zero_can_be_given_later() -> None:
+    one = crane(d=0.0).compile().simulate(1.0, parameters={"shaft.d": 14.0}, t_eval=11)
+    two = crane().simulate(1.0, t_eval=11)
+    assert one["shaft.tau"] == pytest.approx(two["shaft.tau"], rel=1e-12)
+
+
+def test_start_values_may_be_speeds_twists_and_torques() -> None:
+    model = two_masses().compile()
+    sol = model.simulate(0.1, initial={"J1.omega": 3.0, "shaft.phi_rel": 0.01}, t_eval=11)
+    assert sol["J1.omega"][0] == 3.0
+    assert sol["shaft.tau_c"][0] == pytest.approx(100.0)
+    assert sol["J2.omega"][0] == 0.0
+
+
+def test_a_start_value_of_a_geared_inertia_moves_its_group() -> None:
+    net = sw.Network("geared")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.Gear("gear", ratio=4.0), "a", "b")
+    net.add(sw.Inertia("J2", J=2.0), "b")
+    net.add(sw.Damper("d", d=1e-3), "b")
+    sol = net.simulate(0.1, initial={"J2.omega": 5.0}, t_eval=3)
+    assert sol["J1.omega"][0] == pytest.approx(20.0)
+    with pytest.raises(sw.ParameterError, match="contradicts"):
+        net.simulate(0.1, initial={"J1.omega": 1.0, "J2.omega": 5.0})
+    with pytest.raises(sw.SignalError, match=r"J1\.omega"):
+        net.simulate(0.1, initial={"J1.speed": 1.0})
+
+
+def test_steady_operation_is_where_the_start_runs_to() -> None:
+    model = sw.scenes.crane_start().compile()
+    steady = model.steady_state()
+    late = model.simulate(40.0, t_eval=[40.0])
+    for k, name in enumerate(model.states):
+        assert steady[name] == pytest.approx(late.x[0, k], rel=1e-6)
+    again = model.simulate(5.0, initial=steady, t_eval=11)
+    assert again["J2.omega"] == pytest.approx(np.full(11, steady["J2.omega"]), rel=1e-9)
+
+
+def test_no_steady_operation_is_said_with_the_state_that_keeps_changing() -> None:
+    with pytest.raises(sw.SimulationError, match="omega"):
+        two_masses().compile().steady_state()
+
+
+def test_an_impossible_law_fails_with_time_state_and_reason() -> None:
+    net = two_masses(tau=1 / (sw.t - sympy.Rational(1, 2)) ** 2)
+    for engine in ("scipy", "heyoka", "sundials"):
+        with pytest.raises(sw.SimulationError, match=r"t = .*s"):
+            net.simulate(1.0, engine=engine)
+
+
+def test_an_angle_is_recorded_when_asked_for() -> None:
+    sol = two_masses().simulate(1.0, angles=["J2"], t_eval=11)
+    steps = sol.at(np.linspace(0, 1, 20001))
+    trapezoid = np.sum((steps["J2.omega"][1:] + steps["J2.omega"][:-1]) / 2) / 20000
+    assert sol["J2.phi"][-1] == pytest.approx(trapezoid, rel=1e-7)  # error of the trapezoidal rule
+    with pytest.raises(sw.SignalError, match="shaft"):
+        two_masses().compile(angles=["axle"])
+
+
+def test_a_law_that_reads_the_angle_adds_an_angle_state_and_swings() -> None:
+    net = sw.Network("pendulum")
+    net.add(sw.Inertia("J", J=2.0), "arm")
+    net.add(sw.TorqueSource("gravity", tau=-50.0 * sw.phi), "arm")
+    model = net.compile()
+    assert "gravity.phi" in model.states
+    sol = model.simulate(1.0, initial={"gravity.phi": 0.1}, t_eval=101)
+    assert sol["gravity.phi"] == pytest.approx(0.1 * np.cos(5.0 * sol.t), abs=1e-9)
+
+
+def test_a_speed_jump_is_an_impulse_to_what_is_rigidly_joined() -> None:
+    net = sw.Network("impulse")
+    net.add(sw.SpeedSource("drive", omega=sw.Step(10.0, start=0.5)), "ring")
+    net.add(sw.PlanetaryGear("planet", ratio=2.0), "sun", "carrier", "ring")
+    net.add(sw.Inertia("Js", J=1.0), "sun")
+    net.add(sw.Inertia("Jc", J=3.0), "carrier")
+    with pytest.warns(sw.NetworkWarning, match="drive"):
+        model = net.compile()
+    sol = model.simulate(1.0, t_eval=[0.25, 0.75])
+    # lever: sun + 2 ring = 3 carrier; the impulse P on the carrier is three times that on the sun, and opposite:
+    # Js ws = -P, Jc wc = 3 P, ws = 3 wc - 20
+    carrier = 60.0 / (9.0 + 3.0)
+    assert sol["Jc.omega"] == pytest.approx([0.0, carrier])
+    assert sol["Js.omega"] == pytest.approx([0.0, 3 * carrier - 20.0])
+    assert sol.energy_residual < 1e-12
+
+
+def test_a_network_without_states_is_refused_with_the_next_step() -> None:
+    net = sw.Network("static")
+    net.add(sw.VoltageSource("supply", voltage=1.0), "p", "ground")
+    net.add(sw.Resistor("load", R=2.0), "p", "ground")
+    with pytest.raises(sw.SimulationError, match="no states"):
+        net.simulate(1.0)
+
+
+@pytest.mark.parametrize("engine", ["auto", "scipy", "scipy-radau"])
+def test_an_algebraic_loop_is_solved_on_request(engine: str) -> None:
+    net = sw.Network("massless rotor")
+    net.add(sw.KlossMotor("motor", tau_k=9.6, s_k=0.25, n_sync=3000, ratio=35.5, efficiency=0.95), "rotor")
+    net.add(sw.Damper("bearing", d=200.0), "rotor")
+    net.add(sw.Spring("shaft", c=24206.0, d=14.0), "rotor", "wheel")
+    net.add(sw.Inertia("J2", J=62.5), "wheel")
+    with pytest.raises(sw.NetworkError, match="motor"):
+        net.compile()
+    sol = net.simulate(3.0, algebraic_loops="solve", engine=engine, t_eval=101)
+    small = sw.Network("nearly massless rotor")
+    for part, nodes in zip(net.parts, (p.nodes for p in net.netlist().placed), strict=True):
+        small.add(part, *nodes)
+    small.add(sw.Inertia("J1", J=1e-6), "rotor")
+    limit = small.simulate(3.0, t_eval=101)
+    late = slice(5, None)  # the rotor's own transient is over
+    assert sol["shaft.tau"][late] == pytest.approx(limit["shaft.tau"][late], rel=1e-5)
+    assert sol.energy_residual < 1e-6
+
+
+def test_the_cost_counts_operations_and_leaving_out_saves_them() -> None:
+    whole, less = crane().compile().cost(), crane(d=0.0).compile().cost()
+    assert whole.form == "scalar"
+    assert less.total < whole.total
+    chain = sw.scenes.shaft_chain(100).compile().cost()
+    assert chain.form == "array"
+    # per element: two torques on a speed, two speeds on a torque
+    assert chain.entries == 2 * (2 * 99)
+
+
+def test_the_generated_code_reads_like_the_equations() -> None:
+    source = crane().compile().scalar.source
+    assert "tanh" in source
+    assert source.count("\n") < 20
