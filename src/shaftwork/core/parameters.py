@@ -8,7 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-REQUIRED = dataclasses.MISSING
+REQUIRED: Any = object()
+"""Stands for the default of a parameter that has none."""
 
 
 @dataclass(frozen=True)
@@ -72,10 +73,12 @@ class Parameter:
             return self._from_quantity(value)
         if value is None or isinstance(value, (bool, str, bytes, complex)):
             return value, f"must be a number{' or a law' if self.law else ''}, not {type(value).__name__} {value!r}"
+        if self.law and getattr(value, "free_symbols", None):
+            return value, None
         try:
             number = float(value)
         except (TypeError, ValueError, OverflowError):
-            if self.law and callable(getattr(value, "has", None)):
+            if self.law and callable(getattr(value, "has", None)):  # a table: a law of time without symbols
                 return value, None
             return value, f"must be a number{' or a law' if self.law else ''}, not {type(value).__name__}"
         return number, self.objection(number)
@@ -103,4 +106,5 @@ def parameter(unit: str, meaning: str, *, default: Any = REQUIRED, latex: str = 
         return Parameter(name=name, unit=unit, meaning=meaning, default=default, latex=latex or name, **bounds)
 
     metadata: dict[str, Callable[[str], Parameter]] = {"declare": declare}
-    return dataclasses.field(default=default, metadata=metadata, kw_only=True)
+    given = dataclasses.MISSING if default is REQUIRED else default
+    return dataclasses.field(default=given, metadata=metadata, kw_only=True)

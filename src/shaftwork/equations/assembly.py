@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
-from sympy import Add, Expr, Integer, Mul, Symbol
+from sympy import Add, Expr, Integer, Mul
 
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.equations.quantities import Flow, Quantities, rate_of
@@ -49,15 +49,23 @@ def rising_first(terms: Iterable[Expr]) -> Terms:
 
 def tidy(expression: Expr) -> Expr:
     """The expression with sums of negative terms inside products turned round: -(-1 - i) x is (1 + i) x."""
-    if not (expression.is_Add or expression.is_Mul):
+    if not (expression.is_Add or expression.is_Mul or (expression.is_Pow and expression.exp.is_even)):
         return expression
     parts = [tidy(part) for part in expression.args]
+    if expression.is_Pow:
+        base, exponent = parts
+        return (-base if _falls(base) else base) ** exponent
     if expression.is_Add:
         return Add(*parts)
-    turned = [part.is_Add and all(term.could_extract_minus_sign() for term in part.args) for part in parts]
+    turned = [_falls(part) for part in parts]
     if not any(turned):
         return Mul(*parts)
     return Mul((-1) ** sum(turned), *(-part if turn else part for part, turn in zip(parts, turned, strict=True)))
+
+
+def _falls(part: Expr) -> bool:
+    """Whether a sum has negative terms only."""
+    return bool(part.is_Add) and all(term.could_extract_minus_sign() for term in part.args)
 
 
 @dataclass(frozen=True, eq=False)

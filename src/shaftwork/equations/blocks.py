@@ -15,7 +15,7 @@ from shaftwork.equations.assembly import Group, Sides, sides, tidy
 from shaftwork.equations.notation import in_text
 from shaftwork.equations.printing import LINE_WIDTH, Line, Writer, printed_width, with_rates
 from shaftwork.equations.quantities import Flow, rate_of
-from shaftwork.equations.records import Equations, Row
+from shaftwork.equations.records import Eliminated, Equations, Row
 from shaftwork.equations.second_order import SecondOrder
 from shaftwork.network.templates import Kind
 
@@ -62,9 +62,10 @@ class Blocks:
     def state(self) -> Iterator[Block]:
         """Rates of the states, what stands in them, and what was eliminated."""
         rows = self.equations.states
-        implicit = any(not row.explicit for row in rows)
-        remark = "Rates that stand together on a left side are solved numerically." if implicit else ""
-        yield Block("State equations", tuple(self._lines(rows)), remark)
+        shown = [row.sides if row.explicit and len(row.groups) <= 1 else row.coupled for row in rows]
+        coupled = any(made is not row.sides for made, row in zip(shown, rows, strict=True))
+        remark = "Rates that stand together on a left side are coupled by inertias or springs." if coupled else ""
+        yield Block("State equations", tuple(map(self.writer.line, shown)), remark)
         algebraic = [row for row in self.equations.eliminated if row.kind == "algebraic"]
         yield Block("where", (*self._laws_in_states(), *self._lines(algebraic)))
         dependent = [row for row in self.equations.eliminated if row.kind in ("speed", "torque")]
@@ -113,7 +114,8 @@ class Blocks:
         parameters = {letter.name for letter in self.equations.letters if letter.parameter}
         order = sorted(names, key=lambda name: name not in parameters)
         ordered = with_rates({name: names[name] for name in order})
-        return Writer({**ordered, **_dotted(self.equations)}, graph.parameters if self.values else {})
+        values = graph.parameters if self.values else {}
+        return Writer({**ordered, **_dotted(self.equations)}, frozenset(parameters), values)
 
     def _lines(self, rows: Iterable[Row]) -> Iterator[Line]:
         seen: dict[str, None] = {}
@@ -124,7 +126,7 @@ class Blocks:
                     yield line
                 seen[line.text] = None
 
-    def _explained(self, rows: Iterable[Row]) -> Iterator[Line]:
+    def _explained(self, rows: Iterable[Eliminated]) -> Iterator[Line]:
         for row in rows:
             if not row.trivial:
                 yield self.writer.line(row.sides, rf"\text{{({in_text(row.why)})}}")

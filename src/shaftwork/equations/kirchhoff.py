@@ -18,7 +18,7 @@ from shaftwork.equations.records import (
     NodeEquation,
     StateEquation,
 )
-from shaftwork.equations.solution import Solution
+from shaftwork.equations.solution import Solution, System
 from shaftwork.network.graph import GROUND
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm, branch_name
@@ -102,24 +102,21 @@ class _Writer:
                 yield CouplingEquation(*self.origin((branch.index,)), partial(self.assembly.coupling, branch.index))
 
     def states(self) -> Iterator[StateEquation]:
-        makers = {"across": self._speed_row, "through": self._torque_row, "integral": self._integral_row}
-        solved = {"across": self._speed_solved, "through": self._torque_solved, "integral": lambda _: True}
         for state in self.form.states:
-            make, explicit = partial(makers[state.kind], state.branch), partial(solved[state.kind], state.branch)
-            symbol = Symbol(state.name, real=True)
-            yield StateEquation(*self.origin((state.branch,)), make, state.name, symbol, state.unit, explicit)
-
-    def _speed_row(self, branch: int) -> Sides:
-        return self.solution.speeds.row(branch)
-
-    def _speed_solved(self, branch: int) -> bool:
-        return self.solution.speeds.solved(branch)
-
-    def _torque_row(self, branch: int) -> Sides:
-        return self.solution.torques.row(branch)
-
-    def _torque_solved(self, branch: int) -> bool:
-        return self.solution.torques.solved(branch)
+            branch, symbol = state.branch, Symbol(state.name, real=True)
+            makers: tuple[Callable[[], Sides], Callable[[], bool], Callable[[], Sides]]
+            if state.kind == "integral":
+                row = partial(self._integral_row, branch)
+                makers = (row, _always, row)
+            else:
+                system = partial(getattr, self.solution, "speeds" if state.kind == "across" else "torques")
+                makers = (
+                    partial(_row, system, branch),
+                    partial(_solved, system, branch),
+                    partial(_coupled, system, branch),
+                )
+            make, solved, coupled = makers
+            yield StateEquation(*self.origin((branch,)), make, state.name, symbol, state.unit, solved, coupled)
 
     def _integral_row(self, branch: int) -> Sides:
         link = branch in self.form.tree.loops
@@ -222,6 +219,22 @@ class _Writer:
             yield f"{self.part(branch)} closes a loop of couplings of unequal ratio and holds {names} at rest."
         if tree.frozen:
             yield "Ratios cancel for the given values; other ratios change the structure of these equations."
+
+
+def _always() -> bool:
+    return True
+
+
+def _row(system: Callable[[], System], branch: int) -> Sides:
+    return system().row(branch)
+
+
+def _solved(system: Callable[[], System], branch: int) -> bool:
+    return system().solved(branch)
+
+
+def _coupled(system: Callable[[], System], branch: int) -> Sides:
+    return system().coupled(branch)
 
 
 def _listed(names: Iterable[str]) -> str:

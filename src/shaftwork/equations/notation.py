@@ -48,9 +48,31 @@ WORDS = {
 """The quantities of the domains in words."""
 PECULIAR = re.compile(r"[^A-Za-z0-9.,:;()-]")
 """Characters that are not printed in text as they are."""
-GREEK = (
-    "alpha beta gamma delta epsilon zeta eta theta iota kappa lamda mu nu xi pi rho sigma tau upsilon phi chi psi omega"
-).split()
+GREEK = [
+    "alpha",
+    "beta",
+    "gamma",
+    "delta",
+    "epsilon",
+    "zeta",
+    "eta",
+    "theta",
+    "iota",
+    "kappa",
+    "lamda",
+    "mu",
+    "nu",
+    "xi",
+    "pi",
+    "rho",
+    "sigma",
+    "tau",
+    "upsilon",
+    "phi",
+    "chi",
+    "psi",
+    "omega",
+]
 
 
 @dataclass(frozen=True)
@@ -209,13 +231,13 @@ def _quantity_letters(form: StateForm, quantities: Quantities) -> Iterator[tuple
             template = graph.branches[index].template
             if several and template.kind is Kind.THROUGH_STORE:
                 yield flow.part, _letter(quantities.store(index), quantity, _mark(template.label, quantity))
-    for branch in graph.branches:
-        if branch.template.kind is Kind.ACROSS_SOURCE:
-            domain = quantities.domain((branch.plus, branch.minus))
-            yield branch.part, _letter(quantities.integral(branch.index), domain.integral)
-        if branch.terms:
-            quantity = quantities.multiplier_quantity(branch.index)
-            yield branch.part, _letter(quantities.multiplier(branch.index), quantity, _mark(branch.template.label))
+    for made in graph.branches:
+        if made.template.kind is Kind.ACROSS_SOURCE:
+            domain = quantities.domain((made.plus, made.minus))
+            yield made.part, _letter(quantities.integral(made.index), domain.integral)
+        if made.terms:
+            quantity = quantities.multiplier_quantity(made.index)
+            yield made.part, _letter(quantities.multiplier(made.index), quantity, _mark(made.template.label))
     for state in form.states:
         if state.kind == "integral":
             part = graph.branches[state.branch].part

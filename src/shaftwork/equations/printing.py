@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 
-from sympy import Expr, Float, Integer, Symbol
+from sympy import Expr, Float, Integer, Piecewise, Symbol
 from sympy.printing.latex import LatexPrinter
 
 from shaftwork.components.laws import t as TIME
@@ -61,20 +60,43 @@ class Writer:
 
     Args:
         names: LaTeX of every symbol by name, in the order in which factors are printed.
+        parameters: names of the parameters among them; a sum of parameters is printed before the variable it multiplies.
         values: number of every parameter that is printed by its value; empty to print symbols.
     """
 
-    def __init__(self, names: Mapping[str, str], values: Mapping[str, float] = MappingProxyType({})) -> None:
+    def __init__(self, names: Mapping[str, str], parameters: Collection[str], values: Mapping[str, float]) -> None:
         self._values = {Symbol(name, real=True): _number(value) for name, value in values.items()}
         self._ordered = {Symbol(name, real=True): Symbol(f"{k:07d}", real=True) for k, name in enumerate(names)}
         printed = dict(zip(self._ordered.values(), names.values(), strict=True))
-        self._printer = _Printer({"symbol_names": {**printed, TIME: "t"}, "mul_symbol": r" \, "})
+        self._parameters = {Symbol(name, real=True) for name in parameters}
+        self._sums: dict[Expr, Symbol] = {}
+        self._symbol_names = {**printed, TIME: "t"}
+        self._printer = _Printer({"symbol_names": self._symbol_names, "mul_symbol": r" \, "})
 
     def latex(self, expression: Expr) -> str:
         """An expression in LaTeX."""
         if self._values and not self._values.keys().isdisjoint(expression.free_symbols):
             expression = _rounded(expression.xreplace(self._values))
-        return str(self._printer.doprint(expression.xreplace(self._ordered)))
+        return str(self._printer.doprint(self._in_order(expression).xreplace(self._ordered)))
+
+    def _in_order(self, expression: Expr) -> Expr:
+        """The expression with sums of parameters that multiply something as symbols, so that they are sorted as such."""
+        if not expression.args or expression.is_Atom or isinstance(expression, Piecewise):
+            return expression
+        parts = [self._in_order(part) for part in expression.args]
+        over = [part for part in parts if not (part.is_Number or (part.is_Pow and part.exp.is_negative))]
+        if expression.is_Mul and len(over) > 1:
+            parts = [self._as_symbol(part) if part.is_Add else part for part in parts]
+        return expression.func(*parts)
+
+    def _as_symbol(self, total: Expr) -> Expr:
+        if not total.free_symbols <= self._parameters:
+            return total
+        if total not in self._sums:
+            self._sums[total] = Symbol(f"{len(self._parameters) - 1:07d} {len(self._sums)}", real=True)
+            inner = self._printer.doprint(total.xreplace(self._ordered))
+            self._symbol_names[self._sums[total]] = rf"\left({inner}\right)"
+        return self._sums[total]
 
     def line(self, sides: Sides, remark: str = "") -> Line:
         """A row of the equations."""

@@ -124,17 +124,24 @@ class StateEquation(Row):
         symbol: its symbol.
         unit: its SI unit.
         solved: makes `explicit`.
+        make_coupled: makes `coupled`.
     """
 
     name: str
     symbol: Symbol
     unit: str
     solved: Callable[[], bool]
+    make_coupled: Callable[[], Sides]
 
     @cached_property
     def explicit(self) -> bool:
         """False where more rates are coupled than are solved symbolically; the left side then holds them all."""
         return self.solved()
+
+    @cached_property
+    def coupled(self) -> Sides:
+        """The row before it is solved: where several rates stand in it, it is far shorter so."""
+        return self.make_coupled()
 
     @property
     def rate(self) -> Expr:

@@ -13,14 +13,14 @@ from shaftwork.equations.printing import aligned
 from shaftwork.equations.records import Equations, Form
 from shaftwork.equations.series import shortened
 
-
 PREAMBLE = r"""\documentclass[11pt,a4paper]{article}
 \usepackage[T1]{fontenc}
 \usepackage[margin=25mm]{geometry}
 \usepackage{amsmath}
 \usepackage{booktabs}
 \usepackage{longtable}
-\allowdisplaybreaks"""
+\allowdisplaybreaks
+\setcounter{LTchunksize}{1000} % column widths are right after one run"""
 BEGIN = r"""\date{}
 \begin{document}
 \maketitle"""

@@ -54,13 +54,16 @@ class System:
         """The equation of an unknown, solved where its block is small."""
         block = self.blocks[unknown]
         if not self.solved(unknown):
-            left = (
-                self.matrix[unknown, other] * self.symbol(other) for other in block if (unknown, other) in self.matrix
-            )
-            return sides(Add(*left), self.right(unknown))
+            return self.coupled(unknown)
         factors = self._inverse_row(block, block.index(unknown))
         groups = (Group(factor, rising_first(self.right(other))) for factor, other in zip(factors, block, strict=True))
         return Sides(self.symbol(unknown), tuple(group for group in groups if group.factor != 0 and group.terms))
+
+    def coupled(self, unknown: int) -> Sides:
+        """The equation of an unknown with all unknowns that it contains on the left."""
+        block = self.blocks[unknown]
+        left = (self.matrix[unknown, other] * self.symbol(other) for other in block if (unknown, other) in self.matrix)
+        return sides(Add(*left), self.right(unknown))
 
     def _inverse_row(self, block: Sequence[int], place: int) -> tuple[Expr, ...]:
         if len(block) == 1:

@@ -6,6 +6,7 @@ import math
 
 from shaftwork.components.rotation import Inertia, Spring
 from shaftwork.components.sources import TorqueSource
+from shaftwork.core.errors import ParameterError
 from shaftwork.pipeline.network import Network
 from shaftwork.scenes.catalog import Scene, enter
 
@@ -32,7 +33,12 @@ def shaft_chain(
         shear_modulus: Pa.
         damping: of each spring, N m s/rad.
         torque: the step, N m.
+
+    Raises:
+        ParameterError: m is less than 2.
     """
+    if m < 2:
+        raise ParameterError(f"shaft_chain: m = {m} elements make no shaft; give 2 or more.")
     polar = math.pi * DIAMETER**4 / 32
     stiffness = shear_modulus * polar / (LENGTH / (m - 1))
     net = Network("shaft chain")

@@ -1,0 +1,75 @@
+"""Declared parameters: bounds, units, laws, and what the constructor says of wrong arguments."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pint
+import pytest
+
+import shaftwork as sw
+from shaftwork.core.parameters import Parameter
+
+
+def problem_of(part: sw.Component) -> str:
+    net = sw.Network("one part")
+    net.add(part, *[f"n{k}" for k in range(len(part.ports))])
+    return str(next(problem for problem in net.check() if problem.severity == "error" and part.name in problem.parts))
+
+
+@pytest.mark.parametrize(
+    ("part", "words"),
+    [
+        (sw.Inertia("J1", J=-1.0), ("J1", "J", "at least 0", "-1")),
+        (sw.Inertia("J1", J=math.nan), ("J1", "finite")),
+        (sw.Inertia("J1", J=math.inf), ("J1", "finite")),
+        (sw.Inertia("J1", J="heavy"), ("J1", "number", "heavy")),
+        (sw.Inertia("J1", J=None), ("J1", "number")),
+        (sw.Inertia("J1", J=True), ("J1", "number")),
+        (sw.Inertia("J1", J=[1.0, 2.0]), ("J1", "number", "list")),
+        (sw.Inertia("J1", J=sw.t), ("J1", "number")),
+        (sw.Inertia("J1", J=1 + 2j), ("J1", "number")),
+    ],
+)
+def test_a_value_that_cannot_be_is_named_with_its_part_and_bound(part: sw.Component, words: tuple[str, ...]) -> None:
+    message = problem_of(part)
+    for word in words:
+        assert word in message
+
+
+def test_a_wrong_or_missing_argument_is_answered_with_the_parameters() -> None:
+    with pytest.raises(sw.ParameterError, match=r"J \[kg\*m\^2\] moment of inertia"):
+        sw.Inertia("J1", j=1.0)
+    with pytest.raises(sw.ParameterError, match="Spring 'shaft'.*missing.*'c'"):
+        sw.Spring("shaft", d=1.0)
+    with pytest.raises(sw.ParameterError, match="no parameters"):
+        sw.Ground("frame", J=1.0)
+
+
+def test_quantities_with_units_are_converted_and_wrong_units_are_refused() -> None:
+    unit = pint.UnitRegistry()
+    net = sw.Network("units")
+    net.add(sw.Inertia("J1", J=10000.0 * unit.g * unit.m**2), "a")
+    net.add(sw.TorqueSource("T", tau=0.02 * unit.kN * unit.m), "a")
+    net.add(sw.KlossMotor("M", tau_k=9.6 * unit.N * unit.m, s_k=0.25, n_sync=3000 / unit.minute), "a")
+    model = net.compile()
+    assert model.parameters["J1.J"] == pytest.approx(10.0)
+    assert model.parameters["T.tau"] == pytest.approx(20.0)
+    assert model.parameters["M.n_sync"] == pytest.approx(3000.0)
+    assert "kg*m^2" in problem_of(sw.Inertia("J1", J=3.0 * unit.kg))
+    assert "N*m/rad" in problem_of(sw.Spring("s", c=3.0 * unit.N / unit.m))
+
+
+def test_numpy_and_integer_values_are_numbers() -> None:
+    net = sw.Network("numbers")
+    net.add(sw.Inertia("J1", J=np.float32(2.0)), "a")
+    net.add(sw.Inertia("J2", J=np.array(3)), "a")
+    net.add(sw.Inertia("J3", J=4), "a")
+    assert list(net.compile().parameters.values()) == [2.0, 3.0, 4.0]
+
+
+def test_bounds_read_as_words() -> None:
+    assert Parameter("eta", "1", "efficiency", above=0, at_most=1).bounds == "above 0 and at most 1"
+    assert Parameter("i", "1", "ratio", nonzero=True).bounds == "not zero"
+    assert Parameter("x", "m", "place").bounds == ""

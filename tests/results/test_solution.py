@@ -1,0 +1,107 @@
+"""What can be asked of a motion: quantities, energy, tables, curves."""
+
+from __future__ import annotations
+
+import builtins
+from typing import Any
+
+import numpy as np
+import pytest
+
+import shaftwork as sw
+
+
+@pytest.fixture(scope="module")
+def sol() -> sw.Solution:
+    return sw.scenes.crane_start().simulate(t_end=2.0, t_eval=201)
+
+
+def test_every_quantity_has_a_value_at_every_time_and_a_unit(sol: sw.Solution) -> None:
+    assert set(sol) == set(sol.names)
+    for name in sol.names:
+        assert sol[name].shape == sol.t.shape
+        assert np.isfinite(sol[name]).all()
+        assert sol.observer.units[name]
+    assert "shaft.tau" in sol
+    assert "shaft.length" not in sol
+
+
+def test_a_quantity_that_does_not_exist_is_answered_with_those_that_do(sol: sw.Solution) -> None:
+    with pytest.raises(sw.SignalError, match=r"'shaft' has: .*shaft\.tau"):
+        sol["shaft.torque"]
+    with pytest.raises(sw.SignalError, match="shaft"):
+        sol["shaf.tau"]
+    with pytest.raises(sw.SignalError, match=r"angles=\['J2'\]"):
+        sol["J2.phi"]
+
+
+def test_twist_is_torque_over_stiffness_and_node_speeds_are_part_speeds(sol: sw.Solution) -> None:
+    assert sol["shaft.phi_rel"] == pytest.approx(sol["shaft.tau_c"] / 24206.0)
+    assert sol["wheel.omega"] == pytest.approx(sol["J2.omega"])
+    assert sol["shaft.tau"] == pytest.approx(sol["shaft.tau_c"] + 14.0 * sol["shaft.omega_rel"])
+
+
+def test_energy_is_supplied_stored_and_lost(sol: sw.Solution) -> None:
+    balance = sol.energy
+    assert sol.energy_residual < 1e-10
+    stored = sol["J1.energy"] + sol["J2.energy"] + sol["shaft.energy"]
+    assert balance.stored[-1] == pytest.approx(stored[-1], rel=1e-9)
+    assert balance.supplied[-1] > balance.lost[-1] > 0
+    assert balance.work >= balance.supplied[-1]
+
+
+def test_power_at_the_ports_sums_to_zero(sol: sw.Solution) -> None:
+    powers = np.array([sol[f"{name}.power"] for name in ("motor", "J1", "shaft", "J2", "load")])
+    assert np.abs(powers.sum(axis=0)).max() < 1e-12 * np.abs(powers).max()
+
+
+def test_other_times_come_from_the_dense_output_and_outside_times_are_refused(sol: sw.Solution) -> None:
+    assert sol.at([0.5])["shaft.tau"][0] == pytest.approx(sol["shaft.tau"][50], rel=1e-8)
+    with pytest.raises(sw.SignalError, match="from t = 0 s to 2 s"):
+        sol.at([2.5])
+
+
+def test_tables_hold_the_named_quantities_with_units(sol: sw.Solution) -> None:
+    frame = sol.to_pandas("shaft.tau", "J2.omega")
+    assert list(frame.columns) == ["shaft.tau", "J2.omega"]
+    assert frame.index.name == "t"
+    data = sol.to_xarray()
+    assert set(data.data_vars) == set(sol.names)
+    assert data["shaft.tau"].attrs["units"] == "N*m"
+    assert data.attrs["engine"] == sol.engine
+
+
+def test_curves_share_an_axis_by_unit(sol: sw.Solution) -> None:
+    figure = sol.plot("shaft.tau", "motor.tau", "J2.omega")
+    assert [axis.get_ylabel() for axis in figure.axes] == ["N m", "rad/s"]
+    assert [len(axis.get_lines()) for axis in figure.axes] == [2, 1]
+    assert sol.plot().axes
+    with pytest.raises(sw.SignalError):
+        sol.plot("shaft.torque")
+
+
+def test_a_missing_library_is_named_with_the_extra_that_brings_it(
+    sol: sw.Solution, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = builtins.__import__
+
+    def absent(name: str, *args: Any, **kwargs: Any) -> Any:
+        if name.split(".")[0] in ("matplotlib", "pandas", "xarray"):
+            raise ImportError(name)
+        return real(name, *args, **kwargs)
+
+    monkeypatch.setattr(builtins, "__import__", absent)
+    for name in ("pandas", "xarray"):
+        monkeypatch.setitem(__import__("sys").modules, name, None)
+    with pytest.raises(sw.MissingExtraError, match=r"shaftwork\[plot\]"):
+        sol.plot()
+    with pytest.raises(sw.MissingExtraError, match=r"shaftwork\[data\]"):
+        sol.to_pandas()
+    with pytest.raises(sw.MissingExtraError, match=r"shaftwork\[data\]"):
+        sol.to_xarray()
+
+
+def test_a_solution_says_what_it_is(sol: sw.Solution) -> None:
+    assert "crane start" in repr(sol)
+    assert sol.engine in repr(sol)
+    assert sol.events == ()

@@ -1,0 +1,69 @@
+"""The scenes against what their sources print."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import shaftwork as sw
+from shaftwork.scenes.crane import RATED_SPEED, RATED_TORQUE, WHEEL_RADIUS
+from shaftwork.scenes.shaft_chain import PRINTED_SHEAR_MODULUS
+from tests.reference.mna import Piece, spectrum
+
+
+@pytest.mark.parametrize("name", list(sw.scenes.SCENES))
+def test_every_scene_runs_to_its_end_with_its_signals(name: str) -> None:
+    scene = sw.scenes.SCENES[name]
+    sol = scene().simulate(scene.t_end)
+    assert sol.t[-1] == scene.t_end
+    for signal in scene.signals:
+        assert np.isfinite(sol[signal]).all()
+    assert sol.energy_residual < 1e-8
+    assert scene.source
+    assert scene.chosen
+
+
+def test_the_crane_travels_at_about_1_08_m_s_after_about_5_s() -> None:
+    sol = sw.scenes.crane_start().simulate(12.0)
+    speed = WHEEL_RADIUS * sol["J2.omega"]
+    assert speed[-1] == pytest.approx(1.08, abs=0.01)
+    reached = sol.t[np.argmax(speed > 0.98 * speed[-1])]
+    assert reached == pytest.approx(5.0, abs=0.25)
+    assert sol["shaft.tau"][-1] == pytest.approx(22.4, abs=0.2)
+
+
+def test_the_crane_motor_passes_through_its_rated_point() -> None:
+    motor = sw.scenes.crane_start().parts[0]
+    slip = 1 - RATED_SPEED / motor.n_sync
+    assert 2 * motor.tau_k / (slip / motor.s_k + motor.s_k / slip) == pytest.approx(RATED_TORQUE)
+
+
+def test_the_chain_has_the_frequencies_of_its_elements_and_nears_the_exact_shaft() -> None:
+    exact = np.array([38.88573365, 1567.02210303])  # Hz: transcendental equation of the lossless shaft
+    errors = []
+    for m in (10, 20, 40):
+        net = sw.scenes.shaft_chain(m)
+        model = net.compile()
+        values = np.linalg.eigvals(model.jacobian(0.0, np.zeros(len(model.states))).toarray())
+        ours = np.sort(values.imag[values.imag > 1.0]) / (2 * np.pi)
+        pieces = [
+            Piece(type(p.part).__name__, p.part.name, p.nodes, {k: float(v) for k, v in p.part.values.items()})
+            for p in net.netlist().placed
+        ]
+        referee = spectrum(pieces)
+        assert ours == pytest.approx(np.sort(referee.imag[referee.imag > 1.0]) / (2 * np.pi), rel=1e-9)
+        errors.append(np.abs(ours[:2] / exact - 1))
+    # equal lumps at the ends carry half an element too much: first order
+    for coarse, fine in zip(errors[:-1], errors[1:], strict=True):
+        assert 1.7 < coarse[1] / fine[1] < 2.5
+
+
+def test_the_printed_shear_modulus_is_offered() -> None:
+    soft = sw.scenes.shaft_chain(5, shear_modulus=PRINTED_SHEAR_MODULUS).compile()
+    hard = sw.scenes.shaft_chain(5).compile()
+    assert hard.parameters["c1.c"] == pytest.approx(10 * soft.parameters["c1.c"])
+
+
+def test_a_chain_needs_two_elements() -> None:
+    with pytest.raises(sw.ParameterError, match="2 or more"):
+        sw.scenes.shaft_chain(1)
