@@ -41,7 +41,7 @@ def test_a_value_that_cannot_be_is_named_with_its_part_and_bound(part: sw.Compon
 def test_a_wrong_or_missing_argument_is_answered_with_the_parameters() -> None:
     with pytest.raises(sw.ParameterError, match=r"J \[kg\*m\^2\] moment of inertia"):
         sw.Inertia("J1", j=1.0)
-    with pytest.raises(sw.ParameterError, match="Spring 'shaft'.*missing.*'c'"):
+    with pytest.raises(sw.ParameterError, match=r"Spring 'shaft'.*missing.*'c'"):
         sw.Spring("shaft", d=1.0)
     with pytest.raises(sw.ParameterError, match="no parameters"):
         sw.Ground("frame", J=1.0)

@@ -22,7 +22,7 @@ def network_of(pieces: tuple[Piece, ...]) -> sw.Network:
 
 
 @given(networks(max_inertias=6))
-def test_a_saved_and_loaded_network_is_the_same_network(tmp_path_factory: pytest.TempPathFactory, pieces: tuple) -> None:
+def test_a_loaded_network_is_the_saved_one(tmp_path_factory: pytest.TempPathFactory, pieces: tuple) -> None:
     net = network_of(pieces)
     path = tmp_path_factory.mktemp("models") / "net.toml"
     net.save(path)

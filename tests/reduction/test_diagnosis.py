@@ -257,6 +257,14 @@ def test_ratios_beyond_what_numbers_hold_are_named(ratio: float) -> None:
     assert problem.parts == ("g0", "g1", "g2")
 
 
+def test_ratios_that_vanish_while_the_states_are_chosen_are_named() -> None:
+    gears = [part("Gear", f"g{k}", f"n{k}", f"n{k + 1}", ratio=1e-200) for k in (1, 0)]
+    graph, form, said = diagnose(Netlist("vanishing", (*gears, part("Damper", "d", "n0", d=1.0))))
+    assert graph is not None
+    assert form is None
+    assert [(problem.kind, problem.parts) for problem in said][1:] == [("extreme ratios", ("g1", "g0"))]
+
+
 def test_ratios_that_are_only_large_are_allowed() -> None:
     gears = [part("Gear", f"g{k}", f"n{k}", f"n{k + 1}", ratio=1e6) for k in range(3)]
     inertias = [part("Inertia", f"I{k}", f"n{k}", J=1.0) for k in range(4)]

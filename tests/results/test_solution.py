@@ -86,7 +86,7 @@ def test_a_missing_library_is_named_with_the_extra_that_brings_it(
     real = builtins.__import__
 
     def absent(name: str, *args: Any, **kwargs: Any) -> Any:
-        if name.split(".")[0] in ("matplotlib", "pandas", "xarray"):
+        if name.split(".", 1)[0] in ("matplotlib", "pandas", "xarray"):
             raise ImportError(name)
         return real(name, *args, **kwargs)
 

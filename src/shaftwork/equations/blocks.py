@@ -53,7 +53,7 @@ class Blocks:
         """Balances, loops, couplings and laws."""
         equations = self.equations
         domains = dict.fromkeys(equations.form.graph.domains)
-        balanced = " and ".join(BALANCES[domain] for domain in domains)
+        balanced = " and ".join(", ".join(BALANCES[domain] for domain in domains).rsplit(", ", 1))
         yield Block(f"Balance of {balanced} at the nodes", tuple(self._lines(equations.nodes)))
         yield Block("Speeds around the loops", tuple(self._lines(equations.loops)))
         yield Block("Ideal couplings", tuple(self._lines(equations.couplings)))
@@ -115,7 +115,10 @@ class Blocks:
         order = sorted(names, key=lambda name: name not in parameters)
         ordered = with_rates({name: names[name] for name in order})
         values = graph.parameters if self.values else {}
-        return Writer({**ordered, **_dotted(self.equations)}, frozenset(parameters), values)
+        printed = {**ordered, **_dotted(self.equations)}
+        angles = map(self.equations.assembly.quantities.angle, range(len(graph.nodes)))
+        last = {name for name in printed if name.startswith("der(")} | {angle.name for angle in angles}
+        return Writer(printed, parameters, last, values)
 
     def _lines(self, rows: Iterable[Row]) -> Iterator[Line]:
         seen: dict[str, None] = {}

@@ -103,20 +103,21 @@ class _Writer:
 
     def states(self) -> Iterator[StateEquation]:
         for state in self.form.states:
-            branch, symbol = state.branch, Symbol(state.name, real=True)
-            makers: tuple[Callable[[], Sides], Callable[[], bool], Callable[[], Sides]]
+            branch, named = state.branch, (state.name, Symbol(state.name, real=True), state.unit)
+            origin = self.origin((branch,))
             if state.kind == "integral":
                 row = partial(self._integral_row, branch)
-                makers = (row, _always, row)
+                yield StateEquation(*origin, row, *named, _always, row)
             else:
-                system = partial(getattr, self.solution, "speeds" if state.kind == "across" else "torques")
-                makers = (
-                    partial(_row, system, branch),
-                    partial(_solved, system, branch),
-                    partial(_coupled, system, branch),
-                )
-            make, solved, coupled = makers
-            yield StateEquation(*self.origin((branch,)), make, state.name, symbol, state.unit, solved, coupled)
+                system = self._speeds if state.kind == "across" else self._torques
+                row, coupled = partial(_row, system, branch), partial(_coupled, system, branch)
+                yield StateEquation(*origin, row, *named, partial(_solved, system, branch), coupled)
+
+    def _speeds(self) -> System:
+        return self.solution.speeds
+
+    def _torques(self) -> System:
+        return self.solution.torques
 
     def _integral_row(self, branch: int) -> Sides:
         link = branch in self.form.tree.loops

@@ -1,8 +1,8 @@
 """Lagrange's equations of a mechanical network, from its energies alone.
 
 An independent way to the second-order form: coordinates come from the couplings by linear algebra, the equations from
-differentiating kinetic and potential energy, Rayleigh's dissipation function and virtual work. Neither the normal tree nor
-the matrices of the second-order form are used. Source: Abdelkader 2016, (18)-(31).
+differentiating kinetic and potential energy, Rayleigh's dissipation function and virtual work. Neither the normal tree
+nor the matrices of the second-order form are used. Source: Abdelkader 2016, (18)-(31).
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class _Energies:
         return Add(*(position.diff(symbol) * speed for symbol, speed in self.speeds.items()))
 
     def energy(self, kind: Kind, of: int) -> Expr:
-        """Half the sum of coefficient times square of the position (`of` 0) or speed (1) across all branches of a kind."""
+        """Half the sum of coefficient times square of the position (`of` 0) or speed (1) across branches of a kind."""
         branches = (branch for branch in self.graph.branches if branch.template.kind is kind)
         squares = (self.quantities.law(branch.index) * self.across(branch)[of] ** 2 for branch in branches)
         return Rational(1, 2) * Add(*squares)

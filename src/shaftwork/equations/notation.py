@@ -17,7 +17,7 @@ from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
 
 INDEX_OPENS, INDEX_CLOSES = "\ue000", "\ue001"
-"""Marks around the number at the end of a subscript, so that rows that differ by it alone are recognised; never printed."""
+"""Marks around the number at the end of a subscript, to recognise rows that differ by it alone; never printed."""
 
 ESCAPES = {
     "\\": r"\backslash ",
@@ -48,31 +48,11 @@ WORDS = {
 """The quantities of the domains in words."""
 PECULIAR = re.compile(r"[^A-Za-z0-9.,:;()-]")
 """Characters that are not printed in text as they are."""
-GREEK = [
-    "alpha",
-    "beta",
-    "gamma",
-    "delta",
-    "epsilon",
-    "zeta",
-    "eta",
-    "theta",
-    "iota",
-    "kappa",
-    "lamda",
-    "mu",
-    "nu",
-    "xi",
-    "pi",
-    "rho",
-    "sigma",
-    "tau",
-    "upsilon",
-    "phi",
-    "chi",
-    "psi",
-    "omega",
-]
+GREEK = frozenset(  # only asked for membership
+    "alpha beta gamma delta epsilon zeta eta theta iota kappa lamda mu nu xi pi rho sigma tau upsilon phi chi psi omega"
+    .split(" ")
+)
+"""Small Greek letters, as Unicode spells them."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +116,7 @@ def split_index(name: str) -> tuple[str, str]:
 
 
 def escaped(name: str) -> str:
-    """Any text as LaTeX that compiles inside `\\mathrm`: signs are escaped, accents dropped, the rest is named."""
+    """Any text as LaTeX for an upright font in a formula: signs are escaped, accents dropped, the rest is named."""
     return "".join(_escape(character) for character in unicodedata.normalize("NFKC", name))
 
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from sympy import Expr, Float, Integer, Piecewise, Symbol
+from sympy import Expr, Float, Integer, Piecewise, Pow, Symbol
 from sympy.printing.latex import LatexPrinter
 
 from shaftwork.components.laws import t as TIME
@@ -14,7 +14,7 @@ from shaftwork.equations.assembly import Group, Sides
 from shaftwork.equations.notation import INDEX_CLOSES, INDEX_OPENS
 from shaftwork.equations.quantities import rate_of
 
-LINE_WIDTH = 78
+LINE_WIDTH = 64
 """Characters of ordinary width that fit on a printed line beside its left side."""
 DIGITS = 6
 """Significant digits of numbers in equations."""
@@ -45,6 +45,10 @@ class Line:
 class _Printer(LatexPrinter):  # type: ignore[misc]
     """sympy's printer with numbers as engineers write them."""
 
+    def _as_ordered_terms(self, expression: Expr, order: str | None = None) -> list[Expr]:
+        terms = super()._as_ordered_terms(expression, order)
+        return sorted(terms, key=lambda term: bool(term.could_extract_minus_sign()))
+
     def _print_Float(self, number: Float) -> str:
         return printed_number(float(number))
 
@@ -60,11 +64,15 @@ class Writer:
 
     Args:
         names: LaTeX of every symbol by name, in the order in which factors are printed.
-        parameters: names of the parameters among them; a sum of parameters is printed before the variable it multiplies.
+        parameters: names of the parameters among them; their sums are printed before the variable that they multiply.
+        last: names of the variables that stand behind a fraction, not above it: rates and coordinates.
         values: number of every parameter that is printed by its value; empty to print symbols.
     """
 
-    def __init__(self, names: Mapping[str, str], parameters: Collection[str], values: Mapping[str, float]) -> None:
+    def __init__(
+        self, names: Mapping[str, str], parameters: Collection[str], last: Collection[str], values: Mapping[str, float]
+    ) -> None:
+        self._last = {Symbol(name, real=True) for name in last}
         self._values = {Symbol(name, real=True): _number(value) for name, value in values.items()}
         self._ordered = {Symbol(name, real=True): Symbol(f"{k:07d}", real=True) for k, name in enumerate(names)}
         printed = dict(zip(self._ordered.values(), names.values(), strict=True))
@@ -80,7 +88,7 @@ class Writer:
         return str(self._printer.doprint(self._in_order(expression).xreplace(self._ordered)))
 
     def _in_order(self, expression: Expr) -> Expr:
-        """The expression with sums of parameters that multiply something as symbols, so that they are sorted as such."""
+        """The expression with every sum of parameters that multiplies something as a symbol, to be sorted as such."""
         if not expression.args or expression.is_Atom or isinstance(expression, Piecewise):
             return expression
         parts = [self._in_order(part) for part in expression.args]
@@ -101,7 +109,9 @@ class Writer:
     def line(self, sides: Sides, remark: str = "") -> Line:
         """A row of the equations."""
         pieces = self.pieces(sides.groups)
-        return Line(self.latex(sides.left), pieces or ("0",), remark)
+        terms = sorted(sides.left.args, key=self._rank) if sides.left.is_Add else [sides.left]
+        left = " ".join(self.pieces((Group(Integer(1), tuple(terms)),)))
+        return Line(left, pieces or ("0",), remark)
 
     def pieces(self, groups: Iterable[Group]) -> tuple[str, ...]:
         """The terms of all groups, each with its sign, the first without a plus."""
@@ -119,8 +129,20 @@ class Writer:
         inside[-1] = f"{inside[-1]} {CLOSES}"
         return inside
 
+    def _rank(self, term: Expr) -> str:
+        """Sorts the terms of a left side by the rates that they contain."""
+        return min((self._ordered[symbol].name for symbol in term.free_symbols & self._last), default="")
+
+    def _product(self, term: Expr) -> str:
+        """A term with a rate or coordinate behind its coefficient."""
+        behind = [factor for factor in term.args if factor in self._last] if term.is_Mul else []
+        if len(behind) != 1 or not (coefficient := term / behind[0]).has(Pow):
+            return self.latex(term)
+        text = self.latex(coefficient)
+        return rf"{rf'\left({text}\right)' if coefficient.is_Add else text} \, {self.latex(behind[0])}"
+
     def _signed(self, term: Expr) -> str:
-        text = self.latex(term)
+        text = self._product(term)
         return f"- {text[1:].lstrip()}" if text.startswith("-") else f"+ {text}"
 
 
@@ -142,11 +164,17 @@ def _rounded(expression: Expr) -> Expr:
 
 def aligned(lines: Sequence[Line]) -> str:
     """Lines as the rows of an aligned block, broken where they are too long for the page."""
-    return " \\\\\n".join(row for line in lines for row in _broken(line))
+    broken = [" \\\\\n".join(_broken(line)) for line in lines]
+    return "".join(
+        text + ("" if place == len(broken) else " \\\\[1ex]\n" if "\n" in text else " \\\\\n")
+        for place, text in enumerate(broken, 1)
+    )
 
 
 def _broken(line: Line) -> list[str]:
     """The rows of a line: as many pieces on each as there is room for."""
+    if 2 * printed_width(line.left) > LINE_WIDTH:
+        return [f"& {line.left}", *(f"&\\qquad {row[1:]}" for row in _broken(replace(line, left="")))]
     room = LINE_WIDTH - printed_width(line.left)
     rows: list[list[str]] = [[]]
     used = 0.0
@@ -174,7 +202,9 @@ def _bracketed(text: str, *, whole: bool) -> str:
 
 
 def printed_width(latex: str) -> float:
-    """About how many ordinary characters wide a formula is in print; subscripts are smaller, fractions as wide as their wider part."""
+    """About how many ordinary characters wide a formula is in print: subscripts are smaller, a fraction is as wide as
+    its wider part, signs have room around them.
+    """
     text = latex.replace(INDEX_OPENS, "").replace(INDEX_CLOSES, "")
     while match := FRACTION.search(text):
         wider = max(match.groups(), key=printed_width)
@@ -182,16 +212,12 @@ def printed_width(latex: str) -> float:
     while match := SUBSCRIPT.search(text):
         small = "x" * round(0.65 * printed_width(match.group(1)))
         text = f"{text[: match.start()]}{small}{text[match.end() :]}"
-    return float(
-        len(
-            re.sub(
-                r"\\(left|right|mathrm|text|operatorname|begin|end|quad|[,;!\s])|[{}&]|\s+", "", COMMAND.sub("x", text)
-            )
-        )
-    )
+    spaced = len(re.findall(r" [+=-] ", text))
+    return len(INVISIBLE.sub("", COMMAND.sub("x", text))) + spaced
 
 
 INNER = r"((?:[^{}]|\{[^{}]*\})*)"
 FRACTION = re.compile(r"\\frac\{" + INNER + r"\}\{" + INNER + r"\}")
 SUBSCRIPT = re.compile(r"[_^]\{" + INNER + r"\}")
 COMMAND = re.compile(r"\\(?!left|right|mathrm|text|operatorname|begin|end|quad)[A-Za-z]+")
+INVISIBLE = re.compile(r"\\(left|right|mathrm|text|operatorname|begin|end|quad|[,;!\s])|[{}&]|\s+")

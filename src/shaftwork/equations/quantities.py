@@ -1,7 +1,8 @@
 """Which sympy symbol stands for which quantity of a network: node speeds, speeds across parts, torques, angles.
 
-Symbols carry the names under which results are read ("J1.omega", "shaft.tau"), so that an equation and a signal that share a
-name share a sign: the torque of a source is the one that it gives to its node, that of a spring goes from node a to node b.
+Symbols carry the names under which results are read ("J1.omega", "shaft.tau"), so that an equation and a signal that
+share a name share a sign: the torque of a source is the one that it gives to its node, that of a spring goes from its
+node a to its node b.
 """
 
 from __future__ import annotations
@@ -116,7 +117,7 @@ class Quantities:
         return Symbol(f"{self.graph.part_of(branch).name}.{quantity.name}", real=True)
 
     def through(self, flow: Flow) -> Symbol:
-        """The through variable of a flow: the state, where it is a lone store, or a parameter, where that is all its law."""
+        """The through variable of a flow: a state, where it is a lone store; a parameter, where that is all its law."""
         first = self.graph.branches[flow.branches[0]]
         if len(flow.branches) == 1:
             if first.template.kind is Kind.THROUGH_STORE:
@@ -193,7 +194,7 @@ class Quantities:
         return self._named(branch.part, self.domain((branch.plus, branch.minus)).across, "")
 
     def _named(self, part: int, quantity: Quantity, label: str) -> Symbol:
-        """ "part.quantity", unless a parameter of the part has taken that name."""
+        """The symbol "part.quantity", or "quantity(part)" where a parameter of the part has taken that name."""
         owner = self.graph.parts[part].name
         ending = f"_{label}" if label else ""
         name = f"{owner}.{quantity.name}{ending}"

@@ -107,7 +107,7 @@ class LoopEquation(Row):
 
 @dataclass(frozen=True, eq=False)
 class LawEquation(Row):
-    """The law of a branch, or of the parallel branches of one part; that of an across store stands in its node's balance."""
+    """The law of a branch, or of the parallel branches of a part; that of an across store is in its node's balance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,7 +224,7 @@ class Equations:
         """The equations as the body of a LaTeX document (needs amsmath), or for a notebook cell.
 
         Args:
-            form: "kirchhoff" (balances, loops, laws), "state" (explicit rates) or "second-order"; by default the first two.
+            form: "kirchhoff" (balances, loops, laws), "state" (rates) or "second-order"; by default the first two.
             values: print the parameters' values instead of their symbols.
 
         Raises:
