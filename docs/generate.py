@@ -1,6 +1,7 @@
 """Makes what the pages show from the code: outputs of their examples, tables of components, help texts.
 
     python docs/generate.py             writes README.md and docs/*.md anew where something has changed
+    python docs/generate.py PAGE ...    these pages alone
 
 A page is Markdown. Its `python` blocks run from top to bottom in one namespace and in an empty folder; a `text`, `toml`
 or `latex` block right after one holds what it printed. A `console` block holds command lines after "$ " and what they
@@ -153,7 +154,8 @@ def _cells(item: Parameter | None) -> tuple[str, ...]:
         return ("", "", "", "", "")
     default = "required" if item.required else f"{item.default:g}"
     meaning = f"{item.meaning} (law)" if item.law else item.meaning
-    return (f"`{item.name}`", item.unit, item.bounds, default, meaning)
+    unit = item.unit.replace("*", "·").replace("^2", "²").replace("^3", "³")  # stars would be Markdown's
+    return (f"`{item.name}`", unit, item.bounds, default, meaning)
 
 
 def component_pages() -> str:
@@ -203,7 +205,7 @@ MADE: dict[str, Callable[[], str]] = {
 
 def main() -> None:
     """Write every page anew that differs from what the code makes of it."""
-    for page in PAGES:
+    for page in [Path(name).resolve() for name in sys.argv[1:]] or PAGES:
         text = page.read_text(encoding="utf-8")
         made = remade(page, text)
         if not same(text, made):

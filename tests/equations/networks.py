@@ -181,7 +181,9 @@ MECHANICAL: dict[str, Callable[[], NetworkBuilder]] = {
     ),
     "inertias in parallel": lambda: _two_inertias((Inertia("J3", J=4.0), "a"), (Spring("s", c=9.0), "a", "b")),
     "torque between two nodes": lambda: _two_inertias((TorqueSource("T", tau=3.0 * t), "a", "b")),
-    "prescribed speed": lambda: _two_inertias((Spring("s", c=9.0, d=1.0), "b", "d"), (SpeedSource("w", omega=7.0), "d")),
+    "prescribed speed": lambda: _two_inertias(
+        (Spring("s", c=9.0, d=1.0), "b", "d"), (SpeedSource("w", omega=7.0), "d")
+    ),
     "prescribed difference": lambda: _two_inertias((SpeedSource("w", omega=2.0 * t), "a", "b")),
     "prescribed speed behind gears": _driven_behind_gear,
     "planetary with held ring": lambda: _two_inertias(

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 from hypothesis import HealthCheck, given, settings
+from sympy import Symbol, cancel, expand, powsimp
+
 from shaftwork.core.errors import CompileError
 from shaftwork.equations.lagrange import Lagrangian, lagrangian
 from shaftwork.equations.second_order import SecondOrder, second_order
-from sympy import Symbol, cancel, expand, powsimp
-
 from tests.equations.networks import MECHANICAL, dc_drive, from_pieces, graph_of
 from tests.strategies import Network, networks
 
@@ -26,7 +26,7 @@ def test_lagranges_equations_are_the_second_order_form(name: str) -> None:
     assert_equal(second_order(graph), lagrangian(graph))
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(pieces=networks(max_inertias=6, electrical=False))
 def test_lagranges_equations_are_the_second_order_form_of_random_networks(pieces: Network) -> None:
     graph = graph_of(from_pieces(pieces))

@@ -7,8 +7,11 @@ it. The examples are the same in every run: a red test must mean a change of the
 from __future__ import annotations
 
 import os
+import signal
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from types import FrameType
 
 import numpy as np
 from hypothesis import HealthCheck, settings
@@ -31,6 +34,22 @@ def share_of_examples(share: float = 1.0) -> settings:
         derandomize=True,
         suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_base_example],
     )
+
+
+@contextmanager
+def processor_time_limit(seconds: float) -> Iterator[None]:
+    """Turn a hang into a failure: far more processor time than anything inside may need, however busy the machine."""
+
+    def give_up(_number: int, _frame: FrameType | None) -> None:
+        raise AssertionError(f"still running after {seconds:g} s of processor time")
+
+    before = signal.signal(signal.SIGVTALRM, give_up)
+    signal.setitimer(signal.ITIMER_VIRTUAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+        signal.signal(signal.SIGVTALRM, before)
 
 
 def network_of(pieces: Iterable[Piece], name: str = "random train") -> Network:

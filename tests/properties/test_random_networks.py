@@ -9,7 +9,7 @@ from hypothesis import given
 from scipy.optimize import linear_sum_assignment
 
 from shaftwork.components import REGISTRY
-from tests.properties.examples import Array, assert_equal_signals, compiled, share_of_examples
+from tests.properties.examples import Array, assert_equal_signals, compiled, processor_time_limit, share_of_examples
 from tests.reference import mna
 from tests.reference.mna import GROUND, TERMINALS, Piece
 from tests.strategies import Network, networks
@@ -71,7 +71,8 @@ def test_every_speed_and_every_torque_equals_that_of_the_referee() -> None:
     @given(networks())
     def compare(pieces: Network) -> None:
         inertias.append(sum(piece.type in ("Inertia", "Mass") for piece in pieces))
-        solution = compiled(pieces).simulate(TIMES[-1], t_eval=TIMES, engine="exact")
+        with processor_time_limit(30.0):
+            solution = compiled(pieces).simulate(TIMES[-1], t_eval=TIMES, engine="exact")
         response = mna.simulate(pieces, None, TIMES)
         wanted = _across(pieces, response) | dict(_through(pieces, response))
         assert_equal_signals({name: solution[name] for name in wanted}, wanted, 1e-7)

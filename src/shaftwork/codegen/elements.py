@@ -15,7 +15,7 @@ from shaftwork.components.laws import NUMERICAL
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.templates import BranchTemplate, Kind
 from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.gains import Gain, Number, value_of
+from shaftwork.reduction.gains import Gain, Number, coefficients_in, fold, value_of
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -88,20 +88,23 @@ class GainMatrix:
         self._columns = np.array([column for _, column, _ in entries], dtype=np.intp)
         self._data = np.array([value_of(gain) for _, _, gain in entries], dtype=float)
         self._shape = shape
-        variable = [(k, gain.exact) for k, (_, _, gain) in enumerate(entries) if isinstance(gain, Gain)]
+        variable = [(k, gain) for k, (_, _, gain) in enumerate(entries) if isinstance(gain, Gain)]
         self._variable = np.array([k for k, _ in variable], dtype=np.intp)
+        self._gains = tuple(gain for _, gain in variable)
+        self._coefficients = coefficients_in(self._gains)
         names = {name: k for k, name in enumerate(graph.parameters)}
-        found = {symbol.name: symbol for _, exact in variable for symbol in exact.free_symbols}
+        found = {symbol.name: symbol for made in self._coefficients for symbol in made.free_symbols}
         ordered = sorted(found, key=names.__getitem__)
         self._places = np.array([names[name] for name in ordered], dtype=np.intp)
         arguments = [[found[name] for name in ordered]]
-        self._function = lambdify(arguments, [exact for _, exact in variable], "numpy") if variable else None
+        self._function = lambdify(arguments, list(self._coefficients), "math") if variable else None
 
     def __call__(self, p: Array) -> Any:
         """The matrix as scipy.sparse.csr_array."""
         data = self._data.copy()
         if self._function is not None:
-            data[self._variable] = self._function(p[self._places])
+            values = dict(zip(self._coefficients, self._function(p[self._places].tolist()), strict=True))
+            data[self._variable] = fold(self._gains, values.__getitem__)
         return sparse.csr_array((data, (self._rows, self._columns)), shape=self._shape)
 
 

@@ -16,8 +16,8 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.rows import BlockTooLargeError, Rows, explicit_rows
 
-SCALAR_STATES = 64
-"""Above this many states the unrolled code costs more to make than it saves."""
+SCALAR_STATES, SCALAR_BRANCHES = 64, 400
+"""Above this many states or branches the unrolled code costs more to make than it saves."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class CompiledModel:
     @cached_property
     def rows(self) -> Rows | None:
         """The state equations as expressions, or None where the network is too large or too closely coupled."""
-        if len(self.states) > SCALAR_STATES:
+        if len(self.states) > SCALAR_STATES or len(self.form.graph.branches) > SCALAR_BRANCHES:
             return None
         try:
             return explicit_rows(self.form)

@@ -156,7 +156,7 @@ class Assembly:
         """What an ideal coupling imposes on the speeds of its nodes."""
         made = self.form.graph.branches[branch]
         pairs = [(self.form.graph.in_network_symbols(factor, made), ends) for factor, *ends in made.terms]
-        terms = [factor * self.quantities.across((ends[0], ends[1])) for factor, ends in pairs]
+        terms = [tidy(factor * self.quantities.across((ends[0], ends[1]))) for factor, ends in pairs]
         left = [term for term in terms if not term.could_extract_minus_sign()]
         return sides(Add(*left), (-term for term in terms if term.could_extract_minus_sign()))
 

@@ -12,11 +12,12 @@ from sympy import Add, Expr, Integer, Symbol, preorder_traversal
 
 from shaftwork.core.domains import ELECTRICAL, ROTATION, TRANSLATION
 from shaftwork.equations.assembly import Group, Sides, sides, tidy
-from shaftwork.equations.notation import in_text
-from shaftwork.equations.printing import LINE_WIDTH, Line, Writer, printed_width, with_rates
+from shaftwork.equations.notation import INDEX_CLOSES, INDEX_OPENS, in_text
+from shaftwork.equations.printing import LINE_WIDTH, Line, Writer, with_rates
 from shaftwork.equations.quantities import Flow, rate_of
 from shaftwork.equations.records import Eliminated, Equations, Row
 from shaftwork.equations.second_order import SecondOrder
+from shaftwork.equations.widths import printed_width
 from shaftwork.network.templates import Kind
 
 AUXILIARY = (r"\sigma", r"\zeta", r"\xi", r"\chi")
@@ -76,7 +77,7 @@ class Blocks:
         form = self.equations.second_order
         size = len(form.coordinates)
         lines = tuple(self._matrices(form)) if size <= LARGEST_MATRIX else ()
-        if not lines or max(printed_width(line.pieces[0]) for line in lines) > LINE_WIDTH:
+        if not lines or max(map(_matrix_width, lines)) > LINE_WIDTH:
             lines = tuple(self._motion(form, row) for row in range(size))
         yield Block("Equations of motion", lines)
         flows = self.equations.assembly.quantities.flows
@@ -132,7 +133,7 @@ class Blocks:
     def _explained(self, rows: Iterable[Eliminated]) -> Iterator[Line]:
         for row in rows:
             if not row.trivial:
-                yield self.writer.line(row.sides, rf"\text{{({in_text(row.why)})}}")
+                yield self.writer.line(row.sides, rf"\text{{({_with_indices(row.why)})}}")
 
     def _laws(self) -> Iterator[Line]:
         for row in self.equations.laws:
@@ -208,6 +209,21 @@ def _dotted(equations: Equations) -> dict[str, str]:
         dotted[velocity.name] = rf"\dot{{{letter}}}{underscore}{subscript}"
         dotted[rate_of(velocity).name] = rf"\ddot{{{letter}}}{underscore}{subscript}"
     return dotted
+
+
+def _matrix_width(line: Line) -> float:
+    """Width of a matrix: that of its widest row, and the room between its columns."""
+    rows = line.pieces[0].split(r"\\")
+    return max(printed_width(row) + 1.8 * row.count("&") for row in rows) + 2.0
+
+
+def _with_indices(sentence: str) -> str:
+    """A sentence for a remark, in which the numbers of parts are indices as in formulas, so that a series stays one."""
+    words = (re.fullmatch(r"([A-Za-z]+)([0-9]+)", word) or word for word in sentence.split(" "))
+    return " ".join(
+        in_text(word) if isinstance(word, str) else f"{word[1]}$_{{{INDEX_OPENS}{word[2]}{INDEX_CLOSES}}}$"
+        for word in words
+    )
 
 
 def _in_order(letter: Symbol, expression: Expr) -> Sides:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from shaftwork.equations.notation import INDEX_CLOSES, INDEX_OPENS, Letter, in_text, split_index
+from shaftwork.equations.notation import INDEX_CLOSES, INDEX_OPENS, Letter, in_text, split_index, without_marks
 from shaftwork.equations.printing import printed_number
 from shaftwork.equations.records import Equations
 from shaftwork.equations.series import SHORTEST_SERIES, runs, together
@@ -35,8 +35,8 @@ def nomenclature(equations: Equations) -> str:
         if letter.parameter
     ]
     tables = (
-        table("llll", ("Variable", "Meaning", "Of", "Unit"), variables),
-        table("lp{60mm}lrl", ("Parameter", "Meaning", "Of", "Value", "Unit"), parameters),
+        table("llp{45mm}l", ("Variable", "Meaning", "Of", "Unit"), variables),
+        table("lp{45mm}p{30mm}rl", ("Parameter", "Meaning", "Of", "Value", "Unit"), parameters),
     )
     return "\n".join(filter(None, tables))
 
@@ -74,7 +74,7 @@ def table(columns: str, headings: Cells, rows: Sequence[Cells]) -> str:
 \\endfoot
 {body}
 \\end{{longtable}}"""
-    return text.replace(INDEX_OPENS, "").replace(INDEX_CLOSES, "")
+    return without_marks(text)
 
 
 def _condensed(rows: Sequence[Cells]) -> Iterator[Cells]:

@@ -48,9 +48,9 @@ WORDS = {
 """The quantities of the domains in words."""
 PECULIAR = re.compile(r"[^A-Za-z0-9.,:;()-]")
 """Characters that are not printed in text as they are."""
-GREEK = frozenset(  # only asked for membership
-    "alpha beta gamma delta epsilon zeta eta theta iota kappa lamda mu nu xi pi rho sigma tau upsilon phi chi psi omega"
-    .split(" ")
+GREEK = (
+    *("alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "iota", "kappa", "lamda", "mu", "nu"),
+    *("xi", "pi", "rho", "sigma", "tau", "upsilon", "phi", "chi", "psi", "omega"),
 )
 """Small Greek letters, as Unicode spells them."""
 
@@ -109,6 +109,11 @@ def _index(digits: str) -> str:
     return f"{INDEX_OPENS}{digits}{INDEX_CLOSES}" if digits else ""
 
 
+def without_marks(latex: str) -> str:
+    """LaTeX as it is printed."""
+    return latex.replace(INDEX_OPENS, "").replace(INDEX_CLOSES, "")
+
+
 def split_index(name: str) -> tuple[str, str]:
     """A name as its stem and the digits at its end."""
     stem = name.rstrip("0123456789")
@@ -154,10 +159,11 @@ def notation(form: StateForm, quantities: Quantities) -> tuple[Mapping[str, str]
             made = {
                 letter.name: letter.printed(member.subscript(style)) for member in members for letter in member.letters
             }
-            if taken.isdisjoint(made.values()) and len({*made.values()}) == len(made):
+            seen = {without_marks(latex) for latex in made.values()}
+            if taken.isdisjoint(seen) and len(seen) == len(made):
                 break
         printed.update(made)
-        taken.update(made.values())
+        taken.update(seen)
     letters = (replace(letter, owner=bearer.name) for _, bearer in bearers for letter in bearer.letters)
     return printed, tuple(letters)
 

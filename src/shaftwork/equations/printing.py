@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -11,10 +10,10 @@ from sympy.printing.latex import LatexPrinter
 
 from shaftwork.components.laws import t as TIME
 from shaftwork.equations.assembly import Group, Sides
-from shaftwork.equations.notation import INDEX_CLOSES, INDEX_OPENS
 from shaftwork.equations.quantities import rate_of
+from shaftwork.equations.widths import printed_width
 
-LINE_WIDTH = 64
+LINE_WIDTH = 76
 """Characters of ordinary width that fit on a printed line beside its left side."""
 DIGITS = 6
 """Significant digits of numbers in equations."""
@@ -83,9 +82,13 @@ class Writer:
 
     def latex(self, expression: Expr) -> str:
         """An expression in LaTeX."""
-        if self._values and not self._values.keys().isdisjoint(expression.free_symbols):
-            expression = _rounded(expression.xreplace(self._values))
-        return str(self._printer.doprint(self._in_order(expression).xreplace(self._ordered)))
+        return str(self._printer.doprint(self._in_order(self._valued(expression)).xreplace(self._ordered)))
+
+    def _valued(self, expression: Expr) -> Expr:
+        """The expression with numbers for those parameters that are printed by their value."""
+        if not self._values or self._values.keys().isdisjoint(expression.free_symbols):
+            return expression
+        return _rounded(expression.xreplace(self._values))
 
     def _in_order(self, expression: Expr) -> Expr:
         """The expression with every sum of parameters that multiplies something as a symbol, to be sorted as such."""
@@ -123,6 +126,8 @@ class Writer:
         factor, terms = group
         if len(terms) < 2 or factor == 1:
             return [self._signed(factor * term) for term in terms]
+        if self._valued(factor) == 1:
+            return [self._signed(term) for term in terms]
         inside = [self._signed(term) for term in terms]
         inside[0] = inside[0].removeprefix("+ ")
         inside[0] = rf"{self._signed(factor)} {OPENS} {inside[0]}"
@@ -138,8 +143,8 @@ class Writer:
         behind = [factor for factor in term.args if factor in self._last] if term.is_Mul else []
         if len(behind) != 1 or not (coefficient := term / behind[0]).has(Pow):
             return self.latex(term)
-        text = self.latex(coefficient)
-        return rf"{rf'\left({text}\right)' if coefficient.is_Add else text} \, {self.latex(behind[0])}"
+        text = rf"\left({self.latex(coefficient)}\right)" if coefficient.is_Add else self.latex(coefficient)
+        return rf"{text} \, {self.latex(behind[0])}"
 
     def _signed(self, term: Expr) -> str:
         text = self._product(term)
@@ -164,29 +169,30 @@ def _rounded(expression: Expr) -> Expr:
 
 def aligned(lines: Sequence[Line]) -> str:
     """Lines as the rows of an aligned block, broken where they are too long for the page."""
-    broken = [" \\\\\n".join(_broken(line)) for line in lines]
-    return "".join(
-        text + ("" if place == len(broken) else " \\\\[1ex]\n" if "\n" in text else " \\\\\n")
-        for place, text in enumerate(broken, 1)
-    )
+    widths = [printed_width(line.left) for line in lines]
+    beside = max((width for width in widths if 2 * width <= LINE_WIDTH), default=0.0)
+    broken = [_broken(line, beside) for line in lines]
+    rows = [" \\\\\n".join(rows) + (r" \\[1ex]" if len(rows) > 1 else r" \\") for rows in broken]
+    return "\n".join(rows).removesuffix("[1ex]").removesuffix(r" \\")
 
 
-def _broken(line: Line) -> list[str]:
-    """The rows of a line: as many pieces on each as there is room for."""
-    if 2 * printed_width(line.left) > LINE_WIDTH:
-        return [f"& {line.left}", *(f"&\\qquad {row[1:]}" for row in _broken(replace(line, left="")))]
-    room = LINE_WIDTH - printed_width(line.left)
+def _broken(line: Line, beside: float) -> list[str]:
+    """The rows of a line, each with as many pieces as there is room for beside the left sides."""
+    if 2 * printed_width(line.left) > LINE_WIDTH:  # a left side of its own row
+        below = (row.partition("&")[2] for row in _broken(replace(line, left=""), beside))
+        return [f"& {line.left}", *(rf"&\qquad {row}" for row in below)]
+    room = LINE_WIDTH - beside
     rows: list[list[str]] = [[]]
     used = 0.0
     for piece in line.pieces:
         width = printed_width(piece)
         if rows[-1] and used + width > room:
             rows.append([])
-            used = printed_width("xx")
+            used = printed_width(r"\quad")
         rows[-1].append(piece)
         used += width
     texts = [f"{line.left} &{line.relation} {' '.join(rows[0])}", *(rf"&\quad {' '.join(row)}" for row in rows[1:])]
-    if line.remark and used + printed_width(line.remark) > room:
+    if line.remark and used + printed_width(rf"\qquad {line.remark}") > room:
         texts.append(rf"&\qquad {line.remark}")
     elif line.remark:
         texts[-1] += rf" \qquad {line.remark}"
@@ -199,25 +205,3 @@ def _bracketed(text: str, *, whole: bool) -> str:
     if whole and r"\left(" not in text:
         opens, closes = r"\left(", r"\right)"
     return text.replace(OPENS, opens).replace(CLOSES, closes)
-
-
-def printed_width(latex: str) -> float:
-    """About how many ordinary characters wide a formula is in print: subscripts are smaller, a fraction is as wide as
-    its wider part, signs have room around them.
-    """
-    text = latex.replace(INDEX_OPENS, "").replace(INDEX_CLOSES, "")
-    while match := FRACTION.search(text):
-        wider = max(match.groups(), key=printed_width)
-        text = f"{text[: match.start()]}{wider}{text[match.end() :]}"
-    while match := SUBSCRIPT.search(text):
-        small = "x" * round(0.65 * printed_width(match.group(1)))
-        text = f"{text[: match.start()]}{small}{text[match.end() :]}"
-    spaced = len(re.findall(r" [+=-] ", text))
-    return len(INVISIBLE.sub("", COMMAND.sub("x", text))) + spaced
-
-
-INNER = r"((?:[^{}]|\{[^{}]*\})*)"
-FRACTION = re.compile(r"\\frac\{" + INNER + r"\}\{" + INNER + r"\}")
-SUBSCRIPT = re.compile(r"[_^]\{" + INNER + r"\}")
-COMMAND = re.compile(r"\\(?!left|right|mathrm|text|operatorname|begin|end|quad)[A-Za-z]+")
-INVISIBLE = re.compile(r"\\(left|right|mathrm|text|operatorname|begin|end|quad|[,;!\s])|[{}&]|\s+")

@@ -8,7 +8,7 @@ from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import ShaftworkError
 from shaftwork.equations.blocks import Block, Blocks
 from shaftwork.equations.nomenclature import nomenclature
-from shaftwork.equations.notation import INDEX_CLOSES, INDEX_OPENS, in_text
+from shaftwork.equations.notation import in_text, without_marks
 from shaftwork.equations.printing import aligned
 from shaftwork.equations.records import Equations, Form
 from shaftwork.equations.series import shortened
@@ -65,7 +65,7 @@ def blocks_of(equations: Equations, form: Form | None, *, values: bool) -> tuple
 
 def _content(block: Block) -> str:
     remark = f"{block.remark}\n" if block.remark else ""
-    rows = aligned(shortened(block.lines)).replace(INDEX_OPENS, "").replace(INDEX_CLOSES, "")
+    rows = without_marks(aligned(shortened(block.lines)))
     return f"{remark}\\begin{{align*}}\n{rows}\n\\end{{align*}}"
 
 

@@ -67,4 +67,4 @@ def _general(run: Sequence[Line]) -> Line:
 
     line = first.mapped(lambda text: INDEX.sub(general, text))
     span = rf"\text{{for }} k = {base}, \dots, {base + len(run) - 1}"
-    return replace(line, remark=", ".join(filter(None, (line.remark, span))))
+    return replace(line, remark=r" \quad ".join(filter(None, (line.remark, span))))

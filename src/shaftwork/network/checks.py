@@ -396,5 +396,5 @@ def _separate_train(graph: CircuitGraph, train: Train, main: Train, spelling: Sp
         f"Join the two{spelling.suggestion(nodes)}, or simulate them as two networks.",
         names,
         nodes,
-        "warning",
+        "note",
     )

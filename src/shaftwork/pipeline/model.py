@@ -258,9 +258,8 @@ class Model(CompiledModel):
         return np.concatenate([np.ones(len(inertias)), torques, np.ones(len(form.integrals))])
 
     def _changes_structure(self, parameters: Mapping[str, float]) -> bool:
-        frozen = {symbol.name for expression in self.form.tree.frozen for symbol in expression.free_symbols}
-        zeros = frozenset(self.form.graph.zeros)
-        return any(name in zeros or name in frozen or value == 0 for name, value in parameters.items())
+        decisive = frozenset((*self.form.graph.zeros, *self.form.tree.frozen))
+        return any(name in decisive or value == 0 for name, value in parameters.items())
 
     def _vector(self, parameters: Mapping[str, float]) -> Array:
         checked = {name: self._checked(name, value) for name, value in parameters.items()}

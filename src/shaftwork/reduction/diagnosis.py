@@ -313,7 +313,7 @@ class _View:
 
     def fixed_ratios(self) -> Iterator[Problem]:
         """Ratios whose values decide the structure of the equations."""
-        found = {symbol.name for expression in self.tree.frozen for symbol in expression.free_symbols}
+        found = self.tree.frozen
         names = tuple(name for name in self.graph.parameters if name in found)
         if names:
             parts = tuple(dict.fromkeys(name.rsplit(".", 1)[0] for name in names))

@@ -1,56 +1,92 @@
-"""The entries of loop and node equations: whole numbers, or gear ratios known both as a value and as an expression."""
+"""The entries of loop and node equations: whole numbers, or gear ratios combined by products, sums and quotients.
+
+A combination is kept as what it was made of, with two values: one for the network's own ratios, which decides whether it is
+zero, and one for other ratios, which tells whether it is zero for all of them. Expressions are made of it only when somebody
+reads them, so long gear trains cost no algebra.
+"""
 
 from __future__ import annotations
 
+import operator
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
+from zlib import crc32
 
-from sympy import Expr, Integer, cancel
+from sympy import Expr, Float, Integer, Symbol, cancel
 
 CANCELLATION = 1e-10
 """A difference below this fraction of its terms is zero: ratios are typed to some ten digits (1.2 * 1.5 is 1.8)."""
+_OPERATIONS: Mapping[str, Callable[[Any, Any], Any]] = {
+    "*": operator.mul,
+    "+": operator.add,
+    "/": operator.truediv,
+}
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gain:
-    """A product or sum of gear ratios: its value decides whether it is zero, its expression goes into the equations."""
+    """A ratio, or a combination of ratios.
+
+    Args:
+        value: for the network's parameters.
+        probe: for other parameters.
+        operation: "*", "+" or "/" of two numbers; "" for a coefficient of a component.
+        of: the two numbers, or the coefficient as an expression in the network's parameters.
+    """
 
     value: float
-    exact: Expr
+    probe: float
+    operation: str
+    of: tuple[Any, ...]
 
     def __mul__(self, other: Number) -> Gain:
-        if isinstance(other, Gain):
-            return Gain(self.value * other.value, self.exact * other.exact)
-        return Gain(self.value * other, self.exact * other)
+        return _combined("*", self, other)
 
     __rmul__ = __mul__
 
     def __neg__(self) -> Gain:
-        return Gain(-self.value, -self.exact)
+        return _combined("*", self, -1)
 
 
 Number = int | Gain
 
 
+def coefficient(expression: Expr, values: Mapping[Symbol, float]) -> Number:
+    """A coefficient of a component: an expression in the network's parameters, whose values are given."""
+    if expression.is_Integer:
+        return int(expression)
+    here = {symbol: Float(value) for symbol, value in values.items()}
+    elsewhere = {symbol: Float(value * (1.1 + crc32(symbol.name.encode()) / 2**32)) for symbol, value in values.items()}
+    return Gain(float(expression.xreplace(here)), float(expression.xreplace(elsewhere)), "", (expression,))
+
+
 def value_of(number: Number) -> float:
-    """The number as a float."""
+    """The number for the network's parameters."""
     return number.value if isinstance(number, Gain) else float(number)
 
 
-def exact_of(number: Number) -> Expr:
-    """The number as a sympy expression in the parameters of the network."""
-    return number.exact if isinstance(number, Gain) else Integer(number)
+def _probe(number: Number) -> float:
+    return number.probe if isinstance(number, Gain) else float(number)
 
 
-def add(first: Number, second: Number, frozen: list[Expr]) -> Number:
-    """The sum; where it vanishes for these ratios but not for all, the expression is put down in `frozen`."""
+def _combined(operation: str, first: Number, second: Number) -> Gain:
+    combine = _OPERATIONS[operation]
+    return Gain(
+        combine(value_of(first), value_of(second)), combine(_probe(first), _probe(second)), operation, (first, second)
+    )
+
+
+def add(first: Number, second: Number, coincidences: list[Gain]) -> Number:
+    """The sum; where it vanishes for these ratios but not for all, it is put down in `coincidences`."""
     if isinstance(first, int) and isinstance(second, int):
         return first + second
-    value = value_of(first) + value_of(second)
-    if abs(value) > CANCELLATION * max(abs(value_of(first)), abs(value_of(second))):
-        return Gain(value, exact_of(first) + exact_of(second))
-    if (rest := cancel(exact_of(first) + exact_of(second))) != 0:
-        frozen.append(rest)
+    total = _combined("+", first, second)
+    if abs(total.value) > CANCELLATION * max(abs(value_of(first)), abs(value_of(second))):
+        return total
+    if abs(total.probe) > CANCELLATION * max(abs(_probe(first)), abs(_probe(second))):
+        coincidences.append(total)
     return 0
 
 
@@ -58,9 +94,60 @@ def divide(first: Number, second: Number) -> Number:
     """The quotient; whole numbers stay whole where the divisor is 1 or -1."""
     if isinstance(second, int) and abs(second) == 1:
         return first * second
-    return Gain(value_of(first) / value_of(second), exact_of(first) / exact_of(second))
+    return _combined("/", first, second)
 
 
-def simplified(number: Number) -> Any:
+def fold(gains: Iterable[Gain], leaf: Callable[[Expr], T]) -> list[T]:
+    """Each gain with its coefficients replaced by what `leaf` makes of them; shared parts are computed once.
+
+    Args:
+        gains: what to compute.
+        leaf: from a coefficient to a number or an expression.
+    """
+    wanted = tuple(gains)
+    done: dict[int, Any] = {}
+
+    def known(number: Number) -> Any:
+        return done[id(number)] if isinstance(number, Gain) else number
+
+    for gain in _parts_first(wanted):
+        if gain.operation:
+            first, second = gain.of
+            done[id(gain)] = _OPERATIONS[gain.operation](known(first), known(second))
+        else:
+            done[id(gain)] = leaf(gain.of[0])
+    return [done[id(gain)] for gain in wanted]
+
+
+def _parts_first(gains: Sequence[Gain]) -> list[Gain]:
+    """All gains and what they are made of, parts before wholes; without recursion, for gear trains may be long."""
+    order: list[Gain] = []
+    seen: dict[int, None] = {}
+    stack: list[tuple[Gain, bool]] = [(gain, False) for gain in reversed(gains)]
+    while stack:
+        gain, complete = stack.pop()
+        if complete:
+            order.append(gain)
+        elif id(gain) not in seen:
+            seen[id(gain)] = None
+            stack.append((gain, True))
+            if gain.operation:
+                stack.extend((part, False) for part in reversed(gain.of) if isinstance(part, Gain))
+    return order
+
+
+def coefficients_in(gains: Iterable[Gain]) -> tuple[Expr, ...]:
+    """The coefficients of components that gains are made of, each once."""
+    return tuple(dict.fromkeys(gain.of[0] for gain in _parts_first(tuple(gains)) if not gain.operation))
+
+
+def exact_of(numbers: Iterable[Number]) -> list[Expr]:
+    """The numbers as sympy expressions in the parameters of the network."""
+    listed = tuple(numbers)
+    expressions = iter(fold((number for number in listed if isinstance(number, Gain)), lambda made: made))
+    return [next(expressions) if isinstance(number, Gain) else Integer(number) for number in listed]
+
+
+def simplified(number: Number) -> Expr:
     """The expression in its shortest rational form, for equations that people read."""
-    return cancel(exact_of(number)) if isinstance(number, Gain) else Integer(number)
+    return cancel(exact_of((number,))[0])

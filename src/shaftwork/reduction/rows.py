@@ -62,16 +62,13 @@ class _Solution:
         self.states = tuple(Symbol(state.name, real=True) for state in form.states)
         carried = zip(form.states, self.states, strict=True)
         own = {(state.kind, state.branch): symbol for state, symbol in carried}
-        self.loops = {
-            link: tuple((tree, exact_of(gain)) for tree, gain in row.items()) for link, row in form.tree.loops.items()
-        }
+        self.loops = _exact_loops(form)
         self.cutsets: dict[int, list[tuple[int, Expr]]] = {}
         for link, row in self.loops.items():
             for tree, gain in row:
                 self.cutsets.setdefault(tree, []).append((link, gain))
         self.across: dict[int, Expr] = {k: own["across", k] for k in form.across_states}
         self.across.update({k: self.law(k) for k in form.across_sources})
-        self.across.update(dict.fromkeys(form.tree.tree[Kind.COUPLING], Integer(0)))
         self.through: dict[int, Expr] = {k: own["through", k] for k in form.through_states}
         self.integral = {k: own["integral", k] for k in form.integrals}
 
@@ -162,6 +159,21 @@ class _Solution:
         for first, gain in members:
             for second, other in members:
                 matrix[first, second] = matrix.get((first, second), Integer(0)) + gain * coefficient * other
+
+
+def _exact_loops(form: StateForm) -> dict[int, tuple[tuple[int, Expr], ...]]:
+    """The loops as expressions, without couplings: their across value is zero."""
+    couplings = frozenset(form.tree.tree[Kind.COUPLING])
+    entries = [
+        (link, tree, gain)
+        for link, row in form.tree.loops.items()
+        for tree, gain in row.items()
+        if tree not in couplings and link not in form.tree.redundant
+    ]
+    loops: dict[int, list[tuple[int, Expr]]] = {link: [] for link in form.tree.loops}
+    for (link, tree, _), exact in zip(entries, exact_of(gain for _, _, gain in entries), strict=True):
+        loops[link].append((tree, exact))
+    return {link: tuple(row) for link, row in loops.items()}
 
 
 def solve_blocks(

@@ -17,11 +17,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from sympy import Expr, Float
+from sympy import Expr
 
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch
 from shaftwork.network.templates import Kind
-from shaftwork.reduction.gains import Gain, Number, add, divide, value_of
+from shaftwork.reduction.gains import Gain, Number, add, coefficient, coefficients_in, divide, value_of
 
 Row = dict[int, Number]
 
@@ -38,7 +38,8 @@ class NormalTree:
         potentials: for each node the sum of tree across variables that its own is; None where nothing fixes it.
         locked: nodes that a closed loop of couplings of unequal ratio holds at rest, with the coupling that closed it.
         redundant: couplings that say what others have said already.
-        frozen: expressions of ratios that vanish for the given values only: these ratios decide the structure.
+        frozen: names of the ratios whose given values make a sum vanish that is not zero for all values: they decide
+            the structure.
     """
 
     tree: Mapping[Kind, tuple[int, ...]]
@@ -47,7 +48,7 @@ class NormalTree:
     potentials: tuple[Row | None, ...]
     locked: tuple[tuple[int, tuple[int, ...]], ...]
     redundant: tuple[int, ...]
-    frozen: tuple[Expr, ...]
+    frozen: tuple[str, ...]
 
 
 class _Elimination:
@@ -56,7 +57,7 @@ class _Elimination:
     def __init__(self, nodes: int) -> None:
         self.solved: list[Row | None] = [None] * nodes
         self.users: list[list[int]] = [[] for _ in range(nodes)]
-        self.frozen: list[Expr] = []
+        self.coincidences: list[Gain] = []
 
     def reduce(self, column: Row) -> Row:
         """The across variable of a branch in terms of free nodes and tree branches."""
@@ -69,7 +70,7 @@ class _Elimination:
     def _accumulate(self, target: Row, row: Row, factor: Number) -> None:
         for key, entry in row.items():
             product = factor * entry
-            total = add(target[key], product, self.frozen) if key in target else product
+            total = add(target[key], product, self.coincidences) if key in target else product
             if isinstance(total, int) and total == 0:
                 del target[key]
             else:
@@ -106,8 +107,8 @@ class _Elimination:
 def column_of(graph: CircuitGraph, branch: GraphBranch) -> Row:
     """The column of the incidence matrix: node to factor (+1 where the branch leaves, -1 where it enters, ratios)."""
     column: Row = {}
-    for coefficient, plus, minus in branch.terms or ((None, branch.plus, branch.minus),):
-        factor = 1 if coefficient is None else _gain(graph, branch, coefficient)
+    for expression, plus, minus in branch.terms or ((None, branch.plus, branch.minus),):
+        factor = 1 if expression is None else _gain(graph, branch, expression)
         for node, sign in ((plus, 1), (minus, -1)):
             if node == GROUND:
                 continue
@@ -119,12 +120,18 @@ def column_of(graph: CircuitGraph, branch: GraphBranch) -> Row:
     return column
 
 
-def _gain(graph: CircuitGraph, branch: GraphBranch, coefficient: Expr) -> Number:
-    if coefficient.is_Integer:
-        return int(coefficient)
+def _gain(graph: CircuitGraph, branch: GraphBranch, expression: Expr) -> Number:
+    if expression.is_Integer:
+        return int(expression)
     part = graph.parts[branch.part]
-    values = {s: Float(graph.parameters[f"{part.name}.{s.name}"]) for s in branch.template.symbols}
-    return Gain(float(coefficient.xreplace(values)), graph.in_network_symbols(coefficient, branch))
+    own = (graph.symbol_of(part, symbol.name) for symbol in branch.template.symbols)
+    values = {symbol: graph.parameters[symbol.name] for symbol in own}
+    return coefficient(graph.in_network_symbols(expression, branch), values)
+
+
+def _names_in(gains: list[Gain]) -> tuple[str, ...]:
+    """The parameters that gains are made of."""
+    return tuple(sorted({symbol.name for made in coefficients_in(gains) for symbol in made.free_symbols}))
 
 
 def _by_branch(row: Row) -> Row:
@@ -163,5 +170,5 @@ def normal_tree(graph: CircuitGraph) -> NormalTree:
         tuple(None if row is None or max(row, default=-1) >= 0 else _by_branch(row) for row in work.solved),
         tuple(locked),
         tuple(links[Kind.COUPLING]),
-        tuple(work.frozen),
+        _names_in(work.coincidences),
     )

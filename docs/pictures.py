@@ -1,0 +1,88 @@
+"""Makes the pictures of the pages.
+
+python docs/pictures.py             needs the extra `plot`, pdflatex and pdftoppm
+"""
+
+from __future__ import annotations
+
+import subprocess
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.image import imread, imsave
+
+from shaftwork import scenes
+from shaftwork.scenes.crane import WHEEL_RADIUS
+
+PICTURES = Path(__file__).parent / "pictures"
+RESOLUTION = 110
+"""Pixels per inch: small files that are sharp in a column of text."""
+
+MARGIN = 20
+"""White pixels around what is printed."""
+
+FRAME = r"""\documentclass[10pt]{article}
+\usepackage{amsmath}
+\usepackage[paperwidth=125mm,paperheight=%dmm,margin=5mm]{geometry}
+\pagestyle{empty}
+\setlength{\parindent}{0pt}
+\begin{document}
+%s
+\end{document}
+"""
+
+
+def crane_start() -> Figure:
+    """Torques and travel speed of the crane's start."""
+    scene = scenes.SCENES["crane-start"]
+    sol = scene().simulate(scene.t_end, t_eval=2601)
+    figure = Figure(figsize=(6.6, 5.2), layout="constrained")
+    torque, speed = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    torque.plot(sol.t, sol["shaft.tau"], linewidth=0.8, label="shaft")
+    torque.plot(sol.t, sol["motor.tau"], linewidth=1.4, label="motor, at the wheel shaft")
+    torque.set_ylabel("torque in N m")
+    torque.legend(frameon=False, loc="upper right")
+    speed.plot(sol.t, WHEEL_RADIUS * sol["J2.omega"], linewidth=1.4, label="travel speed")
+    speed.axhline(1.08, color="0.5", linewidth=0.8, linestyle="--", label="1.08 m/s, printed")
+    speed.set_ylabel("speed in m/s")
+    speed.set_xlabel("t in s")
+    speed.legend(frameon=False, loc="lower right")
+    for axis in (torque, speed):
+        axis.grid(alpha=0.3)
+        axis.set_xlim(0.0, scene.t_end)
+    return figure
+
+
+def typeset(body: str, picture: Path, height: int = 150) -> None:
+    """A LaTeX body as a picture, cut to what is printed on it.
+
+    Args:
+        body: LaTeX that needs amsmath.
+        picture: the PNG file, with its ending.
+        height: of the page in mm, enough for all of it.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder, "page.tex").write_text(FRAME % (height, body), encoding="utf-8")
+        for command in (
+            ("pdflatex", "-interaction=batchmode", "-halt-on-error", "page.tex"),
+            ("pdftoppm", "-png", "-gray", "-singlefile", "-r", str(RESOLUTION), "page.pdf", "page"),
+        ):
+            subprocess.run(command, cwd=folder, check=True, stdout=subprocess.DEVNULL)  # noqa: S603 - fixed programs
+        page = np.atleast_3d(imread(Path(folder, "page.png")))[..., 0]
+    rows, columns = (np.flatnonzero((page < 1).any(axis=axis)) for axis in (1, 0))
+    inside = page[: rows[-1] + MARGIN, max(0, columns[0] - MARGIN) : columns[-1] + MARGIN]
+    imsave(picture, inside, cmap="gray", vmin=0, vmax=1)
+
+
+def main() -> None:
+    """Write all pictures."""
+    PICTURES.mkdir(exist_ok=True)
+    crane_start().savefig(PICTURES / "crane-start.png", dpi=RESOLUTION)
+    equations = scenes.crane_start().equations()
+    typeset(equations.latex(form="kirchhoff"), PICTURES / "crane-equations.png")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,171 @@
+"""What the pages say is so: examples run and print what stands there, tables are up to date, links and names exist."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+import sympy
+
+import shaftwork as sw
+from docs.generate import PAGES, ROOT, components, remade, same
+from shaftwork.components import Component
+
+DOCS = ROOT / "docs"
+NOTEBOOKS = tuple(sorted((ROOT / "notebooks").glob("*.ipynb")))
+TEXTS = {page.name: page.read_text(encoding="utf-8") for page in PAGES}
+STORIES = TEXTS | {
+    notebook.name: "".join(
+        line for cell in json.loads(notebook.read_text(encoding="utf-8"))["cells"] for line in [*cell["source"], "\n"]
+    )
+    for notebook in NOTEBOOKS
+}
+
+CODE = re.compile(r"```.*?```|(?<!`)`([^`\n]+)`(?!`)", re.DOTALL)
+"""Fenced blocks, and what stands between single quotes of code."""
+LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
+PATH = re.compile(r"\b(?:src|tests|docs|notebooks|benchmarks)/[\w./-]*\w")
+QUALIFIED = re.compile(r"\bsw\.([A-Za-z]\w*)(?:\.([a-z]\w*))?")
+MEMBER = re.compile(r"([A-Z][a-z]+\w*)\.([a-z]\w*)(?:\(.*\))?")
+CAPITALISED = re.compile(r"([A-Z][a-z]+\w*)(?:\(.*\))?")
+TEST = re.compile(r"`(test_\w+)`")
+LARGEST_PICTURE = 150_000
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_a_page_is_what_the_code_makes_of_it(page: Path) -> None:
+    """Examples run, outputs, tables and help texts are up to date; `python docs/generate.py` makes them so."""
+    for library in ("heyoka", "sksundae", "matplotlib", "pandas", "xarray"):
+        pytest.importorskip(library, reason="the examples show what all extras together do")
+    text = TEXTS[page.name]
+    made = remade(page, text)
+    different = [
+        (old, new) for old, new in zip(text.splitlines(), made.splitlines(), strict=False) if not same(old, new)
+    ]
+    assert same(text, made), different[:5]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "agree"),
+    [
+        ("299 steps; energy residual 2.3e-14", "301 steps; energy residual 7e-15", True),
+        ("shaft.tau  351.48", "shaft.tau   351.49", True),
+        ("shaft.tau  351.48", "shaft.tau  364.0", False),
+        ("shaft.tau  351.48", "motor.tau  351.48", False),
+        ("engine heyoka", "engine heyoka: why", False),
+        ("| `J` | kg*m^2 |", "| `J` | kg*m |", False),
+    ],
+)
+def test_outputs_agree_in_words_and_nearly_in_numbers(old: str, new: str, agree: bool) -> None:  # noqa: FBT001
+    assert same(old, new) is agree
+
+
+def test_an_example_whose_output_is_not_shown_is_an_error() -> None:
+    with pytest.raises(ValueError, match="is not shown"):
+        remade(Path("page.md"), "```python\nprint(1)\n```\n\nand so on\n")
+
+
+def test_the_table_of_components_has_every_parameter_of_every_component() -> None:
+    for page in ("README.md", "components.md"):
+        for name, cls in components().items():
+            assert name in TEXTS[page]
+            assert all(f"`{item}`" in TEXTS[page] for item in cls.declared)
+
+
+@pytest.mark.parametrize("page", [*PAGES, ROOT / "CONTRIBUTING.md"], ids=lambda page: page.name)
+def test_every_link_leads_to_a_file_and_a_heading(page: Path) -> None:
+    for target in LINK.findall(page.read_text(encoding="utf-8")):
+        if re.match("https?://", target):
+            continue
+        name, _, heading = target.partition("#")
+        place = page.parent / name if name else page
+        assert place.is_file(), target
+        assert not heading or heading in _headings(place), target
+
+
+def _headings(page: Path) -> set[str]:
+    titles = re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w]+", "-", title.lower()).strip("-") for title in titles}
+
+
+def _inline(text: str) -> list[str]:
+    return [found for found in CODE.findall(text) if found]
+
+
+@pytest.mark.parametrize("name", STORIES)
+def test_only_names_that_exist_are_named(name: str) -> None:
+    text = STORIES[name]
+    for owner, member in QUALIFIED.findall(text):
+        assert hasattr(sw, owner), f"sw.{owner}"
+        assert not member or _has(getattr(sw, owner), member), f"sw.{owner}.{member}"
+    for code in _inline(text):
+        if found := MEMBER.fullmatch(code):
+            assert _has(getattr(sw, found[1]), found[2]), code
+        elif found := CAPITALISED.fullmatch(code):
+            assert hasattr(sw, found[1]) or hasattr(sympy, found[1]), code
+
+
+def _has(owner: Any, member: str) -> bool:
+    """Whether a class or module has a member, a field, or, a component, a quantity of this name."""
+    if hasattr(owner, member) or member in getattr(owner, "__dataclass_fields__", ()):
+        return True
+    if not (isinstance(owner, type) and issubclass(owner, Component)):
+        return False
+    return member in owner("part", **{item.name: 1.0 for item in owner.declared.values() if item.required}).signals()
+
+
+@pytest.mark.parametrize("name", STORIES)
+def test_every_file_that_is_named_exists(name: str) -> None:
+    missing = [path for path in PATH.findall(STORIES[name]) if not (ROOT / path).exists()]
+    assert missing == []
+
+
+def test_the_sign_page_names_every_test_of_signs_and_no_other() -> None:
+    tests = (ROOT / "tests/properties/test_signs.py").read_text(encoding="utf-8")
+    reversal = "test_a_reversed_part_changes_only_the_signs_of_its_own_signals"
+    named = set(TEST.findall(TEXTS["signs.md"]))
+    assert named - {reversal} == set(re.findall(r"^def (test_\w+)", tests, re.MULTILINE))
+    assert f"def {reversal}" in (ROOT / "tests/properties/test_invariance.py").read_text(encoding="utf-8")
+
+
+def test_the_page_of_the_interface_has_every_public_name() -> None:
+    """Components have a page of their own, symbols of laws stand in the text."""
+    shown = set()
+    for path in re.findall(r"^::: ([\w.]+)$", TEXTS["api.md"], re.MULTILINE):
+        module, _, name = path.rpartition(".")
+        assert hasattr(importlib.import_module(module), name), path
+        shown.add(name)
+    public = set(dir(sw)) - set(components()) - {"scenes"}
+    assert {name for name in public if name not in shown and f"`{name}`" not in TEXTS["api.md"]} == set()
+
+
+def test_every_kind_of_problem_on_the_page_is_one_of_the_code() -> None:
+    sources = ("network/checks.py", "reduction/diagnosis.py")
+    code = "".join((ROOT / "src/shaftwork" / source).read_text(encoding="utf-8") for source in sources)
+    table = re.findall(r"^\| ([a-z, ]+) \| (?:error|warning|note) \|", TEXTS["diagnosis.md"], re.MULTILINE)
+    kinds = [kind.strip() for row in table for kind in row.split(",")]
+    assert len(kinds) > 20
+    made_of_words = {
+        "two speed sources": "two {words.across} sources",
+        "blocked speed source": "blocked {words.across} source",
+    }
+    assert [kind for kind in kinds if f'"{made_of_words.get(kind, kind)}"' not in code] == []
+
+
+def test_pictures_are_small_and_all_of_them_are_shown() -> None:
+    pictures = tuple(sorted((DOCS / "pictures").iterdir()))
+    assert pictures
+    for picture in pictures:
+        assert picture.stat().st_size < LARGEST_PICTURE, picture.name
+        assert any(f"pictures/{picture.name}" in text for text in TEXTS.values()), picture.name
+
+
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda notebook: notebook.name)
+def test_notebooks_are_stored_without_outputs(notebook: Path) -> None:
+    cells = [cell for cell in json.loads(notebook.read_text(encoding="utf-8"))["cells"] if cell["cell_type"] == "code"]
+    assert cells
+    assert [cell["source"] for cell in cells if cell["outputs"] or cell["execution_count"] is not None] == []

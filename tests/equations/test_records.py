@@ -1,0 +1,173 @@
+"""The records say what the network is, know where every row comes from, and agree with the rows that are compiled."""
+
+from __future__ import annotations
+
+import math
+import random
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from sympy import Expr, Symbol
+
+from shaftwork.components.rotation import Gear, Inertia, Spring
+from shaftwork.components.sources import TorqueSource
+from shaftwork.equations.kirchhoff import kirchhoff
+from shaftwork.equations.quantities import rate_of
+from shaftwork.equations.records import Equations
+from shaftwork.network.builder import NetworkBuilder
+from shaftwork.reduction.form import state_form
+from shaftwork.reduction.rows import BlockTooLargeError, explicit_rows
+from tests.equations.networks import MECHANICAL, crane, dc_drive, equations_of, from_pieces, graph_of, hoist, train
+from tests.strategies import Network, networks
+
+
+def symbol(name: str) -> Symbol:
+    return Symbol(name, real=True)
+
+
+def known_quantities(equations: Equations) -> dict[Symbol, Expr]:
+    """Every quantity that is no state or parameter, by the records that say what it is."""
+    known = {row.left: row.right for row in equations.eliminated if row.kind != "reaction" and not row.trivial}
+    states = {row.symbol for row in equations.states}
+    for row in (*equations.loops, *equations.laws):
+        if row.left.is_Symbol and row.left not in states and not row.left.name.startswith("der(") and not row.trivial:
+            known.setdefault(row.left, row.right)
+    return known
+
+
+def resolved(expression: Expr, known: dict[Symbol, Expr]) -> Expr:
+    for _ in range(20):
+        if known.keys().isdisjoint(expression.free_symbols):
+            return expression
+        expression = expression.xreplace(known)
+    raise AssertionError(f"{expression} does not come to rest")
+
+
+def assert_agrees_with_compiled_rows(equations: Equations) -> None:
+    try:
+        rows = explicit_rows(equations.form)
+    except BlockTooLargeError:
+        return
+    known = known_quantities(equations)
+    chance = random.Random(1)  # noqa: S311 - any numbers will do
+    values = {symbol(name): value for name, value in equations.form.graph.parameters.items()}
+    values |= {state: chance.uniform(-1, 1) for state in rows.states} | {symbol("t"): 0.7}
+    for row, rate in zip(equations.states, rows.rates, strict=True):
+        printed, compiled = float(resolved(row.rate, known).xreplace(values)), float(rate.xreplace(values))
+        # both are exact in exact numbers; 1e-9 leaves room for rounding in sums that cancel
+        assert math.isclose(printed, compiled, rel_tol=1e-9, abs_tol=1e-9 * largest(rate, values)), row.name
+
+
+def largest(expression: Expr, values: dict[Symbol, float]) -> float:
+    return max(abs(float(term.xreplace(values))) for term in expression.expand().as_ordered_terms())
+
+
+@pytest.mark.parametrize("name", [*MECHANICAL, "dc drive"])
+def test_printed_rates_are_the_compiled_rates(name: str) -> None:
+    assert_agrees_with_compiled_rows(equations_of(MECHANICAL[name]() if name in MECHANICAL else dc_drive()))
+
+
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(pieces=networks(max_inertias=6))
+def test_printed_rates_are_the_compiled_rates_of_random_networks(pieces: Network) -> None:
+    assert_agrees_with_compiled_rows(equations_of(from_pieces(pieces)))
+
+
+def test_the_crane_has_the_equations_of_the_textbook() -> None:
+    equations = equations_of(crane())
+    J1, J2, w1, w2 = map(symbol, ("J1.J", "J2.J", "J1.omega", "J2.omega"))
+    motor, shaft, load, spring = map(symbol, ("motor.tau", "shaft.tau", "tau(load)", "shaft.tau_c"))
+    c, d, twist = map(symbol, ("shaft.c", "shaft.d", "shaft.omega_rel"))
+    first, second = equations.nodes
+    assert (first.left, first.right) == (J1 * rate_of(w1), motor - shaft)
+    assert (second.left, second.right) == (J2 * rate_of(w2), shaft + load)
+    assert {(row.left, row.right) for row in equations.loops if not row.trivial} == {(twist, w1 - w2)}
+    laws = {row.left: row.right for row in equations.laws}
+    assert laws[shaft] == spring + d * twist
+    assert laws[rate_of(spring)] == c * twist
+
+
+def test_a_row_knows_its_parts_branches_and_nodes() -> None:
+    equations = equations_of(crane())
+    node = equations.nodes[0]
+    assert (node.node, node.nodes, node.parts) == ("rotor", ("rotor",), ("motor", "J1", "shaft"))
+    assert dict(node.coefficients) == dict.fromkeys(node.branches, 1)
+    loop = next(row for row in equations.loops if row.parts == ("J1", "shaft", "J2"))
+    assert loop.nodes == ("rotor", "wheel")
+    assert sorted(loop.coefficients.values()) == [-1, 1]
+
+
+def test_a_gear_enters_the_balance_with_its_ratio() -> None:
+    equations = equations_of(MECHANICAL["geared inertias"]())
+    gear = equations.form.graph.parts[3].branches[0]
+    assert [row.coefficients[gear] for row in equations.nodes] == [1, -symbol("g.ratio")]
+
+
+def test_every_state_has_its_symbol_unit_and_rate() -> None:
+    equations = equations_of(crane())
+    assert [(row.name, row.unit) for row in equations.states] == [
+        ("J1.omega", "rad/s"),
+        ("J2.omega", "rad/s"),
+        ("shaft.tau_c", "N*m"),
+    ]
+    assert all(row.symbol == symbol(row.name) and row.left == rate_of(row.symbol) for row in equations.states)
+
+
+def test_eliminated_quantities_say_why_and_what_they_are() -> None:
+    equations = equations_of(hoist())
+    found = {(row.kind, row.why): row for row in equations.eliminated}
+    tied = found["speed", "inertia Jd is rigidly tied to drive by g2"]
+    assert (tied.left, tied.right) == (symbol("Jd.omega"), symbol("drive.omega") / symbol("g2.ratio"))
+    series = found["torque", "spring s1 is in series with s2"]
+    assert (series.left, series.right) == (symbol("s1.tau_c"), symbol("s2.tau_c"))
+    assert found["speed", "node wall is held at rest by frame"].right == 0
+    assert any(row.kind == "algebraic" and "no store at" in row.why for row in equations.eliminated)
+
+
+def test_parameters_of_zero_and_redundant_gears_are_noted() -> None:
+    assert any("s1.d, s2.d" in note for note in equations_of(hoist()).notes)
+    assert any(note.startswith("g3 says what") for note in equations_of(MECHANICAL["redundant gears"]()).notes)
+
+
+def test_rates_of_many_coupled_inertias_stay_together() -> None:
+    net = NetworkBuilder("differentials")
+    for k in range(5):
+        net.add(Inertia(f"J{k}", J=1.0 + k), f"n{k}")
+    for k in range(4):
+        net.add(Spring(f"s{k}", c=1.0), f"n{k}", f"n{k + 1}")
+    from shaftwork.components.rotation import PlanetaryGear
+
+    for k in range(3):
+        net.add(Inertia(f"C{k}", J=1.0), f"c{k}")
+        net.add(PlanetaryGear(f"p{k}", ratio=2.0), f"n{k}", f"c{k}", f"n{k + 1}")
+    equations = equations_of(net)
+    assert [row.explicit for row in equations.states if row.name.endswith("omega")] == [False] * 4 + [True]
+    assert len(equations.states[0].left.free_symbols & {rate_of(row.symbol) for row in equations.states}) > 1
+    assert "coupled" in equations.latex(form="state")
+
+
+def test_a_large_network_costs_nothing_before_it_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    form = state_form(graph_of(train(200)))
+    made: list[object] = []
+    from shaftwork.equations.assembly import Assembly
+
+    balance = Assembly.balance
+    monkeypatch.setattr(Assembly, "balance", lambda self, node: made.append(node) or balance(self, node))
+    equations = kirchhoff(form)
+    assert not made
+    assert equations.nodes[7].parts == ("J8", "s7", "s8")
+    assert not made
+    assert equations.nodes[7].right == symbol("s7.tau") - symbol("s8.tau")
+    assert made == [7]
+
+
+def test_the_balance_of_a_reversed_source_keeps_its_sign() -> None:
+    net = NetworkBuilder("reversed")
+    net.add(Inertia("J1", J=1.0), "a")
+    net.add(Inertia("J2", J=1.0), "b")
+    net.add(TorqueSource("T", tau=5.0), "b", "a")
+    net.add(Gear("g", ratio=2.0), "a", "c")
+    net.add(Inertia("J3", J=1.0), "c")
+    first, second, *_ = equations_of(net).nodes
+    assert first.right.coeff(symbol("T.tau")) == -1
+    assert second.right == symbol("T.tau")
