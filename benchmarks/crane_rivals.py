@@ -19,9 +19,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import sympy
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.integrate._ivp import dop853_coefficients as tableau
+
+import shaftwork as sw
+from shaftwork.codegen.heyoka import build
+from shaftwork.integrate import heyoka_taylor
+from shaftwork.integrate.problem import Problem
 
 Array = NDArray[np.float64]
 Solve = Callable[[float], Array]
@@ -122,12 +128,8 @@ def c_dop853() -> tuple[Solve, Counts]:
     return solve, counts
 
 
-def shaftwork_simulate(engine: str = "auto") -> Solve:
-    """The public call on a compiled model, as a user writes it."""
-    import sympy
-
-    import shaftwork as sw
-
+def crane_model() -> sw.Model:
+    """The crane wired as a user wires it."""
     net = sw.Network("crane travel")
     motor = sw.KlossMotor("motor", tau_k=TAU_K, s_k=S_K, n_sync=N_SYNC, ratio=RATIO, efficiency=EFFICIENCY)
     net.add(motor, "rotor")
@@ -135,10 +137,40 @@ def shaftwork_simulate(engine: str = "auto") -> Solve:
     net.add(sw.Spring("shaft", c=C, d=D), "rotor", "wheel")
     net.add(sw.Inertia("J2", J=J2), "wheel")
     net.add(sw.TorqueSource("load", tau=-TAU_W * sympy.tanh(sw.omega / OMEGA_S)), "wheel")
-    model = net.compile()
+    return net.compile()
+
+
+def shaftwork_simulate(engine: str = "auto") -> Solve:
+    """The public call on a compiled model, and reading the torque of the shaft."""
+    model = crane_model()
 
     def solve(rtol: float) -> Array:
         return np.asarray(model.simulate(t_end=T_END, rtol=rtol, t_eval=TIMES, engine=engine)["shaft.tau"])
+
+    return solve
+
+
+def shaftwork_engine() -> Solve:
+    """The Taylor engine alone on the same model: from a prepared problem to states at the output times."""
+    model = crane_model()
+    assert model.rows is not None
+    program = build(model.rows.states, sw.t, model.rows.parameters, model.rows.rates).bind(model.defaults)
+
+    def solve(rtol: float) -> Array:
+        problem = Problem(
+            rhs=model.rhs,
+            jacobian=None,
+            x0=START,
+            t0=0.0,
+            t_end=T_END,
+            names=model.states,
+            atol=rtol * SCALE,
+            rtol=rtol,
+            t_eval=TIMES,
+            symbolic=program,
+        )
+        omega_1, omega_2, spring = heyoka_taylor.solve(problem).x.T
+        return shaft_torque(np.array([omega_1, spring, omega_2]))
 
     return solve
 
@@ -205,6 +237,7 @@ def main() -> None:
     solvers = {
         "C DOP853": c_dop853()[0],
         "scipy DOP853": scipy_dop853,
+        "Shaftwork, engine": shaftwork_engine(),
         "Shaftwork, model.simulate": shaftwork_simulate(),
     }
     curves = {name: work_precision(solve, truth) for name, solve in solvers.items()}

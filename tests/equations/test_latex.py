@@ -14,6 +14,8 @@ import pytest
 
 from shaftwork.components import base
 from shaftwork.components.branches import Branch, ThroughLaw
+from shaftwork.components.electrical import Resistor, VoltageSource
+from shaftwork.components.machines import DCMachine
 from shaftwork.components.rotation import Damper, Inertia, Spring
 from shaftwork.components.sources import TorqueSource
 from shaftwork.core.errors import CompileError, ShaftworkError
@@ -98,6 +100,18 @@ def test_a_part_named_like_its_parameter_has_its_number_as_subscript() -> None:
     assert names["shaft.c"] == r"c_{\mathrm{shaft}}"
     assert names["shaft.tau_c"] == r"\tau_{c,\mathrm{shaft}}"
     assert names["motor.tau_k"] == r"\tau_{k,\mathrm{motor}}"
+
+
+@pytest.mark.parametrize("armature", [{}, {"R": 0.3}, {"L": 1e-3}, {"R": 0.3, "L": 1e-3}])
+def test_the_currents_of_a_machine_are_told_apart(armature: dict[str, float]) -> None:
+    net = NetworkBuilder("machine")
+    net.add(VoltageSource("supply", voltage=24.0), "s", "ground")
+    net.add(Resistor("cable", R=0.1), "s", "p")
+    net.add(DCMachine("M", k=0.05, **armature), "p", "ground", "rotor")
+    net.add(Inertia("J", J=1e-3), "rotor")
+    names = symbols(net)
+    assert len({*names.values()}) == len(names)
+    assert names["M.i_k"] == r"i_{k,\mathrm{M}}"
 
 
 def test_a_chosen_subscript_is_printed() -> None:

@@ -252,11 +252,11 @@ def test_a_part_alone_at_its_nodes_floats(part: Component, nodes: tuple[str, ...
     assert [problem.kind for problem in joined((part, nodes))] == ["floating part"]
 
 
-def test_two_trains_in_one_network_are_a_warning() -> None:
+def test_two_trains_in_one_network_are_a_note() -> None:
     brake = translation.TranslationalDamper("d", d=1.0)
     (problem,) = joined((translation.Mass("m1", m=1.0), ("car",)), (brake, ("car",)))
     assert problem.message == "'m1', 'd' at node 'car' share no node with 'J1', 'shaft', 'J2'."
-    assert (problem.kind, problem.severity) == ("separate train", "warning")
+    assert (problem.kind, problem.severity) == ("separate train", "note")
 
 
 def test_an_inertia_alone_is_a_train() -> None:

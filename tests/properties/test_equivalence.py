@@ -137,10 +137,7 @@ def _speeds(net: sw.Network, **options: Any) -> dict[str, Any]:
 @pytest.mark.parametrize("stiffnesses", [(100.0, 300.0), (100.0, 300.0, 50.0, 70.0)])
 def test_springs_in_series_equal_one_spring_of_their_common_stiffness(stiffnesses: tuple[float, ...]) -> None:
     nodes = ["a", *(f"s{k}" for k in range(1, len(stiffnesses))), "b"]
-    series = [
-        (sw.Spring(f"s{k}", c=c), (nodes[k], nodes[k + 1]))
-        for k, c in enumerate(stiffnesses)
-    ]
+    series = [(sw.Spring(f"s{k}", c=c), (nodes[k], nodes[k + 1])) for k, c in enumerate(stiffnesses)]
     one = sw.Spring("s", c=1.0 / sum(1.0 / c for c in stiffnesses))
     assert len(_chain(*series).compile().states) == 3
     assert_equal_signals(_speeds(_chain(*series)), _speeds(_chain((one, ("a", "b")))), 1e-11)
@@ -158,7 +155,7 @@ def test_inertias_at_one_node_equal_their_sum() -> None:
 
 
 def test_an_ever_stiffer_shaft_tends_to_a_rigid_one() -> None:
-    """The shaft's own oscillation has the amplitude tau J2 / ((J1 + J2) w J1), w = sqrt(c / J): it falls with 1/sqrt(c)."""
+    """The shaft's own oscillation falls with 1/sqrt(c): tau J2 / (J1 (J1 + J2) w), w^2 = c (1/J1 + 1/J2)."""
     rigid = _speeds(_chain((sw.Gear("joint", ratio=1.0), ("a", "b"))))
     errors = []
     for c in (1e4, 1e6, 1e8, 1e10):

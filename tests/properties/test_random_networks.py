@@ -32,9 +32,7 @@ def _across(pieces: Network, response: mna.Response) -> dict[str, Array]:
         for place, node in enumerate(piece.nodes)
     }
     return {
-        f"{node}.{QUANTITIES[domains[node]][0]}": values
-        for node, values in response.across.items()
-        if node != GROUND
+        f"{node}.{QUANTITIES[domains[node]][0]}": values for node, values in response.across.items() if node != GROUND
     }
 
 

@@ -236,7 +236,7 @@ def _in_a_test_bed(name: str) -> sw.Solution:
 def test_a_component_absorbs_what_it_stores_and_loses(name: str) -> None:
     """Power at the ports = d(energy)/dt + heat, for every component; a source "loses" what it supplies, negative.
 
-    The derivative is a central difference with h = 1 ms: h^2/6 times the third derivative, below 1e-5 of the power here.
+    The derivative is a central difference with h = 1 ms, whose error h^2/6 E''' stays below 1e-5 of the power.
     """
     sol = _in_a_test_bed(name)
     stored, lost, supplied = sol.observer.powers(sol.t, sol.x)
@@ -255,7 +255,7 @@ def test_a_component_absorbs_what_it_stores_and_loses(name: str) -> None:
 
 @pytest.mark.parametrize("name", _registered())
 def test_the_signals_of_a_component_multiply_to_its_power(name: str) -> None:
-    """Across times through, summed over the ports with the signs of the sign page, is the power that the part absorbs."""
+    """Across times through, summed over the ports with the signs of the sign page, is what the part absorbs."""
     sol, kind = _in_a_test_bed(name), REGISTRY[name]
     wanted = sol["subject.power"]
     if name == "Ground":
@@ -263,10 +263,10 @@ def test_the_signals_of_a_component_multiply_to_its_power(name: str) -> None:
     elif name == "DCMachine":
         found = sol["subject.u"] * sol["subject.i"] - sol["subject.omega"] * sol["subject.tau"]
     elif kind.role == "coupling":
-        found = sum(
-            sol[f"subject.{port.domain.across.name}_{port.name}"] * sol[f"subject.{port.domain.through.name}_{port.name}"]
-            for port in kind.ports
-        )
+        found = np.zeros_like(wanted)
+        for port in kind.ports:
+            names = (f"subject.{quantity.name}_{port.name}" for quantity in (port.domain.across, port.domain.through))
+            found += np.prod([sol[name] for name in names], axis=0)
     else:
         domain = kind.ports[0].domain
         suffix = "_rel" if len(kind.ports) == 2 and domain is not ELECTRICAL else ""

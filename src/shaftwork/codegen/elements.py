@@ -96,8 +96,10 @@ class GainMatrix:
         found = {symbol.name: symbol for made in self._coefficients for symbol in made.free_symbols}
         ordered = sorted(found, key=names.__getitem__)
         self._places = np.array([names[name] for name in ordered], dtype=np.intp)
-        arguments = [[found[name] for name in ordered]]
-        self._function = lambdify(arguments, list(self._coefficients), "math") if variable else None
+        # lambdify renames arguments that are no identifiers one by one in every expression; this is linear
+        plain = {found[name]: Symbol(f"p{k}", real=True) for k, name in enumerate(ordered)}
+        renamed = [made.xreplace(plain) for made in self._coefficients]
+        self._function = lambdify([list(plain.values())], renamed, "math") if variable else None
 
     def __call__(self, p: Array) -> Any:
         """The matrix as scipy.sparse.csr_array."""

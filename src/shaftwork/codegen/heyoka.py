@@ -122,7 +122,7 @@ def build(
     from shaftwork.codegen.heyoka_expressions import Translator
 
     translator = Translator(states, time, parameters)
-    translated = tuple(translator.expression(sympy.sympify(row)) for row in rows)
+    translated = tuple(translator.expression(row) for row in rows)
     return HeyokaProgram(
         translator.variables, translated, tuple(translator.switches), tuple(translator.conditions), len(parameters)
     )

@@ -13,6 +13,10 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.observer import ModelObserver
 from shaftwork.core.errors import ParameterError, SignalError, SimulationError
 
+SMALLEST_STEP = 1e-6
+"""First step of the way to a steady state, s."""
+DEFECT = 0.3
+"""A step on that way is taken when its equation is left with less than this fraction of the rates."""
 STANDSTILL = 1e-6
 """A steady state has been reached when the last step changed the states by no more than this fraction."""
 CONSISTENT = 1e-9
@@ -75,37 +79,52 @@ def _fill(
             )
 
 
-def steady_state(bound: BoundArrays, start: Array, t: float, *, tolerance: float = 1e-12, limit: int = 500) -> Array:
+def steady_state(bound: BoundArrays, start: Array, t: float, *, tolerance: float = 1e-12, limit: int = 2000) -> Array:
     """States at which nothing changes, reached from a start the way the drive itself would reach it.
 
-    Law: implicit Euler steps (I/h - J) dx = rhs, whose step h grows as the rates fall: at first the motion of the
-    drive, so that of several steady states the one it runs to is found, and in the end Newton's method.
+    Law: implicit Euler steps (I/h - J) dx = rhs, each with one iteration of Newton's method. A step is taken where its
+    defect is small, and the next is then longer: first the motion of the drive is followed, so that of several steady
+    states the one it runs to is found, and in the end the steps are those of Newton's method.
 
     Raises:
         SimulationError: the rates do not vanish; the message names the state that keeps changing.
     """
     x = np.array(start, dtype=float)
     names = [state.name for state in bound.program.form.states]
-    rate = bound.rhs(t, x)
-    h = 1e-3 / max(1.0, float(np.abs(rate).max()))
+    weights = _energy_weights(bound)
+    rate, step = bound.rhs(t, x), np.zeros_like(x)
+    h = SMALLEST_STEP
     identity = sparse.eye_array(len(x), format="csc")
-    step = np.zeros_like(x)
     for _ in range(limit):
         size = np.abs(bound.part.A) @ np.abs(x) + np.abs(bound.part.B) @ np.abs(bound.values(t, x)[1])
         settled = np.linalg.norm(step) <= STANDSTILL * np.linalg.norm(x)  # a drive that runs away is not steady
         if settled and (np.abs(rate) <= tolerance * (size + np.finfo(float).tiny)).all():
             return x
-        step = _solve(sparse.csc_array(identity / h - bound.jacobian(t, x)), rate)
-        new = bound.rhs(t, x + step)
-        ratio = float(np.linalg.norm(rate) / max(float(np.linalg.norm(new)), np.finfo(float).tiny))
-        if not np.isfinite(new).all():
-            h *= 0.1
+        trial = _solve(sparse.csc_array(identity / h - bound.jacobian(t, x)), rate)
+        new = bound.rhs(t, x + trial)
+        defect = np.linalg.norm(weights * (trial / h - new)) / max(
+            np.linalg.norm(weights * rate), np.linalg.norm(weights * size) * tolerance, np.finfo(float).tiny
+        )
+        if not defect < DEFECT:
+            h = h / 4
             continue
-        x, rate, h = x + step, new, min(h * min(max(2.0, ratio), 100.0), 1e12)
-    worst = int(np.argmax(np.abs(rate)))
+        x, rate, step, h = x + trial, new, trial, min(h * (2.0 if defect > DEFECT / 10 else 8.0), 1e12)
+    worst = int(np.argmax(np.abs(weights * rate)))
     raise SimulationError(
         f"No steady state was found: '{names[worst]}' still changes by {rate[worst]:.3g} per second at {x[worst]:.6g}. "
         f"Does something hold the speed (a load, a damper, a motor's curve)? Give a start near the operating point."
+    )
+
+
+def _energy_weights(bound: BoundArrays) -> Array:
+    """Factors of the states with which the sum of squares is twice the stored energy."""
+    form, coefficients = bound.program.form, bound.part.coefficients
+    return np.concatenate(
+        [
+            np.sqrt(coefficients[list(form.across_states)]),
+            1 / np.sqrt(coefficients[list(form.through_states)]),
+            np.ones(len(form.integrals)),
+        ]
     )
 
 

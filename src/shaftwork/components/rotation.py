@@ -80,7 +80,9 @@ class Gear(Component):
     Law: omega_a = ratio omega_b, tau_b = -ratio tau_a. Analogue: an ideal transformer. Source: Marinkovic 2012, (18).
     """
 
-    ratio: float = parameter("1", "speed of a over speed of b; negative for a pair that reverses", nonzero=True)
+    ratio: float = parameter(
+        "1", "speed of a over speed of b; negative for a pair that reverses", nonzero=True, latex="i"
+    )
 
     role: ClassVar[Role] = "coupling"
 
@@ -95,7 +97,7 @@ class PlanetaryGear(Component):
     Law: omega_sun + ratio omega_ring = (1 + ratio) omega_carrier (Willis). Analogue: a three-winding transformer.
     """
 
-    ratio: float = parameter("1", "teeth of the ring over teeth of the sun", above=0)
+    ratio: float = parameter("1", "teeth of the ring over teeth of the sun", above=0, latex="i")
 
     role: ClassVar[Role] = "coupling"
     ports: ClassVar = (Port("sun"), Port("carrier"), Port("ring"))

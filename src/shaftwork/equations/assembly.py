@@ -80,9 +80,11 @@ class Assembly:
 
     @cached_property
     def quantities(self) -> Quantities:
+        """The symbols of the network."""
         return Quantities(self.form.graph)
 
     def ends(self, branch: int) -> tuple[int, int]:
+        """First and second node of a branch."""
         made = self.form.graph.branches[branch]
         return made.plus, made.minus
 

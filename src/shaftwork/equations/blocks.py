@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 from sympy import Add, Expr, Integer, Symbol, preorder_traversal
 
@@ -15,10 +16,12 @@ from shaftwork.equations.assembly import Group, Sides, sides, tidy
 from shaftwork.equations.notation import INDEX_CLOSES, INDEX_OPENS, in_text
 from shaftwork.equations.printing import LINE_WIDTH, Line, Writer, with_rates
 from shaftwork.equations.quantities import Flow, rate_of
-from shaftwork.equations.records import Eliminated, Equations, Row
 from shaftwork.equations.second_order import SecondOrder
 from shaftwork.equations.widths import printed_width
 from shaftwork.network.templates import Kind
+
+if TYPE_CHECKING:  # the records print themselves through this module
+    from shaftwork.equations.records import Eliminated, Equations, Row
 
 AUXILIARY = (r"\sigma", r"\zeta", r"\xi", r"\chi")
 """Letters for sums that occur more than once in a law, such as a slip."""
@@ -110,6 +113,7 @@ class Blocks:
 
     @cached_property
     def writer(self) -> Writer:
+        """Prints the expressions of this network."""
         names = {**self.equations.symbol_names, **self._auxiliary_names}
         graph = self.equations.form.graph
         parameters = {letter.name for letter in self.equations.letters if letter.parameter}

@@ -18,7 +18,7 @@ from shaftwork.equations.records import (
     NodeEquation,
     StateEquation,
 )
-from shaftwork.equations.solution import Solution, System
+from shaftwork.equations.solution import SolvedForm, System
 from shaftwork.network.graph import GROUND
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm, branch_name
@@ -52,7 +52,7 @@ class _Writer:
     def __init__(self, form: StateForm) -> None:
         self.form, self.graph = form, form.graph
         self.assembly = Assembly(form)
-        self.solution = Solution(self.assembly)
+        self.solution = SolvedForm(self.assembly)
 
     def origin(self, branches: Iterable[int], nodes: Iterable[int] = ()) -> Origin:
         """Parts, branches and nodes of a row, each once, in the order of the network."""

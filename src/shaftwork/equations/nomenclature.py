@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 from shaftwork.equations.notation import INDEX_CLOSES, INDEX_OPENS, Letter, in_text, split_index, without_marks
 from shaftwork.equations.printing import printed_number
-from shaftwork.equations.records import Equations
 from shaftwork.equations.series import SHORTEST_SERIES, runs, together
+
+if TYPE_CHECKING:  # the records print themselves through this module
+    from shaftwork.equations.records import Equations
 
 UNITS = {"1": "--", "ohm": r"$\Omega$"}
 Cells = tuple[str, ...]

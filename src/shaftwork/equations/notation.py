@@ -223,7 +223,10 @@ def _quantity_letters(form: StateForm, quantities: Quantities) -> Iterator[tuple
             yield made.part, _letter(quantities.integral(made.index), domain.integral)
         if made.terms:
             quantity = quantities.multiplier_quantity(made.index)
-            yield made.part, _letter(quantities.multiplier(made.index), quantity, _mark(made.template.label))
+            yield (
+                made.part,
+                _letter(quantities.multiplier(made.index), quantity, _mark(quantities.multiplier_label(made.index))),
+            )
     for state in form.states:
         if state.kind == "integral":
             part = graph.branches[state.branch].part
@@ -246,11 +249,13 @@ def _distinct(letters: Iterable[Letter]) -> tuple[Letter, ...]:
     kept: dict[str, Letter] = {}
     for letter in letters:
         kept.setdefault(letter.name, letter)
-    variables = {letter.printed("") for letter in kept.values() if not letter.parameter}
-    return tuple(
-        replace(letter, mark=f"{letter.mark}0") if letter.parameter and letter.printed("") in variables else letter
-        for letter in kept.values()
-    )
+    made: dict[str, Letter] = {}
+    for letter in sorted(kept.values(), key=lambda letter: letter.parameter):
+        marks = (letter.mark + "0" * times for times in count())
+        free = next(own for mark in marks if (own := replace(letter, mark=mark)).printed("") not in made)
+        made[free.printed("")] = free
+    order = {name: place for place, name in enumerate(kept)}
+    return tuple(sorted(made.values(), key=lambda letter: order[letter.name]))
 
 
 def _nodes(quantities: Quantities) -> Iterator[tuple[str, Named]]:

@@ -133,10 +133,13 @@ class Quantities:
 
     def multiplier(self, branch: int) -> Symbol:
         """The through variable of a coupling: a term of coefficient r takes r times it from its node."""
+        part = self.graph.branches[branch].part
+        return self._named(part, self.multiplier_quantity(branch), self.multiplier_label(branch))
+
+    def multiplier_label(self, branch: int) -> str:
+        """What tells a coupling from the other branches of its part; empty where it is the only one."""
         made = self.graph.branches[branch]
-        several = sum(bool(self.graph.branches[k].terms) for k in self.graph.parts[made.part].branches) > 1
-        label = self._label(made) if several else ""
-        return self._named(made.part, self.multiplier_quantity(branch), label)
+        return self._label(made) if len(self.graph.parts[made.part].branches) > 1 else ""
 
     def multiplier_quantity(self, branch: int) -> Quantity:
         """What a coupling's through variable is: that of its first term of coefficient 1 or -1."""

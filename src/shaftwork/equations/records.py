@@ -42,10 +42,12 @@ class Row:
 
     @property
     def left(self) -> Expr:
+        """The left side."""
         return self.sides.left
 
     @property
     def groups(self) -> tuple[Group, ...]:
+        """The right side as groups of terms under a common factor."""
         return self.sides.groups
 
     @cached_property

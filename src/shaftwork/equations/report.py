@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import ShaftworkError
@@ -10,8 +11,10 @@ from shaftwork.equations.blocks import Block, Blocks
 from shaftwork.equations.nomenclature import nomenclature
 from shaftwork.equations.notation import in_text, without_marks
 from shaftwork.equations.printing import aligned
-from shaftwork.equations.records import Equations, Form
 from shaftwork.equations.series import shortened
+
+if TYPE_CHECKING:  # the records print themselves through this module
+    from shaftwork.equations.records import Equations, Form
 
 PREAMBLE = r"""\documentclass[11pt,a4paper]{article}
 \usepackage[T1]{fontenc}

@@ -53,10 +53,12 @@ class SecondOrder:
 
     @cached_property
     def velocities(self) -> tuple[Symbol, ...]:
+        """The rates of the coordinates."""
         return tuple(map(rate_of, self.coordinates))
 
     @cached_property
     def accelerations(self) -> tuple[Symbol, ...]:
+        """The second derivatives of the coordinates."""
         return tuple(map(rate_of, self.velocities))
 
     def terms(self, row: int) -> Iterator[Expr]:

@@ -76,7 +76,7 @@ class System:
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class SolvedForm:
     """The three systems of a state form: speeds, torques, and speeds without a store."""
 
     assembly: Assembly

@@ -8,7 +8,7 @@ through variables of the nonlinear laws and sources, e the prescribed across var
     M x_C' = -F_CR R v_R - F_CL x_L - F_CW w - F_CK K F_EK' e'                    M = C + F_CK K F_CK'
     N x_L' = F_CL' x_C + F_EL' e + F_GL' v_G - F_SL' S F_SW w'                    N = L + F_SL' S F_SL
 
-K are the dependent capacities (rigidly geared inertias), S the dependent compliances (springs in series). This is exact:
+K are the dependent capacities (rigidly geared inertias), S the dependent compliances (springs in series). It is exact:
 nothing is lost by the elimination, and every eliminated quantity comes back from F.
 """
 

@@ -1,0 +1,122 @@
+"""What every component declares, and how wrong arguments are answered."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import pytest
+import sympy
+
+import shaftwork as sw
+from shaftwork.components import REGISTRY
+from shaftwork.components.branches import ACROSS, IdealCoupling
+from shaftwork.components.laws import t
+from shaftwork.core.domains import DOMAINS
+from shaftwork.network.templates import Kind, make_template
+
+OWN = [name for name, kind in REGISTRY.items() if kind.__module__.startswith("shaftwork.")]
+
+
+def _made(name: str, **changes: Any) -> sw.Component:
+    kind = REGISTRY[name]
+    values = {key: 1.5 for key, declared in kind.declared.items() if declared.required and declared.at_most != 1}
+    return kind("part", **{**values, **changes})
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_every_component_is_a_public_name_with_a_law_in_its_docstring(name: str) -> None:
+    assert getattr(sw, name) is REGISTRY[name]
+    assert "Law:" in str(REGISTRY[name].__doc__)
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_every_parameter_declares_unit_and_meaning(name: str) -> None:
+    for declared in REGISTRY[name].declared.values():
+        assert declared.unit
+        assert declared.meaning
+        assert declared.required or declared.objection(declared.default) is None
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_every_component_is_a_frozen_value(name: str) -> None:
+    part = _made(name)
+    assert part == _made(name)
+    assert hash(part) == hash(_made(name))
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        part.name = "other"  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_every_component_refuses_what_it_does_not_know_with_what_it_takes(name: str) -> None:
+    with pytest.raises(sw.ParameterError, match="It takes a name and"):
+        _made(name, wrong=1.0)
+    required = [key for key, declared in REGISTRY[name].declared.items() if declared.required]
+    if required:
+        with pytest.raises(sw.ParameterError, match=f"'{required[0]}'"):
+            REGISTRY[name]("part")
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_couplings_are_power_conserving_and_others_end_at_ports(name: str) -> None:
+    """Every end of a branch is a port, an inner node or the frame."""
+    part = _made(name)
+    values = {key: (value if isinstance(value, float) else sympy.Float(1.5)) for key, value in part.values.items()}
+    ends = {None, *(port.name for port in (*part.ports, *part.inner))}
+    for branch in make_template(part, values).branches:
+        found = [*branch.ends, *(end for _, plus, minus in branch.terms for end in (plus, minus))]
+        assert set(found) <= ends
+        assert (branch.kind is Kind.COUPLING) == bool(branch.terms)
+
+
+@pytest.mark.parametrize(
+    ("part", "kinds"),
+    [
+        (sw.Spring("p", c=1.0, d=1.0), [Kind.THROUGH_STORE, Kind.CONDUCTANCE]),
+        (sw.Spring("p", c=1.0), [Kind.THROUGH_STORE]),
+        (sw.Spring("p", c=0.0, d=1.0), [Kind.CONDUCTANCE]),
+        (sw.Inertia("p", J=0.0), []),
+        (sw.Resistor("p", R=0.0), [Kind.COUPLING]),
+        (sw.Inductor("p", L=0.0), [Kind.COUPLING]),
+        (sw.Capacitor("p", C=0.0), []),
+        (sw.DCMachine("p", k=1.0), [Kind.COUPLING, Kind.COUPLING, Kind.COUPLING]),
+        (sw.CoulombLoad("p", tau=0.0), []),
+        (sw.TorqueSource("p", tau=0.0), []),
+    ],
+    ids=str,
+)
+def test_a_zero_removes_a_branch_or_makes_it_rigid(part: sw.Component, kinds: list[Kind]) -> None:
+    """No torque flows through a spring of zero; no voltage drops over a resistance of zero."""
+    values = {key: float(value) for key, value in part.values.items()}
+    assert [branch.kind for branch in make_template(part, values).branches] == kinds
+
+
+@pytest.mark.parametrize(
+    ("law", "kinds"),
+    [
+        (5.0, [Kind.THROUGH_SOURCE]),
+        (sympy.sin(t), [Kind.THROUGH_SOURCE]),
+        (-2.0 * sw.omega, [Kind.CONDUCTANCE]),
+        (4.0 - 2.0 * sw.omega, [Kind.CONDUCTANCE, Kind.THROUGH_SOURCE]),
+        (-(sw.omega**2), [Kind.LAW]),
+        (sw.t * sw.omega, [Kind.LAW]),
+        (-3.0 * sw.phi, [Kind.LAW]),
+    ],
+    ids=str,
+)
+def test_a_law_that_is_linear_in_speed_joins_the_linear_part(law: Any, kinds: list[Kind]) -> None:
+    value = law if isinstance(law, float) else sympy.sympify(law)
+    assert [made.kind for made in make_template(sw.TorqueSource("p", tau=law), {"tau": value}).branches] == kinds
+
+
+def test_a_branch_may_be_written_in_ten_lines_by_a_user_without_a_trace_in_the_library() -> None:
+    assert all(REGISTRY[name].__module__.startswith("shaftwork.components.") for name in OWN)
+    gear = next(iter(sw.Gear("g", ratio=2.0).branches(type("P", (), {"ratio": sympy.Symbol("ratio")}))))
+    assert isinstance(gear, IdealCoupling)
+    assert ACROSS not in gear.terms[0][0].free_symbols
+
+
+def test_domains_share_no_quantity() -> None:
+    """Signals are told apart by the names of their quantities."""
+    names = [q.name for domain in DOMAINS for q in (domain.across, domain.through, domain.integral)]
+    assert len(set(names)) == len(names) == 9
