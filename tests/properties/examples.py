@@ -15,11 +15,13 @@ from types import FrameType
 
 import numpy as np
 from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from shaftwork import Model, Network, NetworkWarning
 from shaftwork.components import REGISTRY
-from tests.reference.mna import Piece
+from tests.reference.mna import GROUND, Piece
+from tests.strategies import Network as Pieces
 
 EXAMPLES = int(os.environ.get("SHAFTWORK_EXAMPLES", "500"))
 Array = NDArray[np.float64]
@@ -84,3 +86,25 @@ def assert_equal_signals(found: Mapping[str, Array], wanted: Mapping[str, Array]
         if not error <= tolerance * largest[quantity_of(name)] + 1e-300
     }
     assert not wrong, wrong
+
+
+@st.composite
+def inner_drives(draw: st.DrawFn, pieces: Pieces) -> Pieces:
+    """Drives of places that have no store of their own, so that the derivatives of the sources enter the equations.
+
+    They are a torque between two springs in series and a prescribed speed at the sun of a planetary gear. They must
+    rise from zero: a step would leave open how it divides between the springs.
+    """
+    rotors = [piece.nodes[0] for piece in pieces if piece.type == "Inertia"]
+    first, second = (rotors[draw(st.integers(0, 63)) % len(rotors)] for _ in range(2))
+    push = (
+        Piece("Spring", "first half", (first, "middle"), {"c": 300.0}),
+        Piece("Spring", "second half", ("middle", GROUND if first == second else second), {"c": 500.0}),
+        Piece("TorqueSource", "push", ("middle",), {"tau": 10.0}),
+    )
+    steer = (
+        Piece("SpeedSource", "steer", ("steered",), {"omega": 2.0}),
+        Piece("PlanetaryGear", "mixer", ("steered", first, "mixed"), {"ratio": 2.0}),
+        Piece("Inertia", "flywheel", ("mixed",), {"J": 0.5}),
+    )
+    return (push if draw(st.booleans()) else ()) + (steer if draw(st.booleans()) else ())

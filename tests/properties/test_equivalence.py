@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 import shaftwork as sw
 from shaftwork.components import REGISTRY
-from tests.properties.examples import assert_equal_signals, compiled, network_of, share_of_examples
-from tests.reference.mna import Piece
+from tests.properties.examples import assert_equal_signals, compiled, inner_drives, network_of, share_of_examples
+from tests.reference.mna import SOURCE_VALUE, Piece
 from tests.strategies import Network, networks
 
 TIMES = np.linspace(0.0, 0.5, 6)
@@ -32,11 +32,19 @@ LAWS: tuple[Callable[[str], sw.Component], ...] = (
 )
 
 
+def _swinging(piece: Piece) -> Piece:
+    """A source whose value swings."""
+    if (key := SOURCE_VALUE.get(piece.type)) is None:
+        return piece
+    return Piece(piece.type, piece.name, piece.nodes, {key: piece.values[key] * sympy.sin(3 * sw.t + 1)})
+
+
 @st.composite
 def nonlinear_networks(draw: st.DrawFn, max_inertias: int = 8) -> sw.Network:
-    """A random network with motors, loads and laws of speed, angle and time on some of its inertias."""
+    """A random network whose sources swing, with motors, loads and laws of speed, angle and time on some inertias."""
     pieces = draw(networks(max_inertias=max_inertias))
-    net = network_of(pieces)
+    pieces = (*pieces, *draw(inner_drives(pieces)))
+    net = network_of(_swinging(piece) for piece in pieces)
     rotors = [piece.nodes[0] for piece in pieces if piece.type == "Inertia"]
     for number, kind in enumerate(draw(st.lists(st.sampled_from(range(len(LAWS))), min_size=1, max_size=4))):
         net.add(LAWS[kind](f"law{number}"), rotors[draw(st.integers(0, 63)) % len(rotors)])

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from hypothesis import given
+from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
+from shaftwork import t
 from shaftwork.components import REGISTRY
-from tests.properties.examples import Array, assert_equal_signals, compiled, processor_time_limit, share_of_examples
+from tests.properties.examples import (
+    Array,
+    assert_equal_signals,
+    compiled,
+    inner_drives,
+    processor_time_limit,
+    share_of_examples,
+)
 from tests.reference import mna
-from tests.reference.mna import GROUND, TERMINALS, Piece
+from tests.reference.mna import GROUND, SOURCE_VALUE, TERMINALS, Piece
 from tests.strategies import Network, networks
 
 TIMES = np.linspace(0.0, 0.5, 6)
@@ -57,6 +66,25 @@ def _through(pieces: Network, response: mna.Response) -> Iterator[tuple[str, Arr
                 yield f"{piece.name}.{signal}", sign * values
 
 
+@st.composite
+def driven_networks(draw: st.DrawFn) -> tuple[Network, dict[str, mna.Signal]]:
+    """A network whose sources step at t = 0, or rise along straight lines, and the referee's signals of the latter."""
+    pieces = draw(networks())
+    if draw(st.booleans()):
+        return pieces, {}
+    pieces = (*pieces, *draw(inner_drives(pieces)))
+    signals = {p.name: mna.ramp(p.values[SOURCE_VALUE[p.type]]) for p in pieces if p.type in SOURCE_VALUE}
+    return pieces, signals
+
+
+def _rising(pieces: Network, signals: Mapping[str, mna.Signal]) -> Network:
+    """The pieces with the values of the named sources times t, as laws of the library."""
+    return tuple(
+        Piece(p.type, p.name, p.nodes, {key: value * t for key, value in p.values.items()}) if p.name in signals else p
+        for p in pieces
+    )
+
+
 def test_every_speed_and_every_torque_equals_that_of_the_referee() -> None:
     """Tolerance 1e-7 of the largest value of the same quantity.
 
@@ -66,12 +94,13 @@ def test_every_speed_and_every_torque_equals_that_of_the_referee() -> None:
     inertias = []
 
     @share_of_examples()
-    @given(networks())
-    def compare(pieces: Network) -> None:
+    @given(driven_networks())
+    def compare(driven: tuple[Network, dict[str, mna.Signal]]) -> None:
+        pieces, signals = driven
         inertias.append(sum(piece.type in ("Inertia", "Mass") for piece in pieces))
         with processor_time_limit(30.0):
-            solution = compiled(pieces).simulate(TIMES[-1], t_eval=TIMES, engine="exact")
-        response = mna.simulate(pieces, None, TIMES)
+            solution = compiled(_rising(pieces, signals)).simulate(TIMES[-1], t_eval=TIMES, engine="exact")
+        response = mna.simulate(pieces, signals, TIMES)
         wanted = _across(pieces, response) | dict(_through(pieces, response))
         assert_equal_signals({name: solution[name] for name in wanted}, wanted, 1e-7)
 

@@ -101,8 +101,8 @@ def _parameters(frozen: object) -> set[str]:
 
 
 def test_ratios_typed_to_ten_digits_still_agree_around_a_loop() -> None:
-    """1.2 * 1.5 is not 1.8 in binary."""
-    loop = [("g1", 1.2, ("a", "b")), ("g2", 1.5, ("b", "c")), ("g3", 1.8, ("a", "c"))]
+    """7/3 typed to ten decimals differs from 7/3 by a part of 1e-11, far more than rounding."""
+    loop = [("g1", 2.3333333333, ("a", "b")), ("g2", 1.5, ("b", "c")), ("g3", 3.5, ("a", "c"))]
     graph, tree = _tree(
         (sw.Inertia("J", J=1.0), ("a",)), *((sw.Gear(name, ratio=ratio), nodes) for name, ratio, nodes in loop)
     )

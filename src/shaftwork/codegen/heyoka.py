@@ -84,7 +84,6 @@ class HeyokaProgram:
         return heyoka.taylor_adaptive(
             list(zip(self.variables, self.rows, strict=True)),
             [0.0] * len(self.rows),
-            pars=[0.0] * (self.parameter_count + len(self.switches)),
             tol=tolerance,
             compact_mode=len(self.rows) > LARGEST_UNROLLED,
             **options,

@@ -103,16 +103,17 @@ class Inputs:
 
     def _evaluate(self, pick: Callable[[_Group], Function | None], t: Any, y: Array, x: Array, p: Array) -> Array:
         result = np.zeros((self.size, *np.shape(x)[1:]))
-        for group in self._groups:
-            function = pick(group)
-            if function is None:
-                continue
-            across = y[group.outputs] if group.outputs.size else 0.0
-            integral = x[group.integrals] if group.integrals.size else 0.0
-            parameters = p[group.made_of.places]
-            if result.ndim > 1:
-                parameters = parameters[..., None]
-            result[group.inputs] = function(t, across, integral, *parameters)
+        with np.errstate(all="ignore"):  # a law that has no value is NaN here; the engines say when and where
+            for group in self._groups:
+                function = pick(group)
+                if function is None:
+                    continue
+                across = y[group.outputs] if group.outputs.size else 0.0
+                integral = x[group.integrals] if group.integrals.size else 0.0
+                parameters = p[group.made_of.places]
+                if result.ndim > 1:
+                    parameters = parameters[..., None]
+                result[group.inputs] = function(t, across, integral, *parameters)
         return result
 
 

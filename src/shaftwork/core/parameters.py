@@ -11,6 +11,9 @@ from typing import Any
 REQUIRED: Any = object()
 """Stands for the default of a parameter that has none."""
 
+SMALLEST, LARGEST = 1e-60, 1e60
+"""Sizes of values in SI: beyond them products of a few parameters leave the range of floating-point numbers."""
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -59,6 +62,8 @@ class Parameter:
         """Why a number is not admissible, or None when it is."""
         if not math.isfinite(value):
             return "must be a finite number"
+        if value and not SMALLEST <= abs(value) <= LARGEST:
+            return f"must lie between {SMALLEST:g} and {LARGEST:g} in size, or be exactly zero"
         outside = (
             (self.above is not None and value <= self.above)
             or (self.at_least is not None and value < self.at_least)

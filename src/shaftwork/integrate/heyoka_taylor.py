@@ -63,7 +63,9 @@ class _Run:
         integrator = self.integrator
         integrator.time = piece.start
         integrator.state[:] = start_of_piece(self.problem, piece, self.state)
-        integrator.pars[: self.parameters.size] = self.parameters
+        # heyoka keeps no parameters behind the last one that the rows contain
+        used = min(integrator.pars.size, self.parameters.size)
+        integrator.pars[:used] = self.parameters[:used]
         watch = self._watch(piece) if self.program.switches else None
         while True:
             outcome, steps = advance(integrator, watch, self.problem.max_steps - self.steps)

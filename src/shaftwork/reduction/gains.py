@@ -1,7 +1,7 @@
 """The entries of loop and node equations: whole numbers, or gear ratios combined by products, sums and quotients.
 
 A combination is kept as what it was made of, with two values: one for the network's own ratios, which decides whether
-it is zero, and one for other ratios, which tells whether it is zero for all of them. Expressions are made of it only when
+it is zero, and one for other ratios, which tells whether it is always zero. Expressions are made of it only when
 somebody reads them, so long gear trains cost no algebra.
 """
 

@@ -6,7 +6,7 @@ left to the sparse matrices of the array program; both are tested to agree.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import networkx as nx
@@ -161,6 +161,27 @@ class _Solution:
                 matrix[first, second] = matrix.get((first, second), Integer(0)) + gain * coefficient * other
 
 
+def _cramer(matrix: Mapping[tuple[int, int], Expr], block: Sequence[int], right: Mapping[int, Expr]) -> Iterator[Expr]:
+    """Solve one block by cofactors.
+
+    The cofactors are made of single symbols, and the entries put in afterwards: sympy would otherwise try to cancel
+    factors of long entries, which takes minutes for a few geared inertias.
+    """
+    entries = {
+        (i, j): matrix[first, second]
+        for i, first in enumerate(block)
+        for j, second in enumerate(block)
+        if (first, second) in matrix
+    }
+    names = {place: Symbol(f"m{place[0]}{place[1]}") for place in entries}
+    square = Matrix(len(block), len(block), lambda i, j: names.get((i, j), Integer(0)))
+    put_in = {names[place]: entry for place, entry in entries.items()}
+    adjugate = square.adjugate().xreplace(put_in)
+    determinant = square.det(method="berkowitz").xreplace(put_in)
+    for i in range(len(block)):
+        yield Add(*(adjugate[i, j] * right[other] for j, other in enumerate(block))) / determinant
+
+
 def _exact_loops(form: StateForm) -> dict[int, tuple[tuple[int, Expr], ...]]:
     """The loops as expressions, without couplings: their across value is zero."""
     couplings = frozenset(form.tree.tree[Kind.COUPLING])
@@ -197,8 +218,5 @@ def solve_blocks(
             (only,) = block
             solution[only] = right[only] / matrix[only, only]
             continue
-        square = Matrix(len(block), len(block), lambda i, j: matrix.get((block[i], block[j]), Integer(0)))  # noqa: B023
-        adjugate, determinant = square.adjugate(), square.det(method="berkowitz")
-        for i, unknown in enumerate(block):
-            solution[unknown] = Add(*(adjugate[i, j] * right[other] for j, other in enumerate(block))) / determinant
+        solution.update(zip(block, _cramer(matrix, block, right), strict=True))
     return tuple(solution[unknown] for unknown in unknowns)
