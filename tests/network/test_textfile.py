@@ -66,7 +66,9 @@ NAMES = st.text(min_size=1, max_size=12).filter(lambda text: text.isprintable() 
 KEYS = st.from_regex(r"[A-Za-z_][A-Za-z0-9_]{0,8}", fullmatch=True).filter(
     lambda key: key not in ("type", "name", "nodes", "symbol")
 )
-TABLES = st.lists(FLOATS, min_size=2, max_size=4, unique=True).map(lambda x: Table(sorted(x), x))
+TABLES = st.lists(st.floats(-1e9, 1e9, allow_subnormal=False), min_size=2, max_size=4, unique=True).map(
+    lambda x: Table(sorted(x), x)
+)
 VALUES = st.one_of(FLOATS, st.integers(-(2**63) + 1, 2**63 - 1), st.text(max_size=9).filter(str.isprintable), TABLES)
 PARTS = st.builds(
     PartText,

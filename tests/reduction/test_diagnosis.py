@@ -248,21 +248,21 @@ def test_a_negative_damping_that_does_not_cancel_is_allowed() -> None:
     assert problems(part("Damper", "d", "rotor", "hub", d=2.0), part("TorqueSource", "m", "hub", tau=1.9 * omega)) == ()
 
 
-@pytest.mark.parametrize("ratio", [1e-200, 1e200])
+@pytest.mark.parametrize("ratio", [1e-55, 1e55])
 def test_ratios_beyond_what_numbers_hold_are_named(ratio: float) -> None:
-    gears = [part("Gear", f"g{k}", f"n{k}", f"n{k + 1}", ratio=ratio) for k in range(3)]
-    inertias = [part("Inertia", f"I{k}", f"n{k}", J=1.0) for k in range(4)]
+    gears = [part("Gear", f"g{k}", f"n{k}", f"n{k + 1}", ratio=ratio) for k in range(7)]
+    inertias = [part("Inertia", f"I{k}", f"n{k}", J=1.0) for k in range(8)]
     _, _, (problem,) = diagnose(Netlist("extreme", (*gears, *inertias)))
     assert problem.kind == "extreme ratios"
-    assert problem.parts == ("g0", "g1", "g2")
+    assert problem.parts == tuple(f"g{k}" for k in range(7))
 
 
 def test_ratios_that_vanish_while_the_states_are_chosen_are_named() -> None:
-    gears = [part("Gear", f"g{k}", f"n{k}", f"n{k + 1}", ratio=1e-200) for k in (1, 0)]
+    gears = [part("Gear", f"g{k}", f"n{k}", f"n{k + 1}", ratio=1e-55) for k in range(6, -1, -1)]
     graph, form, said = diagnose(Netlist("vanishing", (*gears, part("Damper", "d", "n0", d=1.0))))
     assert graph is not None
     assert form is None
-    assert [(problem.kind, problem.parts) for problem in said][1:] == [("extreme ratios", ("g1", "g0"))]
+    assert [problem.kind for problem in said][1:] == ["extreme ratios"]
 
 
 def test_ratios_that_are_only_large_are_allowed() -> None:

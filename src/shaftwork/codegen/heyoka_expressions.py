@@ -91,9 +91,11 @@ class Translator:
         )
 
     def arguments(self, node: sympy.Basic) -> list[Any]:
+        """The arguments of a node, translated."""
         return [self.expression(argument) for argument in node.args]
 
     def product(self, node: sympy.Mul) -> Any:
+        """A product, with quotients as such and not as negative powers."""
         above: list[Any] = []
         below: list[Any] = []
         for factor in node.args:
@@ -103,6 +105,7 @@ class Translator:
         return upper / heyoka.prod(below) if below else upper
 
     def power(self, node: sympy.Pow) -> Any:
+        """A power, with square roots and quotients as such."""
         base, exponent = self.expression(node.base), node.exp
         if exponent == sympy.S.Half:
             return heyoka.sqrt(base)
@@ -127,11 +130,13 @@ class Translator:
         return self._signs[switch]
 
     def heaviside(self, node: sympy.Heaviside) -> Any:
+        """The unit step of an argument."""
         sign = self.sign(node.args[0])
         at_zero = self.expression(node.args[1])
         return heyoka.select(sign, 0.5 + 0.5 * sign, at_zero)
 
     def extreme(self, node: sympy.Max | sympy.Min) -> Any:
+        """The largest or smallest of the arguments, two at a time."""
         zero = heyoka.expression(0.0)
         better = heyoka.gt if isinstance(node, sympy.Max) else heyoka.lt
         best, *others = sorted(node.args, key=sympy.default_sort_key)
@@ -144,6 +149,7 @@ class Translator:
         return result
 
     def piecewise(self, node: sympy.Piecewise) -> Any:
+        """The first value whose condition holds."""
         pairs: list[ExprCondPair] = list(node.args)
         result = self.expression(pairs[-1].expr)
         if pairs[-1].cond != sympy.true:
@@ -153,9 +159,11 @@ class Translator:
         return result
 
     def choice(self, node: ITE) -> Any:
+        """One of two values by the sign of a switch."""
         return heyoka.select(*self.arguments(node))
 
     def negation(self, node: Not) -> Any:
+        """The opposite of a condition."""
         return heyoka.eq(self.expression(node.args[0]), heyoka.expression(0.0))
 
     def interpolation(self, node: Interpolation) -> Any:

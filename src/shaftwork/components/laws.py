@@ -66,6 +66,11 @@ class Table(sympy.Atom):  # type: ignore[misc]
                     f"Table: x must increase strictly, but x[{index + 1}] = {right!r} follows x[{index}] = {left!r}. "
                     "Sort the points; write a jump as a Step."
                 )
+            if not math.isfinite((ys[index + 1] - ys[index]) / (right - left)):
+                raise ParameterError(
+                    f"Table: between x[{index}] = {left!r} and x[{index + 1}] = {right!r} the slope is not finite. "
+                    "Write a jump as a Step."
+                )
         table: Self = super().__new__(cls)
         table.xs, table.ys = xs, ys
         return table

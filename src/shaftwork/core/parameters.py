@@ -45,6 +45,7 @@ class Parameter:
 
     @property
     def required(self) -> bool:
+        """Whether the user must give a value."""
         return self.default is REQUIRED
 
     @property

@@ -42,6 +42,7 @@ class GuardedFunctions:
         self.not_finite: tuple[float, Array] | None = None
 
     def rhs(self, t: float, x: Array) -> Array:
+        """The right-hand side, asked inside the piece."""
         derivative = self._problem.rhs(min(max(t, self._low), self._high), x)
         # The sum is a cheap test that cannot miss a NaN or an infinity. A trial stage that is too bold may meet one
         # and recover with a smaller step, so it is only remembered here.
@@ -50,9 +51,11 @@ class GuardedFunctions:
         return derivative
 
     def jacobian(self, t: float, x: Array) -> Any:
+        """The sparse Jacobian, asked inside the piece."""
         return self._jacobian(min(max(t, self._low), self._high), x)
 
     def dense_jacobian(self, t: float, x: Array) -> Any:
+        """The Jacobian as a full array."""
         return self.jacobian(t, x).toarray()
 
     def reason(self, reason: str) -> str:

@@ -12,9 +12,10 @@ from sympy import Expr, Symbol
 
 from shaftwork.components.base import Component
 from shaftwork.components.branches import End
+from shaftwork.components.laws import Table, as_expression
 from shaftwork.core.domains import ROTATION, Domain
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
-from shaftwork.network.templates import BranchTemplate, Kind, Template, as_expression, make_template
+from shaftwork.network.templates import BranchTemplate, Kind, Template, make_template
 
 GROUND = -1
 """Node number of the reference."""
@@ -52,6 +53,7 @@ class GraphPart:
 
     @property
     def name(self) -> str:
+        """Name of the part."""
         return self.component.name
 
 
@@ -88,9 +90,11 @@ class CircuitGraph:
         return made
 
     def node_name(self, number: int) -> str:
+        """Name of a node by its number."""
         return REFERENCE if number == GROUND else self.nodes[number]
 
     def part_of(self, branch: int) -> GraphPart:
+        """The part that a branch belongs to."""
         return self.parts[self.branches[branch].part]
 
     def symbol_of(self, part: GraphPart, name: str) -> Symbol:
@@ -129,7 +133,7 @@ def resolve(placed: Placed) -> tuple[ResolvedPart, tuple[tuple[str, Any, str], .
         given = getattr(placed.part, name)
         value, objection = declared.magnitude(given)
         if objection is None and not isinstance(value, float):
-            value = as_expression(value)
+            value = as_expression(value) if isinstance(value, Table | Expr) else value  # the checks name the rest
         if objection is not None:
             objections.append((name, given, objection))
             value = 1.0

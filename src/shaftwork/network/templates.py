@@ -26,7 +26,6 @@ from shaftwork.components.branches import (
     ThroughStore,
     rigid,
 )
-from shaftwork.components.laws import Table
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.domains import DOMAINS
 
@@ -75,11 +74,6 @@ class Template:
 
     branches: tuple[BranchTemplate, ...]
     parameters: tuple[str, ...]
-
-
-def as_expression(law: Any) -> Expr:
-    """A law as the user gave it, as an expression; a table alone is a law of time."""
-    return law(TIME) if isinstance(law, Table) else law
 
 
 def substitution(part: Component) -> dict[Any, Any]:

@@ -66,6 +66,7 @@ class Model(CompiledModel):
 
     @property
     def name(self) -> str:
+        """Title of the network."""
         return self.netlist.name
 
     def simulate(

@@ -50,6 +50,7 @@ class StateForm:
 
     @property
     def across_sources(self) -> tuple[int, ...]:
+        """Prescribed across variables: speeds, voltages."""
         return self.tree.tree[Kind.ACROSS_SOURCE]
 
     @property
@@ -70,18 +71,22 @@ class StateForm:
 
     @property
     def across_states(self) -> tuple[int, ...]:
+        """Capacities in the tree: their across variables are states."""
         return self.tree.tree[Kind.ACROSS_STORE]
 
     @property
     def through_states(self) -> tuple[int, ...]:
+        """Compliances among the links: their through variables are states."""
         return self.tree.links[Kind.THROUGH_STORE]
 
     @property
     def tree_conductances(self) -> tuple[int, ...]:
+        """Conductances in the tree: their across variables are solved for."""
         return self.tree.tree[Kind.CONDUCTANCE]
 
     @property
     def link_conductances(self) -> tuple[int, ...]:
+        """Conductances among the links."""
         return self.tree.links[Kind.CONDUCTANCE]
 
     @property
