@@ -88,9 +88,7 @@ def main() -> None:
         seconds = time.process_time() - start
         truth = exact_speeds(n, sol.t)
         error = np.abs(sol.x[:, :n] - truth).max() / np.abs(truth).max()
-        print(
-            f"n = {n}: 0.2 s of motion by engine {sol.engine} in {seconds:.3f} s CPU, error {error:.1e} of the largest speed"
-        )
+        print(f"n = {n}: 0.2 s of motion, engine {sol.engine}, {seconds:.3f} s CPU, error {error:.1e} of the largest")
 
 
 if __name__ == "__main__":

@@ -88,8 +88,8 @@ def _rising(pieces: Network, signals: Mapping[str, mna.Signal]) -> Network:
 def test_every_speed_and_every_torque_equals_that_of_the_referee() -> None:
     """Tolerance 1e-7 of the largest value of the same quantity.
 
-    Both sides are exact up to rounding; the torque of a dependent store and of a gear comes from differences of stiff
-    springs' torques on both sides, which leaves about eight of the sixteen digits in the worst case.
+    Both sides are exact up to rounding. It is the referee that rounds most: it takes the torque of a geared inertia
+    from an equation of higher index, which costs it half of its sixteen digits in one network of some thousands.
     """
     inertias = []
 
