@@ -19,7 +19,7 @@ class CoulombLoad(Component):
     Law: torque on the node -tau tanh(omega / omega_s). Source: Marinkovic 2012, (7), (8).
     """
 
-    tau: float = parameter("N*m", "size of the resistance", at_least=0, latex=r"\tau_w")
+    tau: float = parameter("N*m", "size of the resistance", at_least=0, latex=r"\tau_0")
     omega_s: float = parameter("rad/s", "speed below which it is rounded", above=0, default=0.01, latex=r"\omega_s")
 
     role: ClassVar[Role] = "loss"
