@@ -94,12 +94,12 @@ BREAKERS: dict[str, Breaker] = {
         _part("Gear", "between", "alone", "output", ratio=2.0), _part("TorqueSource", "torque", "output", tau=1.0)
     ),
     "contradictory_voltages": _plus(
-        _part("VoltageSource", "u1", "f1", GROUND, voltage=1.0),
-        _part("VoltageSource", "u2", "f1", GROUND, voltage=2.0),
+        _part("VoltageSource", "u1", "f1", GROUND, u=1.0),
+        _part("VoltageSource", "u2", "f1", GROUND, u=2.0),
         _part("Resistor", "load", "f1", GROUND, R=1.0),
     ),
-    "current_into_an_open_node": _plus(_part("CurrentSource", "i", "f1", GROUND, current=1.0)),
-    "shorted_voltage": _plus(_part("VoltageSource", "u", GROUND, GROUND, voltage=1.0)),
+    "current_into_an_open_node": _plus(_part("CurrentSource", "i", "f1", GROUND, i=1.0)),
+    "shorted_voltage": _plus(_part("VoltageSource", "u", GROUND, GROUND, u=1.0)),
     "duplicate_name": _duplicate_name,
     "missing_node": lambda net, index: _nodes_of_many(net, index, lambda nodes: nodes[:-1]),
     "too_many_nodes": lambda net, index: _nodes_of_many(net, index, lambda nodes: (*nodes, "one_more")),

@@ -33,7 +33,7 @@ RATIOS = (
 RADII = (0.1, 0.125, 0.2, 0.25, 0.5)
 # power of ten of the smallest value of each parameter
 LOWEST = {"J": -1, "m": 0, "c": 2, "d": -1, "R": 0, "L": -2, "C": -4, "k": -1}
-LOWEST |= {"tau": 0, "force": 0, "omega": -1, "voltage": 0, "current": -1}
+LOWEST |= {"tau": 0, "f": 0, "omega": -1, "u": 0, "i": -1}
 TRANSLATION_LOWEST = {"c": 3, "d": 0}
 SHORT = {
     "Inertia": "J",
@@ -266,7 +266,7 @@ def _travel(b: Builder, s: Step) -> None:
         b.add("TranslationalSpring", start, load := b.node(b.translation, "x"), names="c d" if s.flags[1] else "c")
         return b.add("Mass", load, names="m")
     if s.flags[1]:
-        return b.add("ForceSource", _pick(masses, s.at), names="force")
+        return b.add("ForceSource", _pick(masses, s.at), names="f")
     if start != end and s.flags[2]:
         return b.add("TranslationalSpring", start, end, names="c")
     return b.add("TranslationalDamper", start, end if start != end else GROUND, names="d")
@@ -275,11 +275,11 @@ def _travel(b: Builder, s: Step) -> None:
 def _island(b: Builder, s: Step) -> None:
     supply = b.number("e")
     if s.flags[0]:
-        b.add("CurrentSource", supply, GROUND, names="current")
+        b.add("CurrentSource", supply, GROUND, names="i")
         b.add("Resistor", supply, GROUND, names="R")
         b.electrical.append(supply)
         return
-    b.add("VoltageSource", supply, GROUND, names="voltage")
+    b.add("VoltageSource", supply, GROUND, names="u")
     if b.dependent and s.flags[1]:
         b.add("Capacitor", supply, GROUND, names="C")
     end = b.node(b.electrical, "e")

@@ -73,7 +73,7 @@ def mixed_train(cells: int = 12) -> NetworkBuilder:
     net.add(Drum("drum", radius=0.2), f"n{cells}", "rope")
     net.add(TranslationalSpring("rope", c=1e6, d=200.0), "rope", "hook")
     net.add(Mass("load", m=800.0), "hook")
-    net.add(ForceSource("weight", force=-7848.0), "hook")
+    net.add(ForceSource("weight", f=-7848.0), "hook")
     return net
 
 
@@ -98,7 +98,7 @@ def hoist() -> NetworkBuilder:
 
 def dc_drive() -> NetworkBuilder:
     net = NetworkBuilder("DC drive")
-    net.add(VoltageSource("supply", voltage=24.0), "p", "ground")
+    net.add(VoltageSource("supply", u=24.0), "p", "ground")
     net.add(DCMachine("M", k=0.05, R=0.3, L=1e-3), "p", "ground", "rotor")
     net.add(Inertia("J", J=1e-3), "rotor")
     net.add(Gear("gear", ratio=10.0), "rotor", "out")
@@ -123,7 +123,7 @@ def _lifted_mass() -> NetworkBuilder:
     net.add(Drum("drum", radius=0.1), "shaft", "rope")
     net.add(TranslationalSpring("rope", c=1e4, d=3.0), "rope", "hook")
     net.add(Mass("load", m=50.0), "hook")
-    net.add(ForceSource("weight", force=-490.5), "hook")
+    net.add(ForceSource("weight", f=-490.5), "hook")
     net.add(TorqueSource("motor", tau=60.0 - 0.1 * omega), "shaft")
     return net
 

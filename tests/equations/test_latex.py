@@ -105,7 +105,7 @@ def test_a_part_named_like_its_parameter_has_its_number_as_subscript() -> None:
 @pytest.mark.parametrize("armature", [{}, {"R": 0.3}, {"L": 1e-3}, {"R": 0.3, "L": 1e-3}])
 def test_the_currents_of_a_machine_are_told_apart(armature: dict[str, float]) -> None:
     net = NetworkBuilder("machine")
-    net.add(VoltageSource("supply", voltage=24.0), "s", "ground")
+    net.add(VoltageSource("supply", u=24.0), "s", "ground")
     net.add(Resistor("cable", R=0.1), "s", "p")
     net.add(DCMachine("M", k=0.05, **armature), "p", "ground", "rotor")
     net.add(Inertia("J", J=1e-3), "rotor")

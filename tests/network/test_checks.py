@@ -99,7 +99,7 @@ def test_a_node_of_another_domain_is_said_with_the_part_that_came_first() -> Non
         (rotation.Spring("s", c=1.0), ("rotor", "rotor")),
         (rotation.Damper("d", d=1.0), ("ground",)),
         (rotation.Inertia("J3", J=1.0), ("ground",)),
-        (electrical.VoltageSource("u", voltage=1.0), ("ground", "ground")),
+        (electrical.VoltageSource("u", u=1.0), ("ground", "ground")),
     ],
 )
 def test_a_part_with_all_ends_at_one_node_does_nothing(part: Component, nodes: tuple[str, ...]) -> None:

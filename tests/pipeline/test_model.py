@@ -225,7 +225,7 @@ def test_a_speed_jump_is_an_impulse_to_what_is_rigidly_joined() -> None:
 
 def test_a_network_without_states_is_refused_with_the_next_step() -> None:
     net = sw.Network("static")
-    net.add(sw.VoltageSource("supply", voltage=1.0), "p", "ground")
+    net.add(sw.VoltageSource("supply", u=1.0), "p", "ground")
     net.add(sw.Resistor("load", R=2.0), "p", "ground")
     with pytest.raises(sw.SimulationError, match="no states"):
         net.simulate(1.0)

@@ -22,7 +22,7 @@ TIMES = np.linspace(0.0, 0.5, 6)
 ROUNDING = 1e-9
 """Another tree, or another order of sums, rounds differently; stiff springs turn 1e-16 into some 1e-11."""
 REVERSIBLE = ("Spring", "TranslationalSpring", "Damper", "TranslationalDamper", "Resistor", "Inductor", "Capacitor")
-REVERSIBLE_SOURCES = {"VoltageSource": "voltage", "CurrentSource": "current"}
+REVERSIBLE_SOURCES = {"VoltageSource": "u", "CurrentSource": "i"}
 ROOT = Path(__file__).parents[2]
 
 

@@ -50,7 +50,7 @@ def test_a_source_between_two_nodes_gives_to_a_what_it_takes_from_b() -> None:
 
 
 def test_a_positive_source_force_raises_the_speed_of_its_node() -> None:
-    sol = _motion((sw.ForceSource("pull", force=3.0), ("x",)), (sw.Mass("m", m=2.0), ("x",)))
+    sol = _motion((sw.ForceSource("pull", f=3.0), ("x",)), (sw.Mass("m", m=2.0), ("x",)))
     _close(sol["m.v"], 1.5 * TIMES)
     _close(sol["pull.f"], np.full(9, 3.0))
 
@@ -145,7 +145,7 @@ def test_a_drum_pulls_forward_when_its_shaft_turns_forward(kind: Any) -> None:
 
 def test_a_voltage_source_lifts_its_first_node_and_shows_the_current_that_it_delivers() -> None:
     sol = _motion(
-        (sw.VoltageSource("supply", voltage=6.0), ("p", "ground")),
+        (sw.VoltageSource("supply", u=6.0), ("p", "ground")),
         (sw.Resistor("R", R=3.0), ("p", "q")),
         (sw.Capacitor("C", C=0.1), ("q", "ground")),
     )
@@ -159,7 +159,7 @@ def test_a_voltage_source_lifts_its_first_node_and_shows_the_current_that_it_del
 
 def test_a_current_source_delivers_at_its_first_node() -> None:
     sol = _motion(
-        (sw.CurrentSource("supply", current=2.0), ("p", "ground")),
+        (sw.CurrentSource("supply", i=2.0), ("p", "ground")),
         (sw.Capacitor("C", C=0.1), ("p", "ground")),
         (sw.Inductor("L", L=0.5), ("p", "q")),
         (sw.Resistor("R", R=3.0), ("q", "ground")),
@@ -173,7 +173,7 @@ def test_a_current_source_delivers_at_its_first_node() -> None:
 def test_a_dc_machine_on_a_positive_voltage_drives_its_rotor_forward() -> None:
     """u = k omega + R i + L di/dt and tau = k i, the torque that the machine gives to the rotor."""
     sol = _motion(
-        (sw.VoltageSource("supply", voltage=6.0), ("p", "ground")),
+        (sw.VoltageSource("supply", u=6.0), ("p", "ground")),
         (sw.DCMachine("motor", k=0.5, R=2.0, L=0.1), ("p", "ground", "r")),
         (sw.Inertia("J", J=0.05), ("r",)),
     )
@@ -193,10 +193,10 @@ VALUES = {
     "CoulombLoad": {"tau": 2.0, "omega_s": 0.3},
     "DCMachine": {"k": 0.4, "R": 1.5, "L": 0.3},
     "SpeedSource": {"omega": sympy.sin(3 * sw.t)},
-    "VoltageSource": {"voltage": sympy.cos(3 * sw.t)},
+    "VoltageSource": {"u": sympy.cos(3 * sw.t)},
     "TorqueSource": {"tau": 2 - sw.omega},
-    "ForceSource": {"force": 2 - sw.v},
-    "CurrentSource": {"current": 1 - sw.u},
+    "ForceSource": {"f": 2 - sw.v},
+    "CurrentSource": {"i": 1 - sw.u},
 }
 
 
@@ -217,11 +217,11 @@ def _in_a_test_bed(name: str) -> sw.Solution:
         direct = len(kind.ports) == 1 and kind.role in ("source", "loss")
         far = node if direct else f"far{k}"
         if port.domain is ELECTRICAL:
-            net.add(sw.CurrentSource(f"push{k}", current=push), far, "ground")
+            net.add(sw.CurrentSource(f"push{k}", i=push), far, "ground")
             net.add(sw.Capacitor(f"store{k}", C=0.3), far, "ground")
             net.add(sw.Resistor(f"loss{k}", R=0.8), far, node)
         elif port.domain is TRANSLATION:
-            net.add(sw.ForceSource(f"push{k}", force=push), far)
+            net.add(sw.ForceSource(f"push{k}", f=push), far)
             net.add(sw.Mass(f"store{k}", m=0.3), far)
             net.add(sw.TranslationalDamper(f"loss{k}", d=0.8), far, node)
         else:

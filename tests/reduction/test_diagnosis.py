@@ -66,7 +66,7 @@ def test_two_speed_sources_on_one_rigid_group_are_named_with_the_gear_between() 
 
 def test_two_voltage_sources_in_parallel_are_named() -> None:
     said = problems(
-        *(part("VoltageSource", name, "p", "ground", voltage=1.0) for name in ("u1", "u2")),
+        *(part("VoltageSource", name, "p", "ground", u=1.0) for name in ("u1", "u2")),
         part("DCMachine", "m", "p", "ground", "rotor", k=1.0, R=1.0),
     )
     assert [problem.kind for problem in said] == ["two voltage sources"]
@@ -168,7 +168,7 @@ def test_torques_on_a_massless_gear_are_all_named() -> None:
 
 
 def test_a_current_into_an_open_node_is_said_in_words_of_circuits() -> None:
-    problem = only(part("CurrentSource", "i", "open", "ground", current=1.0))
+    problem = only(part("CurrentSource", "i", "open", "ground", i=1.0))
     assert "node 'open' has no capacitor, no resistor and no inductor: nothing answers the current" in problem.message
 
 

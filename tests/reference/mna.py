@@ -46,10 +46,10 @@ TERMINALS: dict[str, tuple[str, ...]] = {
 CAPACITY = {"Inertia": "J", "Mass": "m", "Capacitor": "C"}
 STORE = {"Spring": "store", "TranslationalSpring": "store", "Inductor": "through", "DCMachine": "store"}
 SOURCE_VALUE = {
-    "VoltageSource": "voltage",
-    "CurrentSource": "current",
+    "VoltageSource": "u",
+    "CurrentSource": "i",
     "TorqueSource": "tau",
-    "ForceSource": "force",
+    "ForceSource": "f",
     "SpeedSource": "omega",
 }
 

@@ -88,7 +88,7 @@ def test_the_torque_of_parallel_gears_is_undetermined_and_everything_else_is_not
 
 def test_an_underdamped_series_circuit_rings_as_its_closed_form() -> None:
     net = (
-        part("VoltageSource", "u", "p", GROUND, voltage=10.0),
+        part("VoltageSource", "u", "p", GROUND, u=10.0),
         part("Resistor", "R", "p", "q", R=2.0),
         part("Inductor", "L", "q", "s", L=0.5),
         part("Capacitor", "C", "s", GROUND, C=0.01),
@@ -102,7 +102,7 @@ def test_an_underdamped_series_circuit_rings_as_its_closed_form() -> None:
 
 def test_a_motor_without_a_coil_runs_up_exponentially() -> None:
     net = (
-        part("VoltageSource", "u", "p", GROUND, voltage=12.0),
+        part("VoltageSource", "u", "p", GROUND, u=12.0),
         part("DCMachine", "m", "p", GROUND, "rotor", k=0.5, R=2.0),
         part("Inertia", "J", "rotor", J=0.1),
     )
@@ -115,7 +115,7 @@ def test_a_motor_without_a_coil_runs_up_exponentially() -> None:
 
 
 def test_a_current_source_raises_its_first_node() -> None:
-    net = (part("CurrentSource", "i", "p", GROUND, current=3.0), part("Resistor", "R", "p", GROUND, R=2.0))
+    net = (part("CurrentSource", "i", "p", GROUND, i=3.0), part("Resistor", "R", "p", GROUND, R=2.0))
     r = simulate(net, None, T)
     assert close(r.across["p"], np.full_like(T, 6.0))
     assert close(r.through["i.through"], np.full_like(T, -3.0))
@@ -143,7 +143,7 @@ def test_a_drum_lifts_with_its_radius() -> None:
         part("Inertia", "J", "a", J=1.0),
         part("Drum", "drum", "a", "x", radius=0.5),
         part("Mass", "m", "x", m=8.0),
-        part("ForceSource", "weight", "x", force=-6.0),
+        part("ForceSource", "weight", "x", f=-6.0),
     )
     r = simulate(net, None, T)
     assert close(r.across["a"], -0.5 * 6.0 * T / (1.0 + 8.0 * 0.25))

@@ -52,25 +52,25 @@ class Capacitor(Component):
 
 @component
 class VoltageSource(Component):
-    """A voltage from n to p. Law: u_p - u_n = voltage(t). The signal i is the current delivered at p."""
+    """A voltage from n to p. Law: u_p - u_n = u(t). The signal i is the current delivered at p."""
 
-    voltage: Any = parameter("V", "voltage", law=True, latex="u")
+    u: Any = parameter("V", "voltage", law=True)
 
     role: ClassVar[Role] = "source"
     ports: ClassVar = TERMINALS
 
     def branches(self, p: Any) -> Iterator[Branch]:
-        yield AcrossLaw(p.voltage)
+        yield AcrossLaw(p.u)
 
 
 @component
 class CurrentSource(Component):
     """A current delivered at p and taken from n. Law: i(t, u)."""
 
-    current: Any = parameter("A", "current", law=True, latex="i")
+    i: Any = parameter("A", "current", law=True)
 
     role: ClassVar[Role] = "source"
     ports: ClassVar = TERMINALS
 
     def branches(self, p: Any) -> Iterator[Branch]:
-        yield ThroughLaw(-p.current)
+        yield ThroughLaw(-p.i)

@@ -35,13 +35,13 @@ class ForceSource(Component):
     Law: f(t, v, s), positive raises the speed of a; v and s are those of a relative to b. Analogue: a current source.
     """
 
-    force: Any = parameter("N", "force", law=True, latex="f")
+    f: Any = parameter("N", "force", law=True)
 
     role: ClassVar[Role] = "source"
     ports: ClassVar = (Port("a", TRANSLATION), Port("b", TRANSLATION, optional=True))
 
     def branches(self, p: Any) -> Iterator[Branch]:
-        yield ThroughLaw(-p.force)
+        yield ThroughLaw(-p.f)
 
 
 @component

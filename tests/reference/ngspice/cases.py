@@ -130,7 +130,7 @@ Iweight y 0 245.25
         Part("Mass", "load", ("y",), {"m": 25.0}),
         Part("Ground", "wall", ("wall",), {}),
         Part("TranslationalDamper", "guide", ("y", "wall"), {"d": 8.0}),
-        Part("ForceSource", "weight", ("y",), {"force": -245.25}),
+        Part("ForceSource", "weight", ("y",), {"f": -245.25}),
     ),
     signals=(("v(a)", "J1.omega"), ("v(y)", "load.v"), ("i(Vrope)", "rope.f")),
     t_end=1.0,
@@ -153,7 +153,7 @@ Rfan w 0 {1/0.004}
 """,
     parts=(
         Part("Ground", "earth", ("n",), {}),
-        Part("VoltageSource", "supply", ("p1", "n"), {"voltage": 48.0}),
+        Part("VoltageSource", "supply", ("p1", "n"), {"u": 48.0}),
         Part("Resistor", "cable", ("p1", "p2"), {"R": 0.2}),
         Part("Inductor", "choke", ("p2", "p"), {"L": 1e-3}),
         Part("Capacitor", "filter", ("p", "n"), {"C": 5e-3}),
