@@ -265,3 +265,33 @@ def test_the_generated_code_reads_like_the_equations() -> None:
     source = crane().compile().scalar.source
     assert "tanh" in source
     assert source.count("\n") < 20
+
+
+@pytest.mark.parametrize("engine", ["auto", "scipy"])
+def test_a_law_alone_at_a_massless_node_gives_its_speed(engine: str) -> None:
+    net = sw.Network("hydraulic brake")
+    net.add(sw.Inertia("J", J=2.0), "disc")
+    net.add(sw.Spring("shaft", c=500.0), "disc", "brake")
+    net.add(sw.TorqueSource("fan", tau=-3.0 * sw.omega - 0.5 * sw.omega**3), "brake")
+    sol = net.simulate(0.5, initial={"J.omega": 4.0}, algebraic_loops="solve", engine=engine, t_eval=101, rtol=1e-9)
+    # the torque of the shaft is what the fan takes at the speed of its node
+    speed = sol["fan.omega"]
+    assert sol["shaft.tau"] == pytest.approx(3.0 * speed + 0.5 * speed**3, abs=1e-9)
+    assert sol["fan.tau"] == pytest.approx(-sol["shaft.tau"], abs=1e-9)
+    assert sol.energy_residual < 1e-6
+    jacobian = net.compile(algebraic_loops="solve").jacobian(0.0, np.array([4.0, 2.0])).toarray()
+    model = net.compile(algebraic_loops="solve")
+    step = 1e-5
+    for k, unit in enumerate(np.eye(2)):
+        x = np.array([4.0, 2.0])
+        slope = (model.rhs(0.0, x + step * unit) - model.rhs(0.0, x - step * unit)) / (2 * step)
+        assert jacobian[:, k] == pytest.approx(slope, rel=1e-6, abs=1e-6)  # error of the central difference
+
+
+def test_a_loop_without_a_solution_is_named() -> None:
+    net = sw.Network("no speed carries this torque")
+    net.add(sw.Inertia("J", J=2.0), "disc")
+    net.add(sw.Spring("shaft", c=500.0), "disc", "brake")
+    net.add(sw.TorqueSource("fan", tau=-1.0 - sw.omega**2), "brake")
+    with pytest.raises(sw.SimulationError, match="fan"):
+        net.simulate(0.5, algebraic_loops="solve")

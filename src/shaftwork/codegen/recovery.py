@@ -150,7 +150,14 @@ def _ends(ends: tuple[str | None, str | None], port: str) -> Iterator[float]:
 
 
 def signals_of(graph: CircuitGraph, part: GraphPart) -> Mapping[str, Signal]:
-    """The signals that a part has in this network: those of a store that was left out are missing."""
+    """The signals that a part has in this network.
+
+    Those of a store that was left out are missing. A part with its optional end at rest also answers to the plain name
+    of its speed, omega for omega_rel.
+    """
     stores = any(graph.branches[k].template.kind is Kind.THROUGH_STORE for k in part.branches)
     declared = part.component.signals()
-    return {name: made for name, made in declared.items() if stores or made.kind not in ("twist", "store")}
+    signals = {name: made for name, made in declared.items() if stores or made.kind not in ("twist", "store")}
+    if any(port.optional and part.nodes[port.name] == GROUND for port in part.component.ports):
+        signals |= {name.removesuffix("_rel"): made for name, made in signals.items()}
+    return signals

@@ -42,6 +42,14 @@ class Network(NetworkBuilder):
         """Everything that is wrong with the network or worth saying about it. Never raises."""
         return diagnose(self.netlist())[2]
 
+    def graph(self) -> CircuitGraph:
+        """The circuit graph: nodes, parts and an ordered table of branches; `.multigraph` is it for networkx.
+
+        Raises:
+            NetworkError: the network cannot be assembled; lists every reason.
+        """
+        return _sound(self.netlist()).graph
+
     def equations(self) -> Equations:
         """Kirchhoff's node and loop equations, laws, states and what was eliminated.
 
