@@ -57,6 +57,16 @@ def test_quantities_with_units_are_converted_and_wrong_units_are_refused() -> No
     assert model.parameters["J1.J"] == pytest.approx(10.0)
     assert model.parameters["T.tau"] == pytest.approx(20.0)
     assert model.parameters["M.n_sync"] == pytest.approx(3000.0)
+    for speed in (3000 * unit.rpm, 50 * unit.turn / unit.s, 50 * unit.Hz, 100 * math.pi * unit.rad / unit.s):
+        net = sw.Network("speed")
+        net.add(sw.KlossMotor("M", tau_k=9.6, s_k=0.25, n_sync=speed), "a")
+        net.add(sw.Inertia("J", J=1.0), "a")
+        assert net.compile().parameters["M.n_sync"] == pytest.approx(3000.0)
+    net = sw.Network("prescribed")
+    net.add(sw.SpeedSource("drive", omega=60 * unit.rpm), "a")
+    net.add(sw.Damper("d", d=1.0 * unit.N * unit.m * unit.s), "a")
+    assert net.simulate(1 * unit.minute, t_eval=2)["drive.tau"] == pytest.approx([2 * math.pi] * 2)
+    assert "rpm or rad/s" in problem_of(sw.SpeedSource("drive", omega=1 * unit.Hz))
     assert "kg*m^2" in problem_of(sw.Inertia("J1", J=3.0 * unit.kg))
     assert "N*m/rad" in problem_of(sw.Spring("s", c=3.0 * unit.N / unit.m))
 

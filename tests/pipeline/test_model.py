@@ -91,7 +91,21 @@ def test_dense_output_agrees_with_output_times() -> None:
     ("arguments", "words"),
     [
         ({"t_end": 0.0}, "after t_start"),
-        ({"t_end": math.nan}, "finite time"),
+        ({"t_end": math.nan}, "finite"),
+        ({"t_end": "abc"}, "t_end"),
+        ({"t_end": None}, "t_end"),
+        ({"t_end": 1.0, "t_start": 1j}, "t_start"),
+        ({"t_end": 1.0, "rtol": "a"}, "rtol"),
+        ({"t_end": 1.0, "atol": 0.0}, "atol"),
+        ({"t_end": 1.0, "atol": math.nan}, "atol"),
+        ({"t_end": 1.0, "atol": [1e-9, 1e-9]}, "3 numbers"),
+        ({"t_end": 1.0, "t_eval": ["a"]}, "list of times"),
+        ({"t_end": 1.0, "t_eval": 10**12}, "at most"),
+        ({"t_end": 1.0, "initial": {"J1.omega": "a"}}, r"J1\.omega"),
+        ({"t_end": 1.0, "initial": [1.0]}, "must map"),
+        ({"t_end": 1.0, "parameters": [1.0]}, "must map"),
+        ({"t_end": 1.0, "parameters": {"motor.tau": sw.Step(1.0)}}, "must be a number here"),
+        ({"t_end": 1.0, "algebraic_loops": "x"}, "'refuse' or 'solve'"),
         ({"t_end": 1.0, "rtol": 0.0}, "rtol"),
         ({"t_end": 1.0, "t_eval": 1}, "at least 2"),
         ({"t_end": 1.0, "t_eval": [0.5, 0.4]}, "strictly increasing"),
@@ -223,12 +237,42 @@ def test_a_speed_jump_is_an_impulse_to_what_is_rigidly_joined() -> None:
     assert sol.energy_residual < 1e-12
 
 
-def test_a_network_without_states_is_refused_with_the_next_step() -> None:
-    net = sw.Network("static")
-    net.add(sw.VoltageSource("supply", u=1.0), "p", "ground")
-    net.add(sw.Resistor("load", R=2.0), "p", "ground")
-    with pytest.raises(sw.SimulationError, match="no states"):
-        net.simulate(1.0)
+def test_a_motion_that_is_prescribed_needs_no_states() -> None:
+    net = sw.Network("servo test bench")
+    net.add(sw.SpeedSource("drive", omega=sw.t**2), "a")
+    net.add(sw.Inertia("J", J=2.0), "a")
+    net.add(sw.Damper("bearing", d=0.5), "a")
+    sol = net.simulate(1.0, t_eval=[0.0, 0.5, 1.0])
+    assert sol["drive.tau"] == pytest.approx(4.0 * sol.t + 0.5 * sol.t**2)
+    assert sol.energy_residual < 1e-12
+    static = sw.Network("static")
+    static.add(sw.VoltageSource("supply", u=1.0), "p", "ground")
+    static.add(sw.Resistor("load", R=2.0), "p", "ground")
+    assert static.simulate(1.0, t_eval=2)["load.i"] == pytest.approx([0.5, 0.5])
+
+
+def test_ratios_may_be_changed_into_and_out_of_a_locked_loop() -> None:
+    def train(ratio: float) -> sw.Network:
+        net = sw.Network("two gears")
+        net.add(sw.TorqueSource("motor", tau=1.0), "a")
+        net.add(sw.Inertia("J1", J=1.0), "a")
+        net.add(sw.Gear("upper", ratio=ratio), "a", "b")
+        net.add(sw.Gear("lower", ratio=3.0), "a", "b")
+        net.add(sw.Inertia("J2", J=9.0), "b")
+        net.add(sw.Spring("shaft", c=10.0), "b", "c")
+        net.add(sw.Inertia("J3", J=1.0), "c")
+        return net
+
+    free = train(3.0).simulate(1.0, t_eval=3)
+    with pytest.warns(sw.NetworkWarning, match="lock"):
+        locked = train(2.0).compile()
+    assert locked.simulate(1.0, t_eval=3)["J1.omega"].tolist() == [0.0, 0.0, 0.0]
+    assert locked.simulate(1.0, t_eval=3, parameters={"upper.ratio": 3.0})["J1.omega"] == pytest.approx(
+        free["J1.omega"]
+    )
+    with pytest.warns(sw.NetworkWarning, match="lock"):
+        stuck = train(3.0).compile().simulate(1.0, t_eval=3, parameters={"upper.ratio": 2.0})
+    assert stuck["J1.omega"].tolist() == [0.0, 0.0, 0.0]
 
 
 @pytest.mark.parametrize("engine", ["auto", "scipy", "scipy-radau"])

@@ -90,6 +90,13 @@ class BoundArrays:
         slope = slope + sparse.csr_array((integral, (by_integral, states)), shape=size)
         return sparse.csc_array(part.A + part.B @ slope)
 
+    def moving_sources(self, t: float) -> tuple[str, ...]:
+        """The parts whose laws change with time at a time."""
+        inputs, graph = self.program.inputs, self.program.form.graph
+        slopes = inputs.time_slopes(t, np.zeros(inputs.outputs), np.zeros(inputs.states), self.p)
+        branches = self.program.assembly.inputs[slopes != 0]
+        return tuple(dict.fromkeys(graph.part_of(int(branch)).name for branch in branches))
+
     def impulse(self, t: float, x: Array, before: float | None = None) -> Array:
         """The states after the inputs have jumped (impulses through rigid joints).
 

@@ -15,7 +15,7 @@ from shaftwork.components.laws import NUMERICAL
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.templates import BranchTemplate, Kind
 from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.gains import Gain, Number, coefficients_in, fold, value_of
+from shaftwork.reduction.gains import Gain, Number, any_sum_vanishes, coefficients_in, fold, value_of
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -101,12 +101,19 @@ class GainMatrix:
         renamed = [made.xreplace(plain) for made in self._coefficients]
         self._function = lambdify([list(plain.values())], renamed, "math") if variable else None
 
+    def _values(self, p: Array) -> dict[Expr, float]:
+        assert self._function is not None  # noqa: S101 (there are coefficients)
+        return dict(zip(self._coefficients, self._function(p[self._places].tolist()), strict=True))
+
+    def degenerates(self, p: Array) -> bool:
+        """Whether ratios meet at p that differ in the network, so that other equations hold there."""
+        return bool(self._gains) and any_sum_vanishes(self._gains, self._values(p))
+
     def __call__(self, p: Array) -> Any:
         """The matrix as scipy.sparse.csr_array."""
         data = self._data.copy()
-        if self._function is not None:
-            values = dict(zip(self._coefficients, self._function(p[self._places].tolist()), strict=True))
-            data[self._variable] = fold(self._gains, values.__getitem__)
+        if self._gains:
+            data[self._variable] = fold(self._gains, self._values(p).__getitem__)
         return sparse.csr_array((data, (self._rows, self._columns)), shape=self._shape)
 
 

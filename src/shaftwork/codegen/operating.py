@@ -12,6 +12,7 @@ from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.observer import ModelObserver
 from shaftwork.core.errors import ParameterError, SignalError, SimulationError
+from shaftwork.core.parameters import in_si
 
 SMALLEST_STEP = 1e-6
 """First step of the way to a steady state, s."""
@@ -42,12 +43,16 @@ def initial_state(bound: BoundArrays, given: Mapping[str, float], t0: float) -> 
     names = [state.name for state in bound.program.form.states]
     place = {name: k for k, name in enumerate(names)}
     x = bound.impulse(t0, np.zeros(len(names)))
-    for name, value in given.items():
-        if not np.isfinite(value):
-            raise ParameterError(f"The start value of '{name}' is {value}; it must be a finite number.")
+    if not isinstance(given, Mapping):
+        raise ParameterError(f"initial = {given!r} must map quantities to values, such as {{'J1.omega': 3.0}}.")
+    units = ModelObserver(bound).units
+    numbers = {
+        str(name): in_si(f"the start value of '{name}'", value, units.get(name, "1")) for name, value in given.items()
+    }
+    for name, value in numbers.items():
         if name in place:
             x[place[name]] = value
-    indirect = {name: float(value) for name, value in given.items() if name not in place}
+    indirect = {name: value for name, value in numbers.items() if name not in place}
     if indirect:
         free = [k for k, name in enumerate(names) if name not in given]
         _fill(bound, names, indirect, free, t0, x)
@@ -59,10 +64,13 @@ def _fill(
 ) -> None:
     """Change the free states of x so that the given quantities, which depend on the states linearly, come true."""
     observer = ModelObserver(bound)
-    if unknown := [name for name in given if name not in observer.units]:
+    derived = ("power", "energy")
+    if unknown := [name for name in given if name not in observer.units or name.endswith(derived)]:
         owner = unknown[0].rpartition(".")[0]
         own = [name for name in observer.units if name.rpartition(".")[0] == owner] or names
-        raise SignalError(f"There is no quantity '{unknown[0]}' to start from. Near it: {', '.join(own)}.")
+        raise SignalError(
+            f"There is no speed, twist or torque '{unknown[0]}' to start from. Near it: {', '.join(own)}."
+        )
     trial = np.vstack([x, x + np.eye(len(x))[free]])
     times = np.full(len(trial), t0)
     values = np.array([observer.signal(name, times, trial) for name in given])

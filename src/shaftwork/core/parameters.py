@@ -8,11 +8,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from shaftwork.core.errors import ParameterError
+
 REQUIRED: Any = object()
 """Stands for the default of a parameter that has none."""
 
 SMALLEST, LARGEST = 1e-60, 1e60
 """Sizes of values in SI: beyond them products of a few parameters leave the range of floating-point numbers."""
+ANGLES = ("radian", "degree", "turn", "revolution", "gradian", "arc")
 
 
 @dataclass(frozen=True)
@@ -90,11 +93,34 @@ class Parameter:
         return number, self.objection(number)
 
     def _from_quantity(self, value: Any) -> tuple[Any, str | None]:
+        """Units with angles need care: to a library of units a revolution is 2 pi and a radian is 1, pure numbers."""
+        counts_angle = any(word in str(value.units) for word in ANGLES)
+        if self.unit == "rad/s" and not counts_angle and value.check("1/[time]"):
+            return value, f"is given in '{value.units}', which may count revolutions or radians; give rpm or rad/s"
+        target = {"1": "dimensionless", "1/min": "revolution / minute" if counts_angle else "1 / minute"}
         try:
-            number = float(value.to("dimensionless" if self.unit == "1" else self.unit.replace("*", " * ")).magnitude)
+            number = float(value.to(target.get(self.unit, self.unit)).magnitude)
         except Exception as error:  # noqa: BLE001 (pint has its own classes, which must not be imported here)
             return value, f"is given in '{value.units}', but needs {self.unit} ({error})"
         return number, self.objection(number)
+
+
+def in_si(name: str, value: Any, unit: str = "1", **bounds: Any) -> float:
+    """A number that a user gave as an argument, in SI; a quantity with units is converted.
+
+    Args:
+        name: of the argument, for the message.
+        value: the number or quantity.
+        unit: SI unit.
+        **bounds: as of `Parameter`.
+
+    Raises:
+        ParameterError: it is no number, of the wrong unit or outside its bounds.
+    """
+    number, objection = Parameter(name, unit, "", **bounds).magnitude(value)
+    if objection is not None:
+        raise ParameterError(f"{name} = {value!r} {objection}.")
+    return float(number)
 
 
 def parameter(unit: str, meaning: str, *, default: Any = REQUIRED, latex: str = "", **bounds: Any) -> Any:

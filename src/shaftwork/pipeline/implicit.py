@@ -1,4 +1,4 @@
-"""Networks with algebraic loops: the implicit system of states and loop unknowns, solved by IDA."""
+"""Networks that are no plain differential equation: with algebraic loops, or with nothing that moves freely."""
 
 from __future__ import annotations
 
@@ -28,6 +28,23 @@ class _States:
 
     def __call__(self, times: Array) -> Array:
         return self.whole(times)[:, : self.count]
+
+
+@dataclass(frozen=True)
+class _NoStates:
+    """The dense output of a network without states."""
+
+    steps: Array
+
+    def __call__(self, times: Array) -> Array:
+        return np.zeros((len(times), 0))
+
+
+def at_rest(problem: Problem) -> tuple[Trajectory, str, str]:
+    """The run of a network without states: everything follows from the sources at every instant."""
+    steps = np.array([problem.t0, *problem.breakpoints, problem.t_end])
+    t = steps if problem.t_eval is None else problem.t_eval
+    return Trajectory(t, np.zeros((len(t), 0)), _NoStates(steps)), "exact", "Nothing moves freely; all is prescribed."
 
 
 def solve_loops(bound: BoundArrays, problem: Problem) -> tuple[Trajectory, str, str]:

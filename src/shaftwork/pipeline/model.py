@@ -18,16 +18,19 @@ from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.operating import initial_state, steady_state
 from shaftwork.components.laws import breakpoints, pieces_degree
 from shaftwork.core.errors import ParameterError, SimulationError
+from shaftwork.core.parameters import in_si
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import LinearInputs, Problem
 from shaftwork.network.netlist import Netlist, Placed
 from shaftwork.network.templates import Kind
-from shaftwork.pipeline.implicit import solve_loops
+from shaftwork.pipeline.implicit import at_rest, solve_loops
 from shaftwork.reduction.form import StateForm
 from shaftwork.results.solution import Solution
 
-OUTPUTS = 1001
-"""Output times when the user gives none."""
+OUTPUTS, MOST_OUTPUTS = 1001, 10_000_000
+"""Output times when the user gives none, and the most that can be asked for."""
+VARIANTS = 8
+"""Models of other structure that are kept for later calls."""
 NOMINAL = 1e-3
 """Absolute tolerance as a fraction of the relative one, for a speed of 1 rad/s (m/s, V)."""
 EngineName = Literal["auto", "scipy", "scipy-radau", "heyoka", "sundials", "exact"]
@@ -40,13 +43,26 @@ class _Prepared:
     """Everything that depends on the parameter vector alone, made once for a run of equal calls."""
 
     p: Array
-    bound: BoundArrays
+    bind: Callable[[Array], BoundArrays]
     rhs: Callable[[float, Array], Array]
     breakpoints: tuple[float, ...]
     symbolic: Any
     linear: LinearInputs | None
     atol: Array
     engines: dict[tuple[float, ...], tuple[str, str]]
+
+    @cached_property
+    def bound(self) -> BoundArrays:
+        """The matrices, which many a run of compiled code can do without."""
+        return self.bind(self.p)
+
+    def jacobian(self, t: float, x: Array) -> Any:
+        """Of the right-hand side, sparse."""
+        return self.bound.jacobian(t, x)
+
+    def impulse(self, t: float, x: Array) -> Array:
+        """The states after a breakpoint."""
+        return self.bound.impulse(t, x, before=math.nextafter(t, -math.inf))
 
 
 class Model(CompiledModel):
@@ -102,16 +118,17 @@ class Model(CompiledModel):
             SimulationError: the integration failed; says when, in which state and why.
             MissingExtraError: the engine asked for is not installed.
         """
-        if parameters and self._changes_structure(parameters):
+        values = self._checked_all(parameters)
+        if self._changes_structure(values):
             options = {"t_start": t_start, "rtol": rtol, "atol": atol, "t_eval": t_eval, "initial": initial}
-            return self._variant(parameters).simulate(t_end, engine=engine, max_steps=max_steps, **options)  # type: ignore[arg-type]
-        prepared = self._prepare(self.defaults if not parameters else self._vector(parameters))
-        span = _span(t_start, t_end, rtol)
-        x0 = initial_state(prepared.bound, initial or {}, span[0])
-        problem = self._problem(prepared, span, x0, rtol, atol, t_eval, max_steps)
+            return self._variant(values).simulate(t_end, engine=engine, max_steps=max_steps, **options)  # type: ignore[arg-type]
+        prepared = self._prepare(self.vector(values) if values else self.defaults)
+        span = _span(t_start, t_end)
+        x0 = self._start(prepared, initial, span[0])
+        problem = self._problem(prepared, span, x0, _tolerance(rtol), atol, t_eval, max_steps)
         if not self.states:
-            raise SimulationError(f"'{self.name}' has no states: nothing moves freely. Add an inertia or a spring.")
-        if self.form.loop_laws and engine in ("auto", "sundials"):
+            trajectory, name, why = at_rest(problem)
+        elif self.form.loop_laws and engine in ("auto", "sundials"):
             trajectory, name, why = solve_loops(prepared.bound, problem)
         else:
             name, why = self._engine(prepared, problem, engine)
@@ -145,17 +162,23 @@ class Model(CompiledModel):
         Raises:
             SimulationError: nothing comes to rest or to a steady speed.
         """
-        if parameters and self._changes_structure(parameters):
-            return self._variant(parameters).steady_state(t, initial=initial)
-        prepared = self._prepare(self.defaults if not parameters else self._vector(parameters))
+        values = self._checked_all(parameters)
+        if self._changes_structure(values):
+            return self._variant(values).steady_state(t, initial=initial)
+        prepared = self._prepare(self.vector(values) if values else self.defaults)
         when = t if math.isfinite(t) else max((0.0, *prepared.breakpoints)) + 1.0
         start = initial_state(prepared.bound, initial or {}, when)
+        if not math.isfinite(t) and (moving := prepared.bound.moving_sources(when)):
+            raise SimulationError(
+                f"{', '.join(moving)} never stops changing, so there is no steady operation. "
+                f"Name the time at which the sources are to be read: steady_state(t=...)."
+            )
         return dict(zip(self.states, steady_state(prepared.bound, start, when).tolist(), strict=True))
 
     def choose_engine(self, t_end: float, *, t_start: float = 0.0, rtol: float = 1e-8) -> tuple[str, str]:
         """The engine that "auto" takes for a motion, and why."""
-        prepared, span = self._prepare(self.defaults), _span(t_start, t_end, rtol)
-        x0 = initial_state(prepared.bound, {}, t_start)
+        prepared, span = self._prepare(self.defaults), _span(t_start, t_end)
+        x0 = self._start(prepared, None, span[0])
         return self._engine(prepared, self._problem(prepared, span, x0, rtol, None, None, 1), "auto")
 
     def _engine(self, prepared: _Prepared, problem: Problem, engine: str) -> tuple[str, str]:
@@ -176,24 +199,18 @@ class Model(CompiledModel):
         t_eval: OutputTimes,
         max_steps: int,
     ) -> Problem:
-        bound = prepared.bound
         inside = tuple(time for time in prepared.breakpoints if span[0] < time < span[1])
-        jumps = bound.part.B1.nnz > 0
-
-        def jump(t: float, x: Array) -> Array:
-            return bound.impulse(t, x, before=math.nextafter(t, -math.inf))
-
         return Problem(
             rhs=prepared.rhs,
-            jacobian=bound.jacobian,
+            jacobian=prepared.jacobian,
             x0=x0,
             t0=span[0],
             t_end=span[1],
             names=self.states,
-            atol=rtol * prepared.atol if atol is None else np.broadcast_to(np.asarray(atol, float), x0.shape),
+            atol=rtol * prepared.atol if atol is None else _absolute(atol, len(x0)),
             rtol=rtol,
             breakpoints=inside,
-            jump=jump if jumps else None,
+            jump=prepared.impulse if self.form.has_impulses else None,
             t_eval=_output_times(t_eval, *span),
             linear=prepared.linear,
             symbolic=prepared.symbolic,
@@ -203,17 +220,15 @@ class Model(CompiledModel):
     def _prepare(self, p: Array) -> _Prepared:
         key = p.tobytes()
         if self._prepared is None or self._prepared[0] != key:
-            bound = self.bind(p)
-            rhs = bound.rhs if self.scalar is None else self.scalar.bind(p)
-            program = self._program
+            scalar, program = self.scalar, self._program
             made = _Prepared(
                 p=p,
-                bound=bound,
-                rhs=rhs,
+                bind=self.bind,
+                rhs=self.bind(p).rhs if scalar is None else scalar.bind(p),
                 breakpoints=self._breakpoints(p),
                 symbolic=None if program is None else program.bind(p),
-                linear=self._linear_inputs(bound, rhs),
-                atol=NOMINAL * self._nominal(bound),
+                linear=self._linear_inputs(p),
+                atol=NOMINAL * self._nominal(self.arrays.assembly.coefficients(p)),
                 engines={},
             )
             self._prepared = (key, made)
@@ -243,28 +258,41 @@ class Model(CompiledModel):
             times.update(breakpoints(law, values))
         return tuple(sorted(times))
 
-    def _linear_inputs(self, bound: BoundArrays, rhs: Callable[[float, Array], Array]) -> LinearInputs | None:
+    def _start(self, prepared: _Prepared, initial: Mapping[str, float] | None, t0: float) -> Array:
+        if initial is None and not self.form.has_impulses:
+            return np.zeros(len(self.states))
+        return initial_state(prepared.bound, {} if initial is None else initial, t0)
+
+    def _linear_inputs(self, p: Array) -> LinearInputs | None:
         """The linear form, where the network is linear and its inputs are straight lines between breakpoints."""
         if not self.linear or any(pieces_degree(law) is None for _, law in self._laws_of_time()):
             return None
-        rest = np.zeros(len(self.states))
-        return LinearInputs(bound.jacobian(0.0, rest).tocsr(), lambda t: rhs(t, rest))
+        rest, bound = np.zeros(len(self.states)), self.bind(p)
+        return LinearInputs(bound.jacobian(0.0, rest).tocsr(), lambda t: bound.rhs(t, rest))
 
-    def _nominal(self, bound: BoundArrays) -> Array:
+    def _nominal(self, coefficients: Array) -> Array:
         """The size of each state at a speed of one: stores of torque by their impedance sqrt(stiffness * inertia)."""
-        coefficients, form = bound.part.coefficients, self.form
+        form = self.form
         inertias = coefficients[list(form.across_states)]
         typical = float(np.median(inertias)) if inertias.size else 1.0
         torques = np.sqrt(coefficients[list(form.through_states)] * typical)
         return np.concatenate([np.ones(len(inertias)), torques, np.ones(len(form.integrals))])
 
-    def _changes_structure(self, parameters: Mapping[str, float]) -> bool:
+    def _changes_structure(self, values: Mapping[str, float]) -> bool:
+        """Whether other equations hold for new values: something becomes zero or stops being it, ratios meet."""
+        if not values:
+            return False
         decisive = frozenset((*self.form.graph.zeros, *self.form.tree.frozen))
-        return any(name in decisive or value == 0 for name, value in parameters.items())
+        if any(name in decisive or value == 0 for name, value in values.items()):
+            return True
+        return self.arrays.assembly.loops.degenerates(self.vector(values))
 
-    def _vector(self, parameters: Mapping[str, float]) -> Array:
-        checked = {name: self._checked(name, value) for name, value in parameters.items()}
-        return self.vector(checked)
+    def _checked_all(self, parameters: Mapping[str, float] | None) -> dict[str, float]:
+        if parameters is None:
+            return {}
+        if not isinstance(parameters, Mapping):
+            raise ParameterError(f"parameters = {parameters!r} must map names to values, such as {{'shaft.c': 3e4}}.")
+        return {str(name): self._checked(str(name), value) for name, value in parameters.items()}
 
     def _checked(self, name: str, value: Any) -> float:
         """A new parameter value in SI and within its bounds."""
@@ -276,16 +304,19 @@ class Model(CompiledModel):
             )
             raise ParameterError(f"There is no parameter '{name}'. There are: {', '.join(known) or 'none'}.")
         number, objection = placed.part.declared[parameter].magnitude(value)
+        if objection is None and not isinstance(number, float):
+            objection = "must be a number here: a law is part of the network, so build another network with it"
         if objection is not None:
             raise ParameterError(f"{type(placed.part).__name__} '{owner}': {parameter} = {value!r} {objection}.")
         return float(number)
 
-    def _variant(self, parameters: Mapping[str, float]) -> Model:
-        """The model of the same network with other values where these change its structure."""
-        checked = {name: self._checked(name, value) for name, value in parameters.items()}
-        key = tuple(sorted(checked.items()))
+    def _variant(self, values: Mapping[str, float]) -> Model:
+        """The model of the same network with other values where these change its structure; the last few are kept."""
+        key = tuple(sorted(values.items()))
         if key not in self._variants:
-            self._variants[key] = self._rebuild(_replaced(self.netlist, checked))
+            self._variants[key] = self._rebuild(_replaced(self.netlist, values))
+        while len(self._variants) > VARIANTS:
+            del self._variants[next(iter(self._variants))]
         return self._variants[key]
 
 
@@ -304,13 +335,28 @@ def _replaced(netlist: Netlist, values: Mapping[str, float]) -> Netlist:
     return Netlist(netlist.name, placed)
 
 
-def _span(t_start: float, t_end: float, rtol: float) -> tuple[float, float]:
-    start, end = float(t_start), float(t_end)
-    if not (math.isfinite(start) and math.isfinite(end) and end > start):
+def _span(t_start: Any, t_end: Any) -> tuple[float, float]:
+    start, end = in_si("t_start", t_start, "s"), in_si("t_end", t_end, "s")
+    if not end > start:
         raise ParameterError(f"t_end = {t_end} must be a finite time after t_start = {t_start}.")
-    if not 0 < rtol < 1:
-        raise ParameterError(f"rtol = {rtol} must lie between 0 and 1; 1e-8 is a good choice.")
     return start, end
+
+
+def _tolerance(rtol: Any) -> float:
+    value = in_si("rtol", rtol)
+    if not 0 < value < 1:
+        raise ParameterError(f"rtol = {rtol} must lie between 0 and 1; 1e-8 is a good choice.")
+    return value
+
+
+def _absolute(atol: Any, size: int) -> Array:
+    try:
+        values = np.broadcast_to(np.asarray(atol, dtype=float), (size,))
+    except (TypeError, ValueError):
+        raise ParameterError(f"atol = {atol!r} must be one number, or {size} numbers, one for each state.") from None
+    if not (np.isfinite(values).all() and (values > 0).all()):
+        raise ParameterError(f"atol = {atol!r} must be above 0; leave it out for a value that suits the states.")
+    return values
 
 
 def _output_times(t_eval: OutputTimes, start: float, end: float) -> Array | None:
@@ -320,10 +366,13 @@ def _output_times(t_eval: OutputTimes, start: float, end: float) -> Array | None
         return None
     if t_eval is None or isinstance(t_eval, (int, np.integer)):
         count = OUTPUTS if t_eval is None else int(t_eval)
-        if count < 2:
-            raise ParameterError(f"t_eval = {count} output times are too few; give at least 2.")
+        if not 2 <= count <= MOST_OUTPUTS:
+            raise ParameterError(f"t_eval = {count} output times: give at least 2 and at most {MOST_OUTPUTS}.")
         return np.linspace(start, end, count)
-    times = np.asarray(t_eval, dtype=float)
+    try:
+        times = np.asarray(t_eval, dtype=float)
+    except (TypeError, ValueError):
+        raise ParameterError(f"t_eval = {t_eval!r} must be a list of times, their number, or 'steps'.") from None
     good = times.ndim == 1 and times.size > 0 and bool(np.isfinite(times).all())
     if not good or times[0] < start or times[-1] > end or (np.diff(times) <= 0).any():
         raise ParameterError(f"t_eval must hold strictly increasing times between {start:g} and {end:g} s.")

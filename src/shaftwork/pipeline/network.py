@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal, Self
 
-from shaftwork.core.errors import NetworkError, NetworkWarning, Problem, SignalError
+from shaftwork.core.errors import NetworkError, NetworkWarning, ParameterError, Problem, SignalError
 from shaftwork.equations.kirchhoff import kirchhoff
 from shaftwork.equations.records import Equations
 from shaftwork.network.builder import NetworkBuilder
@@ -69,7 +69,10 @@ class Network(NetworkBuilder):
         Raises:
             NetworkError: the network cannot be assembled; lists every reason.
         """
-        return _compiled(self.netlist(), tuple(angles), LOOP if algebraic_loops == "solve" else "")
+        if algebraic_loops not in ("refuse", "solve"):
+            raise ParameterError(f"algebraic_loops = {algebraic_loops!r} must be 'refuse' or 'solve'.")
+        asked = (angles,) if isinstance(angles, str) else tuple(angles)
+        return _compiled(self.netlist(), asked, LOOP if algebraic_loops == "solve" else "")
 
     def simulate(
         self,

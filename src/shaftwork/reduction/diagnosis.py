@@ -16,10 +16,11 @@ from shaftwork.components.branches import ACROSS
 from shaftwork.components.laws import InterpolationSlope, breakpoints, t
 from shaftwork.core.domains import Domain
 from shaftwork.core.errors import Problem
-from shaftwork.network.checks import LEFT_OUT, Spelling, at_nodes, connection_problems, examine, listed, title
+from shaftwork.network.checks import LEFT_OUT, connection_problems, examine
 from shaftwork.network.graph import GROUND, CircuitGraph, build_graph, ends_of
 from shaftwork.network.netlist import Netlist
 from shaftwork.network.templates import Kind
+from shaftwork.network.wording import Spelling, at_nodes, listed, title
 from shaftwork.reduction.form import StateForm, state_form
 from shaftwork.reduction.gains import Gain, value_of
 from shaftwork.reduction.tree import column_of
@@ -70,8 +71,7 @@ def diagnose(netlist: Netlist) -> tuple[CircuitGraph | None, StateForm | None, t
         netlist: any netlist; nothing is raised.
 
     Returns:
-        Graph and state form of the network, None where it cannot be made as it was typed, and every problem: those of
-        the parts first, then of their connections, then of the equations.
+        Graph and state form, None where a part is wrong, and every problem: of parts, of connections, of equations.
     """
     repaired, typed = examine(netlist)
     if not repaired.placed:

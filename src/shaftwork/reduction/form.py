@@ -117,6 +117,12 @@ class StateForm:
         laws = (*self.tree.links[Kind.LAW], *self.tree.tree[Kind.LAW])
         return tuple(dict.fromkeys((*laws, *self.integrals)))
 
+    @property
+    def has_impulses(self) -> bool:
+        """Whether a jump of a source is an impulse to stores that are joined to it rigidly."""
+        speeds = self.dependent_across and self.across_sources
+        return bool(speeds or (self.dependent_through and self.tree.links[Kind.THROUGH_SOURCE]))
+
     @cached_property
     def states(self) -> tuple[State, ...]:
         """The states: speeds of the tree's stores, torques of the links' stores, integrals."""

@@ -136,6 +136,24 @@ def _parts_first(gains: Sequence[Gain]) -> list[Gain]:
     return order
 
 
+def any_sum_vanishes(gains: Iterable[Gain], values: Mapping[Expr, float]) -> bool:
+    """Whether, for other values of the coefficients, a sum is zero that is not zero for the network's own."""
+    order = _parts_first(tuple(gains))
+    sums = [gain for gain in order if gain.operation == "+"]
+    terms = [gain.of for gain in sums]
+    try:
+        totals = fold(sums, values.__getitem__)
+        sizes = [max(abs(number) for number in _folded(pair, values)) for pair in terms]
+    except ZeroDivisionError:
+        return True
+    return any(abs(total) <= CANCELLATION * size for total, size in zip(totals, sizes, strict=True))
+
+
+def _folded(numbers: Sequence[Number], values: Mapping[Expr, float]) -> list[float]:
+    folded = iter(fold((number for number in numbers if isinstance(number, Gain)), values.__getitem__))
+    return [next(folded) if isinstance(number, Gain) else float(number) for number in numbers]
+
+
 def coefficients_in(gains: Iterable[Gain]) -> tuple[Expr, ...]:
     """The coefficients of components that gains are made of, each once."""
     return tuple(dict.fromkeys(gain.of[0] for gain in _parts_first(tuple(gains)) if not gain.operation))
