@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 
 import numpy as np
@@ -13,18 +13,20 @@ from shaftwork.codegen.recovery import History, signals_of
 from shaftwork.components.base import Signal
 from shaftwork.core.domains import ROTATION
 from shaftwork.network.graph import CircuitGraph, GraphPart
+from shaftwork.reduction.form import StateForm
 
 
 class ModelObserver:
     """Recovers every quantity of a network from its states.
 
     Args:
-        bound: the array program with the parameter vector of the run.
+        form: the state form.
+        bind: makes the array program with the parameter vector of the run; called when a quantity is first read.
     """
 
-    def __init__(self, bound: BoundArrays) -> None:
-        self._bound = bound
-        self._graph: CircuitGraph = bound.program.form.graph
+    def __init__(self, form: StateForm, bind: Callable[[], BoundArrays]) -> None:
+        self._form, self._bind = form, bind
+        self._graph: CircuitGraph = form.graph
         self._last: tuple[tuple[int, int], History] | None = None
 
     @cached_property
@@ -34,7 +36,7 @@ class ModelObserver:
 
     @cached_property
     def _integrals(self) -> dict[str, int]:
-        return {state.name: k for k, state in enumerate(self._bound.program.form.states) if state.kind == "integral"}
+        return {state.name: k for k, state in enumerate(self._form.states) if state.kind == "integral"}
 
     @cached_property
     def _nodes(self) -> dict[str, int]:
@@ -46,7 +48,7 @@ class ModelObserver:
         """Every quantity that can be read and its unit; where a part and a node share a name, the part's is meant."""
         units = {f"{name}": domain.across.unit for name, domain in zip(self._nodes, self._graph.domains, strict=True)}
         units |= {name: _unit(signal) for name, (_, signal) in self._signals.items()}
-        units |= {s.name: s.unit for s in self._bound.program.form.states if s.kind == "integral"}
+        units |= {s.name: s.unit for s in self._form.states if s.kind == "integral"}
         units |= {f"{part.name}.power": "W" for part in self._graph.parts}
         return units | {f"{part.name}.energy": "J" for part in self._graph.parts}
 
@@ -54,7 +56,7 @@ class ModelObserver:
         """All branch quantities along a trajectory; the last one asked for is kept."""
         key = (id(t), id(x))
         if self._last is None or self._last[0] != key:
-            self._last = (key, History(self._bound, t, x))
+            self._last = (key, History(self._bind(), t, x))
         return self._last[1]
 
     def signal(self, name: str, t: Array, x: Array) -> Array:
@@ -72,7 +74,7 @@ class ModelObserver:
 
     def powers(self, t: Array, x: Array) -> tuple[dict[str, Array], dict[str, Array], dict[str, Array]]:
         """Stored energy, lost power and supplied power by part."""
-        history = History(self._bound, t, x)
+        history = History(self._bind(), t, x)
         parts = self._graph.parts
         stored = {part.name: history.stored(part) for part in parts if part.component.role != "source"}
         lost = {part.name: history.lost(part) for part in parts if part.component.role != "source"}

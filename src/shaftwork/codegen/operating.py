@@ -45,7 +45,7 @@ def initial_state(bound: BoundArrays, given: Mapping[str, float], t0: float) -> 
     x = bound.impulse(t0, np.zeros(len(names)))
     if not isinstance(given, Mapping):
         raise ParameterError(f"initial = {given!r} must map quantities to values, such as {{'J1.omega': 3.0}}.")
-    units = ModelObserver(bound).units
+    units = ModelObserver(bound.program.form, lambda: bound).units
     numbers = {
         str(name): in_si(f"the start value of '{name}'", value, units.get(name, "1")) for name, value in given.items()
     }
@@ -63,7 +63,7 @@ def _fill(
     bound: BoundArrays, names: list[str], given: Mapping[str, float], free: list[int], t0: float, x: Array
 ) -> None:
     """Change the free states of x so that the given quantities, which depend on the states linearly, come true."""
-    observer = ModelObserver(bound)
+    observer = ModelObserver(bound.program.form, lambda: bound)
     derived = ("power", "energy")
     if unknown := [name for name in given if name not in observer.units or name.endswith(derived)]:
         owner = unknown[0].rpartition(".")[0]

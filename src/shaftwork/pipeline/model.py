@@ -30,7 +30,9 @@ from shaftwork.results.solution import Solution
 OUTPUTS, MOST_OUTPUTS = 1001, 10_000_000
 """Output times when the user gives none, and the most that can be asked for."""
 VARIANTS = 8
-"""Models of other structure that are kept for later calls."""
+"""Models of other structure, and choices of an engine, that are kept for later calls."""
+SIMILAR = 5.0
+"""An engine suits parameters that differ by less than this factor too: looking anew would cost more than the run."""
 NOMINAL = 1e-3
 """Absolute tolerance as a fraction of the relative one, for a speed of 1 rad/s (m/s, V)."""
 EngineName = Literal["auto", "scipy", "scipy-radau", "heyoka", "sundials", "exact"]
@@ -49,7 +51,6 @@ class _Prepared:
     symbolic: Any
     linear: LinearInputs | None
     atol: Array
-    engines: dict[tuple[float, ...], tuple[str, str]]
 
     @cached_property
     def bound(self) -> BoundArrays:
@@ -79,6 +80,7 @@ class Model(CompiledModel):
         self.netlist, self._rebuild = netlist, rebuild
         self._prepared: tuple[bytes, _Prepared] | None = None
         self._variants: dict[tuple[tuple[str, float], ...], Model] = {}
+        self._choices: list[tuple[tuple[float, float, float], Array, tuple[str, str]]] = []
 
     @property
     def name(self) -> str:
@@ -142,7 +144,7 @@ class Model(CompiledModel):
             why=why,
             statistics=trajectory.statistics,
             dense=trajectory.dense,
-            observer=ModelObserver(prepared.bound),
+            observer=ModelObserver(self.form, lambda: prepared.bound),
         )
 
     def steady_state(
@@ -185,9 +187,12 @@ class Model(CompiledModel):
         if engine != "auto":
             return engine, "asked for"
         key = (problem.t0, problem.t_end, problem.rtol)
-        if key not in prepared.engines:
-            prepared.engines[key] = choice.choose(problem)
-        return prepared.engines[key]
+        for run, p, chosen in self._choices:
+            if run == key and ((p / SIMILAR < prepared.p) == (prepared.p < p * SIMILAR)).all():
+                return chosen
+        chosen = choice.choose(problem)
+        self._choices = [*self._choices[1 - VARIANTS :], (key, prepared.p, chosen)]
+        return chosen
 
     def _problem(
         self,
@@ -229,7 +234,6 @@ class Model(CompiledModel):
                 symbolic=None if program is None else program.bind(p),
                 linear=self._linear_inputs(p),
                 atol=NOMINAL * self._nominal(self.arrays.assembly.coefficients(p)),
-                engines={},
             )
             self._prepared = (key, made)
         return self._prepared[1]

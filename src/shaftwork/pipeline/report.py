@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from shaftwork.codegen.elements import Array
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.network import Network
 
@@ -41,13 +41,19 @@ def _lines(net: Network, model: Model, t_end: float) -> Iterator[str]:
     cost = model.cost()
     yield f"right-hand side: {cost.form} code, {cost.total} operations; {cost.entries} entries in the linear part"
     if 0 < len(model.states) <= LARGEST_DENSE:
-        yield from _time_constants(np.linalg.eigvals(model.jacobian(0.0, np.zeros(len(model.states))).toarray()))
+        yield from _time_constants(model)
     if model.states:
         name, why = model.choose_engine(t_end)
         yield f"engine for {t_end:g} s: {name}, {why}"
 
 
-def _time_constants(eigenvalues: Array) -> Iterator[str]:
+def _time_constants(model: Model) -> Iterator[str]:
+    jacobian = model.jacobian(0.0, np.zeros(len(model.states))).toarray()
+    if not np.isfinite(jacobian).all():
+        rows = np.flatnonzero(~np.isfinite(jacobian).all(axis=1))
+        yield f"time constants at rest: none, since {_some([model.states[k] for k in rows])} has no finite slope there"
+        return
+    eigenvalues: NDArray[np.complex128] = np.linalg.eigvals(jacobian).astype(complex)
     size = np.abs(eigenvalues)
     moving = eigenvalues[size > 1e-9 * size.max()] if size.max() else eigenvalues[:0]
     swings = np.unique(np.round(np.abs(moving.imag[moving.imag > 1e-9 * np.abs(moving)]) / (2 * np.pi), 12))
