@@ -18,17 +18,22 @@ from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.operating import initial_state, steady_state
 from shaftwork.components.laws import breakpoints, pieces_degree
 from shaftwork.core.errors import ParameterError, SimulationError
-from shaftwork.core.parameters import in_si
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import LinearInputs, Problem
 from shaftwork.network.netlist import Netlist, Placed
 from shaftwork.network.templates import Kind
+from shaftwork.pipeline.arguments import (
+    OutputTimes,
+    absolute_tolerances,
+    output_times,
+    relative_tolerance,
+    time_span,
+    watched_by,
+)
 from shaftwork.pipeline.implicit import at_rest, solve_loops
 from shaftwork.reduction.form import StateForm
 from shaftwork.results.solution import Solution
 
-OUTPUTS, MOST_OUTPUTS = 1001, 10_000_000
-"""Output times when the user gives none, and the most that can be asked for."""
 VARIANTS = 8
 """Models of other structure, and choices of an engine, that are kept for later calls."""
 SIMILAR = 5.0
@@ -36,7 +41,6 @@ SIMILAR = 5.0
 NOMINAL = 1e-3
 """Absolute tolerance as a fraction of the relative one, for a speed of 1 rad/s (m/s, V)."""
 EngineName = Literal["auto", "scipy", "scipy-radau", "heyoka", "sundials", "exact"]
-OutputTimes = int | Sequence[float] | Array | Literal["steps"] | None
 Rebuild = Callable[[Netlist], "Model"]
 
 
@@ -99,6 +103,7 @@ class Model(CompiledModel):
         initial: Mapping[str, float] | None = None,
         parameters: Mapping[str, float] | None = None,
         max_steps: int = 10_000_000,
+        progress: Callable[[float], None] | None = None,
     ) -> Solution:
         """Integrate the motion.
 
@@ -114,6 +119,8 @@ class Model(CompiledModel):
             parameters: values that differ from the network's, "part.parameter" to value in SI; nothing is recompiled
                 unless a value changes the structure (a damping that was exactly zero).
             max_steps: give up after this many steps.
+            progress: called again and again with the time that the engine has reached, s; not by the compiled engine
+                and the exact one, which are done before anyone looks.
 
         Raises:
             ParameterError: an argument is out of its range.
@@ -122,12 +129,15 @@ class Model(CompiledModel):
         """
         values = self._checked_all(parameters)
         if self._changes_structure(values):
-            options = {"t_start": t_start, "rtol": rtol, "atol": atol, "t_eval": t_eval, "initial": initial}
-            return self._variant(values).simulate(t_end, engine=engine, max_steps=max_steps, **options)  # type: ignore[arg-type]
+            options: dict[str, Any] = {"t_start": t_start, "rtol": rtol, "atol": atol, "t_eval": t_eval}
+            options |= {"engine": engine, "initial": initial, "max_steps": max_steps, "progress": progress}
+            return self._variant(values).simulate(t_end, **options)
         prepared = self._prepare(self.vector(values) if values else self.defaults)
-        span = _span(t_start, t_end)
+        span = time_span(t_start, t_end)
         x0 = self._start(prepared, initial, span[0])
-        problem = self._problem(prepared, span, x0, _tolerance(rtol), atol, t_eval, max_steps)
+        problem = self._problem(prepared, span, x0, relative_tolerance(rtol), atol, t_eval, max_steps)
+        if progress is not None:
+            problem = dataclasses.replace(problem, rhs=watched_by(problem.rhs, progress))
         if not self.states:
             trajectory, name, why = at_rest(problem)
         elif self.form.loop_laws and engine in ("auto", "sundials"):
@@ -179,7 +189,7 @@ class Model(CompiledModel):
 
     def choose_engine(self, t_end: float, *, t_start: float = 0.0, rtol: float = 1e-8) -> tuple[str, str]:
         """The engine that "auto" takes for a motion, and why."""
-        prepared, span = self._prepare(self.defaults), _span(t_start, t_end)
+        prepared, span = self._prepare(self.defaults), time_span(t_start, t_end)
         x0 = self._start(prepared, None, span[0])
         return self._engine(prepared, self._problem(prepared, span, x0, rtol, None, None, 1), "auto")
 
@@ -212,11 +222,11 @@ class Model(CompiledModel):
             t0=span[0],
             t_end=span[1],
             names=self.states,
-            atol=rtol * prepared.atol if atol is None else _absolute(atol, len(x0)),
+            atol=rtol * prepared.atol if atol is None else absolute_tolerances(atol, len(x0)),
             rtol=rtol,
             breakpoints=inside,
             jump=prepared.impulse if self.form.has_impulses else None,
-            t_eval=_output_times(t_eval, *span),
+            t_eval=output_times(t_eval, *span),
             linear=prepared.linear,
             symbolic=prepared.symbolic,
             max_steps=max_steps,
@@ -337,47 +347,3 @@ def _replaced(netlist: Netlist, values: Mapping[str, float]) -> Netlist:
         for item in netlist.placed
     )
     return Netlist(netlist.name, placed)
-
-
-def _span(t_start: Any, t_end: Any) -> tuple[float, float]:
-    start, end = in_si("t_start", t_start, "s"), in_si("t_end", t_end, "s")
-    if not end > start:
-        raise ParameterError(f"t_end = {t_end} must be a finite time after t_start = {t_start}.")
-    return start, end
-
-
-def _tolerance(rtol: Any) -> float:
-    value = in_si("rtol", rtol)
-    if not 0 < value < 1:
-        raise ParameterError(f"rtol = {rtol} must lie between 0 and 1; 1e-8 is a good choice.")
-    return value
-
-
-def _absolute(atol: Any, size: int) -> Array:
-    try:
-        values = np.broadcast_to(np.asarray(atol, dtype=float), (size,))
-    except (TypeError, ValueError):
-        raise ParameterError(f"atol = {atol!r} must be one number, or {size} numbers, one for each state.") from None
-    if not (np.isfinite(values).all() and (values > 0).all()):
-        raise ParameterError(f"atol = {atol!r} must be above 0; leave it out for a value that suits the states.")
-    return values
-
-
-def _output_times(t_eval: OutputTimes, start: float, end: float) -> Array | None:
-    if isinstance(t_eval, str):
-        if t_eval != "steps":
-            raise ParameterError(f"t_eval = '{t_eval}' must be times, their number, or 'steps'.")
-        return None
-    if t_eval is None or isinstance(t_eval, (int, np.integer)):
-        count = OUTPUTS if t_eval is None else int(t_eval)
-        if not 2 <= count <= MOST_OUTPUTS:
-            raise ParameterError(f"t_eval = {count} output times: give at least 2 and at most {MOST_OUTPUTS}.")
-        return np.linspace(start, end, count)
-    try:
-        times = np.asarray(t_eval, dtype=float)
-    except (TypeError, ValueError):
-        raise ParameterError(f"t_eval = {t_eval!r} must be a list of times, their number, or 'steps'.") from None
-    good = times.ndim == 1 and times.size > 0 and bool(np.isfinite(times).all())
-    if not good or times[0] < start or times[-1] > end or (np.diff(times) <= 0).any():
-        raise ParameterError(f"t_eval must hold strictly increasing times between {start:g} and {end:g} s.")
-    return times
