@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import csv
+import os
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+import sympy
 
 import shaftwork as sw
 from shaftwork.cli import DONE, FAILED, WRONG_INPUT, main
@@ -67,6 +70,7 @@ def test_check_tells_structure_states_time_constants_and_engine(capsys: pytest.C
         (["run", "missing.toml"], WRONG_INPUT, "missing.toml"),
         (["run", "crane-start", "--t-end", "-1"], WRONG_INPUT, "after t_start"),
         (["check", "crane-start.txt"], WRONG_INPUT, ".toml"),
+        (["run", "crane-start", "--engine", "exact"], WRONG_INPUT, "Use --engine auto"),
     ],
 )
 def test_wrong_input_ends_with_2_and_one_message(
@@ -76,6 +80,65 @@ def test_wrong_input_ends_with_2_and_one_message(
     said = capsys.readouterr().err
     assert words in said
     assert "Traceback" not in said
+
+
+def test_a_bad_folder_is_found_before_the_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sw.Network, "compile", None)  # a run would call it
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    for folder in (tmp_path / "file", tmp_path / "file" / "inside"):
+        assert main(["run", "crane-start", "--out", str(folder)]) == WRONG_INPUT
+        said = capsys.readouterr()
+        assert said.out == ""
+        assert f"--out {folder} is no folder to write to" in said.err
+        assert "Give another folder." in said.err
+
+
+def test_a_linear_model_whose_inputs_are_curved_is_no_model_for_the_exact_engine(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for law, code in ((sympy.sin(sw.t), WRONG_INPUT), (sw.Ramp(1.0, 0.5), DONE)):
+        net = sw.Network("linear")
+        net.add(sw.Inertia("J", J=1.0), "a")
+        net.add(sw.TorqueSource("T", tau=law), "a")
+        net.save(tmp_path / "linear.toml")
+        assert main(["run", str(tmp_path / "linear.toml"), "--t-end", "1", "--engine", "exact"]) == code
+        assert ("'linear' is not one" in capsys.readouterr().err) == (code == WRONG_INPUT)
+
+
+@pytest.mark.parametrize("law", [1 / sw.omega, sympy.log(sw.omega), (1e10 + sw.omega) ** 40], ids=str)
+def test_check_says_where_the_slopes_at_rest_are_not_finite(
+    law: sympy.Expr, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    net = sw.Network("steep")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.TorqueSource("T", tau=law), "a")
+    net.save(tmp_path / "steep.toml")
+    assert main(["check", str(tmp_path / "steep.toml")]) == DONE
+    assert "time constants at rest: none, since J.omega has no finite slope there" in capsys.readouterr().out
+
+
+def test_an_unforeseen_error_ends_with_1_and_one_line(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_args: object, **_options: object) -> None:
+        raise np.linalg.LinAlgError("Singular\nmatrix")
+
+    monkeypatch.setattr(sw.Network, "compile", fail)
+    assert main(["run", "crane-start"]) == FAILED
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "'run crane-start' failed with LinAlgError: Singular matrix." in line
+
+
+def test_a_reader_that_closes_the_pipe_ends_the_command_quietly() -> None:
+    """The reader is gone before the first word, so that every write fails."""
+    command = [sys.executable, "-m", "shaftwork.cli", "latex", "shaft-chain"]
+    reading, writing = os.pipe()
+    os.close(reading)
+    with os.fdopen(writing, "wb") as pipe:
+        done = subprocess.run(command, stdout=pipe, stderr=subprocess.PIPE, text=True, check=False)
+    assert (done.returncode, done.stderr) == (DONE, "")
 
 
 def test_every_problem_of_a_wrong_network_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

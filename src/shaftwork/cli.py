@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shaftwork.core.errors import ShaftworkError, SimulationError
+from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError
 
 if TYPE_CHECKING:
+    from shaftwork.pipeline.model import Model
     from shaftwork.pipeline.network import Network
     from shaftwork.results.solution import Solution
     from shaftwork.scenes.catalog import Scene
@@ -26,20 +29,39 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     command: Callable[[argparse.Namespace], None] = options.command
     try:
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
+        with _warnings_on_standard_error():
             command(options)
-        for warning in caught:
-            print(f"warning: {warning.message}", file=sys.stderr)
-    except SimulationError as error:
-        print(f"shaftwork: {error}", file=sys.stderr)
-        return FAILED
-    except (ShaftworkError, OSError) as error:
-        print(f"shaftwork: {error}", file=sys.stderr)
-        return WRONG_INPUT
-    except BrokenPipeError:
+        sys.stdout.flush()
+    except BrokenPipeError:  # whoever reads, such as head, has enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for what Python still flushes when it ends
         return DONE
+    except SimulationError as error:
+        return _ended(FAILED, str(error))
+    except (ShaftworkError, OSError) as error:
+        return _ended(WRONG_INPUT, str(error))
+    except Exception as error:  # noqa: BLE001 (numpy and sympy may raise anything on laws beyond all measure)
+        doing = " ".join([options.name, *([options.model] if "model" in options else [])])
+        reason = " ".join(str(error).split())
+        return _ended(
+            FAILED, f"'{doing}' failed with {type(error).__name__}: {reason}. Look for extreme laws or values."
+        )
     return DONE
+
+
+def _ended(code: int, message: str) -> int:
+    print(f"shaftwork: {message}", file=sys.stderr)
+    return code
+
+
+@contextmanager
+def _warnings_on_standard_error() -> Iterator[None]:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            yield
+        finally:
+            for warning in caught:
+                print(f"warning: {warning.message}", file=sys.stderr)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -52,7 +74,7 @@ def _parser() -> argparse.ArgumentParser:
         name: str, run: Callable[[argparse.Namespace], None], text: str, *, model: bool = True
     ) -> argparse.ArgumentParser:
         made = commands.add_parser(name, help=text, description=text)
-        made.set_defaults(command=run)
+        made.set_defaults(command=run, name=name)
         if model:
             made.add_argument("model", metavar="SCENE|FILE.toml", help="a ready scene or a model file")
         return made
@@ -95,8 +117,13 @@ def _load(name: str) -> tuple[Network, Scene | None]:
 
 def _run(options: argparse.Namespace) -> None:
     net, scene = _load(options.model)
+    if options.out:
+        _make_folder(options.out)
     t_end = options.t_end if options.t_end is not None else scene.t_end if scene else FALLBACK_END
-    solution = net.simulate(t_end, rtol=options.rtol, engine=options.engine)
+    model = net.compile()
+    if options.engine == "exact":
+        _refuse_nonlinear(model)
+    solution = model.simulate(t_end, rtol=options.rtol, engine=options.engine)
     signals = scene.signals if scene else _worth_seeing(solution)
     print(f"{net.name}: {t_end:g} s of motion" + (f" ({scene.source})" if scene else ""))
     for line in scene.chosen if scene else ():
@@ -107,6 +134,26 @@ def _run(options: argparse.Namespace) -> None:
     _table(solution, signals)
     if options.out:
         _write(solution, signals, options.out)
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ParameterError(f"--out {folder} is no folder to write to: {error}. Give another folder.") from None
+    if not os.access(folder, os.W_OK):
+        raise ParameterError(f"--out {folder} is a folder that you may not write to. Give another folder.")
+
+
+def _refuse_nonlinear(model: Model) -> None:
+    from shaftwork.components.laws import pieces_degree
+
+    laws = (branch.template.law for branch in model.form.graph.branches)
+    if not model.linear or any(pieces_degree(law) is None for law in laws):
+        raise ParameterError(
+            f"--engine exact takes linear models with inputs of straight pieces, and '{model.name}' is not one. "
+            "Use --engine auto."
+        )
 
 
 def _worth_seeing(solution: Solution) -> tuple[str, ...]:
@@ -131,7 +178,6 @@ def _table(solution: Solution, signals: Sequence[str]) -> None:
 def _write(solution: Solution, signals: Sequence[str], folder: Path) -> None:
     import numpy as np
 
-    folder.mkdir(parents=True, exist_ok=True)
     table = folder / "signals.csv"
     columns = np.column_stack([solution.t, *(solution[name] for name in signals)])
     header = ",".join(["t [s]", *(f"{name} [{solution.observer.units[name]}]" for name in signals)])

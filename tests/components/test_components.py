@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
+import pickle
+import re
 from typing import Any
 
 import pytest
@@ -114,6 +117,45 @@ def test_a_branch_may_be_written_in_ten_lines_by_a_user_without_a_trace_in_the_l
     gear = next(iter(sw.Gear("g", ratio=2.0).branches(type("P", (), {"ratio": sympy.Symbol("ratio")}))))
     assert isinstance(gear, IdealCoupling)
     assert ACROSS not in gear.terms[0][0].free_symbols
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        ({"role": "foo"}, "Mine: role = 'foo' is none of: store, loss, source, coupling."),
+        ({"ports": ("a",)}, "Mine: ports = ('a',) must be a tuple such as (Port('a'), Port('b'))."),
+        ({"ports": [sw.Port("a")]}, "must be a tuple such as"),
+        ({"inner": ("m",)}, "Mine: inner = ('m',) must be a tuple"),
+        ({"ports": ()}, "Mine: its ports are []. Give it one or more"),
+        ({"inner": (sw.Port("a"),)}, "Mine: its ports are ['a', 'b', 'a']"),
+        ({"k": 1.0, "__annotations__": {"k": "float"}}, "Mine: k is not declared. Write k: float = parameter("),
+    ],
+    ids=str,
+)
+def test_a_class_that_is_no_sound_component_is_refused_when_it_is_made(body: dict[str, Any], words: str) -> None:
+    with pytest.raises(sw.ShaftworkError, match=re.escape(words)):
+        sw.component(type("Mine", (sw.Component,), body))
+    assert "Mine" not in REGISTRY
+
+
+def test_a_class_that_was_not_decorated_is_told_the_decorator() -> None:
+    class Bare(sw.Component):
+        k: float = sw.parameter("1", "a factor")
+
+    class Derived(sw.Inertia):
+        pass
+
+    for make in (lambda: Bare("b", k=1.0), lambda: Derived("d", J=1.0), lambda: sw.Component("c")):
+        with pytest.raises(sw.ShaftworkError, match=r"is not a component yet\. Write @component above `class "):
+            sw.Network().add(make(), "a")
+    with pytest.raises(sw.ShaftworkError, match=r"int is no Component\. Write: class int\(Component\)"):
+        sw.component(int)  # type: ignore[type-var]
+
+
+def test_a_part_can_be_copied_and_sent() -> None:
+    part = sw.Spring("shaft", c=1.0)
+    assert copy.deepcopy(part) == part
+    assert pickle.loads(pickle.dumps(part)) == part  # noqa: S301 (our own bytes)
 
 
 def test_domains_share_no_quantity() -> None:

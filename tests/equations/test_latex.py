@@ -11,10 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from sympy import Heaviside
 
 from shaftwork.components import base
 from shaftwork.components.branches import Branch, ThroughLaw
 from shaftwork.components.electrical import Resistor, VoltageSource
+from shaftwork.components.laws import omega
 from shaftwork.components.machines import DCMachine
 from shaftwork.components.rotation import Damper, Inertia, Spring
 from shaftwork.components.sources import TorqueSource
@@ -141,14 +143,16 @@ def test_a_series_of_equal_rows_is_one_general_row() -> None:
     assert max(map(printed_width, text.splitlines())) < 100
 
 
-def test_rows_that_differ_in_a_value_are_no_series() -> None:
+def test_a_row_that_differs_in_a_value_is_left_out_of_its_series() -> None:
     net = NetworkBuilder("values")
     for k in range(1, 9):
         net.add(Inertia(f"J{k}", J=0.5 if k == 4 else 1.5), f"n{k}")
         net.add(Damper(f"d{k}", d=2.0), f"n{k}")
     text = equations_of(net).latex(form="state", values=True)
-    assert r"\frac{d \omega_{4}}{d t} &=" in text
-    assert r"k = 1, \dots" not in text
+    series, other = text.splitlines()[-3:-1]
+    assert series.startswith(r"\frac{d \omega_{k}}{d t} &=")
+    assert series.endswith(r"\text{for } k = 1, 2, 3, 5, \dots, 8 \\")
+    assert other.startswith(r"\frac{d \omega_{4}}{d t} &=")
 
 
 def test_a_general_row_stands_for_exactly_the_rows_that_it_replaces() -> None:
@@ -264,3 +268,42 @@ def test_a_parameter_that_looks_like_a_variable_gets_a_subscript(monkeypatch: py
     net.add(Preloaded("p", tau=3.0), "a")
     names = symbols(net)
     assert (names["p.tau"], names["tau(p)"]) == (r"\tau_{0,\mathrm{p}}", r"\tau_{\mathrm{p}}")
+
+
+@compiles
+@pytest.mark.parametrize("name", ["crane", "50 parts", "dc drive"])
+def test_a_document_is_right_after_one_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")  # a PDF holds the time of the run
+    source = equations_of(NETWORKS[name]()).document()
+    log = compile_latex(source, tmp_path)
+    once = (tmp_path / "report.pdf").read_bytes()
+    assert "Rerun" not in log
+    compile_latex(source, tmp_path)
+    assert (tmp_path / "report.pdf").read_bytes() == once
+
+
+def test_a_law_is_printed_once_below_the_balances() -> None:
+    equations = equations_of(crane())
+    law = r"\tau_{\mathrm{motor}} &="
+    assert equations.latex().count(law) == equations.latex(form="state").count(law) == 1
+    kirchhoff, state = equations.document().split(r"\section{State form}")
+    assert kirchhoff.count(law) == 1
+    assert law not in state.partition(r"\section{Second-order form}")[0]
+
+
+def test_a_document_says_why_it_has_no_second_order_form() -> None:
+    equations = equations_of(dc_drive())
+    with pytest.raises(CompileError) as reason:
+        equations.latex(form="second-order")
+    section = equations.document().partition(r"\section{Second-order form}")[2].partition(r"\section")[0]
+    assert section.strip() == str(reason.value)
+
+
+@pytest.mark.parametrize("arguments", [(), (0,), (1,)])
+def test_a_unit_step_is_printed_as_one(arguments: tuple[int, ...]) -> None:
+    net = NetworkBuilder("step")
+    net.add(Inertia("J", J=1.0), "a")
+    net.add(TorqueSource("T", tau=3 * Heaviside(omega, *arguments) ** 2), "a")
+    text = equations_of(net).latex(form="kirchhoff")
+    assert r"\mathrm{H}\left(\omega_{\mathrm{J}}\right)" in text
+    assert "theta" not in text

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -12,12 +12,15 @@ import pytest
 import sympy
 
 from shaftwork.components import electrical, laws, machines, rotation, sources, translation
-from shaftwork.components.base import Component, Port
-from shaftwork.components.branches import ACROSS, AcrossStore, Branch, ThroughLaw
+from shaftwork.components.base import Component, Port, component
+from shaftwork.components.branches import ACROSS, AcrossLaw, AcrossStore, Branch, IdealCoupling, ThroughLaw
 from shaftwork.core.errors import Problem
-from shaftwork.network.checks import Spelling, connection_problems, declaration_problems, examine
+from shaftwork.core.parameters import parameter
+from shaftwork.network.checks import connection_problems, declaration_problems, examine
+from shaftwork.network.grammar import FUNCTIONS
 from shaftwork.network.graph import build_graph
 from shaftwork.network.netlist import Netlist, Placed
+from shaftwork.network.wording import Spelling
 
 ROTOR = Placed(rotation.Inertia("J1", J=1.0), ("rotor",))
 SHAFT = Placed(rotation.Spring("shaft", c=1e3, d=1.0), ("rotor", "wheel"))
@@ -60,7 +63,14 @@ def test_equal_names_are_said_with_both_places() -> None:
 
 @pytest.mark.parametrize(
     ("name", "words"),
-    [("", "has no name"), (" ", "has no name"), ("ground", "stands for the frame"), ("a.b", "has a dot in its name")],
+    [
+        ("", "has no name"),
+        (" ", "has no name"),
+        ("ground", "stands for the frame"),
+        ("a.b", "has a dot in its name"),
+        ("two\nlines", "'two\\nlines' has no plain name"),
+        ("n" * 201, "has no plain name"),
+    ],
 )
 def test_a_part_that_cannot_be_named_is_said(name: str, words: str) -> None:
     problem = typed(rotation.Inertia(name, J=1.0), "wheel")
@@ -68,7 +78,9 @@ def test_a_part_that_cannot_be_named_is_said(name: str, words: str) -> None:
     assert words in problem.message
 
 
-@pytest.mark.parametrize(("node", "kind"), [("", "node name"), (3, "node name"), ("a.b", "dotted node name")])
+@pytest.mark.parametrize(
+    ("node", "kind"), [("", "node name"), (3, "node name"), ("a\nb", "node name"), ("a.b", "dotted node name")]
+)
 def test_a_node_that_cannot_be_named_is_said(node: Any, kind: str) -> None:
     problem = typed(rotation.Inertia("J3", J=1.0), node)
     assert problem.kind == kind
@@ -158,6 +170,13 @@ def test_a_wrong_unit_is_said_with_the_right_one() -> None:
         (sympy.Symbol("k") * laws.t, "contains the symbol k, which has no value"),
         (sympy.Function("f")(laws.t), "contains the unknown function f"),
         (sympy.I * laws.t, "is not a finite real law"),
+        (sympy.floor(laws.t), "contains the unknown function floor"),
+        (3.0 * sympy.erf(laws.omega) + 1, "contains the unknown function erf"),
+        (sympy.Mod(laws.t, 2), "contains the unknown function Mod"),
+        (sympy.gamma(laws.t), "contains the unknown function gamma"),
+        (sympy.Derivative(sympy.sin(laws.t), laws.t), "contains the unknown function Derivative"),
+        (sympy.Integral(sympy.sin(laws.t), (laws.t, 0, laws.t)), "contains the unknown function Integral"),
+        (sympy.Piecewise((1, laws.t < 0.5)), "has Piecewise((1, t < 0.5)), without a value where no condition holds"),
         (laws.t < 1, "is a StrictLessThan, not a number or a law"),
         (sympy.Matrix([laws.t, 1]), "not a number or a law"),
     ],
@@ -182,29 +201,84 @@ def test_laws_of_time_speed_angle_and_tables_are_allowed() -> None:
     assert declaration_problems(netlist(*((part, ("rotor",)) for part in parts))) == ()
 
 
-@dataclass(frozen=True)
-class Odd(Component):
-    """A component of a user, with an error in it."""
+def test_an_unknown_function_is_answered_with_those_of_the_grammar() -> None:
+    problem = typed(sources.TorqueSource("motor", tau=sympy.floor(laws.t)), "rotor")
+    for name in (*FUNCTIONS, "Piecewise", "Table"):
+        assert name in problem.hint
 
-    kind: str = "raises"
-    ports = (Port("a"),)
 
-    def branches(self, p: Any) -> Iterator[Branch]:  # noqa: ARG002
-        if self.kind == "raises":
-            raise ZeroDivisionError("no teeth")
-        if self.kind == "ends":
-            yield ThroughLaw(ACROSS, ("a", "nowhere"))
-        yield AcrossStore(laws.t)
+def test_every_function_of_the_grammar_is_allowed() -> None:
+    """No name of the grammar is refused by the check that refuses the others."""
+    known = [function.make(*[laws.omega, laws.t][: function.fewest]) for function in FUNCTIONS.values()]
+    curves = [laws.Table([0, 1], [0, 1])(laws.omega), laws.Ramp(1.0, 0.1), sympy.Max(laws.t, laws.omega, 2.0)]
+    for law in (*known, *curves, sympy.Piecewise((1, (laws.t < 1) | ~(laws.omega > 2)), (2, True))):
+        assert declaration_problems(netlist((sources.TorqueSource("motor", tau=law + laws.t), ("rotor",)))) == ()
+
+
+def odd(make: Callable[[Any], Iterable[Any]]) -> Component:
+    """A part of a user's class, whose branches come from a function of its parameters."""
+
+    @component
+    class Odd(Component):
+        k: float = parameter("1", "a factor", default=2.0)
+        ports = (Port("a"), Port("b", optional=True))
+
+        def branches(self, p: Any) -> Iterator[Branch]:
+            yield from make(p)
+
+    return Odd("odd")
 
 
 @pytest.mark.parametrize(
-    ("kind", "words"),
-    [("raises", "no teeth"), ("ends", "'nowhere', which is no port"), ("of time", "a branch law depends on t")],
+    ("make", "words"),
+    [
+        (lambda p: [AcrossStore(p.k / p.missing)], "missing"),
+        (lambda _: [ThroughLaw(ACROSS, ("a", "nowhere"))], "'nowhere', which is no port"),
+        (lambda _: [AcrossStore(laws.t)], "a branch law depends on t"),
+        (lambda _: ["a"], "branch 1 is 'a', which is no branch"),
+        (lambda _: [AcrossStore(1.0), None], "branch 2 is None, which is no branch"),
+        (lambda _: [ThroughLaw("2*across")], "branch 1 (ThroughLaw) has '2*across', not a number or an expression"),
+        (lambda _: [ThroughLaw([1.0])], "branch 1 (ThroughLaw) has [1.0], not a number"),
+        (lambda _: [ThroughLaw(laws.t < 1)], "branch 1 (ThroughLaw) has t < 1, not a number"),
+        (lambda _: [ThroughLaw(sympy.nan, label="drag")], "branch 1 (ThroughLaw 'drag') has nan, which has no finite"),
+        (lambda _: [ThroughLaw(sympy.erf(ACROSS))], "a branch law contains the unknown function erf"),
+    ],
 )
-def test_an_error_in_a_users_component_is_said_and_not_raised(kind: str, words: str) -> None:
-    problem = typed(Odd("odd", kind=kind), "rotor")
+def test_an_error_in_a_users_component_is_said_and_not_raised(make: Any, words: str) -> None:
+    problem = typed(odd(make), "rotor")
     assert problem.kind == "component"
+    assert "Odd 'odd': " in problem.message
     assert words in problem.message
+
+
+@pytest.mark.parametrize(
+    "branch",
+    [
+        ThroughLaw(sympy.nan * ACROSS),
+        ThroughLaw(float("inf")),
+        ThroughLaw(sympy.oo * ACROSS**2),
+        ThroughLaw(sympy.I * ACROSS),
+        AcrossLaw(sympy.zoo),
+        AcrossStore(float("nan")),
+        IdealCoupling(((1, "a", None), (sympy.nan, "b", None))),
+    ],
+    ids=str,
+)
+def test_a_branch_law_without_a_finite_value_is_said(branch: Branch) -> None:
+    problem = typed(odd(lambda _: [branch]), "rotor")
+    assert problem.kind == "component"
+    assert f"Odd 'odd': branch 1 ({type(branch).__name__}) has " in problem.message
+    assert "which has no finite real value" in problem.message
+
+
+@pytest.mark.parametrize("number", [3, 3.0, np.float64(3.0), sympy.Rational(9, 3)], ids=lambda n: type(n).__name__)
+def test_a_branch_takes_plain_numbers(number: Any) -> None:
+    plain = odd(lambda _: [AcrossStore(number), ThroughLaw(number), ThroughLaw(number * ACROSS)])
+    coupling = odd(lambda _: [IdealCoupling(((number, "a", None), (-number, "b", None)))])
+    assert declaration_problems(netlist((plain, ("rotor",)))) == ()
+    assert declaration_problems(netlist((coupling, ("rotor", "wheel")))) == ()
+    (*_, store, torque, loss) = build_graph(netlist((plain, ("rotor",)))).branches
+    assert [branch.template.law for branch in (store, torque, loss)] == pytest.approx([3.0, 3.0, 3.0])
 
 
 def test_all_slips_are_reported_together_and_the_rest_can_be_assembled() -> None:

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import shaftwork as sw
+from shaftwork.network.graph import resolve
 from tests.reference.mna import Piece
 from tests.strategies import networks
 
@@ -60,6 +61,72 @@ def test_tables_and_defaults_come_back(tmp_path: Path) -> None:
     text = (tmp_path / "table.toml").read_text(encoding="utf-8")
     assert "omega_s" not in text  # a default is not written
     assert sw.Network.load(tmp_path / "table.toml").netlist() == net.netlist()
+
+
+@pytest.mark.parametrize("law", [sympy.pi, 2 * sympy.pi / 3, sympy.sqrt(2), sympy.Integer(5), sympy.exp(1)], ids=str)
+def test_a_law_without_symbols_comes_back_as_its_number(law: sympy.Expr, tmp_path: Path) -> None:
+    net = sw.Network("constant")
+    net.add(sw.Inertia("J", J=law), "a")
+    net.add(sw.TorqueSource("T", tau=law), "a")
+    net.save(tmp_path / "constant.toml")
+    loaded = sw.Network.load(tmp_path / "constant.toml")
+    assert [resolve(placed)[0].values for placed in loaded.netlist().placed] == [
+        resolve(placed)[0].values for placed in net.netlist().placed
+    ]
+    assert [type(value) for part in loaded.parts for value in part.values.values()] == [float, float]
+
+
+def test_a_law_of_numbers_in_a_file_is_its_number(tmp_path: Path) -> None:
+    path = written(tmp_path, 'type = "TorqueSource"\nname = "T"\nnodes = ["a"]\ntau = "2*pi"')
+    net = sw.Network.load(path)
+    assert net.parts[0].values == {"tau": float(2 * sympy.pi)}
+    net.save(tmp_path / "again.toml")
+    assert sw.Network.load(tmp_path / "again.toml").netlist() == net.netlist()
+
+
+def test_a_law_that_cannot_be_written_is_said_to_be_written(tmp_path: Path) -> None:
+    net = sw.Network("large")
+    net.add(sw.TorqueSource("T", tau=10**45 * sw.t), "a")
+    with pytest.raises(
+        sw.ModelFileError, match=r"TorqueSource 'T': tau leads to an integer .* cannot be saved.*floats"
+    ):
+        net.save(tmp_path / "large.toml")
+    net = sw.Network("unknown")
+    net.add(sw.TorqueSource("T", tau=sympy.erf(sw.t)), "a")
+    with pytest.raises(sw.ModelFileError, match=r"TorqueSource 'T': tau cannot be saved: erf\(t\)"):
+        net.save(tmp_path / "unknown.toml")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_place_that_cannot_be_written_or_read_is_named_with_the_next_step(tmp_path: Path) -> None:
+    net = sw.Network("m")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    for place in (tmp_path / "missing" / "x.toml", tmp_path, "nul\0.toml"):
+        with pytest.raises(sw.ModelFileError, match=r"cannot be written: .*Give the path of a file"):
+            net.save(place)
+        with pytest.raises(sw.ModelFileError, match=r"cannot be read: .*Give the path of a model file"):
+            sw.Network.load(place)
+    for call in (net.save, sw.Network.load):
+        with pytest.raises(sw.ModelFileError, match=r"3 is no path\. Give the place of a model file"):
+            call(3)
+
+
+@pytest.mark.parametrize("text", ["", "\n", "no model"])
+def test_a_file_without_a_model_is_told_how_one_starts(text: str, tmp_path: Path) -> None:
+    (tmp_path / "m.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(sw.ModelFileError, match="starts with: format = 1") as caught:
+        sw.Network.load(tmp_path / "m.toml")
+    assert "pathlib" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["two\nlines", "n" * 201, "tab\tstop", " "])
+def test_a_name_that_cannot_be_saved_is_a_problem_of_the_check(name: str, tmp_path: Path) -> None:
+    net = sw.Network("m")
+    net.add(sw.Inertia(name, J=1.0), "a")
+    net.add(sw.Inertia("J", J=1.0), name)
+    assert {"part name", "node name"} <= {problem.kind for problem in net.check()}
+    with pytest.raises(sw.ModelFileError, match="printable characters"):
+        net.save(tmp_path / "m.toml")
 
 
 def written(tmp_path: Path, part: str) -> Path:

@@ -161,7 +161,7 @@ def test_a_hand_written_file_may_have_comments_literal_texts_and_broken_lists() 
         (PART + 'c = """2*t"""', "line 8: a text stands between"),
         (PART + 'c = "2*t', "line 8: '\"' is not expected here"),
         (PART + 'c = "a\\nb"', "line 8, part 'shaft': c is"),
-        (PART + f'c = "{"t" * 200_001}"', "line 8, part 'shaft': c is"),
+        (PART + f'c = "{"t" * 200_001}"', "line 8, part 'shaft': c has 200001 characters, more than 200000"),
         (PART + "symbol = 3", "line 8, part 'shaft': symbol is 3"),
         (PART + "k\N{LATIN SMALL LETTER E WITH ACUTE} = 3", "is not expected here"),
         (PART + "c = 1\rd = 2", "line 8: '\\r' is not expected"),
@@ -284,3 +284,13 @@ def test_a_law_in_a_file_is_only_a_text() -> None:
     attack = "__import__('os').system('touch owned')"
     (part,) = read(PART + f'tau = "{attack}"').parts
     assert part.parameters == {"tau": attack}
+
+
+def test_a_text_that_is_too_long_is_told_its_length() -> None:
+    with pytest.raises(ModelFileError, match=r"tau has 200001 characters, more than 200000\. Use a Table"):
+        PartText("TorqueSource", "T", ("a",), {"tau": "1" * 200_001})
+
+
+def test_a_place_given_as_a_text_is_told_of_paths() -> None:
+    with pytest.raises(ModelFileError, match=r"'crane\.toml' has no line key = value.*pathlib\.Path"):
+        read("crane.toml")

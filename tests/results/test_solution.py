@@ -35,6 +35,20 @@ def test_a_quantity_that_does_not_exist_is_answered_with_those_that_do(sol: sw.S
         sol["J2.phi"]
 
 
+@pytest.mark.parametrize("name", [3, None, ["shaft.tau"], ("J1", "omega")], ids=repr)
+def test_what_is_no_name_is_answered_with_names(sol: sw.Solution, name: Any) -> None:
+    for ask in (sol.__getitem__, sol.plot, sol.to_pandas, sol.to_xarray):
+        with pytest.raises(sw.SignalError, match=r"is no name of a quantity\. 'crane start.*' has .*J1\.omega"):
+            ask(name)
+    assert name not in sol
+
+
+@pytest.mark.parametrize("times", ["a", ["a"], [], [[0.5], [1.0]], {}], ids=repr)
+def test_what_are_no_times_is_answered_with_the_span(sol: sw.Solution, times: Any) -> None:
+    with pytest.raises(sw.SignalError, match=r"is no list of times\. Give times in s from 0 to 2"):
+        sol.at(times)
+
+
 def test_twist_is_torque_over_stiffness_and_node_speeds_are_part_speeds(sol: sw.Solution) -> None:
     assert sol["shaft.phi_rel"] == pytest.approx(sol["shaft.tau_c"] / 24206.0)
     assert sol["wheel.omega"] == pytest.approx(sol["J2.omega"])

@@ -105,12 +105,17 @@ class Translator:
         return upper / heyoka.prod(below) if below else upper
 
     def power(self, node: sympy.Pow) -> Any:
-        """A power, with square roots and quotients as such."""
+        """A power, with square roots and quotients as such, and whole powers as products.
+
+        heyoka's own recurrence for a power divides by the base, which is zero at rest.
+        """
         base, exponent = self.expression(node.base), node.exp
         if exponent == sympy.S.Half:
             return heyoka.sqrt(base)
         if exponent.is_number and exponent.is_negative:
             return 1.0 / self.expression(node.base**-exponent)
+        if exponent.is_number and float(exponent).is_integer():
+            return _whole_power(base, int(exponent))
         return base ** self.expression(exponent)
 
     def sign(self, switch: sympy.Expr) -> Any:
@@ -190,6 +195,14 @@ class Translator:
             return heyoka.select(beyond, choose(middle + 1, last), choose(first, middle))
 
         return choose(0, len(xs))
+
+
+def _whole_power(base: Any, exponent: int) -> Any:
+    """A positive whole power by repeated squaring."""
+    if exponent == 1:
+        return base
+    half = _whole_power(base, exponent // 2)
+    return half * half * base if exponent % 2 else half * half
 
 
 def _slopes(node: Any) -> tuple[float, ...]:

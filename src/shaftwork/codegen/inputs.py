@@ -13,6 +13,7 @@ from sympy import Expr, Integer
 from shaftwork.codegen.elements import Array, Index, TemplateGroup, groups_of, numeric
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.laws import t as TIME
+from shaftwork.components.slopes import jumps, slope
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
 
@@ -70,7 +71,7 @@ class Inputs:
             np.array([output[branch] for branch in members] if reads else [], dtype=np.intp),
             np.array([integral[branch] for branch in members] if made.template.has_integral else [], dtype=np.intp),
             function(law) or numeric(symbols, Integer(0)),
-            (function(law.diff(TIME)), function(law.diff(ACROSS)), function(law.diff(INTEGRAL))),
+            (function(slope(law, TIME)), function(slope(law, ACROSS)), function(slope(law, INTEGRAL))),
         )
 
     def values(self, t: Any, y: Array, x: Array, p: Array) -> Array:
@@ -92,8 +93,11 @@ class Inputs:
     @property
     def linear(self) -> bool:
         """Whether every input is linear in the across variable and integral that it reads, with constant slope."""
-        slopes = (made.made_of.template.law.diff(read) for made in self._groups for read in (ACROSS, INTEGRAL))
-        return not any(slope.has(ACROSS, INTEGRAL, TIME) for slope in slopes)
+        laws = [made.made_of.template.law for made in self._groups]
+        slopes = (slope(law, read) for law in laws for read in (ACROSS, INTEGRAL))
+        if any(found.has(ACROSS, INTEGRAL, TIME) for found in slopes):
+            return False
+        return not any(jumps(law, ACROSS, INTEGRAL) for law in laws)
 
     def reading(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
         """Which input reads which output, and which input reads which integral: (inputs, outputs), (inputs, states)."""

@@ -158,6 +158,7 @@ def signals_of(graph: CircuitGraph, part: GraphPart) -> Mapping[str, Signal]:
     stores = any(graph.branches[k].template.kind is Kind.THROUGH_STORE for k in part.branches)
     declared = part.component.signals()
     signals = {name: made for name, made in declared.items() if stores or made.kind not in ("twist", "store")}
-    if any(port.optional and part.nodes[port.name] == GROUND for port in part.component.ports):
+    ports = part.component.ports
+    if any(port.optional for port in ports) and any(part.nodes[port.name] == GROUND for port in ports):
         signals |= {name.removesuffix("_rel"): made for name, made in signals.items()}
     return signals

@@ -22,11 +22,11 @@ class _Printer(PythonCodePrinter):  # type: ignore[misc]
 
     def _print_sign(self, expression: Expr) -> str:
         argument = self._print(expression.args[0])
-        return f"((({argument}) > 0) - (({argument}) < 0))"
+        return f"(1.0 if ({argument}) > 0 else -1.0 if ({argument}) < 0 else 0.0)"
 
     def _print_Heaviside(self, expression: Expr) -> str:
-        argument = self._print(expression.args[0])
-        return f"(0.5 * ((({argument}) > 0) + (({argument}) >= 0)))"
+        argument, at_zero = (self._print(part) for part in expression.args)
+        return f"(1.0 if ({argument}) > 0 else 0.0 if ({argument}) < 0 else {at_zero})"
 
 
 class ScalarProgram:

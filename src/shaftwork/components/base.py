@@ -7,11 +7,11 @@ import inspect
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any, ClassVar, Literal, TypeVar, dataclass_transform
+from typing import Any, ClassVar, Literal, Self, TypeVar, dataclass_transform, get_args
 
 from shaftwork.components.branches import Branch, End
 from shaftwork.core.domains import ELECTRICAL, ROTATION, Domain
-from shaftwork.core.errors import ParameterError
+from shaftwork.core.errors import ParameterError, ShaftworkError
 from shaftwork.core.parameters import Parameter, parameter
 
 Role = Literal["store", "loss", "source", "coupling"]
@@ -60,6 +60,14 @@ class Component:
     role: ClassVar[Role] = "store"
     declared: ClassVar[Mapping[str, Parameter]] = {}
 
+    def __new__(cls, *_args: Any, **_values: Any) -> Self:
+        if "declared" not in vars(cls) or cls is Component:
+            raise ShaftworkError(
+                f"{cls.__name__} is not a component yet. Write @component above `class {cls.__name__}(Component):`; it "
+                "reads the declared parameters and makes the constructor that takes them."
+            )
+        return super().__new__(cls)
+
     def branches(self, p: Any) -> Iterator[Branch]:
         """Yield the branches; `p.name` is the symbol of parameter `name` (0 where its value is exactly zero)."""
         raise NotImplementedError
@@ -82,13 +90,38 @@ C = TypeVar("C", bound=Component)
 
 @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(parameter,))
 def component(cls: type[C]) -> type[C]:
-    """Make a class a component: a frozen record of its declared parameters, entered in the registry."""
+    """Make a class a component: a frozen record of its declared parameters, entered in the registry.
+
+    Raises:
+        ShaftworkError: the class is no `Component`, a field is not declared by `parameter`, or its ports or its role
+            are not what they must be.
+    """
+    _refuse_wrong_class(cls)
     made = dataclass(frozen=True)(cls)
-    fields = (field for field in dataclasses.fields(made) if field.name not in ("name", "symbol"))
+    fields = [field for field in dataclasses.fields(made) if field.name not in ("name", "symbol")]
+    if bare := [field.name for field in fields if "declare" not in field.metadata]:
+        raise ShaftworkError(
+            f"{cls.__name__}: {bare[0]} is not declared. Write {bare[0]}: float = parameter('unit', 'meaning'), or "
+            "make it a ClassVar if all parts share it."
+        )
     made.declared = {field.name: field.metadata["declare"](field.name) for field in fields}
     _explain_wrong_arguments(made)
     REGISTRY[made.__name__] = made
     return made
+
+
+def _refuse_wrong_class(cls: type[Component]) -> None:
+    name = cls.__name__
+    if not issubclass(cls, Component):
+        raise ShaftworkError(f"{name} is no Component. Write: class {name}(Component):")
+    if cls.role not in get_args(Role):
+        raise ShaftworkError(f"{name}: role = {cls.role!r} is none of: {', '.join(get_args(Role))}.")
+    for field, ports in (("ports", cls.ports), ("inner", cls.inner)):
+        if not isinstance(ports, tuple) or not all(isinstance(port, Port) for port in ports):
+            raise ShaftworkError(f"{name}: {field} = {ports!r} must be a tuple such as (Port('a'), Port('b')).")
+    names = [port.name for port in (*cls.ports, *cls.inner)]
+    if not cls.ports or len(set(names)) < len(names):
+        raise ShaftworkError(f"{name}: its ports are {names}. Give it one or more, each with a name of its own.")
 
 
 def _explain_wrong_arguments(made: type[Component]) -> None:

@@ -13,10 +13,11 @@ from sympy import Add, Expr, Integer, Symbol, preorder_traversal
 
 from shaftwork.core.domains import ELECTRICAL, ROTATION, TRANSLATION
 from shaftwork.equations.assembly import Group, Sides, sides, tidy
-from shaftwork.equations.notation import INDEX_CLOSES, INDEX_OPENS, in_text
+from shaftwork.equations.notation import INDEX_CLOSES, INDEX_OPENS
 from shaftwork.equations.printing import LINE_WIDTH, Line, Writer, with_rates
 from shaftwork.equations.quantities import Flow, rate_of
 from shaftwork.equations.second_order import SecondOrder
+from shaftwork.equations.spelling import in_text
 from shaftwork.equations.widths import printed_width
 from shaftwork.network.templates import Kind
 
@@ -63,15 +64,20 @@ class Blocks:
         yield Block("Ideal couplings", tuple(self._lines(equations.couplings)))
         yield Block("Laws of the parts", tuple(self._laws()))
 
-    def state(self) -> Iterator[Block]:
-        """Rates of the states, what stands in them, and what was eliminated."""
+    def state(self, *, laws: bool = True) -> Iterator[Block]:
+        """Rates of the states, what stands in them, and what was eliminated.
+
+        Args:
+            laws: print the laws that stand in the rates; not needed below Kirchhoff's equations, which contain them.
+        """
         rows = self.equations.states
         shown = [row.sides if row.explicit and len(row.groups) <= 1 else row.coupled for row in rows]
         coupled = any(made is not row.sides for made, row in zip(shown, rows, strict=True))
         remark = "Rates that stand together on a left side are coupled by inertias or springs." if coupled else ""
         yield Block("State equations", tuple(map(self.writer.line, shown)), remark)
         algebraic = [row for row in self.equations.eliminated if row.kind == "algebraic"]
-        yield Block("where", (*self._laws_in_states(), *self._lines(algebraic)))
+        standing = self._laws_in_states() if laws else ()
+        yield Block("where", (*standing, *self._lines(algebraic)))
         dependent = [row for row in self.equations.eliminated if row.kind in ("speed", "torque")]
         yield Block("Eliminated quantities", tuple(self._explained(dependent)))
 

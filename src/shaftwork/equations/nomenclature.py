@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from shaftwork.equations.notation import INDEX_CLOSES, INDEX_OPENS, Letter, in_text, split_index, without_marks
+from shaftwork.equations.notation import INDEX_CLOSES, INDEX_OPENS, Letter, split_index, without_marks
 from shaftwork.equations.printing import printed_number
-from shaftwork.equations.series import SHORTEST_SERIES, runs, together
+from shaftwork.equations.series import Numbers, listed, replaced, series_in
+from shaftwork.equations.spelling import in_text
 
 if TYPE_CHECKING:  # the records print themselves through this module
     from shaftwork.equations.records import Equations
@@ -29,7 +31,7 @@ def nomenclature(equations: Equations) -> str:
     parameters = [
         (
             _formula(names[letter.name]),
-            letter.meaning,
+            in_text(letter.meaning),
             _owner(letter),
             f"${printed_number(values[letter.name])}$",
             unit(letter.unit),
@@ -38,8 +40,8 @@ def nomenclature(equations: Equations) -> str:
         if letter.parameter
     ]
     tables = (
-        table("llp{45mm}l", ("Variable", "Meaning", "Of", "Unit"), variables),
-        table("lp{45mm}p{30mm}rl", ("Parameter", "Meaning", "Of", "Value", "Unit"), parameters),
+        table(_columns(48, 40, 38, 21), ("Variable", "Meaning", "Of", "Unit"), variables),
+        table(_columns(34, 38, 31, 20, 20), ("Parameter", "Meaning", "Of", "Value", "Unit"), parameters),
     )
     return "\n".join(filter(None, tables))
 
@@ -49,12 +51,19 @@ def _formula(latex: str) -> str:
 
 
 def _meaning(letter: Letter, states: set[str]) -> str:
-    return f"{letter.meaning} (state)" if letter.name in states else letter.meaning
+    return in_text(f"{letter.meaning} (state)" if letter.name in states else letter.meaning)
 
 
 def _owner(letter: Letter) -> str:
+    """The name of a part, which may be broken after an underscore."""
     stem, index = split_index(letter.owner)
-    return f"{in_text(stem)}{INDEX_OPENS}{index}{INDEX_CLOSES}" if index else in_text(stem)
+    text = r"\allowbreak ".join(map(in_text, re.findall("[^_]*_|[^_]+", stem)))
+    return f"{text}{INDEX_OPENS}{index}{INDEX_CLOSES}" if index else text
+
+
+def _columns(*widths: int) -> str:
+    """Columns of fixed widths in millimetres: LaTeX needs a second run to know the widths of others."""
+    return "".join(rf">{{\raggedright\arraybackslash}}p{{{width}mm}}" for width in widths)
 
 
 def unit(text: str) -> str:
@@ -81,11 +90,21 @@ def table(columns: str, headings: Cells, rows: Sequence[Cells]) -> str:
 
 
 def _condensed(rows: Sequence[Cells]) -> Iterator[Cells]:
-    gathered = [rows[place] for place in together(["\n".join(cells) for cells in rows])]
-    for run in runs(["\n".join(cells) for cells in gathered]):
-        members = gathered[run.start : run.stop]
-        if len(members) < SHORTEST_SERIES:
-            yield from members
-        else:
-            pairs = zip(members[0], members[-1], strict=True)
-            yield tuple(first if first == last else rf"{first}, \ldots, {last}" for first, last in pairs)
+    found = series_in(["\n".join(cells) for cells in rows])
+    gone = replaced(found)
+    for place, cells in enumerate(rows):
+        if place in found:
+            for stretch in found[place].stretches:
+                yield _drawn_together(stretch, {number: rows[found[place].members[number]] for number in stretch})
+        elif place not in gone:
+            yield cells
+
+
+def _drawn_together(stretch: Numbers, members: Mapping[int, Cells]) -> Cells:
+    """The rows of a stretch as one: every cell lists what is in it, once where that is always the same."""
+    columns = range(len(members[stretch[0]]))
+    cells = ({number: row[column] for number, row in members.items()} for column in columns)
+    return tuple(
+        cell[stretch[0]] if len(set(cell.values())) == 1 else listed(stretch, cell.__getitem__, r"\ldots")
+        for cell in cells
+    )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import unicodedata
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import count
@@ -12,6 +11,7 @@ from sympy import Symbol
 
 from shaftwork.core.domains import ELECTRICAL, Quantity
 from shaftwork.equations.quantities import Quantities
+from shaftwork.equations.spelling import GREEK, chosen_subscript, escaped
 from shaftwork.network.graph import GraphPart
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
@@ -19,21 +19,6 @@ from shaftwork.reduction.form import StateForm
 INDEX_OPENS, INDEX_CLOSES = "\ue000", "\ue001"
 """Marks around the number at the end of a subscript, to recognise rows that differ by it alone; never printed."""
 
-ESCAPES = {
-    "\\": r"\backslash ",
-    "{": r"\{",
-    "}": r"\}",
-    "_": r"\_",
-    "%": r"\%",
-    "&": r"\&",
-    "#": r"\#",
-    "$": r"\$",
-    "^": r"\wedge ",
-    "~": r"\sim ",
-    " ": r"\ ",
-    "-": r"\text{-}",
-    "'": r"\text{'}",
-}
 WORDS = {
     "omega": "angular speed",
     "tau": "torque",
@@ -46,13 +31,6 @@ WORDS = {
     "psi": "flux linkage",
 }
 """The quantities of the domains in words."""
-PECULIAR = re.compile(r"[^A-Za-z0-9.,:;()-]")
-"""Characters that are not printed in text as they are."""
-GREEK = (
-    *("alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "iota", "kappa", "lamda", "mu", "nu"),
-    *("xi", "pi", "rho", "sigma", "tau", "upsilon", "phi", "chi", "psi", "omega"),
-)
-"""Small Greek letters, as Unicode spells them."""
 
 
 @dataclass(frozen=True)
@@ -95,14 +73,23 @@ class Named:
     def subscript(self, style: int) -> str:
         """The subscript: as short as it may be (0), the whole name (1), the name and a number (2, 3, ...)."""
         if self.chosen is not None and style == 0:
-            return self.chosen if not re.fullmatch(r"[A-Za-z]{2,}", self.chosen) else rf"\mathrm{{{self.chosen}}}"
+            return chosen_subscript(str(self.chosen))  # `symbol=1` is a fair choice, and printing never fails
         stem, index = split_index(self.name)
-        if style == 0 and (stem.rstrip("_") in self.shortable or (index and len(stem) <= 1)):
-            return _index(index)
-        if style == 0 and not index and stem[:1] in self.shortable and len(stem) == 2:
-            stem = stem[1:]
-        text = ",".join(part for part in (f"\\mathrm{{{escaped(stem)}}}" if stem else "", _index(index)) if part)
+        comma = "" if style and stem.endswith("_") else ","
+        if style == 0:
+            stem = self._short(stem, index)
+        text = comma.join(part for part in (f"\\mathrm{{{escaped(stem)}}}" if stem else "", _index(index)) if part)
         return text if style < 2 else f"{text},({style})"
+
+    def _short(self, stem: str, index: str) -> str:
+        """A stem without the letter of the part that stands before it: "J_rotor" is rotor, "Jm" is m, "J1" is 1."""
+        stem = stem.rstrip("_") if index else stem
+        if index and (stem in self.shortable or len(stem) <= 1):
+            return ""
+        letter, _, rest = stem.partition("_")
+        if letter in self.shortable and rest.strip("_"):
+            return rest
+        return stem[1:] if not index and stem[:1] in self.shortable and len(stem) == 2 else stem
 
 
 def _index(digits: str) -> str:
@@ -118,29 +105,6 @@ def split_index(name: str) -> tuple[str, str]:
     """A name as its stem and the digits at its end."""
     stem = name.rstrip("0123456789")
     return stem, name[len(stem) :]
-
-
-def escaped(name: str) -> str:
-    """Any text as LaTeX for an upright font in a formula: signs are escaped, accents dropped, the rest is named."""
-    return "".join(_escape(character) for character in unicodedata.normalize("NFKC", name))
-
-
-def _escape(character: str) -> str:
-    if character in ESCAPES:
-        return ESCAPES[character]
-    if character.isascii() and character.isprintable():
-        return character
-    words = unicodedata.name(character, "").split()
-    if words[:2] == ["GREEK", "SMALL"] and words[-1].lower() in GREEK:
-        return "o" if words[-1] == "OMICRON" else f"\\{words[-1].lower().replace('lamda', 'lambda')} "
-    plain = "".join(c for c in unicodedata.normalize("NFKD", character) if c.isascii() and c.isalnum())
-    return plain or f"U{ord(character):04X}"
-
-
-def in_text(text: str) -> str:
-    """Any text outside formulas: words with signs that LaTeX reads otherwise are escaped."""
-    words = (f"$\\mathrm{{{escaped(word)}}}$" if re.search(PECULIAR, word) else word for word in text.split(" "))
-    return " ".join(words)
 
 
 def notation(form: StateForm, quantities: Quantities) -> tuple[Mapping[str, str], tuple[Letter, ...]]:
@@ -192,7 +156,7 @@ def _parameters(part: GraphPart) -> Iterator[Letter]:
 def _upright(text: str) -> str:
     if text in GREEK:
         return f"\\{text}"
-    return rf"\mathrm{{{text}}}" if re.fullmatch(r"[A-Za-z]{2,}", text) else text
+    return rf"\mathrm{{{escaped(text)}}}" if re.fullmatch(r"[A-Za-z]{2,}|\w*_\w*", text) else text
 
 
 def _quantity_letters(form: StateForm, quantities: Quantities) -> Iterator[tuple[int, Letter]]:
@@ -241,7 +205,7 @@ def _mark(label: str, quantity: Quantity | None = None) -> str:
     """A branch's label as a subscript: "tau_c" of a torque is c."""
     if quantity is not None and label.startswith(f"{quantity.name}_"):
         label = label[len(quantity.name) + 1 :]
-    return label if len(label) == 1 else f"\\mathrm{{{escaped(label)}}}" if label else ""
+    return escaped(label) if len(label) == 1 else f"\\mathrm{{{escaped(label)}}}" if label else ""
 
 
 def _distinct(letters: Iterable[Letter]) -> tuple[Letter, ...]:

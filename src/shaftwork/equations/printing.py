@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from sympy import Expr, Float, Integer, Piecewise, Pow, Symbol
+from sympy import Expr, Float, Heaviside, Integer, Piecewise, Pow, Symbol
 from sympy.printing.latex import LatexPrinter
 
 from shaftwork.components.laws import t as TIME
@@ -37,8 +37,8 @@ class Line:
 
     def mapped(self, change: Callable[[str], str]) -> Line:
         """The line with a change made to every piece of it."""
-        pieces = tuple(map(change, self.pieces))
-        return replace(self, left=change(self.left), pieces=pieces, remark=change(self.remark))
+        left = change(self.left)  # in the order of `text`, for a change that counts its matches
+        return replace(self, left=left, pieces=tuple(map(change, self.pieces)), remark=change(self.remark))
 
 
 class _Printer(LatexPrinter):  # type: ignore[misc]
@@ -50,6 +50,11 @@ class _Printer(LatexPrinter):  # type: ignore[misc]
 
     def _print_Float(self, number: Float) -> str:
         return printed_number(float(number))
+
+    def _print_Heaviside(self, step: Heaviside, exp: str | None = None) -> str:
+        """The unit step, whatever its value at the step is."""
+        text = rf"\mathrm{{H}}\left({self._print(step.args[0])}\right)"
+        return text if exp is None else rf"{text}^{{{exp}}}"
 
 
 def printed_number(value: float) -> str:

@@ -5,25 +5,26 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from shaftwork.core.domains import ELECTRICAL
-from shaftwork.core.errors import ShaftworkError
+from shaftwork.core.errors import CompileError, ShaftworkError
 from shaftwork.equations.blocks import Block, Blocks
 from shaftwork.equations.nomenclature import nomenclature
-from shaftwork.equations.notation import in_text, without_marks
+from shaftwork.equations.notation import without_marks
 from shaftwork.equations.printing import aligned
 from shaftwork.equations.series import shortened
+from shaftwork.equations.spelling import in_text
 
 if TYPE_CHECKING:  # the records print themselves through this module
     from shaftwork.equations.records import Equations, Form
 
 PREAMBLE = r"""\documentclass[11pt,a4paper]{article}
+\usepackage[utf8]{inputenc}
 \usepackage[T1]{fontenc}
 \usepackage[margin=25mm]{geometry}
 \usepackage{amsmath}
+\usepackage{array}
 \usepackage{booktabs}
 \usepackage{longtable}
-\allowdisplaybreaks
-\setcounter{LTchunksize}{1000} % column widths are right after one run"""
+\allowdisplaybreaks"""
 BEGIN = r"""\date{}
 \begin{document}
 \maketitle"""
@@ -60,7 +61,7 @@ def blocks_of(equations: Equations, form: Form | None, *, values: bool) -> tuple
         case "second-order":
             made = tuple(blocks.second_order())
         case None:
-            made = (*blocks.kirchhoff(), *blocks.state())
+            made = (*blocks.kirchhoff(), *blocks.state(laws=False))
         case _:
             raise ShaftworkError(f"There is no form {form!r}; take 'kirchhoff', 'state' or 'second-order'.")
     return tuple(block for block in made if block.lines)
@@ -74,18 +75,25 @@ def _content(block: Block) -> str:
 
 def document(equations: Equations, *, values: bool = False) -> str:
     """A LaTeX document that compiles as it is."""
-    mechanical = ELECTRICAL not in equations.form.graph.domains
     blocks = Blocks(equations, values)
     sections = {
         "Kirchhoff's equations": _section(blocks.kirchhoff()),
-        "State form": _section(blocks.state()),
-        "Second-order form": _section(blocks.second_order()) if mechanical else "",
+        "State form": _section(blocks.state(laws=False)),
+        "Second-order form": _second_order(blocks),
         "Nomenclature": nomenclature(equations),
         "Remarks": "\n\n".join(in_text(note) for note in equations.notes),
     }
     kept = (f"\\section{{{title}}}\n{text}" for title, text in sections.items() if text)
     title = in_text(equations.form.graph.name)
     return "\n".join((PREAMBLE, f"\\title{{{title}}}", BEGIN, *kept, r"\end{document}", ""))
+
+
+def _second_order(blocks: Blocks) -> str:
+    """The second-order form, or why there is none."""
+    try:
+        return _section(blocks.second_order())
+    except CompileError as reason:
+        return in_text(str(reason))
 
 
 def _section(blocks: Iterable[Block]) -> str:

@@ -41,7 +41,11 @@ def solve(problem: Problem) -> Trajectory:
     action of the matrix exponential, 2011.
     """
     if problem.linear is None:
-        raise SimulationError("The exact engine needs a linear system, and this one is not. Use engine='auto'.")
+        raise SimulationError(
+            "The exact engine needs a linear system whose inputs are straight lines in time between their breakpoints, "
+            "and here a law is not linear in speed and angle, or an input such as sin(t) is no straight line. "
+            "Use engine='auto'."
+        )
     system = _System(problem.linear, dense_form=prefers_dense(problem, problem.linear))
     x = np.asarray(problem.x0, dtype=float)
     spans: list[_Span] = []

@@ -51,8 +51,11 @@ class GuardedFunctions:
         return derivative
 
     def jacobian(self, t: float, x: Array) -> Any:
-        """The sparse Jacobian, asked inside the piece."""
-        return self._jacobian(min(max(t, self._low), self._high), x)
+        """The sparse Jacobian, asked inside the piece; zero where a slope is not finite (a square root at rest)."""
+        matrix = self._jacobian(min(max(t, self._low), self._high), x)
+        # It only steers Newton's method, which a NaN would end and an infinite slope would stop where it is.
+        matrix.data[~np.isfinite(matrix.data)] = 0.0
+        return matrix
 
     def dense_jacobian(self, t: float, x: Array) -> Any:
         """The Jacobian as a full array."""

@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 from scipy.interpolate import BarycentricInterpolator
 
@@ -34,8 +35,25 @@ DEGREES = {"BDF": 5, "Adams": 12}
 # matrix, which costs more than the factorisation saves.
 LARGEST_DENSE = 100
 
-# From a piece and its start state to (SUNDIALS solver, consistent start state, text of a failure from its reason).
-Opener = Callable[[Piece, Array], tuple[Any, Array, Callable[[str], str]]]
+
+@dataclass(frozen=True)
+class _Opened:
+    """A SUNDIALS solver at the start of a piece.
+
+    Args:
+        solver: CVODE or IDA, with its first step still to take.
+        start: (n,) consistent start state.
+        explain: text of a failure from SUNDIALS' reason.
+        outgrown: whether the solver must be opened anew, because its pattern misses entries of the Jacobian.
+    """
+
+    solver: Any
+    start: Array
+    explain: Callable[[str], str] = str
+    outgrown: Callable[[], bool] = lambda: False
+
+
+Opener = Callable[[Piece, Array], _Opened]
 
 
 def solve(problem: Problem, method: Method = "BDF") -> Trajectory:
@@ -54,7 +72,12 @@ def solve(problem: Problem, method: Method = "BDF") -> Trajectory:
     Source: Hindmarsh and others, SUNDIALS: suite of nonlinear and differential/algebraic equation solvers, 2005.
     """
     _require("engine='sundials'")
-    return _trajectory(problem, lambda piece, x: _open_cvode(problem, piece, x, method), DEGREES[method])
+
+    def opener() -> Opener:
+        pattern = _Pattern(len(problem.x0))
+        return lambda piece, x: _open_cvode(problem, piece, x, method, pattern)
+
+    return _trajectory(problem, opener, DEGREES[method])
 
 
 def solve_dae(problem: DaeProblem) -> Trajectory:
@@ -67,7 +90,7 @@ def solve_dae(problem: DaeProblem) -> Trajectory:
     Source: as `solve`.
     """
     _require("A nonlinear algebraic loop")
-    return _trajectory(problem, lambda piece, x: _open_ida(problem, piece, x), DEGREES["BDF"])
+    return _trajectory(problem, lambda: lambda piece, x: _open_ida(problem, piece, x), DEGREES["BDF"])
 
 
 def _require(purpose: str) -> None:
@@ -75,7 +98,7 @@ def _require(purpose: str) -> None:
         raise MissingExtraError("scikit-sundae", "stiff", purpose)
 
 
-def _open_cvode(problem: Problem, piece: Piece, x: Array, method: Method) -> tuple[Any, Array, Callable[[str], str]]:
+def _open_cvode(problem: Problem, piece: Piece, x: Array, method: Method, pattern: _Pattern) -> _Opened:
     from sksundae.cvode import CVODE
 
     guard = GuardedFunctions(problem, piece)
@@ -85,34 +108,32 @@ def _open_cvode(problem: Problem, piece: Piece, x: Array, method: Method) -> tup
 
     options: dict[str, Any] = {"method": method, "rtol": problem.rtol, "atol": problem.atol}
     if problem.jacobian is not None:
-        options |= _linear_solver(guard, piece, x)
+        options |= _linear_solver(guard, piece, x, pattern)
     with warnings.catch_warnings():
         # It says that the pattern is only used as a pattern, since the Jacobian is given.
         warnings.filterwarnings("ignore", message="Custom sparse Jacobian")
         solver = CVODE(rhs, **options)
     solver.init_step(piece.start, x)
-    return solver, x, guard.reason
+    return _Opened(solver, x, guard.reason, lambda: pattern.grown)
 
 
-def _linear_solver(guard: GuardedFunctions, piece: Piece, x: Array) -> dict[str, Any]:
+def _linear_solver(guard: GuardedFunctions, piece: Piece, x: Array, pattern: _Pattern) -> dict[str, Any]:
     if x.size <= LARGEST_DENSE:
 
         def fill_dense(t: float, y: Array, _: Array, full: Array) -> None:
             full[:] = guard.dense_jacobian(t, y)
 
         return {"linsolver": "dense", "jacfn": fill_dense}
-    pattern = sparse.csc_array(guard.jacobian(piece.start, x)).copy()
-    pattern.sort_indices()
-    pattern.data[:] = 1.0
-    rows, columns = pattern.indices, np.repeat(np.arange(x.size), np.diff(pattern.indptr))
+    pattern.add(guard.jacobian(piece.start, x))
+    order = pattern.freeze()
 
     def fill_sparse(t: float, y: Array, _: Array, data: Array) -> None:
-        data[:] = guard.jacobian(t, y).tocsr()[rows, columns]
+        data[:] = pattern.values(guard.jacobian(t, y))
 
-    return {"linsolver": "sparse", "sparsity": pattern, "jacfn": fill_sparse}
+    return {"linsolver": "sparse", "sparsity": order, "jacfn": fill_sparse}
 
 
-def _open_ida(problem: DaeProblem, piece: Piece, x: Array) -> tuple[Any, Array, Callable[[str], str]]:
+def _open_ida(problem: DaeProblem, piece: Piece, x: Array) -> _Opened:
     from sksundae.ida import IDA
 
     def residual(t: float, y: Array, derivative: Array, found: Array) -> None:
@@ -131,7 +152,53 @@ def _open_ida(problem: DaeProblem, piece: Piece, x: Array) -> tuple[Any, Array, 
     except RuntimeError as error:
         reason = f"IDA found no consistent initial values ({error})"
         raise failure(problem, "sundials", piece.start, x, reason) from error
-    return solver, start.y.copy(), str
+    return _Opened(solver, start.y.copy())
+
+
+class _Pattern:
+    """The places of the Jacobian's entries in one run: they grow when a law starts to act, a stop that is hit.
+
+    Args:
+        size: number of states.
+    """
+
+    def __init__(self, size: int) -> None:
+        self._size = size
+        # An entry is known by its place along the columns. The diagonal belongs to the matrices that SUNDIALS makes.
+        self._places = np.arange(size, dtype=np.int64) * (size + 1)
+        self._frozen = self._places
+        self._last: tuple[Any, Any, NDArray[np.intp], NDArray[np.bool_]] | None = None
+
+    @property
+    def grown(self) -> bool:
+        """Whether entries were met that the frozen pattern has not."""
+        return self._frozen.size != self._places.size
+
+    def add(self, matrix: Any) -> NDArray[np.int64]:
+        """Add the places of a matrix, a scipy.sparse.csc_array (n, n); they are returned."""
+        columns = np.repeat(np.arange(self._size, dtype=np.int64), np.diff(matrix.indptr))
+        places: NDArray[np.int64] = columns * self._size + matrix.indices
+        self._places = np.union1d(self._places, places)
+        return places
+
+    def freeze(self) -> Any:
+        """Fix the pattern for a solver: a scipy.sparse.csc_array (n, n) of ones."""
+        self._frozen, self._last = self._places, None
+        columns, rows = np.divmod(self._frozen, self._size)
+        # SUNDIALS is built with int indices and reads these arrays as they lie in memory.
+        starts = np.searchsorted(columns, np.arange(self._size + 1)).astype(np.int32)
+        return sparse.csc_array((np.ones(rows.size), rows.astype(np.int32), starts), shape=(self._size, self._size))
+
+    def values(self, matrix: Any) -> Array:
+        """The entries of a matrix in the order of the frozen pattern; those that it has elsewhere are left out."""
+        last = self._last
+        if last is None or not (np.array_equal(last[0], matrix.indptr) and np.array_equal(last[1], matrix.indices)):
+            places = self.add(matrix)
+            found = np.minimum(np.searchsorted(self._frozen, places), self._frozen.size - 1)
+            last = self._last = matrix.indptr, matrix.indices, found, self._frozen[found] == places
+        data = np.zeros(self._frozen.size)
+        data[last[2][last[3]]] = matrix.data[last[3]]
+        return data
 
 
 @dataclass(frozen=True)
@@ -152,7 +219,8 @@ def _march(
     found: list[tuple[Array, list[_Step]]] = []
     left = problem.max_steps
     for piece in pieces(problem):
-        solver, x, explain = open_solver(piece, start_of_piece(problem, piece, x))
+        opened = open_solver(piece, start_of_piece(problem, piece, x))
+        solver, x = opened.solver, opened.start
         found.append((x, []))
         t = piece.start
         while t < piece.end:
@@ -161,7 +229,7 @@ def _march(
             with np.errstate(all="ignore"):
                 result = solver.step(piece.end, method="onestep", tstop=piece.end)
             if not result.success:
-                raise failure(problem, "sundials", t, x, explain(str(result.message)))
+                raise failure(problem, "sundials", t, x, opened.explain(str(result.message)))
             end, x = float(result.t), result.y.copy()
             check_finite(problem, "sundials", end, x)
             if end <= t:
@@ -172,11 +240,14 @@ def _march(
                 solver.step(end)  # after an interpolation SUNDIALS gives the end of the step once more
             found[-1][1].append(_Step(t, end, x, inside.reshape(asked.size, x.size)))
             t, left = end, left - 1
+            if t < piece.end and opened.outgrown():
+                opened = open_solver(Piece(t, piece.end), x)
+                solver = opened.solver
     return found
 
 
-def _trajectory(problem: Problem | DaeProblem, open_solver: Opener, degree: int) -> Trajectory:
-    dense = _Replay(problem, open_solver, degree)
+def _trajectory(problem: Problem | DaeProblem, opener: Callable[[], Opener], degree: int) -> Trajectory:
+    dense = _Replay(problem, opener, degree)
     if problem.t_eval is None:
         t, states = both_sides(problem, *dense.step_ends)
         return Trajectory(t, states, dense, {"steps": dense.steps.size - 1})
@@ -189,7 +260,7 @@ def _trajectory(problem: Problem | DaeProblem, open_solver: Opener, degree: int)
         side: Literal["left", "right"] = "left" if end in problem.breakpoints else "right"
         return times[np.searchsorted(times, start, side="right") : np.searchsorted(times, end, side=side)]
 
-    for piece, (start, marched) in zip(pieces(problem), _march(problem, open_solver, ask), strict=True):
+    for piece, (start, marched) in zip(pieces(problem), _march(problem, opener(), ask), strict=True):
         if piece.start in times:
             rows.append(start[None, :])
         rows.extend(step.inside for step in marched)
@@ -200,15 +271,15 @@ def _trajectory(problem: Problem | DaeProblem, open_solver: Opener, degree: int)
 class _Replay:
     """Dense output that runs the problem again when it is first asked, and keeps each step's own polynomial."""
 
-    def __init__(self, problem: Problem | DaeProblem, open_solver: Opener, degree: int) -> None:
+    def __init__(self, problem: Problem | DaeProblem, opener: Callable[[], Opener], degree: int) -> None:
         self._problem = problem
-        self._open = open_solver
+        self._opener = opener
         # Chebyshev points of [0, 1] with both ends: the interpolation inside a step is exact and well conditioned.
         self._points = (1 - np.cos(np.pi * np.arange(degree + 1) / degree)) / 2
 
     @cached_property
     def _found(self) -> list[tuple[Array, list[_Step]]]:
-        return _march(self._problem, self._open, lambda start, end: start + (end - start) * self._points[1:-1])
+        return _march(self._problem, self._opener(), lambda start, end: start + (end - start) * self._points[1:-1])
 
     @cached_property
     def _dense(self) -> PiecewiseDense:

@@ -8,22 +8,26 @@ from __future__ import annotations
 
 import dataclasses
 import reprlib
-from collections.abc import Iterator, Mapping, Sequence
-from functools import cached_property
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import networkx as nx
 import sympy
-from sympy.core.function import AppliedUndef
+from sympy.core.relational import Relational
+from sympy.functions.elementary.piecewise import ExprCondPair
+from sympy.logic.boolalg import BooleanAtom, BooleanFunction
 
 from shaftwork.components.base import Component
 from shaftwork.components.branches import ACROSS, INTEGRAL
-from shaftwork.components.laws import SYMBOLS, t
+from shaftwork.components.laws import SYMBOLS, Interpolation, InterpolationSlope, Table, t
 from shaftwork.core.domains import Domain
-from shaftwork.core.errors import Problem
+from shaftwork.core.errors import Problem, ShaftworkError
+from shaftwork.network.grammar import FUNCTION_NAMES, FUNCTIONS
 from shaftwork.network.graph import GROUND, CircuitGraph, resolve
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
 from shaftwork.network.templates import BranchTemplate, Kind, make_template, substitution
+from shaftwork.network.textfile import MAXIMUM_NAME, is_name
+from shaftwork.network.wording import Spelling, at_nodes, listed, title
 
 LEFT_OUT = ("node name", "node count", "wrong domain", "no effect", "component")
 """Kinds of problems whose part is left out of what is examined further."""
@@ -35,60 +39,15 @@ _READS: Mapping[Kind, frozenset[sympy.Symbol]] = {
 }
 """What the laws of a kind may depend on besides parameters; those not listed depend on parameters alone."""
 
+_EVALUATED = (
+    *(function.make for function in FUNCTIONS.values() if isinstance(function.make, type)),
+    *(sympy.Symbol, sympy.Number, sympy.NumberSymbol, sympy.Add, sympy.Mul, sympy.Pow, sympy.Piecewise, ExprCondPair),
+    *(Table, Interpolation, InterpolationSlope, Relational, BooleanFunction, BooleanAtom),
+)
+"""The nodes of expressions that every engine can evaluate."""
+
 Train = tuple[int, ...]
 """Numbers of the parts that hang together."""
-
-
-def title(part: Component) -> str:
-    """A part as messages name it: "Gear 'stage 1'"."""
-    return f"{type(part).__name__} '{part.name}'"
-
-
-def listed(names: Sequence[str], most: int = 6) -> str:
-    """Names in quotes; of many, the first few and the number of the others."""
-    shown = [f"'{name}'" for name in names[:most]]
-    return ", ".join(shown) + (f" and {len(names) - most} more" if len(names) > most else "")
-
-
-def at_nodes(names: Sequence[str]) -> str:
-    """Nodes as messages name them: "nodes 'rotor', 'wheel'"."""
-    return f"node{'s' * (len(names) > 1)} {listed(names)}" if names else "no node"
-
-
-class Spelling:
-    """Node names that may stand for another by a slip: one letter too many, missing or wrong, other case or spaces."""
-
-    def __init__(self, names: Sequence[str]) -> None:
-        self._names = names
-
-    @cached_property
-    def _by_variant(self) -> dict[str, list[str]]:
-        made: dict[str, list[str]] = {}
-        for name in self._names:
-            for variant in _variants(name):
-                made.setdefault(variant, []).append(name)
-        return made
-
-    def suggestion(self, names: Sequence[str]) -> str:
-        """A question in parentheses for the first of the names that is like another node, else nothing."""
-        own = frozenset(names)
-        for name in names:
-            likes = (other for variant in _variants(name) for other in self._by_variant.get(variant, ()))
-            for other in likes:
-                if other not in own and _digits(other) == _digits(name):  # n1 and n2 are two nodes, not a slip
-                    return f" (did you mean node '{other}'?)"
-        return ""
-
-
-def _digits(name: str) -> str:
-    return "".join(filter(str.isdigit, name))
-
-
-def _variants(name: str) -> tuple[str, ...]:
-    """The name without case and spaces, and all that come of it when one letter is left out."""
-    plain = "".join(filter(str.isalnum, name.lower()))
-    short = len(plain) - len(_digits(plain)) < 4
-    return (plain, *(() if short else (plain[:k] + plain[k + 1 :] for k in range(len(plain)))))
 
 
 class _Fault(NamedTuple):
@@ -155,6 +114,9 @@ class _Examination:
         elif name == REFERENCE:
             hint = "Rename the part; a Ground part may be called 'frame'."
             self.report("part name", f"{title(part)}: the name '{REFERENCE}' stands for the frame.", hint, placed)
+        elif not is_name(name):
+            hint = f"Use 1 to {MAXIMUM_NAME} printable characters, without line ends and tabs."
+            self.report("part name", f"{type(part).__name__} {reprlib.repr(name)} has no plain name.", hint, placed)
         elif "." in name:
             hint = f"A dot joins part and quantity, as in 'shaft.tau': write '{name.replace('.', '_')}'."
             self.report("part name", f"{title(part)} has a dot in its name.", hint, placed)
@@ -171,8 +133,8 @@ class _Examination:
     def _stands(self, placed: Placed) -> bool:
         """Whether the part stands at nodes that suit its ports."""
         part, nodes, before = placed.part, placed.nodes, len(self.problems)
-        if strange := [node for node in nodes if not isinstance(node, str) or not node.strip()]:
-            hint = "A node is named by a text such as 'rotor'."
+        if strange := [node for node in nodes if not is_name(node)]:
+            hint = f"A node is named by a text such as 'rotor', of 1 to {MAXIMUM_NAME} printable characters."
             self.report("node name", f"{title(part)}: {reprlib.repr(strange[0])} is no node.", hint, placed)
             return False
         self._check_count(placed)
@@ -230,6 +192,9 @@ class _Examination:
             for name, given, objection in objections:
                 self._report_value(placed, name, given, objection)
             faults = self._faults_of(part, resolved.values)
+        except ShaftworkError as error:
+            self.report("component", f"{title(part)}: {error}", "Correct its branches().", placed)
+            return None
         except Exception as error:  # noqa: BLE001 - a component written by a user may raise anything
             message = f"{title(part)}: its laws cannot be made ({type(error).__name__}: {error})."
             self.report("component", message, "Correct its branches() or the law that it is given.", placed)
@@ -272,7 +237,9 @@ def _law_faults(part: Component, values: Mapping[str, Any]) -> Iterator[_Fault]:
     yield from faults
     sound = {**values, **dict.fromkeys((fault.parameter for fault in faults), 1.0)}
     for template in make_template(part, sound).branches:
-        if not (strange := _strange_symbols(template)):
+        if unreadable := _unreadable("", template.law):
+            yield unreadable._replace(what=f"a branch law {unreadable.what}")
+        elif not (strange := _strange_symbols(template)):
             _check_ends(part, template)
         elif template.kind is Kind.ACROSS_SOURCE and strange <= {ACROSS, INTEGRAL}:
             for name in (name for name, law in laws.items() if law.free_symbols - {t}):
@@ -290,8 +257,8 @@ def _fault_of_law(part: Component, name: str, law: sympy.Expr) -> _Fault | None:
         return _Fault(
             name, f"= {str(law)[:60]} is not a finite real law", "Remove what is infinite, undefined or imaginary."
         )
-    if unknown := sorted(str(call.func) for call in law.atoms(AppliedUndef)):
-        return _Fault(name, f"contains the unknown function {unknown[0]}", "Use a Table or a function of sympy.")
+    if unreadable := _unreadable(name, law):
+        return unreadable
     readable = (t, *substitution(part))
     strange = sorted(law.free_symbols - set(readable), key=str)
     if not strange:
@@ -303,6 +270,18 @@ def _fault_of_law(part: Component, name: str, law: sympy.Expr) -> _Fault | None:
         what = f"contains a symbol {symbol} of your own, which is not Shaftwork's"
         return _Fault(name, what, f"Take the symbols from the package (shaftwork.{symbol}); {able}.")
     return _Fault(name, f"contains the symbol {symbol}, which has no value", f"Put its number in; {able}.")
+
+
+def _unreadable(name: str, law: sympy.Expr) -> _Fault | None:
+    """The first thing in an expression that no engine can evaluate."""
+    for node in sympy.preorder_traversal(law):
+        if isinstance(node, sympy.Piecewise) and node.args[-1].cond != sympy.true:
+            what = f"has {str(node)[:60]}, without a value where no condition holds"
+            return _Fault(name, what, "End it with (value, True).")
+        if not isinstance(node, _EVALUATED):
+            hint = f"Take sums, products, powers and: {FUNCTION_NAMES}."
+            return _Fault(name, f"contains the unknown function {node.func.__name__}", hint)
+    return None
 
 
 def _strange_symbols(template: BranchTemplate) -> set[sympy.Symbol]:

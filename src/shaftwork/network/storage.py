@@ -12,9 +12,10 @@ from shaftwork.components import REGISTRY, Component, Table
 from shaftwork.core.errors import ModelFileError, ParameterError
 from shaftwork.network import expressions, textfile
 from shaftwork.network.expression_reader import parse
-from shaftwork.network.grammar import tokens_of
+from shaftwork.network.grammar import fault_of, tokens_of
 from shaftwork.network.netlist import Netlist, Placed
 from shaftwork.network.textfile import ModelText, PartText
+from shaftwork.network.wording import title
 
 MAXIMUM_LAW_WORDS = 4000
 """Numbers, names and signs of all laws of a file together, some 400 laws: more take too long to read."""
@@ -23,11 +24,19 @@ MAXIMUM_LAW_WORDS = 4000
 def write_netlist(netlist: Netlist, path: str | Path) -> None:
     """Write a netlist to a file.
 
+    A law without symbols, such as pi or 2 pi, is written as its number.
+
     Raises:
-        ModelFileError: a parameter has no text form.
+        ModelFileError: a parameter has no text form, or the file cannot be written.
     """
-    parts = tuple(_part_text(placed) for placed in netlist.placed)
-    Path(path).write_text(textfile.write(ModelText(netlist.name, parts)), encoding="utf-8", newline="\n")
+    place = _path_of(path)
+    text = textfile.write(ModelText(netlist.name, tuple(_part_text(placed) for placed in netlist.placed)))
+    try:
+        place.write_text(text, encoding="utf-8", newline="\n")
+    except (OSError, ValueError) as error:
+        raise ModelFileError(
+            f"{place} cannot be written: {error}. Give the path of a file in a folder that exists."
+        ) from None
 
 
 def read_netlist(path: str | Path) -> Netlist:
@@ -36,12 +45,19 @@ def read_netlist(path: str | Path) -> Netlist:
     Raises:
         ModelFileError: the file is no model; says where and what would be right.
     """
-    model = textfile.read(Path(path))
+    model = textfile.read(_path_of(path))
     try:
         _refuse_endless_laws(model)
         return Netlist(model.name, tuple(_placed(part) for part in model.parts))
     except ModelFileError as error:
         raise ModelFileError(f"{path}: {error}") from None
+
+
+def _path_of(path: str | Path) -> Path:
+    try:
+        return Path(path)
+    except TypeError:
+        raise ModelFileError(f"{path!r} is no path. Give the place of a model file, such as 'crane.toml'.") from None
 
 
 def _refuse_endless_laws(model: ModelText) -> None:
@@ -70,10 +86,15 @@ def _is_default(part: Component, name: str) -> bool:
 def _written(part: Component, name: str) -> Any:
     value, objection = part.declared[name].magnitude(getattr(part, name))
     if objection is not None:
-        raise ModelFileError(f"{type(part).__name__} '{part.name}': {name} {objection}, so it cannot be saved.")
-    if isinstance(value, Expr) and not isinstance(value, Table):
+        raise ModelFileError(f"{title(part)}: {name} {objection}, so it cannot be saved.")
+    if not isinstance(value, Expr) or isinstance(value, Table):
+        return value
+    if fault := fault_of(value):  # before the text is made, which would be refused where it is read again
+        raise ModelFileError(f"{title(part)}: {name} {fault}, so it cannot be saved. Write large numbers as floats.")
+    try:
         return expressions.write(value)
-    return value
+    except ModelFileError as error:
+        raise ModelFileError(f"{title(part)}: {name} cannot be saved: {error}") from None
 
 
 def _placed(part: PartText) -> Placed:
@@ -100,6 +121,7 @@ def _read(part: PartText, cls: type[Component], name: str, value: Any) -> Any:
             f"{', '.join(key for key, declared in cls.declared.items() if declared.law) or 'none'}."
         )
     try:
-        return parse(value)
+        law = parse(value)
+        return law if law.free_symbols else float(law)
     except ModelFileError as error:
         raise ModelFileError(f"Part '{part.name}', {name}: {error}") from None

@@ -6,12 +6,14 @@ of zero leaves no branch, a resistance of zero becomes a rigid joint, and neithe
 
 from __future__ import annotations
 
+import dataclasses
+import reprlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any
+from typing import Any, get_args
 
-from sympy import Expr, Integer, Symbol, nan, oo, zoo
+from sympy import Expr, I, Integer, Symbol, nan, oo, zoo
 
 from shaftwork.components.base import Component, symbols_of
 from shaftwork.components.branches import (
@@ -26,8 +28,10 @@ from shaftwork.components.branches import (
     ThroughStore,
     rigid,
 )
+from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.domains import DOMAINS
+from shaftwork.core.errors import ParameterError, ShaftworkError
 
 
 class Kind(IntEnum):
@@ -98,10 +102,49 @@ def make_template(part: Component, values: Mapping[str, Any]) -> Template:
     known = {Symbol(name, real=True): name for name, value in values.items() if isinstance(value, float) and value}
     branches = tuple(
         made
-        for branch in part.branches(symbols_of(placed))
-        for made in _resolve(branch, _default_ends(part), tuple(known))
+        for number, branch in enumerate(part.branches(symbols_of(placed)), 1)
+        for made in _resolve(_in_sympy(branch, number), _default_ends(part), tuple(known))
     )
     return Template(branches, tuple(known.values()))
+
+
+def _in_sympy(branch: Branch, number: int) -> Branch:
+    """The branch with its plain numbers as sympy's, after a check that its laws can be computed with."""
+    match branch:
+        case IdealCoupling():
+            terms = tuple((_law(factor, branch, number), plus, minus) for factor, plus, minus in branch.terms)
+            return dataclasses.replace(branch, terms=terms)
+        case AcrossStore(capacity=law) | ThroughStore(stiffness=law) | ThroughLaw(through=law) | AcrossLaw(across=law):
+            (field, *_) = dataclasses.fields(branch)
+            return dataclasses.replace(branch, **{field.name: _law(law, branch, number)})
+    kinds = ", ".join(kind.__name__ for kind in get_args(Branch))
+    raise ShaftworkError(f"branch {number} is {reprlib.repr(branch)}, which is no branch. branches() yields: {kinds}.")
+
+
+def _law(law: Any, branch: Branch, number: int) -> Expr:
+    """A law or coefficient of a branch as an expression; infinity stands for a rigid joint, where one is possible.
+
+    Raises:
+        ShaftworkError: it is no number or expression, or has no finite real value.
+    """
+    try:
+        made = as_expression(law)
+    except ParameterError:
+        objection = "not a number or an expression of p.name, ACROSS, INTEGRAL and t"
+    else:
+        if not made.has(nan, I, -oo) and (not made.has(oo, zoo) or _is_rigid(branch, made)):
+            return made
+        objection = "which has no finite real value: look for a division by zero"
+    label = f" {branch.label!r}" if branch.label else ""
+    raise ShaftworkError(f"branch {number} ({type(branch).__name__}{label}) has {reprlib.repr(law)}, {objection}.")
+
+
+def _is_rigid(branch: Branch, law: Expr) -> bool:
+    """Whether an infinite law stands for a rigid joint: an infinite store, or a conductance such as 1/R with R = 0."""
+    if isinstance(branch, ThroughLaw):
+        slope = law.diff(ACROSS)
+        return bool(slope.has(oo, zoo)) and not slope.has(ACROSS, INTEGRAL, TIME)
+    return isinstance(branch, AcrossStore | ThroughStore)
 
 
 def _default_ends(part: Component) -> tuple[End, End]:

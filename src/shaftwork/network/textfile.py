@@ -116,9 +116,14 @@ def read(source: str | os.PathLike[str]) -> ModelText:
     """
     title, text = ("model", source) if isinstance(source, str) else (os.fspath(source), _text_of(Path(source)))
     try:
-        return _model(text)
+        return _model(text, is_file=not isinstance(source, str))
     except ModelFileError as error:
         raise ModelFileError(f"{title}: {error}") from None
+
+
+def is_name(value: Any) -> bool:
+    """Whether a text can name a part or a node in a file: 1 to `MAXIMUM_NAME` printable characters."""
+    return isinstance(value, str) and 0 < len(value) <= MAXIMUM_NAME and value.isprintable() and bool(value.strip())
 
 
 def write(model: ModelText) -> str:
@@ -220,14 +225,13 @@ def _tables(text: str) -> dict[str, Any]:
         raise ModelFileError(f"{where}this is no TOML: {reason}. {_USE}") from None
 
 
-def _model(text: str) -> ModelText:
+def _model(text: str, *, is_file: bool) -> ModelText:
     if len(text) > MAXIMUM_SIZE:
         raise ModelFileError(f"there are more than {MAXIMUM_SIZE} characters. Split the model.")
     if "=" not in text:
-        raise ModelFileError(
-            f"{_shown(text)} has no line key = value. A model starts with: format = {FORMAT}. "
-            'To read a file, give its place as pathlib.Path("crane.toml").'
-        )
+        what = _shown(text) if text.strip() else "an empty text"
+        hint = "" if is_file else ' To read a file, give its place as pathlib.Path("crane.toml").'
+        raise ModelFileError(f"{what} has no line key = value. A model starts with: format = {FORMAT}.{hint}")
     lines = _part_lines(text)
     tables = _tables(text)
     if "format" not in tables:
@@ -288,7 +292,7 @@ def _check_name(key: str, value: Any) -> None:
     if not isinstance(value, str):
         missing = "is missing" if value is None else f"is {_shown(value)}"
         raise ModelFileError(f'{key} {missing}. Write names as texts in quotes, such as "shaft".')
-    if not value.strip() or len(value) > MAXIMUM_NAME or not value.isprintable():
+    if not is_name(value):
         raise ModelFileError(
             f"{key} is {_shown(value)}. Use 1 to {MAXIMUM_NAME} printable characters, without line ends and tabs."
         )
@@ -305,7 +309,11 @@ def _checked(key: str, value: Any) -> Value:
             return int(value)
         case float() if math.isfinite(value):
             return float(value)
-        case str() if len(value) <= MAXIMUM_TEXT and value.isprintable():
+        case str() if len(value) > MAXIMUM_TEXT:
+            raise ModelFileError(
+                f"{key} has {len(value)} characters, more than {MAXIMUM_TEXT}. Use a Table of fewer points."
+            )
+        case str() if value.isprintable():
             return value
         case Table():
             return value

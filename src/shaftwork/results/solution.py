@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -67,7 +68,7 @@ class Solution:
         return self.observer.signal(self._known(name), self.t, self.x)
 
     def __contains__(self, name: object) -> bool:
-        return name in self.observer.units
+        return isinstance(name, str) and name in self.observer.units
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.observer.units)
@@ -76,10 +77,18 @@ class Solution:
         """The same motion at other times, from the solver's dense output.
 
         Raises:
-            SignalError: a time lies outside the run.
+            SignalError: these are no times, or one lies outside the run.
         """
-        times = np.atleast_1d(np.asarray(t, dtype=float))
         first, last = self.steps[0], self.steps[-1]
+        try:
+            times = np.atleast_1d(np.asarray(t, dtype=float))
+        except (TypeError, ValueError):
+            times = np.empty(0)
+        if times.ndim != 1 or not times.size:
+            raise SignalError(
+                f"{reprlib.repr(t)} is no list of times. Give times in s from {first:g} to {last:g}, such as "
+                f"[{first:g}, {last:g}]."
+            )
         if not (np.isfinite(times).all() and first <= times.min() and times.max() <= last):
             raise SignalError(
                 f"The run goes from t = {first:g} s to {last:g} s; asked for {times.min()} to {times.max()}."
@@ -121,6 +130,12 @@ class Solution:
 
     def _known(self, name: str) -> str:
         units = self.observer.units
+        if not isinstance(name, str):
+            some = ", ".join(self.names[:6])
+            raise SignalError(
+                f"{reprlib.repr(name)} is no name of a quantity. '{self.name}' has {len(units)}, such as: {some}. "
+                "All of them are in `names`."
+            )
         if name in units:
             return name
         owner, _, quantity = name.rpartition(".")

@@ -1,0 +1,40 @@
+"""Slopes of laws that jump: the derivative between the jumps, without an impulse at them."""
+
+from __future__ import annotations
+
+from sympy import Abs, Dummy, Expr, Heaviside, Symbol, ceiling, floor, sign
+from sympy.core.relational import Relational
+
+from shaftwork.components.laws import InterpolationSlope
+
+STEPS = (sign, Heaviside, Relational, InterpolationSlope, floor, ceiling)
+"""What is constant but for jumps."""
+
+
+def slope(expression: Expr, symbol: Symbol) -> Expr:
+    """Partial derivative of a law where it is smooth.
+
+    Law: d sign(x) / dx = d Heaviside(x) / dx = 0, d |x| / dx = sign(x); sympy's `diff` has 2 DiracDelta(x) for the first
+    and, where it does not know x as real, derivatives of its real part for the last. A jump has no slope: in time it is
+    a breakpoint, in a state the law jumps there and the derivative says nothing about it.
+
+    Args:
+        expression: a law.
+        symbol: what to differentiate by.
+    """
+    kinks = expression.atoms(sign, Heaviside, Abs)
+    if not kinks:
+        return expression.diff(symbol)
+    held = {node: Dummy(real=True) for node in kinks}
+    smooth = expression.xreplace(held)  # from the outside in: what is inside a kink is not seen
+    total = smooth.diff(symbol)
+    for node in expression.atoms(Abs):
+        inner = node.args[0]
+        total += smooth.diff(held[node]) * sign(inner) * slope(inner, symbol)
+    made: Expr = total.xreplace({dummy: node for node, dummy in held.items()})
+    return made
+
+
+def jumps(expression: Expr, *symbols: Symbol) -> bool:
+    """Whether a law may jump in one of the symbols, so that it is not linear in it even where its slope is constant."""
+    return any(not node.free_symbols.isdisjoint(symbols) for node in expression.atoms(*STEPS))
