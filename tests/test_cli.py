@@ -180,3 +180,13 @@ def test_the_command_is_installed_and_its_help_fits_on_one_screen() -> None:
     assert len(done.stdout.splitlines()) <= 24
     for name in ("scenes", "run", "latex", "check"):
         assert name in done.stdout
+
+
+def test_a_long_run_shows_its_progress_on_a_terminal(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = iter(range(10**9))
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    monkeypatch.setattr("shaftwork.cli.time.monotonic", lambda: float(next(clock)))
+    assert main(["run", "crane-start", "--engine", "scipy", "--t-end", "0.1", "--rtol", "1e-4"]) == DONE
+    assert "of 0.1 s" in capsys.readouterr().err

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from shaftwork.scenes.catalog import Scene
 
 DONE, FAILED, WRONG_INPUT = 0, 1, 2
+BAR = 40
+"""Characters of the progress bar."""
 FALLBACK_END = 10.0
 """End time of a model file when none is given, s."""
 
@@ -123,7 +126,7 @@ def _run(options: argparse.Namespace) -> None:
     model = net.compile()
     if options.engine == "exact":
         _refuse_nonlinear(model)
-    solution = model.simulate(t_end, rtol=options.rtol, engine=options.engine)
+    solution = model.simulate(t_end, rtol=options.rtol, engine=options.engine, progress=_progress(t_end))
     signals = scene.signals if scene else _worth_seeing(solution)
     print(f"{net.name}: {t_end:g} s of motion" + (f" ({scene.source})" if scene else ""))
     for line in scene.chosen if scene else ():
@@ -154,6 +157,23 @@ def _refuse_nonlinear(model: Model) -> None:
             f"--engine exact takes linear models with inputs of straight pieces, and '{model.name}' is not one. "
             "Use --engine auto."
         )
+
+
+def _progress(t_end: float) -> Callable[[float], None] | None:
+    """A line on a terminal's standard error that shows how far a long run has come."""
+    if not sys.stderr.isatty():
+        return None
+    shown = time.monotonic() + 1.0  # a run of a second needs none
+
+    def show(t: float) -> None:
+        nonlocal shown
+        now = time.monotonic()
+        if now >= shown:
+            done = int(BAR * min(max(t / t_end, 0.0), 1.0))
+            print(f"\r[{'=' * done}{' ' * (BAR - done)}] {t:.4g} of {t_end:g} s", end="", file=sys.stderr, flush=True)
+            shown = now + 0.2
+
+    return show
 
 
 def _worth_seeing(solution: Solution) -> tuple[str, ...]:

@@ -41,6 +41,10 @@ COMPARISONS: dict[Any, Callable[[Any, Any], Any]] = {
 }
 
 
+# A higher power rises so late from zero that a series of order 13 may not show it, and its step control not see it.
+LARGEST_PRODUCT = 5
+
+
 class Translator:
     """Translates expressions of one system; equal subexpressions are translated once.
 
@@ -105,7 +109,7 @@ class Translator:
         return upper / heyoka.prod(below) if below else upper
 
     def power(self, node: sympy.Pow) -> Any:
-        """A power, with square roots and quotients as such, and whole powers as products.
+        """A power, with square roots and quotients as such, and low whole powers as products.
 
         heyoka's own recurrence for a power divides by the base, which is zero at rest.
         """
@@ -114,7 +118,7 @@ class Translator:
             return heyoka.sqrt(base)
         if exponent.is_number and exponent.is_negative:
             return 1.0 / self.expression(node.base**-exponent)
-        if exponent.is_number and float(exponent).is_integer():
+        if exponent.is_number and exponent <= LARGEST_PRODUCT and float(exponent).is_integer():
             return _whole_power(base, int(exponent))
         return base ** self.expression(exponent)
 

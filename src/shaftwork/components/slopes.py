@@ -14,7 +14,7 @@ STEPS = (sign, Heaviside, Relational, InterpolationSlope, floor, ceiling)
 def slope(expression: Expr, symbol: Symbol) -> Expr:
     """Partial derivative of a law where it is smooth.
 
-    Law: d sign(x) / dx = d Heaviside(x) / dx = 0, d |x| / dx = sign(x); sympy's `diff` has 2 DiracDelta(x) for the first
+    Law: d sign(x) / dx = d Heaviside(x) / dx = 0, d |x| / dx = sign(x); sympy's `diff` has DiracDelta for the first
     and, where it does not know x as real, derivatives of its real part for the last. A jump has no slope: in time it is
     a breakpoint, in a state the law jumps there and the derivative says nothing about it.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import math
 from collections.abc import Callable
 from functools import cached_property
 from typing import Any
@@ -17,8 +18,13 @@ from shaftwork.integrate.switches import Watch, settle
 # The cost grows only with the logarithm of the tolerance, and a loose one loses events.
 LOOSEST_TOLERANCE, TIGHTEST_TOLERANCE = 1e-10, 1e-15
 
-# From (integrator, step callback, step limit) to (outcome name, steps taken); called again after an interruption.
-Advance = Callable[[Any, Watch | None, int], tuple[str, int]]
+# The series of a first step must satisfy the equations to this part of the state and its change; each trial that does
+# not is followed by one of a quarter of its length.
+FIRST_DEFECT, FIRST_TRIALS, SHORTER = 1e-8, 30, 0.25
+
+# From (integrator, step callback, step limit, longest step) to (outcome name, steps taken); called again after an
+# interruption.
+Advance = Callable[[Any, Watch | None, int, float], tuple[str, int]]
 
 
 def solve(problem: Problem) -> Trajectory:
@@ -67,9 +73,14 @@ class _Run:
         used = min(integrator.pars.size, self.parameters.size)
         integrator.pars[:used] = self.parameters[:used]
         watch = self._watch(piece) if self.program.switches else None
+        longest = self._first_step(piece)
         while True:
-            outcome, steps = advance(integrator, watch, self.problem.max_steps - self.steps)
+            left = self.problem.max_steps - self.steps
+            outcome, steps = advance(integrator, watch, left if longest == math.inf else 1, longest)
             self.steps += steps
+            if outcome == "step_limit" and longest < math.inf and left > 1:
+                longest = math.inf
+                continue
             if outcome == "cb_stop" and watch is not None and watch.reason is None:
                 settle(self.program, integrator, piece.end - piece.start)
                 continue
@@ -79,6 +90,36 @@ class _Run:
         self.state = integrator.state.copy()
         if not np.isfinite(self.state).all():
             raise failure(self.problem, "heyoka", integrator.time, self.state, "the state is not finite")
+
+    def _first_step(self, piece: Piece) -> float:
+        """Longest first step in s, infinite where heyoka's own choice is good.
+
+        heyoka takes its step from the last two terms of the series. Where a motion starts as a polynomial, as that of
+        J w' = 1 - w^5 from rest does, these are zero although later ones are not, and the step would have no end.
+        """
+        integrator, longest = self.integrator, math.inf
+        start, state, parameters = integrator.time, integrator.state.copy(), integrator.pars.copy()
+        for _ in range(FIRST_TRIALS):
+            integrator.step(max_delta_t=min(longest, piece.end - piece.start), write_tc=True)
+            step = integrator.time - start
+            good = not np.isfinite(integrator.state).all() or self._satisfied(piece, start, 0.9 * step)
+            integrator.time = start
+            integrator.state[:], integrator.pars[:] = state, parameters
+            integrator.reset_cooldowns() if self.program.switches else None
+            if good:
+                break
+            longest = SHORTER * step
+        return longest
+
+    def _satisfied(self, piece: Piece, start: float, elapsed: float) -> bool:
+        """Whether the series of the last step satisfies the equations at a time inside it."""
+        terms = self.integrator.tc
+        orders = np.arange(1, terms.shape[1])
+        slope = terms[:, 1:] @ (orders * elapsed ** (orders - 1))
+        state = np.array(self.integrator.update_d_output(start + elapsed))
+        with np.errstate(all="ignore"):
+            defect = elapsed * np.abs(self.problem.rhs(piece.inside(start + elapsed), state) - slope)
+        return bool((defect <= FIRST_DEFECT * (np.abs(state) + elapsed * np.abs(slope)) + self.problem.atol).all())
 
     def _watch(self, piece: Piece) -> Watch:
         self.integrator.reset_cooldowns()
@@ -118,11 +159,14 @@ class _GridRecorder:
         self._grid = times if times.size and times[-1] == end else np.append(times, end)
         self._filled = 0
 
-    def __call__(self, integrator: Any, watch: Watch | None, limit: int) -> tuple[str, int]:
+    def __call__(self, integrator: Any, watch: Watch | None, limit: int, longest: float) -> tuple[str, int]:
         pending, now = self._grid[self._filled :], integrator.time
         extra = int(pending[0] != now)  # heyoka's grid starts at the present time
         outcome, _, _, steps, _, found = integrator.propagate_grid(
-            np.append(now, pending) if extra else pending, max_steps=max(limit, 1), callback=watch
+            np.append(now, pending) if extra else pending,
+            max_steps=max(limit, 1),
+            max_delta_t=longest,
+            callback=watch,
         )
         found = found[extra:]
         kept = found[: len(self._rows) - self._filled]
@@ -138,9 +182,9 @@ class _SegmentRecorder:
         self._end = end
         self.segments: list[Any] = []
 
-    def __call__(self, integrator: Any, watch: Watch | None, limit: int) -> tuple[str, int]:
+    def __call__(self, integrator: Any, watch: Watch | None, limit: int, longest: float) -> tuple[str, int]:
         outcome, _, _, steps, segment, _ = integrator.propagate_until(
-            self._end, max_steps=max(limit, 1), callback=watch, c_output=True
+            self._end, max_steps=max(limit, 1), max_delta_t=longest, callback=watch, c_output=True
         )
         if segment is not None:
             self.segments.append(segment)
