@@ -339,3 +339,38 @@ def test_a_loop_without_a_solution_is_named() -> None:
     net.add(sw.TorqueSource("fan", tau=-1.0 - sw.omega**2), "brake")
     with pytest.raises(sw.SimulationError, match="fan"):
         net.simulate(0.5, algebraic_loops="solve")
+
+
+@pytest.mark.parametrize(
+    ("law", "speed"), [(sympy.sqrt(sw.t), 2 / 3), (sw.t ** sympy.Rational(5, 2), 2 / 7), (3 * sw.t**3, 3 / 4)]
+)
+def test_auto_solves_laws_that_have_no_taylor_series_at_the_start(law: sympy.Expr, speed: float) -> None:
+    net = sw.Network("power law")
+    net.add(sw.TorqueSource("motor", tau=law), "rotor")
+    net.add(sw.Inertia("J", J=1.0), "rotor")
+    sol = net.simulate(1.0, t_eval=11)
+    assert sol["J.omega"][-1] == pytest.approx(speed, rel=1e-7)  # a square root costs an explicit method some digits
+    assert sol.energy_residual < 1e-6
+
+
+@pytest.mark.parametrize("law", [sympy.Heaviside(sw.t - 0.5), sympy.sign(sw.t - 0.5), sympy.Heaviside(sw.omega - 0.5)])
+def test_signals_of_laws_that_switch_can_be_read(law: sympy.Expr) -> None:
+    net = sw.Network("switch")
+    net.add(sw.TorqueSource("motor", tau=law + 1.0), "rotor")
+    net.add(sw.Inertia("J", J=1.0), "rotor")
+    one, two = (net.simulate(1.0, t_eval=[0.2, 0.9], engine=engine) for engine in ("auto", "scipy"))
+    for name in ("J.omega", "motor.tau"):
+        assert one[name] == pytest.approx(two[name], rel=1e-5, abs=1e-9)  # scipy steps over the switch of a state
+
+
+def test_a_stiff_train_of_a_hundred_inertias_is_solved_by_the_sparse_implicit_engine() -> None:
+    net = sw.Network("stiff")
+    for k in range(101):
+        net.add(sw.Inertia(f"J{k}", J=1e-6), f"n{k}")
+        if k:
+            net.add(sw.Spring(f"s{k}", c=1e4, d=10.0), f"n{k - 1}", f"n{k}")
+    net.add(sw.KlossMotor("motor", tau_k=10.0, s_k=0.2, n_sync=1000), "n0")
+    sol = net.simulate(0.01, t_eval=11)
+    assert sol.engine == "sundials"
+    assert sol.energy_residual < 1e-5
+    assert sol["J0.omega"][-1] == pytest.approx(1000 * 2 * math.pi / 60, rel=1e-3)

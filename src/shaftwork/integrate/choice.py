@@ -10,6 +10,9 @@ from shaftwork.core.errors import MissingExtraError, ParameterError
 from shaftwork.integrate.problem import Engine, Problem, Trajectory
 
 
+NOT_ANALYTIC = "A law has no Taylor series where the motion passes (a square root at zero), so scipy's DOP853 is taken."
+
+
 @dataclass(frozen=True)
 class EngineEntry:
     """Where an engine lives.
@@ -75,7 +78,7 @@ def choose(problem: Problem) -> tuple[str, str]:
         return stiff
     if compiled:
         return "heyoka", "The system is not stiff and its equations are compiled, so Taylor series are the fastest."
-    reason = "its equations are not compiled" if ENGINES["heyoka"].installed else "heyoka is not installed"
+    reason = "heyoka cannot compile its equations" if ENGINES["heyoka"].installed else "heyoka is not installed"
     return "scipy", f"The system is not stiff and {reason}, so scipy's DOP853 is taken."
 
 
@@ -84,13 +87,16 @@ def available(name: str) -> bool:
     return ENGINES[name].installed
 
 
-def solve(problem: Problem, engine: str = "auto", why: str | None = None) -> tuple[Trajectory, str, str]:
+def solve(
+    problem: Problem, engine: str = "auto", why: str | None = None, *, fallback: bool = False
+) -> tuple[Trajectory, str, str]:
     """Solve a problem with an engine by name, or with the one that suits it.
 
     Args:
         problem: what to solve.
         engine: "auto" or a key of `ENGINES`.
         why: the reason of an earlier `choose`, where its answer is used again.
+        fallback: whether another engine may go on where a Taylor series cannot; always so with "auto".
 
     Returns:
         The trajectory, the name of the engine and why it was taken.
@@ -101,7 +107,15 @@ def solve(problem: Problem, engine: str = "auto", why: str | None = None) -> tup
         SimulationError: the engine failed.
     """
     name, reason = choose(problem) if engine == "auto" else (engine, f"The engine {engine!r} was asked for.")
-    return load(name)(problem), name, why or reason
+    if name != "heyoka" or not (fallback or engine == "auto"):
+        return load(name)(problem), name, why or reason
+    run = load(name)
+    from shaftwork.integrate.heyoka_taylor import SeriesError
+
+    try:
+        return run(problem), name, why or reason
+    except SeriesError:
+        return load("scipy")(problem), "scipy", NOT_ANALYTIC
 
 
 def load(name: str) -> Engine:

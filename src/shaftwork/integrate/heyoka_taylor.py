@@ -27,6 +27,10 @@ FIRST_DEFECT, FIRST_TRIALS, SHORTER = 1e-8, 30, 0.25
 Advance = Callable[[Any, Watch | None, int, float], tuple[str, int]]
 
 
+class SeriesError(SimulationError):
+    """A Taylor series has terms that are not finite: the motion runs away, or a law is not smooth there, sqrt at 0."""
+
+
 def solve(problem: Problem) -> Trajectory:
     """Integrate the heyoka program of a problem.
 
@@ -35,7 +39,8 @@ def solve(problem: Problem) -> Trajectory:
 
     Raises:
         MissingExtraError: heyoka is not installed.
-        SimulationError: the problem has no heyoka program, or the integration failed.
+        SimulationError: the problem has no heyoka program, or the integration failed; a `SeriesError` where another
+            engine may go on.
 
     Source: Biscani, Izzo, Revisiting high-order Taylor methods for astrodynamics and celestial mechanics, MNRAS 2021.
     """
@@ -62,13 +67,14 @@ class _Run:
         self.integrator = self.program.integrator(tolerance)
         self.parameters = problem.symbolic.parameters
         self.state: Array = np.array(problem.x0, dtype=float)
+        self.start = self.state
         self.steps = 0
 
     def piece(self, piece: Piece, advance: Advance) -> None:
         """Bring the run to the end of a piece; `advance` records what it passes."""
         integrator = self.integrator
         integrator.time = piece.start
-        integrator.state[:] = start_of_piece(self.problem, piece, self.state)
+        integrator.state[:] = self.start = start_of_piece(self.problem, piece, self.state)
         # heyoka keeps no parameters behind the last one that the rows contain
         used = min(integrator.pars.size, self.parameters.size)
         integrator.pars[:used] = self.parameters[:used]
@@ -86,10 +92,10 @@ class _Run:
                 continue
             break
         if outcome not in ("time_limit", "success"):
-            raise failure(self.problem, "heyoka", integrator.time, integrator.state, self._reason(outcome, watch))
+            raise self._failure(piece, outcome, watch)
         self.state = integrator.state.copy()
         if not np.isfinite(self.state).all():
-            raise failure(self.problem, "heyoka", integrator.time, self.state, "the state is not finite")
+            raise self._failure(piece, "err_nf_state", watch)
 
     def _first_step(self, piece: Piece) -> float:
         """Longest first step in s, infinite where heyoka's own choice is good.
@@ -126,6 +132,24 @@ class _Run:
         self.integrator.pars[self.parameters.size :] = 0.0
         settle(self.program, self.integrator, piece.end - piece.start)
         return Watch(self.program, piece.start, self.problem.t_end - self.problem.t0)
+
+    def _failure(self, piece: Piece, outcome: str, watch: Watch | None) -> SimulationError:
+        time, state = self._last_good(piece, watch)
+        made = failure(self.problem, "heyoka", time, state, self._reason(outcome, watch))
+        return SeriesError(*made.args) if outcome == "err_nf_state" else made
+
+    def _last_good(self, piece: Piece, watch: Watch | None) -> tuple[float, Array]:
+        """Time and state at the end of the last good step of a run that has failed in a piece."""
+        integrator = self.integrator
+        if watch is not None:
+            return watch.last_good or (piece.start, self.start)
+        if np.isfinite(integrator.time) and np.isfinite(integrator.state).all():
+            return integrator.time, integrator.state.copy()
+        integrator.time, integrator.state[:] = piece.start, self.start
+        good = piece.start, self.start
+        while integrator.step(max_delta_t=piece.end - integrator.time)[0].name == "success":
+            good = integrator.time, integrator.state.copy()
+        return good
 
     def _reason(self, outcome: str, watch: Watch | None) -> str:
         if outcome == "step_limit":

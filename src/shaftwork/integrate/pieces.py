@@ -13,6 +13,10 @@ from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.problem import Array, DaeProblem, Problem
 
 
+# A run has stalled when so many steps together advance by less than so many times this part of the whole time.
+STALL_STEPS, STALL_SPAN = 2000, 1e-10
+
+
 @dataclass(frozen=True)
 class Piece:
     """A span of time in which the right-hand side is smooth.
@@ -149,6 +153,33 @@ def failure(problem: Problem | DaeProblem, engine: str, t: float, x: Array, reas
         f"{reason.strip().rstrip('.')}.{state} "
         "Check the parameters and laws that act on this state, or try another engine or a looser rtol."
     )
+
+
+class Pace:
+    """Tells a run that goes on, in ever shorter steps, from one that has stalled.
+
+    Args:
+        problem: what is being solved.
+    """
+
+    def __init__(self, problem: Problem | DaeProblem) -> None:
+        self._least = STALL_STEPS * STALL_SPAN * (problem.t_end - problem.t0)
+        self._time, self._steps = problem.t0, 0
+
+    def objection(self, t: float) -> str | None:
+        """After each step to a time t in s: the reason to give up, or None."""
+        self._steps += 1
+        if self._steps < STALL_STEPS:
+            return None
+        advance = t - self._time
+        self._time, self._steps = t, 0
+        if advance >= self._least:
+            return None
+        return (
+            f"the last {STALL_STEPS} steps advanced by {advance:.2g} s only, as where the laws on both sides of a jump "
+            "drive the motion back to it. Give such a law a smooth transition, tanh(omega / 0.01) in place of "
+            "sign(omega)"
+        )
 
 
 def check_finite(problem: Problem | DaeProblem, engine: str, t: float, x: Array) -> None:

@@ -13,6 +13,7 @@ from scipy.integrate import BDF, DOP853, LSODA, OdeSolution, Radau
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.pieces import (
     GuardedFunctions,
+    Pace,
     Piece,
     PiecewiseDense,
     both_sides,
@@ -52,13 +53,13 @@ def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
 
     Source: scipy.integrate; Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I (DOP853) and II (Radau).
     """
-    x = np.asarray(problem.x0, dtype=float)
+    x, pace = np.asarray(problem.x0, dtype=float), Pace(problem)
     runs: list[_Run] = []
     parts = pieces(problem)
     with np.errstate(all="ignore"):
         for piece in parts:
             taken = sum(run.counts["steps"] for run in runs)
-            run = _piece(problem, piece, start_of_piece(problem, piece, x), method, problem.max_steps - taken)
+            run = _piece(problem, piece, start_of_piece(problem, piece, x), method, problem.max_steps - taken, pace)
             runs.append(run)
             x = run.states[-1]
     starts = np.array([piece.start for piece in parts])
@@ -73,7 +74,7 @@ def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
     return Trajectory(t, states, dense, statistics)
 
 
-def _piece(problem: Problem, piece: Piece, x: Array, method: Method, max_steps: int) -> _Run:
+def _piece(problem: Problem, piece: Piece, x: Array, method: Method, max_steps: int, pace: Pace) -> _Run:
     guard = GuardedFunctions(problem, piece)
     times, states = [piece.start], [x]
     interpolants: list[Any] = []
@@ -90,14 +91,14 @@ def _piece(problem: Problem, piece: Piece, x: Array, method: Method, max_steps: 
                 raise failure(problem, "scipy", solver.t, solver.y, guard.reason(f"{method}: the state is not finite"))
             if solver.t <= times[-1]:  # LSODA goes on with steps below the spacing of numbers
                 raise failure(problem, "scipy", solver.t, solver.y, f"{method}: the step became too small")
+            if (objection := pace.objection(solver.t)) is not None:
+                raise failure(problem, "scipy", solver.t, solver.y, f"{method}: {objection}")
             interpolants.append(solver.dense_output())
             times.append(solver.t)
             states.append(solver.y)
     except SimulationError:
         raise
-    except (ValueError, RuntimeError) as error:  # a factorisation that met a NaN
-        if guard.not_finite is None:
-            raise
+    except (ValueError, RuntimeError) as error:  # a factorisation that met a NaN, or a singular one
         raise failure(problem, "scipy", times[-1], states[-1], guard.reason(f"{method}: {error}")) from error
     solution = OdeSolution(times, interpolants)
     counts = {"steps": len(interpolants), "rhs": solver.nfev, "jacobians": int(solver.njev)}

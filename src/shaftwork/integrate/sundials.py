@@ -17,6 +17,7 @@ from scipy.interpolate import BarycentricInterpolator
 from shaftwork.core.errors import MissingExtraError
 from shaftwork.integrate.pieces import (
     GuardedFunctions,
+    Pace,
     Piece,
     PiecewiseDense,
     both_sides,
@@ -217,7 +218,7 @@ def _march(
     """All steps of each piece, behind the piece's start state; `ask` gives the times wanted in a step."""
     x = np.asarray(problem.x0, dtype=float)
     found: list[tuple[Array, list[_Step]]] = []
-    left = problem.max_steps
+    left, pace = problem.max_steps, Pace(problem)
     for piece in pieces(problem):
         opened = open_solver(piece, start_of_piece(problem, piece, x))
         solver, x = opened.solver, opened.start
@@ -234,6 +235,8 @@ def _march(
             check_finite(problem, "sundials", end, x)
             if end <= t:
                 raise failure(problem, "sundials", t, x, "the step became too small")
+            if (objection := pace.objection(end)) is not None:
+                raise failure(problem, "sundials", end, x, objection)
             asked = ask(t, end)
             inside = np.array([solver.step(time).y.copy() if time < end else x for time in asked])
             if asked.size and asked[0] < end:

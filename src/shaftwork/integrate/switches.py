@@ -65,7 +65,9 @@ class Watch:
         self._program = program
         self._short = CHATTER_SPAN * duration
         self._short_steps = 0
-        self._before = self._last = start
+        self._last = start
+        self.last_good: tuple[float, Array] | None = None
+        """Time in s and state (n,) at the start of the step that stopped the run or failed."""
         self._largest: Array = np.zeros(len(program.switches))
         self.reason: str | None = None
 
@@ -78,15 +80,16 @@ class Watch:
             # Right at its event (heyoka still "cools" it down) a switch may be on the wrong side by rounding.
             wrong &= [cooling is None for cooling in integrator.te_cooldowns]
         self._short_steps = self._short_steps + 1 if integrator.time - self._last < self._short else 0
-        self._before, self._last = self._last, integrator.time
+        before, self._last = self._last, integrator.time
         if wrong.any() or self._short_steps > CHATTER_STEPS:
             suspects = wrong if wrong.any() else np.abs(values) <= np.abs(values).min()
             condition = self._program.conditions[int(np.flatnonzero(suspects)[0])]
             self.reason = (
-                f"from t = {self._before:.9g} s on the motion sticks where the condition {condition} changes, because "
+                f"from t = {before:.9g} s on the motion sticks where the condition {condition} changes, because "
                 "the laws on both sides drive it back there. Give the law a smooth transition, such as "
                 "tanh(omega / 0.01) in place of sign(omega)"
             )
             return False
+        self.last_good = integrator.time, integrator.state.copy()
         # A switch that rested at zero and now leaves it needs its sign.
         return not bool((values[signs == 0.0] != 0.0).any())

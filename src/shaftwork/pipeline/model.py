@@ -144,7 +144,14 @@ class Model(CompiledModel):
             trajectory, name, why = solve_loops(prepared.bound, problem)
         else:
             name, why = self._engine(prepared, problem, engine)
-            trajectory, name, why = choice.solve(problem, engine=name, why=why)
+            try:
+                trajectory, name, why = choice.solve(problem, engine=name, why=why)
+            except SimulationError as error:
+                # a law such as sqrt(omega) has no Taylor series at standstill, though it has a value
+                if engine != "auto" or name != "heyoka" or "not finite" not in str(error):
+                    raise
+                why = "The laws have no Taylor series where the motion goes, so scipy's DOP853 is taken."
+                trajectory, name, why = choice.solve(problem, engine="scipy", why=why)
         return Solution(
             name=self.name,
             t=trajectory.t,
