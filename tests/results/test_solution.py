@@ -61,7 +61,7 @@ def test_energy_is_supplied_stored_and_lost(sol: sw.Solution) -> None:
     stored = sol["J1.energy"] + sol["J2.energy"] + sol["shaft.energy"]
     assert balance.stored[-1] == pytest.approx(stored[-1], rel=1e-9)
     assert balance.supplied[-1] > balance.lost[-1] > 0
-    assert balance.work >= balance.supplied[-1]
+    assert balance.work >= balance.supplied[-1] * (1 - 1e-12)  # the same sum, rounded in another order
 
 
 def test_power_at_the_ports_sums_to_zero(sol: sw.Solution) -> None:

@@ -75,6 +75,7 @@ class HeyokaProgram:
     def _compile(self, tolerance: float) -> Any:
         import heyoka
 
+        heyoka.set_logger_level_error()  # a failed run says so itself
         options: dict[str, Any] = {}
         if self.switches:
             options["t_events"] = [

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from shaftwork.core.errors import MissingExtraError, ParameterError
 from shaftwork.integrate.problem import Engine, Problem, Trajectory
 
-
+# Why scipy goes on where heyoka stopped.
 NOT_ANALYTIC = "A law has no Taylor series where the motion passes (a square root at zero), so scipy's DOP853 is taken."
 
 

@@ -12,7 +12,6 @@ import numpy as np
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.problem import Array, DaeProblem, Problem
 
-
 # A run has stalled when so many steps together advance by less than so many times this part of the whole time.
 STALL_STEPS, STALL_SPAN = 2000, 1e-10
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import warnings
 from collections.abc import Callable
+from contextlib import redirect_stdout
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
@@ -149,7 +150,8 @@ def _open_ida(problem: DaeProblem, piece: Piece, x: Array) -> _Opened:
         calc_init_dt=1e-3 * (piece.end - piece.start),
     )
     try:
-        start = solver.init_step(piece.start, x, problem.derivative0)
+        with redirect_stdout(None):
+            start = solver.init_step(piece.start, x, problem.derivative0)
     except RuntimeError as error:
         reason = f"IDA found no consistent initial values ({error})"
         raise failure(problem, "sundials", piece.start, x, reason) from error
@@ -227,7 +229,8 @@ def _march(
         while t < piece.end:
             if left <= 0:
                 raise failure(problem, "sundials", t, x, f"{problem.max_steps} steps were not enough")
-            with np.errstate(all="ignore"):
+            # SUNDIALS prints what its result says as well.
+            with np.errstate(all="ignore"), redirect_stdout(None):
                 result = solver.step(piece.end, method="onestep", tstop=piece.end)
             if not result.success:
                 raise failure(problem, "sundials", t, x, opened.explain(str(result.message)))

@@ -1,0 +1,45 @@
+"""Slopes of laws between their jumps."""
+
+from __future__ import annotations
+
+import pytest
+import sympy
+from sympy import Abs, Derivative, DiracDelta, Heaviside, Max, Piecewise, sign, sqrt
+
+from shaftwork.components.laws import Table, omega, phi, t
+from shaftwork.components.slopes import jumps, slope
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        sign(omega) * omega**2,
+        Heaviside(omega - 1) * omega,
+        Abs(omega) * omega,
+        Abs(omega**2 - sign(omega) * Abs(omega - 1)),
+        Abs(sqrt(omega + 9)) * sign(omega),
+        Max(omega, 0) * sign(omega + 1),
+        Piecewise((omega, Abs(omega) < 1), (omega**3 * sign(omega), True)),
+        Table([0, 1, 3], [0, 5, -1])(Abs(omega)),
+        sympy.exp(-Abs(omega)),
+    ],
+    ids=str,
+)
+def test_the_slope_is_the_limit_of_the_difference_quotient(law: sympy.Expr) -> None:
+    found = slope(law, omega)
+    assert not found.has(DiracDelta, Derivative)
+    for speed in (-2.3, -0.4, 0.3, 2.2):
+        above, below = (float(law.subs(omega, speed + side)) for side in (1e-6, -1e-6))
+        # central differences: 1e-12 of the third derivative and 1e-16 / 1e-6 of rounding
+        assert float(found.subs(omega, speed)) == pytest.approx((above - below) / 2e-6, rel=1e-7, abs=1e-7)
+
+
+def test_a_step_of_time_has_no_slope() -> None:
+    assert slope(sign(t - 0.5) + Heaviside(t), t) == 0
+
+
+def test_what_jumps_is_told_from_what_does_not() -> None:
+    assert jumps(Piecewise((1, omega < 0.5), (2, True)), omega)
+    assert jumps(Heaviside(phi), omega, phi)
+    assert not jumps(Heaviside(t) * omega, omega, phi)
+    assert not jumps(omega**2, omega)
