@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError
 
 if TYPE_CHECKING:
-    from shaftwork.pipeline.model import Model
     from shaftwork.pipeline.network import Network
     from shaftwork.results.solution import Solution
     from shaftwork.scenes.catalog import Scene
@@ -124,8 +123,6 @@ def _run(options: argparse.Namespace) -> None:
         _make_folder(options.out)
     t_end = options.t_end if options.t_end is not None else scene.t_end if scene else FALLBACK_END
     model = net.compile()
-    if options.engine == "exact":
-        _refuse_nonlinear(model)
     solution = model.simulate(t_end, rtol=options.rtol, engine=options.engine, progress=_progress(t_end))
     signals = scene.signals if scene else _worth_seeing(solution)
     print(f"{net.name}: {t_end:g} s of motion" + (f" ({scene.source})" if scene else ""))
@@ -146,17 +143,6 @@ def _make_folder(folder: Path) -> None:
         raise ParameterError(f"--out {folder} is no folder to write to: {error}. Give another folder.") from None
     if not os.access(folder, os.W_OK):
         raise ParameterError(f"--out {folder} is a folder that you may not write to. Give another folder.")
-
-
-def _refuse_nonlinear(model: Model) -> None:
-    from shaftwork.components.laws import pieces_degree
-
-    laws = (branch.template.law for branch in model.form.graph.branches)
-    if not model.linear or any(pieces_degree(law) is None for law in laws):
-        raise ParameterError(
-            f"--engine exact takes linear models with inputs of straight pieces, and '{model.name}' is not one. "
-            "Use --engine auto."
-        )
 
 
 def _progress(t_end: float) -> Callable[[float], None] | None:

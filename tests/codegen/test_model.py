@@ -106,3 +106,14 @@ def test_the_generated_code_names_nothing_but_time_states_and_parameters() -> No
     assert source.startswith("def ")
     assert "import" not in source
     assert "return [" in source
+
+
+@pytest.mark.parametrize("n", [3, 40], ids=["scalar", "array"])
+def test_the_constants_of_a_law_are_those_that_were_given(n: int) -> None:
+    """Printed with 15 digits, as sympy does, a third and 0.7 / 0.49 would be other floats."""
+    net = _chain(n)
+    net.add(sw.TorqueSource("load", tau=sw.t / 3.0 + 1.4285714285714286 * sw.omega**2), "n0")
+    rest = np.zeros(2 * n - 1)
+    rest[0] = 1.0
+    rate = net.compile().rhs(1.0, rest)[0]
+    assert rate == 5.0 + 1.0 / 3.0 + 1.4285714285714286 - 0.1

@@ -26,7 +26,6 @@ from shaftwork.components.laws import (
     phi,
     pieces_degree,
     t,
-    unsupported_functions,
 )
 from shaftwork.core.errors import ParameterError
 
@@ -258,24 +257,3 @@ def test_the_symbols_are_real_and_bear_their_names() -> None:
     assert [symbol.name for symbol in SYMBOLS] == ["t", "omega", "phi", "v", "s", "u", "psi"]
     assert all(symbol.is_real for symbol in SYMBOLS)
     assert phi == sympy.Symbol("phi", real=True)
-
-
-def test_functions_that_not_every_form_of_a_model_computes_are_named_once_in_order() -> None:
-    f = sympy.Function("f")
-    law = sympy.floor(t) + sympy.Mod(omega, 2) * sympy.erf(phi) + sympy.floor(omega) + f(t).diff(t)
-    assert sorted(unsupported_functions(law)) == ["Derivative", "Mod", "Tuple", "erf", "f", "floor"]
-    assert unsupported_functions(sympy.Integral(sympy.sin(omega), (omega, 0, phi)))[0] == "Integral"
-
-
-@pytest.mark.parametrize(
-    "law",
-    [
-        Step(2, 1) * sympy.sqrt(omega) + Ramp(1, 2),
-        TABLE(sympy.Abs(phi)) * sympy.sign(omega) - TABLE(omega).diff(omega),
-        sympy.Piecewise((1, (omega > 0) & ~(t < 1)), (sympy.tanh(t) / sympy.cosh(t), True)),
-        sympy.Max(sympy.atan2(t, omega), sympy.pi, 1.5) ** 1.7 + sympy.Heaviside(t),
-    ],
-    ids=str,
-)
-def test_what_a_law_is_usually_made_of_is_supported(law: sympy.Expr) -> None:
-    assert unsupported_functions(law) == ()

@@ -132,10 +132,52 @@ def test_sundials_says_once_why_it_failed(capfd: pytest.CaptureFixture[str]) -> 
 
 
 def test_the_exact_engine_says_that_an_input_is_no_straight_line() -> None:
-    with pytest.raises(sw.SimulationError, match="straight lines in time"):
+    with pytest.raises(sw.ParameterError, match="straight lines in time"):
         body(sympy.sin(sw.t)).simulate(1.0, engine="exact")
 
 
 def test_a_law_that_jumps_in_the_speed_is_not_linear() -> None:
     assert not body(2 - sympy.Heaviside(sw.omega - 0.5)).compile().linear
     assert body(sympy.Heaviside(sw.t - 0.5) - sw.omega).compile().linear
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_law_that_jumps_in_the_speed_between_constant_values_is_no_constant_source(engine: str) -> None:
+    """1 N m below 0.5 rad/s, 2 N m above: 0.5 s to the jump, then 0.5 s at the double."""
+    law = sympy.Piecewise((1, sw.omega < 0.5), (2, True))
+    sol = body(law).simulate(1.0, engine=engine)
+    # an engine without events steps over the jump with its tolerance for the state
+    assert sol["J.omega"][-1] == pytest.approx(1.5, abs=1e-4 if engine == "scipy-radau" else 1e-6)
+    assert sol["m.tau"][[0, -1]] == pytest.approx([1.0, 2.0])
+
+
+@pytest.mark.filterwarnings("ignore:jumping source:shaftwork.core.errors.NetworkWarning")
+@pytest.mark.parametrize("form", ["scaled", "plain"])
+@pytest.mark.parametrize("time", [0.5, 1 / 3, 0.7])
+def test_a_prescribed_speed_that_jumps_gives_its_whole_impulse(time: float, form: str) -> None:
+    """Two inertias share what the source turns: the whole jump is an impulse to them, however the step is written."""
+    step = sympy.Heaviside(sw.t - time) if form == "plain" else sympy.Heaviside(sw.t / time - 1)
+    net = sw.Network("jump")
+    net.add(sw.SpeedSource("drive", omega=6 * step), "sun")
+    net.add(sw.PlanetaryGear("gear", ratio=2.0), "sun", "carrier", "ring")
+    net.add(sw.Inertia("J1", J=2.0), "ring")
+    net.add(sw.Inertia("J2", J=1.0), "carrier")
+    sol = net.simulate(1.0, t_eval=[0.1, time, 1.0])
+    # sun + 2 ring = 3 carrier, and the impulses obey J1 ring / 2 = -J2 carrier / 3
+    assert sol["J1.omega"] == pytest.approx([0.0, 6 * 2 / -22, 6 * 2 / -22])
+    assert sol["J2.omega"] == pytest.approx([0.0, 6 * 6 / 22, 6 * 6 / 22])
+    assert sol.energy_residual < 1e-9
+
+
+@pytest.mark.filterwarnings("ignore:jumping source:shaftwork.core.errors.NetworkWarning")
+def test_a_capacitor_behind_a_voltage_that_jumps_takes_the_whole_jump() -> None:
+    """Two capacitors in series across the source: each takes half of the jump at once, exactly at 0.5 s."""
+    net = sw.Network("divider")
+    net.add(sw.VoltageSource("u", u=10 * sympy.Heaviside(sw.t - 0.5)), "a", "0")
+    net.add(sw.Capacitor("C1", C=1e-3), "a", "b")
+    net.add(sw.Capacitor("C2", C=1e-3), "b", "0")
+    net.add(sw.Resistor("R", R=1e3), "b", "0")
+    net.add(sw.Ground("earth"), "0")
+    sol = net.simulate(1.0, t_eval=[0.25, 0.5, 1.0])
+    # 5 V at once, then with (C1 + C2) R = 2 s towards zero
+    assert sol["C2.u"] == pytest.approx([0.0, 5.0, 5 * np.exp(-0.25)], abs=1e-7)

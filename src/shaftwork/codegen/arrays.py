@@ -11,6 +11,7 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.inputs import Inputs
 from shaftwork.codegen.loops import LoopSolver
 from shaftwork.codegen.matrices import LinearPart, MatrixAssembly
+from shaftwork.core.times import just_after, just_before
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
 
@@ -97,20 +98,20 @@ class BoundArrays:
         branches = self.program.assembly.inputs[slopes != 0]
         return tuple(dict.fromkeys(graph.part_of(int(branch)).name for branch in branches))
 
-    def impulse(self, t: float, x: Array, before: float | None = None) -> Array:
+    def impulse(self, t: float, x: Array, *, from_zero: bool = False) -> Array:
         """The states after the inputs have jumped (impulses through rigid joints).
 
         Args:
-            t: time after the jump.
+            t: time of the jump.
             x: (n,) states before it.
-            before: time before it; without it all inputs were zero.
+            from_zero: whether all inputs were zero before it.
         """
         if not self._has_slopes:
             return x
         inputs, zero = self.program.inputs, np.zeros(self.program.inputs.outputs)
-        step = inputs.values(t, zero, x, self.p)
-        if before is not None:
-            step = step - inputs.values(before, zero, x, self.p)
+        step = inputs.values(just_after(t), zero, x, self.p)
+        if not from_zero:
+            step = step - inputs.values(just_before(t), zero, x, self.p)
         return np.asarray(x + self.part.B1 @ (step * inputs.of_time))
 
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from sympy import Expr, Symbol, lambdify
+from sympy import Expr, Symbol
 
-from shaftwork.components.laws import NUMERICAL
+from shaftwork.codegen.code import scalar, vectorised
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.templates import BranchTemplate, Kind
 from shaftwork.reduction.form import StateForm
@@ -48,14 +48,6 @@ def groups_of(graph: CircuitGraph, branches: Sequence[int]) -> tuple[TemplateGro
     return tuple(made)
 
 
-def numeric(symbols: Sequence[Symbol], expression: Expr) -> Callable[..., Any]:
-    """The expression as a vectorised numpy function of its symbols."""
-    if len(symbols) == 1 and expression == symbols[0]:
-        return lambda value: value
-    function: Callable[..., Any] = lambdify(list(symbols), expression, modules=[NUMERICAL, "numpy"], cse=True)
-    return function
-
-
 class Coefficients:
     """Capacity, stiffness or conductance of every linear branch as a function of the parameter vector."""
 
@@ -63,7 +55,7 @@ class Coefficients:
         linear = [branch.index for branch in graph.branches if branch.template.kind in LINEAR]
         self._size = len(graph.branches)
         self._groups = tuple(
-            (group, numeric(group.template.symbols, group.template.law)) for group in groups_of(graph, linear)
+            (group, vectorised(group.template.symbols, group.template.law)) for group in groups_of(graph, linear)
         )
 
     def __call__(self, p: Array) -> Array:
@@ -99,7 +91,7 @@ class GainMatrix:
         # lambdify renames arguments that are no identifiers one by one in every expression; this is linear
         plain = {found[name]: Symbol(f"p{k}", real=True) for k, name in enumerate(ordered)}
         renamed = [made.xreplace(plain) for made in self._coefficients]
-        self._function = lambdify([list(plain.values())], renamed, "math") if variable else None
+        self._function = scalar([list(plain.values())], renamed, shared=False) if variable else None
 
     def _values(self, p: Array) -> dict[Expr, float]:
         assert self._function is not None  # noqa: S101 (there are coefficients)

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from sympy import Expr, Integer
 
-from shaftwork.codegen.elements import Array, Index, TemplateGroup, groups_of, numeric
+from shaftwork.codegen.code import vectorised
+from shaftwork.codegen.elements import Array, Index, TemplateGroup, groups_of
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import jumps, slope
@@ -62,7 +63,7 @@ class Inputs:
         members = [int(branch) for branch in made.branches]
 
         def function(expression: Expr) -> Function | None:
-            return None if expression == 0 else numeric(symbols, expression)
+            return None if expression == 0 else vectorised(symbols, expression)
 
         reads = made.template.kind is Kind.LAW
         return _Group(
@@ -70,7 +71,7 @@ class Inputs:
             np.array([place[branch] for branch in members], dtype=np.intp),
             np.array([output[branch] for branch in members] if reads else [], dtype=np.intp),
             np.array([integral[branch] for branch in members] if made.template.has_integral else [], dtype=np.intp),
-            function(law) or numeric(symbols, Integer(0)),
+            function(law) or vectorised(symbols, Integer(0)),
             (function(slope(law, TIME)), function(slope(law, ACROSS)), function(slope(law, INTEGRAL))),
         )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -12,6 +12,7 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.recovery import History, signals_of
 from shaftwork.components.base import Signal
 from shaftwork.core.domains import ROTATION
+from shaftwork.core.times import just_after, just_before
 from shaftwork.network.graph import CircuitGraph, GraphPart
 from shaftwork.reduction.form import StateForm
 
@@ -22,10 +23,12 @@ class ModelObserver:
     Args:
         form: the state form.
         bind: makes the array program with the parameter vector of the run; called when a quantity is first read.
+        jumps: times at which inputs jump: there they are read after the jump, as the states are, and where a time is
+            listed twice in a row, first before it.
     """
 
-    def __init__(self, form: StateForm, bind: Callable[[], BoundArrays]) -> None:
-        self._form, self._bind = form, bind
+    def __init__(self, form: StateForm, bind: Callable[[], BoundArrays], jumps: Sequence[float] = ()) -> None:
+        self._form, self._bind, self._jumps = form, bind, np.asarray(jumps, dtype=float)
         self._graph: CircuitGraph = form.graph
         self._last: tuple[tuple[int, int], History] | None = None
 
@@ -56,7 +59,7 @@ class ModelObserver:
         """All branch quantities along a trajectory; the last one asked for is kept."""
         key = (id(t), id(x))
         if self._last is None or self._last[0] != key:
-            self._last = (key, History(self._bind(), t, x))
+            self._last = (key, History(self._bind(), self._one_sided(t), x))
         return self._last[1]
 
     def signal(self, name: str, t: Array, x: Array) -> Array:
@@ -71,6 +74,17 @@ class ModelObserver:
         owner, quantity = name.rsplit(".", 1)
         part = next(part for part in self._graph.parts if part.name == owner)
         return history.absorbed(part) if quantity == "power" else history.stored(part)
+
+    def _one_sided(self, t: Array) -> Array:
+        """The times, moved by some rounding units to one side of a jump."""
+        at = np.flatnonzero(np.isin(t, self._jumps))
+        if not at.size:
+            return t
+        moved = t.copy()
+        for k in at:
+            first_of_two = k + 1 < len(t) and t[k + 1] == t[k]
+            moved[k] = just_before(float(t[k])) if first_of_two else just_after(float(t[k]))
+        return moved
 
     def powers(self, t: Array, x: Array) -> tuple[dict[str, Array], dict[str, Array], dict[str, Array]]:
         """Stored energy, lost power and supplied power by part."""

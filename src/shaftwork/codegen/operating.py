@@ -13,6 +13,7 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.observer import ModelObserver
 from shaftwork.core.errors import ParameterError, SignalError, SimulationError
 from shaftwork.core.parameters import in_si
+from shaftwork.core.times import just_after
 
 SMALLEST_STEP = 1e-6
 """First step of the way to a steady state, s."""
@@ -42,7 +43,7 @@ def initial_state(bound: BoundArrays, given: Mapping[str, float], t0: float) -> 
     """
     names = [state.name for state in bound.program.form.states]
     place = {name: k for k, name in enumerate(names)}
-    x = bound.impulse(t0, np.zeros(len(names)))
+    x = bound.impulse(t0, np.zeros(len(names)), from_zero=True)
     if not isinstance(given, Mapping):
         raise ParameterError(f"initial = {given!r} must map quantities to values, such as {{'J1.omega': 3.0}}.")
     units = ModelObserver(bound.program.form, lambda: bound).units
@@ -72,7 +73,7 @@ def _fill(
             f"There is no speed, twist or torque '{unknown[0]}' to start from. Near it: {', '.join(own)}."
         )
     trial = np.vstack([x, x + np.eye(len(x))[free]])
-    times = np.full(len(trial), t0)
+    times = np.full(len(trial), just_after(t0))
     values = np.array([observer.signal(name, times, trial) for name in given])
     wanted = np.array(list(given.values()))
     rows, gap = values[:, 1:] - values[:, :1], wanted - values[:, 0]

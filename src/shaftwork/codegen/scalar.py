@@ -2,31 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from sympy import Expr, Symbol, count_ops, cse, lambdify
-from sympy.printing.pycode import PythonCodePrinter
+from sympy import Symbol, count_ops, cse
 
+from shaftwork.codegen.code import scalar
 from shaftwork.codegen.elements import Array
-from shaftwork.components.laws import NUMERICAL
 from shaftwork.components.laws import t as TIME
 from shaftwork.reduction.rows import Rows
-
-
-class _Printer(PythonCodePrinter):  # type: ignore[misc]
-    """Python's own math functions; sign and Heaviside are not among them."""
-
-    def _print_sign(self, expression: Expr) -> str:
-        argument = self._print(expression.args[0])
-        return f"(1.0 if ({argument}) > 0 else -1.0 if ({argument}) < 0 else 0.0)"
-
-    def _print_Heaviside(self, expression: Expr) -> str:
-        argument, at_zero = (self._print(part) for part in expression.args)
-        return f"(1.0 if ({argument}) > 0 else 0.0 if ({argument}) < 0 else {at_zero})"
 
 
 class ScalarProgram:
@@ -46,16 +31,7 @@ class ScalarProgram:
     @cached_property
     def function(self) -> Callable[..., list[float]]:
         """(t, states, parameters) to the list of rates, in Python floats."""
-        modules: list[Any] = [NUMERICAL, math]
-        settings = {"fully_qualified_modules": False, "inline": True, "allow_unknown_functions": True}
-        made: Callable[..., list[float]] = lambdify(
-            [TIME, self._states, self._parameters],
-            list(self._rates),
-            modules=modules,
-            printer=_Printer(settings),
-            cse=True,
-        )
-        return made
+        return scalar([TIME, self._states, self._parameters], list(self._rates))
 
     @property
     def source(self) -> str:

@@ -12,8 +12,6 @@ import numpy as np
 import sympy
 from numpy.typing import NDArray
 from sympy.core.relational import Relational
-from sympy.functions.elementary.piecewise import ExprCondPair
-from sympy.logic.boolalg import Boolean
 
 from shaftwork.core.errors import ParameterError
 
@@ -34,15 +32,6 @@ psi = sympy.Symbol("psi", real=True)
 
 SYMBOLS: tuple[sympy.Symbol, ...] = (t, omega, phi, v, s, u, psi)
 """Every symbol that a law may contain."""
-
-SUPPORTED: tuple[type[sympy.Basic], ...] = (
-    *(sympy.Symbol, sympy.Number, sympy.NumberSymbol, sympy.Add, sympy.Mul, sympy.Pow, sympy.exp, sympy.log),
-    *(sympy.sin, sympy.cos, sympy.tan, sympy.sec, sympy.csc, sympy.cot, sympy.asin, sympy.acos, sympy.atan),
-    *(sympy.sinh, sympy.cosh, sympy.tanh, sympy.sech, sympy.csch, sympy.coth, sympy.asinh, sympy.acosh, sympy.atanh),
-    *(sympy.atan2, sympy.Abs, sympy.sign, sympy.Heaviside, sympy.Max, sympy.Min, sympy.Piecewise, ExprCondPair),
-    *(Relational, Boolean),
-)
-"""What a law may be made of besides tables."""
 
 Samples = tuple[tuple[float, ...], tuple[float, ...]]
 
@@ -289,21 +278,6 @@ def pieces_degree(expression: sympy.Expr) -> int | None:
     """
     degree = _degree(expression)
     return int(degree) if degree <= 1 else None
-
-
-def unsupported_functions(expression: sympy.Basic) -> tuple[str, ...]:
-    """Names of the functions in an expression that cannot be computed in every form of a model, in order.
-
-    Supported are powers, the elementary functions, `Abs`, `sign`, `Heaviside`, `Max`, `Min`, `Piecewise` with its
-    conditions, and tables. Others (floor and Mod jump where no breakpoint is known, erf, Derivative, Integral, a
-    function without a definition) are named.
-
-    Args:
-        expression: a law or any expression that contains laws.
-    """
-    nodes = sympy.preorder_traversal(expression)
-    strange = (node.func.__name__ for node in nodes if not isinstance(node, (*SUPPORTED, Table, _TableFunction)))
-    return tuple(dict.fromkeys(strange))
 
 
 def _degree(expression: sympy.Expr) -> float:

@@ -13,6 +13,7 @@ import networkx as nx
 from sympy import Add, Expr, Integer, count_ops, together
 
 from shaftwork.components.laws import t as TIME
+from shaftwork.components.slopes import slope
 from shaftwork.equations.assembly import Assembly, Group, Sides, Terms, rising_first, sides
 from shaftwork.equations.quantities import rate_of
 from shaftwork.network.templates import Kind
@@ -151,7 +152,7 @@ class SolvedForm:
             if assembly.kind(link) is Kind.ACROSS_STORE:
                 for source, factor in assembly.factors(link):
                     if assembly.kind(source) is Kind.ACROSS_SOURCE:
-                        rate = assembly.quantities.law(source).diff(TIME)
+                        rate = slope(assembly.quantities.law(source), TIME)
                         terms.append(-gain * assembly.quantities.law(link) * factor * rate)
         return tuple(term for term in terms if term != 0)
 
@@ -164,7 +165,7 @@ class SolvedForm:
                 compliance = 1 / assembly.quantities.law(tree)
                 for source, factor in assembly.cutsets.get(tree, ()):
                     if assembly.kind(source) is not Kind.THROUGH_STORE:
-                        rate = assembly.quantities.law(source).diff(TIME)
+                        rate = slope(assembly.quantities.law(source), TIME)
                         terms.append(-gain * compliance * factor * rate)
         return tuple(term for term in terms if term != 0)
 

@@ -12,7 +12,7 @@ from scipy import sparse
 from scipy.linalg import expm
 from scipy.sparse.linalg import expm_multiply
 
-from shaftwork.core.errors import SimulationError
+from shaftwork.core.errors import ParameterError
 from shaftwork.integrate.modal import find_modes
 from shaftwork.integrate.pieces import Piece, both_sides, failure, pieces, start_of_piece
 from shaftwork.integrate.problem import Array, LinearInputs, Problem, Trajectory
@@ -35,16 +35,17 @@ def solve(problem: Problem) -> Trajectory:
     M holds A and the two coefficients of u, z(t + h) = exp(M h) z(t). A may be singular, defective or stiff.
 
     Raises:
-        SimulationError: the system is not linear, its forcing is not a straight line, or the motion is unbounded.
+        ParameterError: the system is not linear, or its forcing is no straight line.
+        SimulationError: the motion is unbounded.
 
     Source: Van Loan, Computing integrals involving the matrix exponential, 1978; Al-Mohy and Higham, Computing the
     action of the matrix exponential, 2011.
     """
     if problem.linear is None:
-        raise SimulationError(
+        raise ParameterError(
             "The exact engine needs a linear system whose inputs are straight lines in time between their breakpoints, "
             "and here a law is not linear in speed and angle, or an input such as sin(t) is no straight line. "
-            "Use engine='auto'."
+            "Take the engine 'auto'."
         )
     system = _System(problem.linear, dense_form=prefers_dense(problem, problem.linear))
     x = np.asarray(problem.x0, dtype=float)
@@ -244,9 +245,9 @@ def _straight_line(problem: Problem, forcing: Callable[[float], Array], piece: P
     bend = np.abs(middle - (early + late) / 2)
     if (bend > STRAIGHT * (np.abs(early) + np.abs(late)).max(initial=0.0)).any():
         name = problem.names[int(np.argmax(bend))]
-        raise SimulationError(
+        raise ParameterError(
             f"The exact engine needs an input that is a straight line between breakpoints; the one of {name!r} bends "
-            f"between t = {piece.start:.6g} s and {piece.end:.6g} s. Use engine='auto'."
+            f"between t = {piece.start:.6g} s and {piece.end:.6g} s. Take the engine 'auto'."
         )
     slope = (late - early) / (0.5 * length)
     slope[np.abs(slope) * length <= 8 * np.finfo(float).eps * np.abs(early)] = 0.0

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from shaftwork.core.errors import SimulationError
+from shaftwork.core.times import just_after, just_before
 from shaftwork.integrate.problem import Array, DaeProblem, Problem
 
 # A run has stalled when so many steps together advance by less than so many times this part of the whole time.
@@ -29,9 +30,9 @@ class Piece:
     end: float
 
     def inside(self, time: float) -> float:
-        """The time in s, moved by one rounding unit where it touches an end: there another piece's input may be met."""
+        """The time in s, moved by some rounding units where it touches an end: there another piece's input is met."""
         # A method's last stage lies exactly on the end of its step, and a step function is one-sided at its jump.
-        return min(max(time, float(np.nextafter(self.start, self.end))), float(np.nextafter(self.end, self.start)))
+        return min(max(time, just_after(self.start)), just_before(self.end))
 
 
 class GuardedFunctions:

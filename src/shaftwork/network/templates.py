@@ -30,6 +30,7 @@ from shaftwork.components.branches import (
 )
 from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME
+from shaftwork.components.slopes import jumps, slope
 from shaftwork.core.domains import DOMAINS
 from shaftwork.core.errors import ParameterError, ShaftworkError
 
@@ -142,8 +143,8 @@ def _law(law: Any, branch: Branch, number: int) -> Expr:
 def _is_rigid(branch: Branch, law: Expr) -> bool:
     """Whether an infinite law stands for a rigid joint: an infinite store, or a conductance such as 1/R with R = 0."""
     if isinstance(branch, ThroughLaw):
-        slope = law.diff(ACROSS)
-        return bool(slope.has(oo, zoo)) and not slope.has(ACROSS, INTEGRAL, TIME)
+        found = slope(law, ACROSS)
+        return bool(found.has(oo, zoo)) and not found.has(ACROSS, INTEGRAL, TIME)
     return isinstance(branch, AcrossStore | ThroughStore)
 
 
@@ -179,11 +180,11 @@ def _linear(
 def _through_law(
     through: Expr, ends: tuple[End, End], label: str, symbols: tuple[Symbol, ...]
 ) -> Iterator[BranchTemplate]:
-    slope = through.diff(ACROSS)
-    if slope.has(ACROSS, INTEGRAL, TIME):
+    conductance = slope(through, ACROSS)
+    if conductance.has(ACROSS, INTEGRAL, TIME) or jumps(through, ACROSS):
         yield _template(Kind.LAW, through, ends, (), label, symbols)
         return
-    yield from _linear(Kind.CONDUCTANCE, slope, ends, label, symbols)
+    yield from _linear(Kind.CONDUCTANCE, conductance, ends, label, symbols)
     rest = through.subs(ACROSS, 0)
     if rest != 0 and not rest.has(nan):
         kind = Kind.LAW if rest.has(INTEGRAL) else Kind.THROUGH_SOURCE

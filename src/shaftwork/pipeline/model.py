@@ -17,9 +17,9 @@ from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.operating import initial_state, steady_state
 from shaftwork.components.laws import breakpoints, pieces_degree
-from shaftwork.core.errors import ParameterError, SimulationError
+from shaftwork.core.errors import CompileError, ParameterError, SimulationError
 from shaftwork.integrate import choice
-from shaftwork.integrate.problem import LinearInputs, Problem
+from shaftwork.integrate.problem import LinearInputs, Problem, Trajectory
 from shaftwork.network.netlist import Netlist, Placed
 from shaftwork.network.templates import Kind
 from shaftwork.pipeline.arguments import (
@@ -67,7 +67,7 @@ class _Prepared:
 
     def impulse(self, t: float, x: Array) -> Array:
         """The states after a breakpoint."""
-        return self.bound.impulse(t, x, before=math.nextafter(t, -math.inf))
+        return self.bound.impulse(t, x)
 
 
 class Model(CompiledModel):
@@ -138,20 +138,8 @@ class Model(CompiledModel):
         problem = self._problem(prepared, span, x0, relative_tolerance(rtol), atol, t_eval, max_steps)
         if progress is not None:
             problem = dataclasses.replace(problem, rhs=watched_by(problem.rhs, progress))
-        if not self.states:
-            trajectory, name, why = at_rest(problem)
-        elif self.form.loop_laws and engine in ("auto", "sundials"):
-            trajectory, name, why = solve_loops(prepared.bound, problem)
-        else:
-            name, why = self._engine(prepared, problem, engine)
-            try:
-                trajectory, name, why = choice.solve(problem, engine=name, why=why)
-            except SimulationError as error:
-                # a law such as sqrt(omega) has no Taylor series at standstill, though it has a value
-                if engine != "auto" or name != "heyoka" or "not finite" not in str(error):
-                    raise
-                why = "The laws have no Taylor series where the motion goes, so scipy's DOP853 is taken."
-                trajectory, name, why = choice.solve(problem, engine="scipy", why=why)
+        trajectory, name, why = self._solve(prepared, problem, engine)
+        started = tuple(time for time in prepared.breakpoints if time == span[0])
         return Solution(
             name=self.name,
             t=trajectory.t,
@@ -161,7 +149,7 @@ class Model(CompiledModel):
             why=why,
             statistics=trajectory.statistics,
             dense=trajectory.dense,
-            observer=ModelObserver(self.form, lambda: prepared.bound),
+            observer=ModelObserver(self.form, lambda: prepared.bound, (*started, *problem.breakpoints)),
         )
 
     def steady_state(
@@ -199,6 +187,15 @@ class Model(CompiledModel):
         prepared, span = self._prepare(self.defaults), time_span(t_start, t_end)
         x0 = self._start(prepared, None, span[0])
         return self._engine(prepared, self._problem(prepared, span, x0, rtol, None, None, 1), "auto")
+
+    def _solve(self, prepared: _Prepared, problem: Problem, engine: str) -> tuple[Trajectory, str, str]:
+        """The run, the engine that made it, and why that one."""
+        if not self.states:
+            return at_rest(problem)
+        if self.form.loop_laws and engine in ("auto", "sundials"):
+            return solve_loops(prepared.bound, problem)
+        name, why = self._engine(prepared, problem, engine)
+        return choice.solve(problem, name, why, fallback=engine == "auto")
 
     def _engine(self, prepared: _Prepared, problem: Problem, engine: str) -> tuple[str, str]:
         if engine != "auto":
@@ -257,13 +254,16 @@ class Model(CompiledModel):
 
     @cached_property
     def _program(self) -> Any:
-        """The heyoka program, where there are rows and heyoka is installed."""
+        """The heyoka program, where there are rows, heyoka is installed and knows every function in them."""
         if self.rows is None or not choice.available("heyoka"):
             return None
         from shaftwork.codegen.heyoka import build
         from shaftwork.components.laws import t as time
 
-        return build(self.rows.states, time, self.rows.parameters, self.rows.rates)
+        try:
+            return build(self.rows.states, time, self.rows.parameters, self.rows.rates)
+        except CompileError:
+            return None
 
     def _laws_of_time(self) -> list[tuple[int, Any]]:
         branches = self.form.graph.branches
@@ -292,11 +292,21 @@ class Model(CompiledModel):
         return LinearInputs(bound.jacobian(0.0, rest).tocsr(), lambda t: bound.rhs(t, rest))
 
     def _nominal(self, coefficients: Array) -> Array:
-        """The size of each state at a speed of one: stores of torque by their impedance sqrt(stiffness * inertia)."""
-        form = self.form
+        """The size of each state at a speed of one.
+
+        A store of torque has its impedance sqrt(stiffness * inertia), or the damping beside it where that is larger: a
+        tolerance below what an overdamped spring carries is lost in the rounding of an implicit step.
+        """
+        form, graph = self.form, self.form.graph
+        damping = np.zeros(len(graph.parts))
+        for branch in graph.branches:
+            if branch.template.kind is Kind.CONDUCTANCE:
+                damping[branch.part] = max(damping[branch.part], coefficients[branch.index])
         inertias = coefficients[list(form.across_states)]
         typical = float(np.median(inertias)) if inertias.size else 1.0
-        torques = np.sqrt(coefficients[list(form.through_states)] * typical)
+        springs = list(form.through_states)
+        beside = damping[[graph.branches[index].part for index in springs]]
+        torques = np.maximum(np.sqrt(coefficients[springs] * typical), beside)
         return np.concatenate([np.ones(len(inertias)), torques, np.ones(len(form.integrals))])
 
     def _changes_structure(self, values: Mapping[str, float]) -> bool:

@@ -14,6 +14,7 @@ from sympy import Add, Expr, Integer, Matrix, Symbol
 
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.laws import t as TIME
+from shaftwork.components.slopes import slope
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.gains import exact_of
@@ -127,7 +128,7 @@ class _Solution:
             capacity = self.law(link)
             self._add_products(matrix, link, capacity, frozenset(unknowns))
             driven = (
-                gain * self.law(tree).diff(TIME) for tree, gain in self.loops[link] if tree in form.across_sources
+                gain * slope(self.law(tree), TIME) for tree, gain in self.loops[link] if tree in form.across_sources
             )
             prescribed = capacity * Add(*driven)
             for tree, gain in self.loops[link]:
@@ -144,7 +145,7 @@ class _Solution:
             compliance = 1 / self.law(tree)
             members = self.cutsets.get(tree, [])
             states = [(link, gain) for link, gain in members if link in right]
-            source = Add(*(gain * self.through[link].diff(TIME) for link, gain in members if link not in right))
+            source = Add(*(gain * slope(self.through[link], TIME) for link, gain in members if link not in right))
             for first, gain in states:
                 right[first] -= gain * compliance * source
                 for second, other in states:

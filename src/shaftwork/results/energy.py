@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shaftwork.core.times import just_after, just_before
 from shaftwork.results.observer import Array, Observer
 
 NODES = 12
@@ -70,9 +71,12 @@ def energy_balance(observer: Observer, dense: Callable[[Array], Array], steps: A
 
 def _stored_on_both_sides(observer: Observer, dense: Callable[[Array], Array], steps: Array) -> tuple[Array, Array]:
     """Stored energy just before and at every time of `steps`; they differ where an input's jump is an impulse."""
-    at = _total(observer.powers(steps, dense(steps))[0], len(steps))
-    earlier = np.maximum(np.nextafter(steps, -np.inf), steps[0])
-    return _total(observer.powers(earlier, dense(earlier))[0], len(steps)), at
+    states = dense(steps)
+    after = _total(observer.powers(np.array([just_after(time) for time in steps]), states)[0], len(steps))
+    earlier = np.array([steps[0], *(just_before(time) for time in steps[1:])])
+    before = _total(observer.powers(earlier, dense(earlier))[0], len(steps))
+    before[0] = after[0]
+    return before, after
 
 
 def _integrate(

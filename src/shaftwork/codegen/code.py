@@ -1,0 +1,59 @@
+"""Expressions as Python functions whose constants are the floats that the expressions hold."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from sympy import Expr, Float, Symbol, lambdify
+from sympy.printing.numpy import NumPyPrinter
+from sympy.printing.pycode import PythonCodePrinter
+
+from shaftwork.components.laws import NUMERICAL
+
+SETTINGS = {"fully_qualified_modules": False, "inline": True, "allow_unknown_functions": True}
+
+
+class _Scalar(PythonCodePrinter):  # type: ignore[misc]
+    """Python's own math functions; sign and Heaviside are not among them."""
+
+    def _print_Float(self, number: Float) -> str:
+        return repr(float(number))  # sympy prints 15 digits, which is another float
+
+    def _print_sign(self, expression: Expr) -> str:
+        argument = self._print(expression.args[0])
+        return f"(1.0 if ({argument}) > 0 else -1.0 if ({argument}) < 0 else 0.0)"
+
+    def _print_Heaviside(self, expression: Expr) -> str:
+        argument, at_zero = (self._print(part) for part in expression.args)
+        return f"(1.0 if ({argument}) > 0 else 0.0 if ({argument}) < 0 else {at_zero})"
+
+
+class _Vectorised(NumPyPrinter):  # type: ignore[misc]
+    """numpy's functions."""
+
+    def _print_Float(self, number: Float) -> str:
+        return repr(float(number))
+
+
+def scalar(arguments: Sequence[Any], expressions: Any, *, shared: bool = True) -> Callable[..., Any]:
+    """Expressions as a function of floats.
+
+    Args:
+        arguments: symbols or lists of symbols.
+        expressions: one, or a list of them.
+        shared: whether common subexpressions are looked for.
+    """
+    printer, modules = _Scalar(SETTINGS), [NUMERICAL, math]
+    function: Callable[..., Any] = lambdify(arguments, expressions, modules=modules, printer=printer, cse=shared)
+    return function
+
+
+def vectorised(symbols: Sequence[Symbol], expression: Expr) -> Callable[..., Any]:
+    """An expression as a function of arrays or floats."""
+    if len(symbols) == 1 and expression == symbols[0]:
+        return lambda value: value
+    printer, modules = _Vectorised(SETTINGS), [NUMERICAL, "numpy"]
+    function: Callable[..., Any] = lambdify(list(symbols), expression, modules=modules, printer=printer, cse=True)
+    return function
