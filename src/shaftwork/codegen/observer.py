@@ -77,9 +77,9 @@ class ModelObserver:
 
     def _one_sided(self, t: Array) -> Array:
         """The times, moved by some rounding units to one side of a jump."""
-        at = np.flatnonzero(np.isin(t, self._jumps))
-        if not at.size:
+        if not self._jumps.size:
             return t
+        at = np.flatnonzero(np.isin(t, self._jumps))
         moved = t.copy()
         for k in at:
             first_of_two = k + 1 < len(t) and t[k + 1] == t[k]
