@@ -37,7 +37,7 @@ BLOCK = re.compile(r"^```(?P<language>\w+)\n(?P<body>.*?)^```$", re.MULTILINE | 
 MADE_PART = re.compile(r"(?P<start><!-- made: (?P<name>[\w ]+) -->\n).*?(?P<end><!-- end -->)", re.DOTALL)
 OUTPUT = ("text", "toml", "latex")
 """Languages of the blocks that hold what the block before them printed."""
-FAMILIES = ("rotation", "translation", "sources", "loads", "machines", "electrical")
+FAMILIES = ("rotation", "shafts", "translation", "sources", "loads", "machines", "electrical")
 """The modules of components in the order in which they are shown."""
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 NOISE, TOLERANCE = 1e-9, 0.02
@@ -152,7 +152,8 @@ def _ports(cls: type[Component]) -> str:
 def _cells(item: Parameter | None) -> tuple[str, ...]:
     if item is None:
         return ("", "", "", "", "")
-    default = "required" if item.required else f"{item.default:g}"
+    written = repr if item.record else "{:g}".format
+    default = "required" if item.required else written(item.default)
     meaning = f"{item.meaning} (law)" if item.law else item.meaning
     unit = item.unit.replace("*", "·").replace("^2", "²").replace("^3", "³")  # stars would be Markdown's
     return (f"`{item.name}`", unit, item.bounds, default, meaning)

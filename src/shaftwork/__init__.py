@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from shaftwork.components.loads import *
     from shaftwork.components.machines import *
     from shaftwork.components.rotation import *
+    from shaftwork.components.shaft_models import CentralDifference, Lumped, OneSpring, Rigid, Spectral
+    from shaftwork.components.shafts import *
     from shaftwork.components.sources import *
     from shaftwork.components.translation import *
     from shaftwork.core.errors import (
@@ -56,6 +58,7 @@ _HOME = {
         "ThroughLaw",
         "ThroughStore",
     ),
+    "shaftwork.components.shaft_models": ("CentralDifference", "Lumped", "OneSpring", "Rigid", "Spectral"),
     "shaftwork.components.laws": ("Ramp", "Step", "Table", "omega", "phi", "psi", "s", "t", "u", "v"),
     "shaftwork.core.errors": (
         "CompileError",

@@ -85,7 +85,8 @@ def undocumented() -> Iterator[str]:
             if not ast.get_docstring(node):
                 yield f"{place(file, node)} {node.name}"
             if isinstance(node, ast.ClassDef):
-                known = documented_methods(classes, node.name)
+                here = {made.name: made for made in ast.walk(module) if isinstance(made, ast.ClassDef)}
+                known = documented_methods({**classes, **here}, node.name)
                 for method in filter(is_public, node.body):
                     if not isinstance(method, ast.ClassDef) and method.name not in known:
                         yield f"{place(file, method)} {node.name}.{method.name}"

@@ -16,6 +16,8 @@ from shaftwork.components import REGISTRY
 from shaftwork.components.branches import ACROSS, IdealCoupling
 from shaftwork.components.laws import t
 from shaftwork.core.domains import DOMAINS
+from shaftwork.network.graph import resolve
+from shaftwork.network.netlist import Placed
 from shaftwork.network.templates import Kind, make_template
 
 OWN = [name for name, kind in REGISTRY.items() if kind.__module__.startswith("shaftwork.")]
@@ -38,7 +40,7 @@ def test_every_parameter_declares_unit_and_meaning(name: str) -> None:
     for declared in REGISTRY[name].declared.values():
         assert declared.unit
         assert declared.meaning
-        assert declared.required or declared.objection(declared.default) is None
+        assert declared.required or declared.magnitude(declared.default)[1] is None
 
 
 @pytest.mark.parametrize("name", OWN)
@@ -64,8 +66,8 @@ def test_every_component_refuses_what_it_does_not_know_with_what_it_takes(name: 
 def test_couplings_are_power_conserving_and_others_end_at_ports(name: str) -> None:
     """Every end of a branch is a port, an inner node or the frame."""
     part = _made(name)
-    values = {key: (value if isinstance(value, float) else sympy.Float(1.5)) for key, value in part.values.items()}
-    ends = {None, *(port.name for port in (*part.ports, *part.inner))}
+    values = resolve(Placed(part, ()))[0].values
+    ends = {None, *(port.name for port in (*part.ports, *part.inner_ports()))}
     for branch in make_template(part, values).branches:
         found = [*branch.ends, *(end for _, plus, minus in branch.terms for end in (plus, minus))]
         assert set(found) <= ends

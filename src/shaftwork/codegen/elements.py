@@ -33,10 +33,11 @@ class TemplateGroup:
 
 
 def groups_of(graph: CircuitGraph, branches: Sequence[int]) -> tuple[TemplateGroup, ...]:
-    """The given branches by template, in order of first appearance."""
-    found: dict[int, list[int]] = {}
+    """The given branches by equal law, in order of first appearance."""
+    found: dict[tuple[Any, ...], list[int]] = {}
     for index in branches:
-        found.setdefault(id(graph.branches[index].template), []).append(index)
+        template = graph.branches[index].template
+        found.setdefault((template.kind, template.law, template.symbols), []).append(index)
     made = []
     for members in found.values():
         template = graph.branches[members[0]].template

@@ -10,7 +10,7 @@ import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array, potential_matrix
-from shaftwork.components.base import Signal
+from shaftwork.components.base import Profile, Signal
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart
 from shaftwork.network.templates import Kind
 
@@ -120,6 +120,21 @@ class History:
             case "twist":
                 store = self._store(part)
                 return np.asarray(self.through[store] / self.bound.part.coefficients[store])
+
+    def profile(self, part: GraphPart, profile: Profile) -> Array:
+        """(k, places) a quantity along the part."""
+        if profile.kind == "across":
+            return self.potentials[[part.nodes[name] for (name,) in profile.of]].T
+        branches = self.form.graph.branches
+        labels = {branches[k].template.label: k for k in part.branches}
+        columns = np.zeros((len(self.t), len(profile.of)))
+        for place, members in enumerate(profile.of):
+            if (port := members[0].removeprefix("-")) in part.nodes:
+                columns[:, place] = self._through_port(part, port) * (-1.0 if members[0] != port else 1.0)
+            else:
+                found = [labels[label] for label in members if label in labels]  # no damping has left no branch
+                columns[:, place] = self.through[found].sum(axis=0)
+        return columns
 
     def _store(self, part: GraphPart) -> int:
         branches = self.form.graph.branches

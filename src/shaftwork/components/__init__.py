@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from shaftwork.components import electrical, loads, machines, rotation, sources, translation
+from shaftwork.components import electrical, loads, machines, rotation, shafts, sources, translation
 from shaftwork.components.base import REGISTRY, Component, Port, Signal, component
 from shaftwork.components.laws import Table
 
@@ -17,6 +17,7 @@ __all__ = [
     "loads",
     "machines",
     "rotation",
+    "shafts",
     "sources",
     "translation",
 ]

@@ -44,6 +44,24 @@ class Signal:
 
 
 @dataclass(frozen=True)
+class Profile:
+    """A quantity along a part, read at several places at once.
+
+    Args:
+        kind: "across" (speed of nodes) or "through" (sum of branches).
+        places: (k,) where, in m from the first end, ascending.
+        of: for each place the node's name, or the labels of the branches; a port's name stands for what the shaft takes
+            in there, with "-" before it for what it gives.
+        domain: of the quantity.
+    """
+
+    kind: Literal["across", "through"]
+    places: tuple[float, ...]
+    of: tuple[tuple[str, ...], ...]
+    domain: Domain
+
+
+@dataclass(frozen=True)
 class Component:
     """Base of all components. A subclass decorated with `component` declares parameters and yields branches.
 
@@ -75,6 +93,14 @@ class Component:
     def signals(self) -> dict[str, Signal]:
         """The quantities that can be read from the part; by default all that its ports and stores define."""
         return default_signals(self)
+
+    def profiles(self) -> dict[str, Profile]:
+        """The quantities that can be read along the part; by default none."""
+        return {}
+
+    def inner_ports(self) -> tuple[Port, ...]:
+        """The nodes inside the part; by default the same for all parts of the class."""
+        return self.inner
 
     @property
     def values(self) -> dict[str, Any]:

@@ -2,6 +2,9 @@
 
 A branch runs from its first end to its second; its through variable is what the first node gives to the branch, its
 across variable is the first node's value less the second's. Power through * across is therefore absorbed by the branch.
+
+A label names the branch's own variable where its part has several, that of an across store its across variable:
+"tau_c", "omega_3". A number at its end is a running one, and equations print equal rows with an index in its place.
 """
 
 from __future__ import annotations

@@ -33,6 +33,7 @@ class Parameter:
         nonzero: zero is refused.
         law: also takes a table or an expression of time, speed and angle.
         latex: LaTeX symbol.
+        record: a class of records that the value is one of, instead of a number; its `read` makes one of a text.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Parameter:
     nonzero: bool = False
     law: bool = False
     latex: str = ""
+    record: Any = None
 
     @property
     def required(self) -> bool:
@@ -77,7 +79,9 @@ class Parameter:
         return f"must be {self.bounds}" if outside else None
 
     def magnitude(self, value: Any) -> tuple[Any, str | None]:
-        """The value in SI as a float (for a law also the expression itself), and the objection to it, or None."""
+        """The value in SI as a float (also a law's expression, or the record), and the objection to it, or None."""
+        if self.record is not None:
+            return self._from_text(value)
         if hasattr(value, "dimensionality") and hasattr(value, "to"):
             return self._from_quantity(value)
         if value is None or isinstance(value, (bool, str, bytes, complex)):
@@ -91,6 +95,14 @@ class Parameter:
                 return value, None
             return value, f"must be a number{' or a law' if self.law else ''}, not {type(value).__name__}"
         return number, self.objection(number)
+
+    def _from_text(self, value: Any) -> tuple[Any, str | None]:
+        if isinstance(value, self.record):
+            return value, None
+        try:
+            return self.record.read(value), None
+        except ParameterError as error:
+            return value, f"is none: {str(error).rstrip('.')}"
 
     def _from_quantity(self, value: Any) -> tuple[Any, str | None]:
         """Units with angles need care: to a library of units a revolution is 2 pi and a radian is 1, pure numbers."""
@@ -131,7 +143,7 @@ def parameter(unit: str, meaning: str, *, default: Any = REQUIRED, latex: str = 
         meaning: what it is, a few words.
         default: value where the user gives none; without it the parameter is required.
         latex: LaTeX symbol, by default the name.
-        **bounds: `above`, `at_least`, `at_most`, `nonzero`, `law` of `Parameter`.
+        **bounds: `above`, `at_least`, `at_most`, `nonzero`, `law`, `record` of `Parameter`.
     """
 
     def declare(name: str) -> Parameter:

@@ -10,7 +10,7 @@ from itertools import count
 from sympy import Symbol
 
 from shaftwork.core.domains import ELECTRICAL, Quantity
-from shaftwork.equations.quantities import Quantities
+from shaftwork.equations.quantities import Quantities, running_number
 from shaftwork.equations.spelling import GREEK, chosen_subscript, escaped
 from shaftwork.network.graph import GraphPart
 from shaftwork.network.templates import Kind
@@ -45,6 +45,7 @@ class Letter:
         meaning: a few words for the nomenclature.
         parameter: whether it is a parameter, with a value.
         owner: name of the part or node that it belongs to.
+        number: running number within the part.
     """
 
     name: str
@@ -54,10 +55,11 @@ class Letter:
     meaning: str
     parameter: bool = False
     owner: str = ""
+    number: str = ""
 
     def printed(self, subscript: str) -> str:
         """The symbol in LaTeX."""
-        subscripts = ",".join(text for text in (self.mark, subscript) if text)
+        subscripts = ",".join(text for text in (self.mark, subscript, _index(self.number)) if text)
         return f"{self.base}_{{{subscripts}}}" if subscripts else self.base
 
 
@@ -164,48 +166,45 @@ def _quantity_letters(form: StateForm, quantities: Quantities) -> Iterator[tuple
     graph = quantities.graph
     for node, branch in quantities.owners.items():
         domain, part = graph.domains[node], graph.branches[branch].part
-        yield part, _letter(quantities.node(node), domain.across)
-        yield part, _letter(quantities.angle(node), domain.integral)
+        label = graph.branches[branch].template.label
+        yield part, _letter(quantities.node(node), domain.across, label)
+        yield part, _letter(quantities.angle(node), domain.integral, label.removeprefix(f"{domain.across.name}_"))
     for ends, pair in quantities.pairs.items():
         quantity = quantities.domain(ends).across
         sign = "" if quantity is ELECTRICAL.across else r"\Delta "
-        letter = _letter(pair.symbol, quantity, _mark(pair.label))
+        letter = _letter(pair.symbol, quantity, pair.label)
         yield (
             pair.part,
             replace(letter, base=sign + letter.base, meaning=f"{letter.meaning} across" if sign else letter.meaning),
         )
     for flow in quantities.flows:
         quantity, several = quantities.domain((flow.plus, flow.minus)).through, len(flow.branches) > 1
-        yield flow.part, _letter(quantities.through(flow), quantity, _mark(flow.label))
+        yield flow.part, _letter(quantities.through(flow), quantity, flow.label)
         for index in flow.branches:
             template = graph.branches[index].template
             if several and template.kind is Kind.THROUGH_STORE:
-                yield flow.part, _letter(quantities.store(index), quantity, _mark(template.label, quantity))
+                yield flow.part, _letter(quantities.store(index), quantity, template.label)
     for made in graph.branches:
         if made.template.kind is Kind.ACROSS_SOURCE:
             domain = quantities.domain((made.plus, made.minus))
             yield made.part, _letter(quantities.integral(made.index), domain.integral)
         if made.terms:
             quantity = quantities.multiplier_quantity(made.index)
-            yield (
-                made.part,
-                _letter(quantities.multiplier(made.index), quantity, _mark(quantities.multiplier_label(made.index))),
-            )
+            label = quantities.multiplier_label(made.index)
+            yield made.part, _letter(quantities.multiplier(made.index), quantity, label)
     for state in form.states:
         if state.kind == "integral":
             part = graph.branches[state.branch].part
             yield part, Letter(state.name, state.latex, "", state.unit, WORDS[state.name.rsplit(".", 1)[1]])
 
 
-def _letter(symbol: Symbol, quantity: Quantity, mark: str = "") -> Letter:
-    return Letter(symbol.name, quantity.latex, mark, quantity.unit, WORDS[quantity.name])
-
-
-def _mark(label: str, quantity: Quantity | None = None) -> str:
-    """A branch's label as a subscript: "tau_c" of a torque is c."""
-    if quantity is not None and label.startswith(f"{quantity.name}_"):
-        label = label[len(quantity.name) + 1 :]
-    return escaped(label) if len(label) == 1 else f"\\mathrm{{{escaped(label)}}}" if label else ""
+def _letter(symbol: Symbol, quantity: Quantity, label: str = "") -> Letter:
+    """The letter of a quantity; the label of its branch is the mark, "tau_c" of a torque is c, "tau_c_3" is c and 3."""
+    stem = label.removeprefix(f"{quantity.name}_")
+    number = stem if stem.isdecimal() else running_number(stem)
+    mark = stem[: len(stem) - len(number)].rstrip("_")
+    mark = escaped(mark) if len(mark) == 1 else f"\\mathrm{{{escaped(mark)}}}" if mark else ""
+    return Letter(symbol.name, quantity.latex, mark, quantity.unit, WORDS[quantity.name], number=number)
 
 
 def _distinct(letters: Iterable[Letter]) -> tuple[Letter, ...]:

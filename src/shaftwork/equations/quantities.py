@@ -21,6 +21,12 @@ from shaftwork.reduction.form import branch_name
 Ends = tuple[int, int]
 
 
+def running_number(label: str) -> str:
+    """The number at the end of a branch's label, "3" of "tau_c_3", or nothing."""
+    head, _, number = label.rpartition("_")
+    return number if head and number.isdecimal() else ""
+
+
 def rate_of(symbol: Symbol) -> Symbol:
     """The symbol of a quantity's time derivative."""
     return Symbol(f"der({symbol.name})", real=True)
@@ -108,8 +114,11 @@ class Quantities:
         """The angle, position or flux linkage of a node: the integral of its across variable."""
         quantity = self.graph.domains[number].integral
         owner = self.owners.get(number)
-        name = f"{quantity.name}({self.graph.nodes[number]})"
-        return Symbol(name if owner is None else f"{self.graph.part_of(owner).name}.{quantity.name}", real=True)
+        if owner is None:
+            return Symbol(f"{quantity.name}({self.graph.nodes[number]})", real=True)
+        number_within = running_number(self.graph.branches[owner].template.label)
+        ending = f"_{number_within}" if number_within else ""
+        return Symbol(f"{self.graph.part_of(owner).name}.{quantity.name}{ending}", real=True)
 
     def integral(self, branch: int) -> Symbol:
         """The integral of what is across a branch: of a law that reads it, or of a prescribed speed."""
@@ -194,7 +203,8 @@ class Quantities:
         law = self.law(branch.index)
         if branch.template.kind is Kind.ACROSS_SOURCE and law.is_Symbol and law.name in self.graph.parameters:
             return law
-        return self._named(branch.part, self.domain((branch.plus, branch.minus)).across, "")
+        quantity = self.domain((branch.plus, branch.minus)).across
+        return self._named(branch.part, quantity, branch.template.label.removeprefix(f"{quantity.name}_"))
 
     def _named(self, part: int, quantity: Quantity, label: str) -> Symbol:
         """The symbol "part.quantity", or "quantity(part)" where a parameter of the part has taken that name."""
@@ -212,6 +222,7 @@ class Quantities:
                 together.setdefault((branch.plus, branch.minus), []).append(index)
         for (plus, minus), branches in together.items():
             label = self._label(self.graph.branches[branches[0]]) if len(together) > 1 else ""
+            label = running_number(label) or label
             yield Flow(number, tuple(branches), plus, minus, self._sign(part, branches), label)
 
     def _sign(self, part: GraphPart, branches: list[int]) -> int:

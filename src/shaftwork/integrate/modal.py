@@ -19,12 +19,14 @@ SERIES_TERMS = 20
 
 @dataclass(frozen=True)
 class Modes:
-    """Eigenvalues and eigenvectors of a matrix that is well conditioned for them.
+    """Eigenvalues and eigenvectors of a real matrix that is well conditioned for them.
+
+    Of each conjugate pair one is kept, with its vector doubled: the motion is the real part of what it gives.
 
     Args:
-        values: (n,) eigenvalues, 1/s.
-        vectors: (n, n), a column for each mode.
-        inverse: (n, n) inverse of the vectors.
+        values: (k,) eigenvalues, 1/s.
+        vectors: (n, k), a column for each mode.
+        inverse: (k, n) rows of the inverse of all vectors.
     """
 
     values: Complex
@@ -50,7 +52,10 @@ def find_modes(matrix: Any) -> Modes | None:
     values, vectors = np.linalg.eig(matrix)
     if np.linalg.cond(vectors) > LARGEST_CONDITION:
         return None
-    return Modes(values.astype(complex), vectors.astype(complex), np.linalg.inv(vectors).astype(complex))
+    inverse = np.linalg.inv(vectors).astype(complex)
+    kept = values.imag >= 0
+    weights = np.where(values.imag > 0, 2.0, 1.0)[kept]
+    return Modes(values[kept].astype(complex), vectors[:, kept] * weights, inverse[kept])
 
 
 def _integrals(z: Complex) -> tuple[Complex, Complex]:

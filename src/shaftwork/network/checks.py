@@ -221,6 +221,7 @@ class _Examination:
             _Fault(name, f"is a {type(value).__name__}, not a number or a law", "Give a number, a Table or a formula.")
             for name, value in values.items()
             if not isinstance(value, float) and (not isinstance(value, sympy.Expr) or value.is_Matrix)
+            if part.declared[name].record is None
         )
         if odd:
             return odd
@@ -232,15 +233,17 @@ class _Examination:
 
 def _law_faults(part: Component, values: Mapping[str, Any]) -> Iterator[_Fault]:
     """What the laws of a part read that they may not, first as given, then in the branches that they end in."""
-    laws = {name: value for name, value in values.items() if not isinstance(value, float)}
+    laws = {name: value for name, value in values.items() if isinstance(value, sympy.Expr)}
     faults = tuple(fault for name, law in laws.items() if (fault := _fault_of_law(part, name, law)))
     yield from faults
     sound = {**values, **dict.fromkeys((fault.parameter for fault in faults), 1.0)}
-    for template in make_template(part, sound).branches:
+    templates = make_template(part, sound).branches
+    _check_ends(part, templates)
+    for template in {(made.kind, made.law, made.terms): made for made in templates}.values():
         if unreadable := _unreadable("", template.law):
             yield unreadable._replace(what=f"a branch law {unreadable.what}")
         elif not (strange := _strange_symbols(template)):
-            _check_ends(part, template)
+            continue
         elif template.kind is Kind.ACROSS_SOURCE and strange <= {ACROSS, INTEGRAL}:
             for name in (name for name, law in laws.items() if law.free_symbols - {t}):
                 read = ", ".join(sorted(symbol.name for symbol in laws[name].free_symbols - {t}))
@@ -289,9 +292,10 @@ def _strange_symbols(template: BranchTemplate) -> set[sympy.Symbol]:
     return set(found - {*template.symbols} - _READS.get(template.kind, frozenset()))
 
 
-def _check_ends(part: Component, template: BranchTemplate) -> None:
-    ports = {None, *(port.name for port in (*part.ports, *part.inner))}
-    ends = [*template.ends, *(end for _, plus, minus in template.terms for end in (plus, minus))]
+def _check_ends(part: Component, templates: tuple[BranchTemplate, ...]) -> None:
+    ports = {None, *(port.name for port in (*part.ports, *part.inner_ports()))}
+    couplings = (ends for template in templates for _, *ends in template.terms)
+    ends = [end for pair in (*(template.ends for template in templates), *couplings) for end in pair]
     if strange := [end for end in ends if end not in ports]:
         raise ValueError(f"a branch ends at {strange[0]!r}, which is no port")
 

@@ -198,7 +198,7 @@ def _port_nodes(placed: Placed, table: _Table) -> dict[str, int]:
     nodes = {port.name: GROUND for port in part.ports}
     for port, node in zip(part.ports, placed.nodes, strict=False):
         nodes[port.name] = table.node(node, port.domain)
-    for port in part.inner:
+    for port in part.inner_ports():
         nodes[port.name] = table.node(f"{part.name}.{port.name}", port.domain)
     return nodes
 

@@ -61,7 +61,12 @@ def _path_of(path: str | Path) -> Path:
 
 
 def _refuse_endless_laws(model: ModelText) -> None:
-    laws = [value for part in model.parts for value in part.parameters.values() if isinstance(value, str)]
+    laws = [
+        value
+        for part in model.parts
+        for name, value in part.parameters.items()
+        if isinstance(value, str) and not _is_record(REGISTRY.get(part.type), name)
+    ]
     words = 0
     for law in laws:
         words += len(tokens_of(law))
@@ -72,6 +77,11 @@ def _refuse_endless_laws(model: ModelText) -> None:
             )
 
 
+def _is_record(cls: type[Component] | None, name: str) -> bool:
+    """Whether a parameter is a record with a text of its own, such as the model of a shaft."""
+    return cls is not None and name in cls.declared and cls.declared[name].record is not None
+
+
 def _part_text(placed: Placed) -> PartText:
     part = placed.part
     values = {name: _written(part, name) for name in part.declared if not _is_default(part, name)}
@@ -80,13 +90,17 @@ def _part_text(placed: Placed) -> PartText:
 
 def _is_default(part: Component, name: str) -> bool:
     declared = part.declared[name]
-    return not declared.required and isinstance(value := getattr(part, name), float) and value == declared.default
+    kinds = (float,) if declared.record is None else (declared.record,)
+    return not declared.required and isinstance(value := getattr(part, name), kinds) and value == declared.default
 
 
 def _written(part: Component, name: str) -> Any:
-    value, objection = part.declared[name].magnitude(getattr(part, name))
+    declared = part.declared[name]
+    value, objection = declared.magnitude(getattr(part, name))
     if objection is not None:
         raise ModelFileError(f"{title(part)}: {name} {objection}, so it cannot be saved.")
+    if declared.record is not None:
+        return repr(value)
     if not isinstance(value, Expr) or isinstance(value, Table):
         return value
     if fault := fault_of(value):  # before the text is made, which would be refused where it is read again
@@ -113,7 +127,7 @@ def _placed(part: PartText) -> Placed:
 
 
 def _read(part: PartText, cls: type[Component], name: str, value: Any) -> Any:
-    if not isinstance(value, str):
+    if not isinstance(value, str) or _is_record(cls, name):
         return value
     if name not in cls.declared or not cls.declared[name].law:
         raise ModelFileError(

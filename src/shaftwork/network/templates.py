@@ -6,9 +6,8 @@ of zero leaves no branch, a resistance of zero becomes a rigid joint, and neithe
 
 from __future__ import annotations
 
-import dataclasses
 import reprlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, get_args
@@ -73,6 +72,9 @@ class BranchTemplate:
         return bool(self.law.has(INTEGRAL))
 
 
+_Resolved = tuple[Kind, Expr]
+
+
 @dataclass(frozen=True, eq=False)
 class Template:
     """All branches of a component with a given pattern of zero parameters."""
@@ -99,27 +101,67 @@ def make_template(part: Component, values: Mapping[str, Any]) -> Template:
         if isinstance(value, float):
             placed[name] = Symbol(name, real=True) if value else Integer(0)
         else:
-            placed[name] = value.xreplace(translate)
+            placed[name] = value.xreplace(translate) if isinstance(value, Expr) else value
     known = {Symbol(name, real=True): name for name, value in values.items() if isinstance(value, float) and value}
+    resolver = _Resolver(_default_ends(part), tuple(known))
     branches = tuple(
         made
         for number, branch in enumerate(part.branches(symbols_of(placed)), 1)
-        for made in _resolve(_in_sympy(branch, number), _default_ends(part), tuple(known))
+        for made in resolver.templates(branch, number)
     )
     return Template(branches, tuple(known.values()))
 
 
-def _in_sympy(branch: Branch, number: int) -> Branch:
-    """The branch with its plain numbers as sympy's, after a check that its laws can be computed with."""
-    match branch:
-        case IdealCoupling():
-            terms = tuple((_law(factor, branch, number), plus, minus) for factor, plus, minus in branch.terms)
-            return dataclasses.replace(branch, terms=terms)
-        case AcrossStore(capacity=law) | ThroughStore(stiffness=law) | ThroughLaw(through=law) | AcrossLaw(across=law):
-            (field, *_) = dataclasses.fields(branch)
-            return dataclasses.replace(branch, **{field.name: _law(law, branch, number)})
-    kinds = ", ".join(kind.__name__ for kind in get_args(Branch))
-    raise ShaftworkError(f"branch {number} is {reprlib.repr(branch)}, which is no branch. branches() yields: {kinds}.")
+class _Resolver:
+    """Branches as templates; a law that many branches of a part share is looked at once.
+
+    Args:
+        default: ends of a branch that names none.
+        symbols: symbols of the parameters, in the order of their declaration.
+    """
+
+    def __init__(self, default: tuple[End, End], symbols: tuple[Symbol, ...]) -> None:
+        self._default, self._symbols = default, symbols
+        self._known: dict[Any, tuple[_Resolved, ...]] = {}
+        self._read: dict[Any, tuple[Symbol, ...]] = {}
+
+    def templates(self, branch: Branch, number: int) -> Iterator[BranchTemplate]:
+        """None when the law vanishes, a rigid joint when it is infinite, two when it is affine."""
+        match branch:
+            case IdealCoupling(terms, label):
+                exact = tuple((_law(factor, branch, number), plus, minus) for factor, plus, minus in terms)
+                yield self._template(Kind.COUPLING, Integer(0), (None, None), exact, label)
+            case AcrossStore(law, ends, label) | ThroughStore(law, ends, label) | ThroughLaw(law, ends, label):
+                for kind, found in self._resolved(branch, law, number):
+                    joint = rigid(ends or self._default).terms if kind is Kind.COUPLING else ()
+                    where = (None, None) if joint else ends or self._default
+                    yield self._template(kind, found, where, joint, label)
+            case AcrossLaw(law, ends, label):
+                made = _law(law, branch, number)
+                yield self._template(Kind.ACROSS_SOURCE, made, ends or self._default, (), label)
+            case _:
+                kinds = ", ".join(kind.__name__ for kind in get_args(Branch))
+                raise ShaftworkError(
+                    f"branch {number} is {reprlib.repr(branch)}, which is no branch. branches() yields: {kinds}."
+                )
+
+    def _resolved(self, branch: Branch, law: Any, number: int) -> tuple[_Resolved, ...]:
+        key = (type(branch), law)
+        try:
+            return self._known[key]
+        except (KeyError, TypeError):  # a law that is no expression may have no hash
+            made = tuple(_resolve(branch, _law(law, branch, number)))
+        self._known[key] = made
+        return made
+
+    def _template(
+        self, kind: Kind, law: Expr, ends: tuple[End, End], terms: tuple[tuple[Expr, End, End], ...], label: str
+    ) -> BranchTemplate:
+        key = (law, *(coefficient for coefficient, _, _ in terms))
+        if key not in self._read:
+            found = law.free_symbols.union(*(coefficient.free_symbols for coefficient, _, _ in terms))
+            self._read[key] = tuple(made for made in self._symbols if made in found)
+        return BranchTemplate(kind, law, ends, terms, label, self._read[key])
 
 
 def _law(law: Any, branch: Branch, number: int) -> Expr:
@@ -152,53 +194,30 @@ def _default_ends(part: Component) -> tuple[End, End]:
     return (part.ports[0].name, part.ports[1].name if len(part.ports) > 1 else None)
 
 
-def _resolve(branch: Branch, default: tuple[End, End], symbols: tuple[Symbol, ...]) -> Iterator[BranchTemplate]:
-    """The branch as templates: none when its law vanishes, a rigid joint when it is infinite, two when it is affine."""
+def _resolve(branch: Branch, law: Expr) -> Iterator[_Resolved]:
+    """A store or law as kinds and laws: none when it vanishes, a coupling if it is infinite, two if it is affine."""
     match branch:
-        case IdealCoupling(terms, label):
-            yield _template(Kind.COUPLING, Integer(0), (None, None), terms, label, symbols)
-        case AcrossLaw(across, ends, label):
-            yield _template(Kind.ACROSS_SOURCE, across, ends or default, (), label, symbols)
-        case AcrossStore(capacity, ends, label):
-            yield from _linear(Kind.ACROSS_STORE, capacity, ends or default, label, symbols)
-        case ThroughStore(stiffness, ends, label):
-            yield from _linear(Kind.THROUGH_STORE, stiffness, ends or default, label, symbols)
-        case ThroughLaw(through, ends, label):
-            yield from _through_law(through, ends or default, label, symbols)
+        case AcrossStore():
+            yield from _linear(Kind.ACROSS_STORE, law)
+        case ThroughStore():
+            yield from _linear(Kind.THROUGH_STORE, law)
+        case ThroughLaw():
+            yield from _through_law(law)
 
 
-def _linear(
-    kind: Kind, coefficient: Expr, ends: tuple[End, End], label: str, symbols: tuple[Symbol, ...]
-) -> Iterator[BranchTemplate]:
+def _linear(kind: Kind, coefficient: Expr) -> Iterator[_Resolved]:
     if coefficient.has(zoo, oo, nan):
-        joint = rigid(ends, label)
-        yield _template(Kind.COUPLING, Integer(0), (None, None), joint.terms, label, symbols)
+        yield Kind.COUPLING, Integer(0)
     elif coefficient != 0:
-        yield _template(kind, coefficient, ends, (), label, symbols)
+        yield kind, coefficient
 
 
-def _through_law(
-    through: Expr, ends: tuple[End, End], label: str, symbols: tuple[Symbol, ...]
-) -> Iterator[BranchTemplate]:
+def _through_law(through: Expr) -> Iterator[_Resolved]:
     conductance = slope(through, ACROSS)
     if conductance.has(ACROSS, INTEGRAL, TIME) or jumps(through, ACROSS):
-        yield _template(Kind.LAW, through, ends, (), label, symbols)
+        yield Kind.LAW, through
         return
-    yield from _linear(Kind.CONDUCTANCE, conductance, ends, label, symbols)
+    yield from _linear(Kind.CONDUCTANCE, conductance)
     rest = through.subs(ACROSS, 0)
     if rest != 0 and not rest.has(nan):
-        kind = Kind.LAW if rest.has(INTEGRAL) else Kind.THROUGH_SOURCE
-        yield _template(kind, rest, ends, (), label, symbols)
-
-
-def _template(
-    kind: Kind,
-    law: Expr,
-    ends: tuple[End, End],
-    terms: Iterable[tuple[Expr, End, End]],
-    label: str,
-    symbols: tuple[Symbol, ...],
-) -> BranchTemplate:
-    kept = tuple(terms)
-    found = law.free_symbols.union(*(coefficient.free_symbols for coefficient, _, _ in kept))
-    return BranchTemplate(kind, law, ends, kept, label, tuple(symbol for symbol in symbols if symbol in found))
+        yield Kind.LAW if rest.has(INTEGRAL) else Kind.THROUGH_SOURCE, rest

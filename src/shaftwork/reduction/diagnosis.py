@@ -372,14 +372,14 @@ def _cancelling(form: StateForm, own: Sequence[int], beside: Sequence[int]) -> I
 
 
 def _coefficients(graph: CircuitGraph, branches: Iterable[int]) -> dict[int, float]:
-    made: dict[int, Any] = {}
+    made: dict[tuple[Any, ...], Any] = {}
     values: dict[int, float] = {}
     for index in branches:
         template, part = graph.branches[index].template, graph.part_of(index)
-        if id(template) not in made:
-            made[id(template)] = sympy.lambdify(template.symbols, template.law, "math")
+        if (key := (template.law, template.symbols)) not in made:
+            made[key] = sympy.lambdify(template.symbols, template.law, "math")
         numbers = (graph.parameters[f"{part.name}.{symbol.name}"] for symbol in template.symbols)
-        values[index] = float(made[id(template)](*numbers))
+        values[index] = float(made[key](*numbers))
     return values
 
 

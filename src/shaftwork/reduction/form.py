@@ -153,9 +153,8 @@ def _domain(graph: CircuitGraph, branch: GraphBranch) -> Domain:
 
 def _across_state(graph: CircuitGraph, branch: GraphBranch) -> State:
     quantity = _domain(graph, branch).across
-    return State(
-        f"{graph.parts[branch.part].name}.{quantity.name}", branch.index, "across", quantity.unit, quantity.latex
-    )
+    label = branch.template.label or quantity.name
+    return State(f"{graph.parts[branch.part].name}.{label}", branch.index, "across", quantity.unit, quantity.latex)
 
 
 def _through_state(graph: CircuitGraph, branch: GraphBranch) -> State:

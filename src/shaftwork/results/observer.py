@@ -23,6 +23,15 @@ class Observer(Protocol):
         """(k,) a quantity at times t (k,) with states x (k, n)."""
         ...
 
+    @property
+    def profiles(self) -> Mapping[str, tuple[str, tuple[float, ...]]]:
+        """Every quantity that can be read along a part, "part.quantity": its unit and the places in m."""
+        ...
+
+    def profile(self, name: str, t: Array, x: Array) -> Array:
+        """(k, places) a quantity along a part at times t (k,) with states x (k, n)."""
+        ...
+
     def powers(self, t: Array, x: Array) -> tuple[dict[str, Array], dict[str, Array], dict[str, Array]]:
         """By part, at times t (k,) with states x (k, n): stored energy in J, lost power in W, supplied power in W."""
         ...

@@ -60,12 +60,19 @@ class Solution:
         return tuple(self.observer.units)
 
     def __getitem__(self, name: str) -> Array:
-        """(k,) a quantity at the output times, such as "shaft.tau".
+        """(k,) a quantity at the output times, such as "shaft.tau"; (k, places) one along a shaft, see `places`.
 
         Raises:
             SignalError: there is no such quantity; the message lists what the part has.
         """
+        if isinstance(name, str) and name in self.observer.profiles:
+            return self.observer.profile(name, self.t, self.x)
         return self.observer.signal(self._known(name), self.t, self.x)
+
+    @property
+    def places(self) -> Mapping[str, Array]:
+        """Every quantity that is read along a part, and the places in m from its first end."""
+        return {name: np.array(places) for name, (_, places) in self.observer.profiles.items()}
 
     def __contains__(self, name: object) -> bool:
         return isinstance(name, str) and name in self.observer.units
