@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from shaftwork import scenes
+    from shaftwork import scenes, studies
     from shaftwork.components.base import Component, Port, Signal, component
     from shaftwork.components.branches import (
         ACROSS,
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from shaftwork.components.loads import *
     from shaftwork.components.machines import *
     from shaftwork.components.rotation import *
-    from shaftwork.components.shaft_models import CentralDifference, Lumped, OneSpring, Rigid, Spectral
+    from shaftwork.components.shaft_models import Auto, CentralDifference, Lumped, OneSpring, Rigid, Spectral, Wave
     from shaftwork.components.shafts import *
     from shaftwork.components.sources import *
     from shaftwork.components.translation import *
@@ -58,7 +58,15 @@ _HOME = {
         "ThroughLaw",
         "ThroughStore",
     ),
-    "shaftwork.components.shaft_models": ("CentralDifference", "Lumped", "OneSpring", "Rigid", "Spectral"),
+    "shaftwork.components.shaft_models": (
+        "Auto",
+        "CentralDifference",
+        "Lumped",
+        "OneSpring",
+        "Rigid",
+        "Spectral",
+        "Wave",
+    ),
     "shaftwork.components.laws": ("Ramp", "Step", "Table", "omega", "phi", "psi", "s", "t", "u", "v"),
     "shaftwork.core.errors": (
         "CompileError",
@@ -76,6 +84,7 @@ _HOME = {
     "shaftwork.pipeline.network": ("Network",),
     "shaftwork.results.solution": ("Solution",),
 }
+_PACKAGES = ("scenes", "studies")
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 
 
@@ -83,8 +92,8 @@ def __getattr__(name: str) -> Any:
     """Load a public name: one of the table above, a sub-package, or a component from the registry."""
     if name in _MODULE_OF:
         value = getattr(import_module(_MODULE_OF[name]), name)
-    elif name == "scenes":
-        value = import_module("shaftwork.scenes")
+    elif name in _PACKAGES:
+        value = import_module(f"shaftwork.{name}")
     elif name.startswith("_"):
         raise AttributeError(f"module 'shaftwork' has no attribute '{name}'")
     else:
@@ -99,4 +108,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*_MODULE_OF, "scenes", *import_module("shaftwork.components").REGISTRY})
+    return sorted({*_MODULE_OF, *_PACKAGES, *import_module("shaftwork.components").REGISTRY})

@@ -87,12 +87,18 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--t-end", metavar="S", type=float, help="end of the motion in s")
     run.add_argument("--rtol", type=float, default=1e-8, help="relative tolerance (default %(default)g)")
     run.add_argument(
-        "--engine", default="auto", choices=("auto", "scipy", "scipy-radau", "heyoka", "sundials", "exact")
+        "--engine",
+        default="auto",
+        choices=("auto", "scipy", "scipy-radau", "heyoka", "sundials", "exact", "banded", "wave"),
     )
     latex = command("latex", _latex, "print the equations as LaTeX")
     latex.add_argument("--form", choices=("kirchhoff", "state", "second-order"), help="which equations (default: all)")
     latex.add_argument("--values", action="store_true", help="numbers instead of symbols")
     latex.add_argument("--document", action="store_true", help="a whole document that pdflatex compiles")
+    compare = command("compare", _compare, "lumped against distributed shafts: error against run time")
+    compare.add_argument("--shaft", metavar="NAME", help="which shaft (default: the first)")
+    compare.add_argument("--t-end", metavar="S", type=float, help="end of the motion in s")
+    compare.add_argument("--out", metavar="DIR", type=Path, help="folder for picture and CSV")
     command("check", _check, "structure, states, time constants, stiffness, and the engine that auto would take")
     return parser
 
@@ -134,6 +140,28 @@ def _run(options: argparse.Namespace) -> None:
     _table(solution, signals)
     if options.out:
         _write(solution, signals, options.out)
+
+
+def _compare(options: argparse.Namespace) -> None:
+    from shaftwork.components.shafts import Shaft
+    from shaftwork.core.errors import ParameterError
+    from shaftwork.studies import work_precision
+
+    net, scene = _load(options.model)
+    shafts = [part.name for part in net.parts if isinstance(part, Shaft)]
+    if not shafts:
+        raise ParameterError(
+            f"'{net.name}' has no shaft whose models could be compared. Try: shaftwork compare shaft-step."
+        )
+    if options.out:
+        _make_folder(options.out)
+    t_end = options.t_end if options.t_end is not None else scene.t_end if scene else FALLBACK_END
+    study = work_precision(net, options.shaft or shafts[0], t_end=t_end)
+    print(f"{study}\n\n{study.advice}")
+    if options.out:
+        study.to_csv(options.out / "work-precision.csv")
+        study.plot().savefig(options.out / "work-precision.png", dpi=150)
+        print(f"\nwritten: {options.out / 'work-precision.csv'}, {options.out / 'work-precision.png'}")
 
 
 def _make_folder(folder: Path) -> None:

@@ -259,3 +259,28 @@ def test_a_law_of_the_speed_may_stand_at_either_end() -> None:
     net.add(sw.TorqueSource("brake", tau=-5 * sympy.tanh(sw.omega / 0.5)), "l")
     first, second = (net.simulate(0.05, engine=name, rtol=1e-9) for name in ("auto", "scipy-radau"))
     assert np.abs(first["line.tau_b"] - second["line.tau_b"]).max() < 1e-5 * np.abs(first["line.tau_b"]).max()
+
+
+@pytest.mark.parametrize(("f_max", "tolerance"), [(100.0, 1e-3), (2000.0, 1e-2), (5000.0, 1e-3), (20000.0, 1e-6)])
+def test_auto_takes_the_smallest_spectral_model_that_is_right_up_to_its_frequency(
+    f_max: float, tolerance: float
+) -> None:
+    part = sw.Shaft("line", **STEEL, model=sw.Auto(f_max=f_max, tolerance=tolerance))
+    speed = np.sqrt(77.5e9 / 7900)
+
+    def error(n: int) -> float:
+        net = sw.Network("free")
+        net.add(sw.Shaft("line", **STEEL, model=sw.Spectral(n)), "a", "b")
+        compiled = net.compile()
+        found = np.linalg.eigvals(compiled.jacobian(0.0, np.zeros(len(compiled.states))).toarray()).imag
+        lowest = np.sort(found[found > 1.0]) / (2 * np.pi)
+        exact = speed / 2 * np.arange(1, max(f_max / (speed / 2), 1) + 0.5)
+        return float(np.abs(lowest[: len(exact)] / exact - 1).max()) if len(lowest) >= len(exact) else np.inf
+
+    assert error(part.resolved.n) <= tolerance
+    assert part.resolved.n == 1 or error(part.resolved.n - 1) > tolerance / 10  # the clamped shaft decides too
+
+
+def test_a_bore_must_be_smaller_than_the_shaft() -> None:
+    with pytest.raises(sw.ParameterError, match=r"inner_diameter = 0\.02 must be smaller than the diameter 0\.02"):
+        sw.Shaft("line", **STEEL, inner_diameter=0.02)

@@ -181,3 +181,39 @@ def test_a_capacitor_behind_a_voltage_that_jumps_takes_the_whole_jump() -> None:
     sol = net.simulate(1.0, t_eval=[0.25, 0.5, 1.0])
     # 5 V at once, then with (C1 + C2) R = 2 s towards zero
     assert sol["C2.u"] == pytest.approx([0.0, 5.0, 5 * np.exp(-0.25)], abs=1e-7)
+
+
+@pytest.mark.parametrize("omega_s", [0.1, 0.01, 1e-3, 1e-4])
+@pytest.mark.parametrize(("amplitude", "rate"), [(3.0, 2.0), (25.0, 3.0)])
+def test_a_rounded_travel_resistance_turns_with_the_speed(omega_s: float, amplitude: float, rate: float) -> None:
+    """Away from standstill tanh(omega / omega_s) is 1 to the last bit, and a series there does not show its fall."""
+    net = body(amplitude * sympy.sin(rate * sw.t))
+    net.add(sw.CoulombLoad("load", tau=2.0, omega_s=omega_s), "n")
+    fast, slow = (net.simulate(3.0, engine=engine, rtol=1e-10) for engine in ("heyoka", "scipy"))
+    assert fast["J.omega"] == pytest.approx(slow["J.omega"], abs=1e-7)
+    assert fast.energy_residual < 1e-10
+
+
+@pytest.mark.parametrize("width", [1e-2, 1e-4])
+def test_a_short_pulse_is_not_stepped_over_by_the_series(width: float) -> None:
+    """The work of a bell curve: its area is width sqrt(pi)."""
+    sol = body(sympy.exp(-(((sw.t - 0.5) / width) ** 2)) / width).simulate(1.0, engine="heyoka")
+    assert sol["J.omega"][-1] == pytest.approx(np.sqrt(np.pi), rel=1e-8)  # the tail beyond e^-24
+
+
+WRAPPED = [
+    sympy.atan2(sympy.sin(sw.phi), sympy.cos(sw.phi)),
+    sympy.atan(sympy.tan(sw.phi)),
+    sympy.asin(sympy.sin(sw.phi)),
+]
+
+
+@pytest.mark.parametrize("angle", WRAPPED, ids=str)
+def test_an_angle_that_is_brought_back_into_one_turn_begins_anew(angle: sympy.Expr) -> None:
+    """Neither taken for the angle itself nor for its smooth continuation."""
+    sol, reference = (body(3 + angle).simulate(3.0, engine=engine) for engine in ("auto", "scipy-radau"))
+    assert not body(3 + angle).compile().linear
+    assert sol["J.omega"][-1] == pytest.approx(reference["J.omega"][-1], rel=1e-3)  # Radau steps over the jumps
+    assert sol.energy_residual < 1e-5
+    with pytest.raises(sw.SimulationError, match="needs the equations as a heyoka program"):
+        body(3 + angle).simulate(3.0, engine="heyoka")

@@ -11,7 +11,6 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.inputs import Inputs
 from shaftwork.codegen.loops import LoopSolver
 from shaftwork.codegen.matrices import LinearPart, MatrixAssembly
-from shaftwork.core.times import just_after, just_before
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
 
@@ -51,7 +50,7 @@ class BoundArrays:
         inputs, part = self.program.inputs, self.part
         if self.loops is not None:
             return self._values_with_loops(self.loops, t, x)
-        y = part.C @ x
+        y = part.C @ x[: inputs.states]
         if part.D.nnz:  # only inputs of time alone reach the outputs: else there is a loop
             first = inputs.values(t, np.zeros((inputs.outputs, *x.shape[1:])), x, self.p)
             y = y + part.D @ _times(inputs.of_time, first)
@@ -71,7 +70,7 @@ class BoundArrays:
 
     def rates(self, t: Any, x: Array, y: Array, u: Array) -> Array:
         """x' from the states and the inputs that go with them."""
-        rate: Array = self.part.A @ x + self.part.B @ u
+        rate: Array = self.part.A @ x[: self.part.A.shape[0]] + self.part.B @ u
         if self._has_slopes:
             slopes = self.program.inputs.time_slopes(t, y, x, self.p)
             rate = rate + self.part.B1 @ _times(self.program.inputs.of_time, slopes)
@@ -98,20 +97,20 @@ class BoundArrays:
         branches = self.program.assembly.inputs[slopes != 0]
         return tuple(dict.fromkeys(graph.part_of(int(branch)).name for branch in branches))
 
-    def impulse(self, t: float, x: Array, *, from_zero: bool = False) -> Array:
+    def impulse(self, x: Array, before: float | None, after: float) -> Array:
         """The states after the inputs have jumped (impulses through rigid joints).
 
         Args:
-            t: time of the jump.
             x: (n,) states before it.
-            from_zero: whether all inputs were zero before it.
+            before: time just before the jump; None where all inputs were zero.
+            after: time just after it.
         """
         if not self._has_slopes:
             return x
         inputs, zero = self.program.inputs, np.zeros(self.program.inputs.outputs)
-        step = inputs.values(just_after(t), zero, x, self.p)
-        if not from_zero:
-            step = step - inputs.values(just_before(t), zero, x, self.p)
+        step = inputs.values(after, zero, x, self.p)
+        if before is not None:
+            step = step - inputs.values(before, zero, x, self.p)
         return np.asarray(x + self.part.B1 @ (step * inputs.of_time))
 
 

@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 
 # From about this number of states on, unrolled code takes seconds to compile and is hardly faster.
 LARGEST_UNROLLED = 100
+# e^-24 is 4e-11: what a series misses beyond is below the tolerance, and what follows it sees.
+NEAR = 24.0
 
 
 @dataclass(frozen=True)
@@ -30,14 +32,19 @@ class HeyokaProgram:
         rows: f, one heyoka expression for each state; parameters are par[0..], the signs of the switches follow them.
         switches: heyoka expressions whose sign the rows depend on.
         conditions: the same as text, for messages.
+        timed: which of them depend on the time alone; their signs are known before a run, piece by piece.
         parameter_count: number of parameters of the model, without the signs.
+        fading: heyoka expressions u of functions that are constant to the last bit where e^-|u| is nothing beside 1; a
+            step ends where u comes near, because a series from afar does not show that they change there.
     """
 
     variables: tuple[Any, ...]
     rows: tuple[Any, ...]
     switches: tuple[Any, ...]
     conditions: tuple[str, ...]
+    timed: NDArray[np.bool_]
     parameter_count: int
+    fading: tuple[Any, ...] = ()
     _compiled: dict[float, Any] = field(default_factory=dict, repr=False, compare=False)
     _switch_values: list[Any] = field(default_factory=list, repr=False, compare=False)
 
@@ -57,12 +64,17 @@ class HeyokaProgram:
         values: Array = compiled(x, pars=parameters[: compiled.nparams], time=t)
         return values
 
-    def switch_signs(self, t: float, x: Array, parameters: Array) -> Array:
-        """Signs of the switches (k,) at time t in s, state x (n,) and the model's own parameters (p,)."""
-        signs = np.zeros(len(self.switches))
+    def switch_signs(self, t: float, x: Array, parameters: Array, held: Array | None = None) -> Array:
+        """Signs of the switches (k,) at time t in s, state x (n,) and the model's own parameters (p,).
+
+        Those of `held` (k,) that are not zero are taken as they are.
+        """
+        held = np.zeros(len(self.switches)) if held is None else held
+        signs = held
         # A switch may depend on the sign of an earlier one: the maximum of three compares with the maximum of two.
         for _ in range(len(self.switches)):
-            found = np.sign(self.switch_values(t, x, np.concatenate([parameters, signs])))
+            values = self.switch_values(t, x, np.concatenate([parameters, signs]))
+            found = np.where(held == 0, np.sign(values), held)
             if np.array_equal(found, signs):
                 break
             signs = found
@@ -77,10 +89,13 @@ class HeyokaProgram:
 
         heyoka.set_logger_level_error()  # a failed run says so itself
         options: dict[str, Any] = {}
-        if self.switches:
+        if self.switches or self.fading:
             options["t_events"] = [
-                _crossing(heyoka.par[index], switch, index)
-                for index, switch in enumerate(self.switches, self.parameter_count)
+                *(
+                    _crossing(heyoka.par[index], switch, index)
+                    for index, switch in enumerate(self.switches, self.parameter_count)
+                ),
+                *(heyoka.t_event(value**2 - NEAR**2, callback=_go_on) for value in self.fading),
             ]
         return heyoka.taylor_adaptive(
             list(zip(self.variables, self.rows, strict=True)),
@@ -124,8 +139,19 @@ def build(
     translator = Translator(states, time, parameters)
     translated = tuple(translator.expression(row) for row in rows)
     return HeyokaProgram(
-        translator.variables, translated, tuple(translator.switches), tuple(translator.conditions), len(parameters)
+        translator.variables,
+        translated,
+        tuple(translator.switches),
+        tuple(translator.conditions),
+        np.array(translator.timed, dtype=bool),
+        len(parameters),
+        tuple(translator.fading.values()),
     )
+
+
+def _go_on(_integrator: Any, _direction: int) -> bool:
+    """The callback of an event that only ends a step."""
+    return True
 
 
 def _crossing(sign: Any, switch: Any, index: int) -> Any:

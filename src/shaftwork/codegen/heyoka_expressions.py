@@ -14,12 +14,13 @@ from sympy.functions.elementary.piecewise import ExprCondPair
 from sympy.logic.boolalg import ITE, And, BooleanFalse, BooleanTrue, Not, Or, Xor
 
 from shaftwork.components.laws import Interpolation, InterpolationSlope
+from shaftwork.components.slopes import wraps
 from shaftwork.core.errors import CompileError
 
 SAME_NAME: dict[Any, Callable[..., Any]] = {
     getattr(sympy, name): getattr(heyoka, name)
     for name in (
-        *("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh"),
+        *("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh"),
         *("exp", "log", "erf", "erfc"),
     )
 }
@@ -41,6 +42,8 @@ COMPARISONS: dict[Any, Callable[[Any, Any], Any]] = {
 }
 
 
+# Far from zero these are a constant to the last bit, so that a series does not show where they change.
+FADING = (sympy.tanh, sympy.coth, sympy.sech, sympy.csch, sympy.exp)
 # A higher power rises so late from zero that a series of order 13 may not show it, and its step control not see it.
 LARGEST_PRODUCT = 5
 
@@ -58,6 +61,9 @@ class Translator:
         self.variables = tuple(heyoka.expression(f"x{index}") for index in range(len(states)))
         self.switches: list[Any] = []
         self.conditions: list[str] = []
+        self.timed: list[bool] = []
+        self._states = frozenset(states)
+        self.fading: dict[sympy.Expr, Any] = {}
         self._first_sign = len(parameters)
         self._moving = frozenset((*states, time))
         self._done: dict[sympy.Basic, Any] = dict(zip(states, self.variables, strict=True))
@@ -77,6 +83,11 @@ class Translator:
 
     def _translate(self, node: sympy.Basic) -> Any:
         kind = node.func
+        if wraps(node):
+            raise CompileError(f"A Taylor series goes on smoothly where {node} begins a new turn. Use engine='scipy'.")
+        if kind in FADING and not self._moving.isdisjoint(node.free_symbols):
+            rate = 1.0 if kind is sympy.exp else 2.0  # tanh u is 1 - 2 e^(-2 u)
+            self.fading[node.args[0]] = rate * self.expression(node.args[0])
         if kind in SAME_NAME:
             return SAME_NAME[kind](*self.arguments(node))
         if kind in RECIPROCALS:
@@ -135,6 +146,7 @@ class Translator:
                 sign = heyoka.par[self._first_sign + len(self.switches)]
                 self.switches.append(value)
                 self.conditions.append(f"{switch} > 0")
+                self.timed.append(self._states.isdisjoint(switch.free_symbols))
             self._signs[switch] = sign
         return self._signs[switch]
 

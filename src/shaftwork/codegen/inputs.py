@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sympy import Expr, Integer
+from sympy import Expr, I, Integer, nan
 
 from shaftwork.codegen.code import vectorised
 from shaftwork.codegen.elements import Array, Index, TemplateGroup, groups_of
@@ -50,6 +50,7 @@ class Inputs:
         output = {int(branch): k for k, branch in enumerate(outputs)}
         first = self.states - len(form.integrals)
         integral = {branch: first + k for k, branch in enumerate(form.integrals)}
+        integral |= {branch: self.states + k for k, branch in enumerate(form.waves)}
         self._groups = tuple(self._group(made, place, output, integral) for made in groups_of(form.graph, order))
         self.of_time = np.ones(self.size, dtype=bool)
         for group in self._groups:
@@ -58,19 +59,21 @@ class Inputs:
 
     @staticmethod
     def _group(made: TemplateGroup, place: Any, output: Any, integral: Any) -> _Group:
-        law = made.template.law
+        is_wave = made.template.line is not None
+        law = INTEGRAL if is_wave else made.template.law  # both are read from x
         symbols = (TIME, ACROSS, INTEGRAL, *made.template.symbols)
         members = [int(branch) for branch in made.branches]
 
         def function(expression: Expr) -> Function | None:
-            return None if expression == 0 else vectorised(symbols, expression)
+            real = nan if expression.has(I) else expression  # the slope of (-2)^omega has log(-2)
+            return None if real == 0 else vectorised(symbols, real)
 
         reads = made.template.kind is Kind.LAW
         return _Group(
             made,
             np.array([place[branch] for branch in members], dtype=np.intp),
             np.array([output[branch] for branch in members] if reads else [], dtype=np.intp),
-            np.array([integral[branch] for branch in members] if made.template.has_integral else [], dtype=np.intp),
+            np.array([integral[branch] for branch in members] if law.has(INTEGRAL) else [], dtype=np.intp),
             function(law) or vectorised(symbols, Integer(0)),
             (function(slope(law, TIME)), function(slope(law, ACROSS)), function(slope(law, INTEGRAL))),
         )
@@ -103,18 +106,20 @@ class Inputs:
     def reading(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
         """Which input reads which output, and which input reads which integral: (inputs, outputs), (inputs, states)."""
         pairs = [(g.inputs, g.outputs) for g in self._groups if g.outputs.size]
-        integrals = [(g.inputs, g.integrals) for g in self._groups if g.integrals.size]
+        integrals = [(g.inputs, g.integrals) for g in self._groups if g.outputs.size and g.integrals.size]
         return (*_joined(pairs), *_joined(integrals))
 
     def _evaluate(self, pick: Callable[[_Group], Function | None], t: Any, y: Array, x: Array, p: Array) -> Array:
         result = np.zeros((self.size, *np.shape(x)[1:]))
+        t = np.float64(t)  # of Python's floats the cube root of -1 is complex, and 1 / 0 an exception
         with np.errstate(all="ignore"):  # a law that has no value is NaN here; the engines say when and where
             for group in self._groups:
                 function = pick(group)
                 if function is None:
                     continue
                 across = y[group.outputs] if group.outputs.size else 0.0
-                integral = x[group.integrals] if group.integrals.size else 0.0
+                known = group.integrals.size and group.integrals[-1] < len(x)  # not the waves, where none are given
+                integral = x[group.integrals] if known else 0.0
                 parameters = p[group.made_of.places]
                 if result.ndim > 1:
                     parameters = parameters[..., None]

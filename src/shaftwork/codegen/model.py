@@ -58,7 +58,7 @@ class CompiledModel:
     @cached_property
     def rows(self) -> Rows | None:
         """The state equations as expressions, or None where the network is too large or too closely coupled."""
-        if len(self.states) > SCALAR_STATES or len(self.form.graph.branches) > SCALAR_BRANCHES:
+        if self.form.waves or len(self.states) > SCALAR_STATES or len(self.form.graph.branches) > SCALAR_BRANCHES:
             return None
         try:
             return explicit_rows(self.form)

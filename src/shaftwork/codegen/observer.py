@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import cached_property
 
 import numpy as np
@@ -10,9 +10,10 @@ import numpy as np
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.recovery import History, signals_of
-from shaftwork.components.base import Signal
+from shaftwork.codegen.timeline import NOTHING, Timeline
+from shaftwork.codegen.waves import Dense, along_lines
+from shaftwork.components.base import Profile, Signal
 from shaftwork.core.domains import ROTATION
-from shaftwork.core.times import just_after, just_before
 from shaftwork.network.graph import CircuitGraph, GraphPart
 from shaftwork.reduction.form import StateForm
 
@@ -23,12 +24,12 @@ class ModelObserver:
     Args:
         form: the state form.
         bind: makes the array program with the parameter vector of the run; called when a quantity is first read.
-        jumps: times at which inputs jump: there they are read after the jump, as the states are, and where a time is
+        instants: times at which inputs jump: there they are read after the jump, as the states are, and where a time is
             listed twice in a row, first before it.
     """
 
-    def __init__(self, form: StateForm, bind: Callable[[], BoundArrays], jumps: Sequence[float] = ()) -> None:
-        self._form, self._bind, self._jumps = form, bind, np.asarray(jumps, dtype=float)
+    def __init__(self, form: StateForm, bind: Callable[[], BoundArrays], instants: Timeline = NOTHING) -> None:
+        self._form, self._bind, self._instants = form, bind, instants
         self._graph: CircuitGraph = form.graph
         self._last: tuple[tuple[int, int], History] | None = None
 
@@ -59,7 +60,7 @@ class ModelObserver:
         """All branch quantities along a trajectory; the last one asked for is kept."""
         key = (id(t), id(x))
         if self._last is None or self._last[0] != key:
-            self._last = (key, History(self._bind(), self._one_sided(t), x))
+            self._last = (key, History(self._bind(), self._instants.one_sided(t), x))
         return self._last[1]
 
     def signal(self, name: str, t: Array, x: Array) -> Array:
@@ -75,20 +76,29 @@ class ModelObserver:
         part = next(part for part in self._graph.parts if part.name == owner)
         return history.absorbed(part) if quantity == "power" else history.stored(part)
 
-    def _one_sided(self, t: Array) -> Array:
-        """The times, moved by some rounding units to one side of a jump."""
-        if not self._jumps.size:
-            return t
-        at = np.flatnonzero(np.isin(t, self._jumps))
-        moved = t.copy()
-        for k in at:
-            first_of_two = k + 1 < len(t) and t[k + 1] == t[k]
-            moved[k] = just_before(float(t[k])) if first_of_two else just_after(float(t[k]))
-        return moved
+    @cached_property
+    def _profiles(self) -> dict[str, tuple[GraphPart, Profile]]:
+        parts = self._graph.parts
+        return {f"{p.name}.{name}": (p, made) for p in parts for name, made in p.component.profiles().items()}
+
+    @cached_property
+    def profiles(self) -> Mapping[str, tuple[str, tuple[float, ...]]]:
+        """Every quantity that can be read along a part: its unit, and the places in m from the part's first end."""
+        return {
+            name: (made.domain.across.unit if made.kind == "across" else made.domain.through.unit, made.places)
+            for name, (_, made) in self._profiles.items()
+        }
+
+    def profile(self, name: str, t: Array, x: Array, dense: Dense) -> Array:
+        """(k, places) a quantity along a part by its name in `profiles`."""
+        part, profile = self._profiles[name]
+        if profile.shares:
+            return along_lines(self._bind(), part, profile, t, dense)
+        return self.history(t, x).profile(part, profile)
 
     def powers(self, t: Array, x: Array) -> tuple[dict[str, Array], dict[str, Array], dict[str, Array]]:
         """Stored energy, lost power and supplied power by part."""
-        history = History(self._bind(), t, x)
+        history = History(self._bind(), self._instants.one_sided(t), x)
         parts = self._graph.parts
         stored = {part.name: history.stored(part) for part in parts if part.component.role != "source"}
         lost = {part.name: history.lost(part) for part in parts if part.component.role != "source"}

@@ -35,7 +35,7 @@ def initial_state(bound: BoundArrays, given: Mapping[str, float], t0: float) -> 
     Args:
         bound: the array program.
         given: "part.quantity" or "node.quantity" to value in SI.
-        t0: start time, s.
+        t0: start time, s; where something jumps there, a time after it.
 
     Raises:
         SignalError: there is no such quantity.
@@ -43,7 +43,7 @@ def initial_state(bound: BoundArrays, given: Mapping[str, float], t0: float) -> 
     """
     names = [state.name for state in bound.program.form.states]
     place = {name: k for k, name in enumerate(names)}
-    x = bound.impulse(t0, np.zeros(len(names)), from_zero=True)
+    x = bound.impulse(np.zeros(len(names)), None, just_after(t0))
     if not isinstance(given, Mapping):
         raise ParameterError(f"initial = {given!r} must map quantities to values, such as {{'J1.omega': 3.0}}.")
     units = ModelObserver(bound.program.form, lambda: bound).units

@@ -46,7 +46,7 @@ class History:
         first, last = len(form.across_states), len(form.across_states) + len(form.through_states)
         tree[list(form.across_states)] = self.x[:first]
         tree[list(form.across_inputs)] = u[laws:]
-        tree[list(form.tree_conductances)] = part.conductance_x @ self.x + part.conductance_u @ u
+        tree[list(form.tree_conductances)] = part.conductance_x @ self.x[: len(form.states)] + part.conductance_u @ u
         if series := list(form.dependent_through):
             rates = np.zeros_like(tree)
             rates[list(form.through_states)] = rate[first:last]

@@ -51,14 +51,16 @@ class Profile:
         kind: "across" (speed of nodes) or "through" (sum of branches).
         places: (k,) where, in m from the first end, ascending.
         of: for each place the node's name, or the labels of the branches; a port's name stands for what the shaft takes
-            in there, with "-" before it for what it gives.
+            in there, with "-" before it for what it gives; of a line (`shares`) its label.
         domain: of the quantity.
+        shares: where the part is a line that waves travel along, the place as a share of the way from its first end.
     """
 
     kind: Literal["across", "through"]
     places: tuple[float, ...]
     of: tuple[tuple[str, ...], ...]
     domain: Domain
+    shares: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

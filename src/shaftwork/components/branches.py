@@ -18,6 +18,9 @@ ACROSS = Symbol("across", real=True)
 INTEGRAL = Symbol("integral", real=True)
 """The integral of the across variable of the branch in whose law it stands (an angle, a position)."""
 
+HISTORY = Symbol("history", real=True)
+"""What has come from the other end of the line in whose law it stands."""
+
 End = str | None
 """A port or an inner node of the component; None is the reference of the domain (speed zero)."""
 
@@ -70,7 +73,21 @@ class IdealCoupling:
     label: str = ""
 
 
-Branch = AcrossStore | ThroughStore | ThroughLaw | AcrossLaw | IdealCoupling
+@dataclass(frozen=True)
+class DelayLine:
+    """A lossless line between two ends, each against the reference: what leaves the one arrives at the other later.
+
+    Law: at each end through = impedance * across + history, and the history of an end at time t is minus
+    2 * impedance * across + history of the other end at time t - delay. Source: Bergeron 1949.
+    """
+
+    impedance: Expr
+    delay: Expr
+    ends: tuple[str, str] | None = None
+    label: str = "h"
+
+
+Branch = AcrossStore | ThroughStore | ThroughLaw | AcrossLaw | IdealCoupling | DelayLine
 
 
 def rigid(ends: tuple[End, End] | None, label: str = "") -> IdealCoupling:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import combinations, pairwise
 from typing import Any, Self
 
@@ -253,22 +253,29 @@ def breakpoints(expression: sympy.Basic, values: Mapping[sympy.Symbol, float] | 
     """Times in s at which an expression jumps or kinks because of the time alone, increasing.
 
     Found are comparisons, Heaviside, sign, Abs, Max, Min and tables of arguments that are linear in `t`. A switch that
-    depends on a state, or on a nonlinear function of time, has no time that is known beforehand and is left out; for
-    the latter `pieces_degree` is None. A listed time need not be a kink (equal slopes on both sides).
+    depends on a state has no time that is known beforehand and is left out, as is one that depends on a nonlinear
+    function of time: that is searched for in the span of a run (`codegen.switching`), and `pieces_degree` is None. A
+    listed time need not be a kink (equal slopes on both sides).
 
     Args:
         expression: a law or any expression that contains laws.
         values: a number for each parameter in the expression.
     """
+    numbers = {symbol: sympy.Float(value) for symbol, value in (values or {}).items()}
     times: set[float] = set()
-    for node in sympy.preorder_traversal(expression):
-        for argument, levels in _switches(node):
-            line = _line(argument.xreplace({symbol: sympy.Float(value) for symbol, value in (values or {}).items()}))
-            if line is None or line[0].is_zero or line[0].free_symbols | line[1].free_symbols:
-                continue
-            slope, offset = float(line[0]), float(line[1])
-            times.update((level - offset) / slope + 0.0 for level in levels)
+    for argument, levels in switches(expression):
+        found = line(argument.xreplace(numbers))
+        if found is None or found[0].is_zero or found[0].free_symbols | found[1].free_symbols:
+            continue
+        slope, offset = float(found[0]), float(found[1])
+        times.update((level - offset) / slope + 0.0 for level in levels)
     return tuple(sorted(time for time in times if math.isfinite(time)))
+
+
+def switches(expression: sympy.Basic) -> Iterator[tuple[sympy.Expr, Sequence[float]]]:
+    """Every argument in an expression with the levels at which it makes the expression jump or bend."""
+    for node in sympy.preorder_traversal(expression):
+        yield from _switches(node)
 
 
 def pieces_degree(expression: sympy.Expr) -> int | None:
@@ -284,7 +291,7 @@ def _degree(expression: sympy.Expr) -> float:
     """Degree in t between breakpoints; infinite where the expression is no polynomial there."""
     if t not in expression.free_symbols:
         return 0
-    if any(_line(argument) is None for argument, _ in _switches(expression)):
+    if any(line(argument) is None for argument, _ in _switches(expression)):
         return math.inf
     match expression:
         case sympy.Symbol():
@@ -296,8 +303,8 @@ def _degree(expression: sympy.Expr) -> float:
         case sympy.Pow(exp=sympy.Integer(is_positive=True) as exponent):
             return _degree(expression.base) * int(exponent)
         case sympy.Piecewise():
-            switches = [switch for _, condition in expression.args for switch in condition.atoms(Relational)]
-            located = all(_line(switch.lhs - switch.rhs) is not None for switch in switches)
+            relations = [relation for _, condition in expression.args for relation in condition.atoms(Relational)]
+            located = all(line(relation.lhs - relation.rhs) is not None for relation in relations)
             return max(_degree(value) for value, _ in expression.args) if located else math.inf
         case sympy.Heaviside() | sympy.sign() | InterpolationSlope():
             return 0
@@ -315,12 +322,18 @@ def _switches(node: sympy.Basic) -> Iterable[tuple[sympy.Expr, Sequence[float]]]
             return [(node.args[0], (0.0,))]
         case sympy.Max() | sympy.Min():
             return [(first - second, (0.0,)) for first, second in combinations(node.args, 2)]
+        case sympy.atan2():
+            return [(node.args[0], (0.0,))]
+        case sympy.tan() | sympy.sec():
+            return [(sympy.cos(node.args[0]), (0.0,))]
+        case sympy.cot() | sympy.csc():
+            return [(sympy.sin(node.args[0]), (0.0,))]
         case _TableFunction():
             return [(node.argument, node.xs)]
     return []
 
 
-def _line(expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr] | None:
+def line(expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr] | None:
     """Slope and offset of an expression that is linear in t, else None."""
     polynomial = expression.as_poly(t)
     if polynomial is None or polynomial.degree() > 1:

@@ -20,7 +20,9 @@ class CoulombLoad(Component):
     """
 
     tau: float = parameter("N*m", "size of the resistance", at_least=0, latex=r"\tau_0")
-    omega_s: float = parameter("rad/s", "speed below which it is rounded", above=0, default=0.01, latex=r"\omega_s")
+    omega_s: float = parameter(
+        "rad/s", "speed below which it is rounded", at_least=1e-6, default=0.01, latex=r"\omega_s"
+    )
 
     role: ClassVar[Role] = "loss"
     ports: ClassVar = (Port("a"),)

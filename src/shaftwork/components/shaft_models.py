@@ -63,17 +63,13 @@ class ShaftModel:
         """
         known = {model.__name__: model for model in MODELS}
         listed = f"The models are: {', '.join(known)}; write for example Lumped(20)."
-        try:
-            call = ast.parse(text, mode="eval").body
-            if not isinstance(call, ast.Call) or not isinstance(call.func, ast.Name) or call.func.id not in known:
-                raise ParameterError(f"{reprlib.repr(text)} is no shaft model. {listed}")
-            values = [ast.literal_eval(value) for value in call.args]
-            named = {str(item.arg): ast.literal_eval(item.value) for item in call.keywords}
-            return known[call.func.id](*values, **named)
-        except ParameterError:
-            raise
-        except (SyntaxError, ValueError, TypeError, RecursionError, MemoryError):
-            raise ParameterError(f"{reprlib.repr(text)} is no shaft model. {listed}") from None
+        match _call(text):
+            case (name, values, named) if name in known:
+                try:
+                    return known[name](*values, **named)
+                except TypeError:
+                    pass
+        raise ParameterError(f"{reprlib.repr(text)} is no shaft model. {listed}")
 
     def mesh(self) -> Mesh:
         """The nodes, stations and weights."""
@@ -81,6 +77,18 @@ class ShaftModel:
 
     def _mesh(self) -> Mesh:
         raise ParameterError(f"{self!r} has no mesh.")
+
+
+def _call(text: Any) -> tuple[str, list[Any], dict[str, Any]] | None:
+    """A call such as "Lumped(20)" as name, values and named values, None where it is not one of plain values."""
+    try:
+        call = ast.parse(text, mode="eval").body
+        if isinstance(call, ast.Call) and isinstance(call.func, ast.Name):
+            named = {str(item.arg): ast.literal_eval(item.value) for item in call.keywords}
+            return call.func.id, [ast.literal_eval(value) for value in call.args], named
+    except (SyntaxError, ValueError, TypeError, RecursionError, MemoryError):
+        pass
+    return None
 
 
 @lru_cache(maxsize=32)
@@ -214,7 +222,88 @@ class Spectral(ShaftModel):
         )
 
 
-MODELS: tuple[type[ShaftModel], ...] = (Rigid, OneSpring, Lumped, CentralDifference, Spectral)
+@dataclass(frozen=True)
+class Wave(ShaftModel):
+    """Two travelling waves: the exact solution of the shaft without internal damping.
+
+    What leaves one end arrives at the other a delay L sqrt(density / shear_modulus) later. Bearing friction is light:
+    it is lumped, half of it in the middle and a quarter at each end, as is usual for lines with losses, which is right
+    for motions slower than the delay. Such a network is solved by the engine "wave" alone.
+
+    Args:
+        places: number of places, the ends among them, at which speed and torque are read along the shaft.
+
+    Source: Bergeron 1949; Dommel, Digital computer solution of electromagnetic transients, 1969.
+    """
+
+    places: int = 5
+
+    purpose: ClassVar[str] = "travelling waves; exact without internal damping"
+
+    def __post_init__(self) -> None:
+        _whole(self, "places", 2, MOST_ELEMENTS)
+
+
+@dataclass(frozen=True)
+class Auto(ShaftModel):
+    """The smallest spectral model whose natural frequencies are right up to a highest one.
+
+    The shaft by itself, free at one end and clamped or free at the other, is compared with its exact frequencies; of
+    all models the spectral one needs the fewest states at any tolerance below a few per cent, as
+    `shaftwork compare` shows.
+
+    Args:
+        f_max: highest frequency that matters, Hz.
+        tolerance: relative error of the natural frequencies up to it.
+    """
+
+    f_max: float = 1000.0
+    tolerance: float = 1e-3
+
+    purpose: ClassVar[str] = "the smallest spectral model that is right up to a frequency"
+
+    def __post_init__(self) -> None:
+        for name, least, most in (("f_max", 0.0, 1e12), ("tolerance", 1e-12, 0.1)):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value <= most:
+                raise ParameterError(f"Auto: {name} = {value!r} must be a number from {least:g} to {most:g}.")
+
+    def chosen(self, delay: float) -> Spectral:
+        """The model for a shaft that a wave crosses in a delay, s.
+
+        Raises:
+            ParameterError: the shaft is too long for one polynomial.
+        """
+        waves = 2 * self.f_max * delay  # half waves along the shaft at the highest frequency
+        for n in range(1, MOST_SPECTRAL + 1):
+            if n > waves and _frequency_error(Spectral(n), waves) <= self.tolerance:
+                return Spectral(n)
+        raise ParameterError(
+            f"{self!r} asks for {waves:.0f} half waves along the shaft, more than one polynomial holds. "
+            f"Divide the shaft into several in a row, or lower f_max."
+        )
+
+
+def _frequency_error(model: ShaftModel, half_waves: float) -> float:
+    """Largest relative error of the natural frequencies up to a number of half waves, free-free and clamped-free."""
+    mesh = model.mesh()
+    weights = np.zeros((len(mesh.lengths), len(mesh.nodes)))
+    for k, row in enumerate(mesh.weights):
+        for j, weight in row:
+            weights[k, j] += weight
+    matrix = weights / np.sqrt(np.array(mesh.lengths))[:, None] / np.sqrt(np.array(mesh.inertias))[None, :]
+    worst = 0.0
+    for first, kept in ((1.0, matrix), (0.5, matrix[:, 1:])):
+        exact = np.pi * np.arange(first, max(half_waves, 1.0) + 0.5)  # the first mode always counts
+        rates = np.sort(np.linalg.svd(kept, compute_uv=False))
+        rates = rates[rates > 1e-6]
+        if len(rates) < len(exact):
+            return np.inf
+        worst = max(worst, float(np.abs(rates[: len(exact)] / exact - 1).max()))
+    return worst
+
+
+MODELS: tuple[type[ShaftModel], ...] = (Rigid, OneSpring, Lumped, CentralDifference, Spectral, Wave, Auto)
 
 # Interior stencils as (offset, factor), and the first rows and norm of the boundary closure, times the interval.
 _SECOND = ((-1, -1 / 2), (1, 1 / 2))

@@ -2,29 +2,31 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from functools import lru_cache
 from typing import Any
 
-from sympy import Expr, Float, Rational, pi
+from sympy import Expr, Float, Rational, pi, sqrt
 
 from shaftwork.components.base import Component, Port, Profile, Signal, component
 from shaftwork.components.branches import (
     ACROSS,
     AcrossStore,
     Branch,
+    DelayLine,
     End,
     IdealCoupling,
     ThroughLaw,
     ThroughStore,
     rigid,
 )
-from shaftwork.components.shaft_models import Lumped, Mesh, OneSpring, Rigid, ShaftModel
+from shaftwork.components.shaft_models import Auto, Lumped, Mesh, OneSpring, Rigid, ShaftModel, Wave
 from shaftwork.core.domains import ROTATION
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter
 
-ENDS = ("a", "b")
+_ENDS = ("a", "b")
 
 
 @component
@@ -51,12 +53,38 @@ class Shaft(Component):
         if objection is not None:
             raise ParameterError(f"Shaft '{self.name}': model {objection}.")
         object.__setattr__(self, "model", made)
+        if self._value("inner_diameter") >= self._value("diameter"):
+            raise ParameterError(
+                f"Shaft '{self.name}': inner_diameter = {self.inner_diameter!r} must be smaller than the diameter "
+                f"{self.diameter!r}."
+            )
+        if isinstance(made, Wave) and self._value("damping") != 0:
+            raise ParameterError(
+                f"Shaft '{self.name}': damping = {self.damping!r} with model=Wave(), whose waves travel without "
+                "internal damping. Take Spectral(16) or Lumped(100), or leave the damping out."
+            )
+
+    def _value(self, name: str) -> float:
+        """A parameter in SI; for one that is not admissible, which the checks of the network report, some number."""
+        value, objection = self.declared[name].magnitude(getattr(self, name))
+        return float(value) if objection is None else float(name not in ("inner_diameter", "damping"))
+
+    @property
+    def resolved(self) -> ShaftModel:
+        """The model, with `Auto` replaced by what it chooses for this shaft."""
+        if not isinstance(self.model, Auto):
+            return self.model
+        return self.model.chosen(
+            self._value("length") * math.sqrt(self._value("density") / self._value("shear_modulus"))
+        )
 
     def inner_ports(self) -> tuple[Port, ...]:
         """The speeds between the ends, and the rates of twist that more than two speeds make up."""
-        if isinstance(self.model, Rigid | OneSpring):
+        if isinstance(self.resolved, Rigid | OneSpring):
             return ()
-        mesh = self.model.mesh()
+        if isinstance(self.resolved, Wave):
+            return (Port("middle"),) if self.friction else ()
+        mesh = self.resolved.mesh()
         twists = (f"twist{k}" for k, row in enumerate(mesh.weights) if not _is_difference(row))
         return tuple(Port(name) for name in (*_names(mesh)[1:-1], *twists))
 
@@ -67,18 +95,29 @@ class Shaft(Component):
             "tau_b": Signal("through", ("b", None), ROTATION, -1),
             "omega_a": Signal("across", ("a", None), ROTATION),
             "omega_b": Signal("across", ("b", None), ROTATION),
-            "omega_rel": Signal("across", ENDS, ROTATION),
+            "omega_rel": Signal("across", _ENDS, ROTATION),
         }
 
     def profiles(self) -> dict[str, Profile]:
         """Speed and torque along the shaft."""
         ends = (0.0, self.length)
-        if isinstance(self.model, Rigid | OneSpring):
+        if isinstance(self.resolved, Rigid | OneSpring):
             return {
                 "tau": Profile("through", ends, (("a",), ("-b",)), ROTATION),
                 "omega": Profile("across", ends, (("a",), ("b",)), ROTATION),
             }
-        mesh = self.model.mesh()
+        if isinstance(self.resolved, Wave):
+            shares = [k / (self.resolved.places - 1) for k in range(self.resolved.places)]
+            lines = (("h", 0.0, 1.0),) if not self.friction else (("h1", 0.0, 0.5), ("h2", 0.5, 1.0))
+            label = {share: next(line for line in lines if share <= line[2]) for share in shares}
+            of = tuple((label[share][0],) for share in shares)
+            within = tuple((share - label[share][1]) / (label[share][2] - label[share][1]) for share in shares)
+            places = tuple(share * self.length for share in shares)
+            return {
+                "tau": Profile("through", places, of, ROTATION, within),
+                "omega": Profile("across", places, of, ROTATION, within),
+            }
+        mesh = self.resolved.mesh()
         inside = [(y * self.length, (f"tau_c_{k}", f"tau_d_{k}")) for k, y in enumerate(mesh.stations) if 0 < y < 1]
         places, of = zip((0.0, ("a",)), *inside, (self.length, ("-b",)), strict=True)
         nodes = tuple((name,) for name in _names(mesh))
@@ -90,18 +129,31 @@ class Shaft(Component):
     def branches(self, p: Any) -> Iterator[Branch]:
         area = pi * (p.diameter**4 - p.inner_diameter**4) / 32
         inertia, stiffness = p.density * area * p.length, p.shear_modulus * area / p.length
-        match self.model:
+        match self.resolved:
             case Rigid():
                 yield AcrossStore(inertia, ("a", None))
-                yield rigid(ENDS)
+                yield rigid(_ENDS)
             case OneSpring():
-                yield ThroughStore(stiffness, ENDS, "tau_c")
-                yield ThroughLaw(p.damping / p.length * ACROSS, ENDS)
+                yield ThroughStore(stiffness, _ENDS, "tau_c")
+                yield ThroughLaw(p.damping / p.length * ACROSS, _ENDS)
+            case Wave():
+                yield from self._waves(p, area)
             case _:
                 yield from self._distributed(p, inertia, stiffness)
 
+    def _waves(self, p: Any, area: Expr) -> Iterator[Branch]:
+        impedance, delay = area * sqrt(p.density * p.shear_modulus), p.length * sqrt(p.density / p.shear_modulus)
+        if p.friction == 0:
+            yield DelayLine(impedance, delay, _ENDS)
+            return
+        friction = p.friction * p.length
+        for name, share in (("a", Rational(1, 4)), ("middle", Rational(1, 2)), ("b", Rational(1, 4))):
+            yield ThroughLaw(friction * share * ACROSS, (name, None), f"tau_d_{name}")
+        yield DelayLine(impedance, delay / 2, ("a", "middle"), "h1")
+        yield DelayLine(impedance, delay / 2, ("middle", "b"), "h2")
+
     def _distributed(self, p: Any, inertia: Expr, stiffness: Expr) -> Iterator[Branch]:
-        mesh = self.model.mesh()
+        mesh = self.resolved.mesh()
         names = _names(mesh)
         friction, damping = p.friction * p.length, p.damping / p.length
         at_nodes = {

@@ -2,13 +2,43 @@
 
 from __future__ import annotations
 
-from sympy import Abs, Dummy, Expr, Heaviside, Symbol, ceiling, floor, sign
+from sympy import (
+    Abs,
+    Basic,
+    Dummy,
+    Expr,
+    Heaviside,
+    Symbol,
+    acos,
+    acot,
+    acsc,
+    asec,
+    asin,
+    atan,
+    atan2,
+    ceiling,
+    cos,
+    cot,
+    csc,
+    floor,
+    preorder_traversal,
+    sec,
+    sign,
+    sin,
+    tan,
+)
 from sympy.core.relational import Relational
 
 from shaftwork.components.laws import InterpolationSlope
 
 STEPS = (sign, Heaviside, Relational, InterpolationSlope, floor, ceiling)
 """What is constant but for jumps."""
+TURNING = (sin, cos, tan, cot, sec, csc)
+
+
+def wraps(node: Basic) -> bool:
+    """Whether a function brings an angle back into one turn, with a jump or a kink where the next turn begins."""
+    return isinstance(node, atan2) or (isinstance(node, atan | asin | acos | acot | asec | acsc) and node.has(*TURNING))
 
 
 def slope(expression: Expr, symbol: Symbol) -> Expr:
@@ -37,4 +67,5 @@ def slope(expression: Expr, symbol: Symbol) -> Expr:
 
 def jumps(expression: Expr, *symbols: Symbol) -> bool:
     """Whether a law may jump in one of the symbols, so that it is not linear in it even where its slope is constant."""
-    return any(not node.free_symbols.isdisjoint(symbols) for node in expression.atoms(*STEPS))
+    found = (node for node in preorder_traversal(expression) if isinstance(node, STEPS) or wraps(node))
+    return any(not node.free_symbols.isdisjoint(symbols) for node in found)

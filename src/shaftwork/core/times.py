@@ -16,3 +16,8 @@ def just_before(time: float) -> float:
 def just_after(time: float) -> float:
     """The time in s and a few rounding units more: an input that jumps there has its value after the jump."""
     return time + ROUNDINGS * math.ulp(time)
+
+
+def around(time: float) -> tuple[float, float]:
+    """`just_before` and `just_after`."""
+    return just_before(time), just_after(time)

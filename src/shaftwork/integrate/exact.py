@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -13,7 +14,7 @@ from scipy.linalg import expm
 from scipy.sparse.linalg import expm_multiply
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.integrate.modal import find_modes
+from shaftwork.integrate.modal import Modes, find_modes
 from shaftwork.integrate.pieces import Piece, both_sides, failure, pieces, start_of_piece
 from shaftwork.integrate.problem import Array, LinearInputs, Problem, Trajectory
 from shaftwork.integrate.stiffness import balance, norm, scale_by
@@ -47,20 +48,21 @@ def solve(problem: Problem) -> Trajectory:
             "and here a law is not linear in speed and angle, or an input such as sin(t) is no straight line. "
             "Take the engine 'auto'."
         )
-    system = _System(problem.linear, dense_form=prefers_dense(problem, problem.linear))
+    system = _system(problem.linear)
+    dense_form = prefers_dense(problem, problem.linear)
     x = np.asarray(problem.x0, dtype=float)
     spans: list[_Span] = []
     for piece in pieces(problem):
         start = start_of_piece(problem, piece, x)
         with np.errstate(over="ignore", invalid="ignore"):
-            span = _span(problem, system, piece, start)
+            span = _span(problem, system, piece, start, dense_form=dense_form)
         spans.append(span)
-        x = span.states[-1]
+        x = span.end
         if not np.isfinite(x).all():
             raise failure(problem, "exact", piece.end, x, "the motion is unbounded")
     dense = _ExactDense(tuple(spans))
     if problem.t_eval is None:
-        t, states = both_sides(problem, [span.times for span in spans], [span.states for span in spans])
+        t, states = both_sides(problem, [span.times for span in spans], [span.at(span.times) for span in spans])
     else:
         t = np.asarray(problem.t_eval, dtype=float)
         states = dense(t)
@@ -83,11 +85,9 @@ def _dense_cost(problem: Problem) -> float:
 
 
 def _sparse_cost(problem: Problem, linear: LinearInputs) -> float:
-    matrix = sparse.csr_array(linear.A)
-    scale = balance(matrix)
-    reach = norm(scale_by(matrix, scale)) * (problem.t_end - problem.t0)
-    products = TAYLOR_PRODUCTS * reach + 20 * _size(problem)[1]
-    return float(products * (SPARSE_CALL + matrix.nnz / SPARSE_RATE))
+    system = _system(linear)
+    products = TAYLOR_PRODUCTS * system.norm * (problem.t_end - problem.t0) + 20 * _size(problem)[1]
+    return float(products * (SPARSE_CALL + system.matrix.nnz / SPARSE_RATE))
 
 
 def _size(problem: Problem) -> tuple[int, int]:
@@ -97,13 +97,24 @@ def _size(problem: Problem) -> tuple[int, int]:
 class _System:
     """The matrix of a problem in scaled coordinates x / scale, and its modes where they are of use."""
 
-    def __init__(self, linear: LinearInputs, *, dense_form: bool) -> None:
+    def __init__(self, linear: LinearInputs) -> None:
         matrix = sparse.csr_array(linear.A)
         self.forcing = linear.forcing
-        self.dense_form = dense_form
         self.scale = balance(matrix)
         self.matrix = scale_by(matrix, self.scale)
-        self.modes = find_modes(self.matrix.toarray()) if dense_form else None
+        self.norm = norm(self.matrix)
+
+    @cached_property
+    def modes(self) -> Modes | None:
+        """The modes, or None where they are too badly conditioned."""
+        return find_modes(self.matrix.toarray())
+
+
+def _system(linear: LinearInputs) -> _System:
+    if "exact" not in linear.found:
+        linear.found["exact"] = _System(linear)
+    found: _System = linear.found["exact"]
+    return found
 
 
 @dataclass(frozen=True)
@@ -156,12 +167,12 @@ class _Span:
 
     Args:
         times: (k,) nodes in s.
-        states: (k, n) states there.
+        end: (n,) state at the last of them.
         at: states (m, n) at any times (m,) of the piece.
     """
 
     times: Array
-    states: Array
+    end: Array
     at: Callable[[Array], Array]
 
 
@@ -179,17 +190,18 @@ class _ExactDense:
     def __call__(self, times: Array) -> Array:
         times = np.atleast_1d(np.asarray(times, dtype=float))
         index = np.clip(np.searchsorted(self._starts, times, side="right") - 1, 0, len(self._spans) - 1)
-        states = np.empty((times.size, self._spans[0].states.shape[1]))
+        states = np.empty((times.size, self._spans[0].end.size))
         for number in np.unique(index):
             states[index == number] = self._spans[number].at(times[index == number])
         return states
 
 
-def _span(problem: Problem, system: _System, piece: Piece, x: Array) -> _Span:
+def _span(problem: Problem, system: _System, piece: Piece, x: Array, *, dense_form: bool) -> _Span:
     times = _nodes(problem, piece)
     level, slope = _straight_line(problem, system.forcing, piece)
-    if system.modes is not None:
-        modes, scale = system.modes, system.scale
+    modes = system.modes if dense_form else None
+    if modes is not None:
+        scale = system.scale
         start, line = x / scale, (level / scale, slope / scale)
 
         def at(asked: Array) -> Array:
@@ -197,15 +209,15 @@ def _span(problem: Problem, system: _System, piece: Piece, x: Array) -> _Span:
             states[asked == piece.start] = x  # without the rounding of the way to the modes and back
             return states
 
-        return _Span(times, np.vstack([x, at(times[1:])]), at)
-    propagator = _propagator(system, level, slope)
+        return _Span(times, at(np.array([piece.end]))[0], at)
+    propagator = _propagator(system, level, slope, dense_form=dense_form)
     states = np.empty((times.size, x.size))
     states[0] = x
     for first, count in _equal_steps(times):
         step = (times[first + count] - times[first]) / count
         block = propagator.march(states[first], times[first] - piece.start, step, count)
         states[first + 1 : first + 1 + count] = block
-    return _Span(times, states, lambda asked: propagator.between(times, states, asked))
+    return _Span(times, states[-1], lambda asked: propagator.between(times, states, asked))
 
 
 def _nodes(problem: Problem, piece: Piece) -> Array:
@@ -225,30 +237,31 @@ def _equal_steps(times: Array) -> list[tuple[int, int]]:
     return [(first, last - first) for first, last in pairwise(edges)]
 
 
-def _propagator(system: _System, level: Array, slope: Array) -> _Propagator:
+def _propagator(system: _System, level: Array, slope: Array, *, dense_form: bool) -> _Propagator:
     scale, matrix = system.scale, system.matrix
     # A common factor of all states brings the forcing to the size of the matrix.
     largest = max(np.abs(level / scale).max(initial=0.0), np.abs(slope / scale).max(initial=0.0))
-    size = norm(matrix)
+    size = system.norm
     if largest > 0 and size > 0:
         scale = scale * 2.0 ** np.ceil(np.log2(largest / size))
     forcing = np.column_stack([slope / scale, level / scale])
     clock = sparse.csr_array(np.array([[0.0, 1.0], [0.0, 0.0]]))
     augmented = sparse.block_array([[matrix, sparse.csr_array(forcing)], [None, clock]], format="csr")
-    return _Propagator(augmented.toarray() if system.dense_form else augmented, scale, system.dense_form)
+    return _Propagator(augmented.toarray() if dense_form else augmented, scale, dense_form)
 
 
 def _straight_line(problem: Problem, forcing: Callable[[float], Array], piece: Piece) -> tuple[Array, Array]:
     """Level at the start of a piece and slope of u, from values strictly inside the piece."""
-    length = piece.end - piece.start
-    early, middle, late = (np.asarray(forcing(piece.start + part * length), dtype=float) for part in (0.25, 0.5, 0.75))
-    bend = np.abs(middle - (early + late) / 2)
+    length = piece.high - piece.low
+    times = [piece.low + part * length for part in (0.25, 0.5, 0.75)]
+    early, middle, late = (np.asarray(forcing(time), dtype=float) for time in times)
+    slope = (late - early) / (times[2] - times[0])
+    bend = np.abs(middle - (early + late) / 2) - np.abs(slope) * np.spacing(piece.high)  # a short piece's times round
     if (bend > STRAIGHT * (np.abs(early) + np.abs(late)).max(initial=0.0)).any():
         name = problem.names[int(np.argmax(bend))]
         raise ParameterError(
             f"The exact engine needs an input that is a straight line between breakpoints; the one of {name!r} bends "
             f"between t = {piece.start:.6g} s and {piece.end:.6g} s. Take the engine 'auto'."
         )
-    slope = (late - early) / (0.5 * length)
     slope[np.abs(slope) * length <= 8 * np.finfo(float).eps * np.abs(early)] = 0.0
-    return early - 0.25 * length * slope, slope
+    return early - (times[0] - piece.start) * slope, slope

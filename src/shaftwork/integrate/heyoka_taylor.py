@@ -13,7 +13,7 @@ import numpy as np
 from shaftwork.core.errors import MissingExtraError, SimulationError
 from shaftwork.integrate.pieces import Piece, PiecewiseDense, both_sides, failure, pieces, start_of_piece
 from shaftwork.integrate.problem import Array, Problem, Trajectory
-from shaftwork.integrate.switches import Watch, settle
+from shaftwork.integrate.switches import Watch, keeps_sides, settle
 
 # The cost grows only with the logarithm of the tolerance, and a loose one loses events.
 LOOSEST_TOLERANCE, TIGHTEST_TOLERANCE = 1e-10, 1e-15
@@ -78,6 +78,7 @@ class _Run:
         # heyoka keeps no parameters behind the last one that the rows contain
         used = min(integrator.pars.size, self.parameters.size)
         integrator.pars[:used] = self.parameters[:used]
+        integrator.reset_cooldowns() if integrator.with_events else None
         watch = self._watch(piece) if self.program.switches else None
         longest = self._first_step(piece)
         while True:
@@ -108,10 +109,12 @@ class _Run:
         for _ in range(FIRST_TRIALS):
             integrator.step(max_delta_t=min(longest, piece.end - piece.start), write_tc=True)
             step = integrator.time - start
-            good = not np.isfinite(integrator.state).all() or self._satisfied(piece, start, 0.9 * step)
+            good = not np.isfinite(integrator.state).all() or (
+                self._satisfied(piece, start, 0.9 * step) and keeps_sides(self.program, integrator, parameters, start)
+            )
             integrator.time = start
             integrator.state[:], integrator.pars[:] = state, parameters
-            integrator.reset_cooldowns() if self.program.switches else None
+            integrator.reset_cooldowns() if integrator.with_events else None
             if good:
                 break
             longest = SHORTER * step
@@ -128,7 +131,6 @@ class _Run:
         return bool((defect <= FIRST_DEFECT * (np.abs(state) + elapsed * np.abs(slope)) + self.problem.atol).all())
 
     def _watch(self, piece: Piece) -> Watch:
-        self.integrator.reset_cooldowns()
         self.integrator.pars[self.parameters.size :] = 0.0
         settle(self.program, self.integrator, piece.end - piece.start)
         return Watch(self.program, piece.start, self.problem.t_end - self.problem.t0)

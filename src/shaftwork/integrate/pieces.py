@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from shaftwork.core.errors import SimulationError
-from shaftwork.core.times import just_after, just_before
-from shaftwork.integrate.problem import Array, DaeProblem, Problem
+from shaftwork.integrate.problem import Array, Problem, Timed
 
 # A run has stalled when so many steps together advance by less than so many times this part of the whole time.
 STALL_STEPS, STALL_SPAN = 2000, 1e-10
@@ -24,15 +23,19 @@ class Piece:
     Args:
         start: s.
         end: s.
+        low: the earliest time in s at which inputs are read, after whatever jumps at the start.
+        high: the latest, before whatever jumps at the end.
     """
 
     start: float
     end: float
+    low: float
+    high: float
 
     def inside(self, time: float) -> float:
         """The time in s, moved by some rounding units where it touches an end: there another piece's input is met."""
         # A method's last stage lies exactly on the end of its step, and a step function is one-sided at its jump.
-        return min(max(time, just_after(self.start)), just_before(self.end))
+        return min(max(time, self.low), self.high)
 
 
 class GuardedFunctions:
@@ -41,8 +44,7 @@ class GuardedFunctions:
     def __init__(self, problem: Problem, piece: Piece) -> None:
         self._problem = problem
         self._jacobian: Callable[[float, Array], Any] = problem.jacobian or _no_jacobian
-        self._low = piece.inside(piece.start)
-        self._high = piece.inside(piece.end)
+        self._low, self._high = piece.low, piece.high
         self.not_finite: tuple[float, Array] | None = None
 
     def rhs(self, t: float, x: Array) -> Array:
@@ -77,13 +79,17 @@ class GuardedFunctions:
         return f"{reason.rstrip('.')}; the derivative of {name!r} was {derivative[bad[0]]} at t = {t:.9g} s"
 
 
-def pieces(problem: Problem | DaeProblem) -> tuple[Piece, ...]:
+def pieces(problem: Timed) -> tuple[Piece, ...]:
     """The pieces between the start, the breakpoints and the end of a problem, in order."""
     ends = (problem.t0, *problem.breakpoints, problem.t_end)
-    return tuple(Piece(start, end) for start, end in pairwise(ends))
+    sides = [problem.sides(end) for end in ends]
+    return tuple(
+        Piece(start, end, after, before)
+        for (start, (_, after)), (end, (before, _)) in pairwise(zip(ends, sides, strict=True))
+    )
 
 
-def start_of_piece(problem: Problem | DaeProblem, piece: Piece, x: Array) -> Array:
+def start_of_piece(problem: Timed, piece: Piece, x: Array) -> Array:
     """State (n,) with which a piece starts, from the state at the end of the piece before (or the start state)."""
     if problem.jump is None or piece.start == problem.t0:
         return x
@@ -120,7 +126,7 @@ def _no_jacobian(t: float, x: Array) -> Any:
     raise NotImplementedError(f"a problem without Jacobian was asked for it at t = {t}, with {x.size} states")
 
 
-def both_sides(problem: Problem | DaeProblem, times: Sequence[Array], states: Sequence[Array]) -> tuple[Array, Array]:
+def both_sides(problem: Timed, times: Sequence[Array], states: Sequence[Array]) -> tuple[Array, Array]:
     """Join the step ends of all pieces: (k,) times and (k, n) states.
 
     Where the state is continuous a breakpoint is listed once, where it may jump twice: before and after.
@@ -131,7 +137,7 @@ def both_sides(problem: Problem | DaeProblem, times: Sequence[Array], states: Se
     return t, x
 
 
-def failure(problem: Problem | DaeProblem, engine: str, t: float, x: Array, reason: str) -> SimulationError:
+def failure(problem: Timed, engine: str, t: float, x: Array, reason: str) -> SimulationError:
     """The error of a failed run: when, in which state, why, and what to try.
 
     Args:
@@ -162,7 +168,7 @@ class Pace:
         problem: what is being solved.
     """
 
-    def __init__(self, problem: Problem | DaeProblem) -> None:
+    def __init__(self, problem: Timed) -> None:
         self._least = STALL_STEPS * STALL_SPAN * (problem.t_end - problem.t0)
         self._time, self._steps = problem.t0, 0
 
@@ -182,7 +188,7 @@ class Pace:
         )
 
 
-def check_finite(problem: Problem | DaeProblem, engine: str, t: float, x: Array) -> None:
+def check_finite(problem: Timed, engine: str, t: float, x: Array) -> None:
     """Raise `SimulationError` when a state (n,) at time t in s is not finite."""
     if not np.isfinite(x).all():
         raise failure(problem, engine, t, x, "the state is not finite")

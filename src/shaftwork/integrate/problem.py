@@ -9,6 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from shaftwork.core.times import around
+
 Array = NDArray[np.float64]
 
 
@@ -19,10 +21,12 @@ class LinearInputs:
     Args:
         A: (n, n) scipy.sparse.csr_array, 1/s times the units of the states.
         forcing: u(t), shape (n,); evaluated strictly inside a piece it is that piece's own polynomial.
+        found: what an engine has found out about A, for the next run with the same parameters.
     """
 
     A: Any
     forcing: Callable[[float], Array]
+    found: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,7 @@ class Problem:
         breakpoints: strictly increasing times in (t0, t_end) where an input jumps or kinks. An engine ends a step there
             and starts anew; inside a piece it never evaluates `rhs` at or past the piece's end.
         jump: state after a breakpoint from (breakpoint, state before it), or None where the state is continuous.
+        sides: from t0, a breakpoint or t_end to the times in s at which inputs are read just before and just after it.
         t_eval: strictly increasing output times in [t0, t_end], or None for the engine's own steps. At a breakpoint the
             state after the jump is the output.
         linear: the same system in linear form when it is one, else None.
@@ -58,6 +63,7 @@ class Problem:
     rtol: float = 1e-8
     breakpoints: tuple[float, ...] = ()
     jump: Callable[[float, Array], Array] | None = None
+    sides: Callable[[float], tuple[float, float]] = around
     t_eval: Array | None = None
     linear: LinearInputs | None = None
     symbolic: Any = None
@@ -73,7 +79,7 @@ class DaeProblem:
         x0: (n,) start values; the algebraic ones are a first guess.
         derivative0: (n,) first guess of dx/dt at the start.
         algebraic: indices of the unknowns whose derivative does not appear.
-        t0, t_end, names, atol, rtol, breakpoints, jump, t_eval, max_steps: as in `Problem`.
+        t0, t_end, names, atol, rtol, breakpoints, jump, sides, t_eval, max_steps: as in `Problem`.
     """
 
     residual: Callable[[float, Array, Array], Array]
@@ -87,8 +93,48 @@ class DaeProblem:
     rtol: float = 1e-8
     breakpoints: tuple[float, ...] = ()
     jump: Callable[[float, Array], Array] | None = None
+    sides: Callable[[float], tuple[float, float]] = around
     t_eval: Array | None = None
     max_steps: int = 10_000_000
+
+
+class Timed(Protocol):
+    """What every problem says of its times, states and tolerances; see `Problem`."""
+
+    @property
+    def t0(self) -> float:
+        """Start, s."""
+        ...
+
+    @property
+    def t_end(self) -> float:
+        """End, s."""
+        ...
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the states, for messages."""
+        ...
+
+    @property
+    def atol(self) -> Array:
+        """Absolute tolerances."""
+        ...
+
+    @property
+    def breakpoints(self) -> tuple[float, ...]:
+        """Where a step must end, s."""
+        ...
+
+    @property
+    def jump(self) -> Callable[[float, Array], Array] | None:
+        """The state after a breakpoint."""
+        ...
+
+    @property
+    def sides(self) -> Callable[[float], tuple[float, float]]:
+        """Times just before and after a breakpoint."""
+        ...
 
 
 class DenseOutput(Protocol):

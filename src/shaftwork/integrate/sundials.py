@@ -6,7 +6,7 @@ import importlib.util
 import warnings
 from collections.abc import Callable
 from contextlib import redirect_stdout
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -237,7 +237,7 @@ def _march(
             end, x = float(result.t), result.y.copy()
             check_finite(problem, "sundials", end, x)
             if end <= t:
-                raise failure(problem, "sundials", t, x, "the step became too small")
+                raise failure(problem, "sundials", t, x, opened.explain("the step became too small"))
             if (objection := pace.objection(end)) is not None:
                 raise failure(problem, "sundials", end, x, objection)
             asked = ask(t, end)
@@ -247,7 +247,7 @@ def _march(
             found[-1][1].append(_Step(t, end, x, inside.reshape(asked.size, x.size)))
             t, left = end, left - 1
             if t < piece.end and opened.outgrown():
-                opened = open_solver(Piece(t, piece.end), x)
+                opened = open_solver(replace(piece, start=t), x)
                 solver = opened.solver
     return found
 

@@ -12,26 +12,30 @@ from shaftwork.integrate.problem import Array
 CHATTER_STEPS, CHATTER_SPAN = 200, 1e-9
 # A switch that is on the wrong side by more than this part of its largest value has missed its event.
 WRONG_SIDE = 1e-9
-# Where in a trial step a switch that starts at zero is looked at: early, but not lost in rounding.
-EARLY = 0.1
+# Where in a trial step a switch that starts at zero is looked at: as early as it is not lost in rounding.
+EARLY = (1e-4, 1e-2, 1e-1)
+
+# Where in a step the sides of the switches are looked at: at no regular places, which a wave might share.
+INSIDE = np.array([0.07, 0.19, 0.31, 0.42, 0.53, 0.61, 0.74, 0.83, 0.91])
 
 
 def settle(program: Any, integrator: Any, horizon: float) -> None:
     """Set the signs of all switches for the motion that starts at the integrator's time and state.
 
-    A switch at exactly zero (a table's kink at its own time, a spring without twist) takes the sign that it has
-    early in a trial step; it stays at zero when it rests there.
+    A switch of the time alone has the sign that it has inside the piece. Any other at exactly zero (a table's kink, a
+    spring without twist) takes the sign that it has early in a trial step; it stays at zero when it rests there.
 
     Args:
         program: a `codegen.heyoka.HeyokaProgram`.
         integrator: its integrator; time and state are left as they were.
-        horizon: longest trial step in s.
+        horizon: length of the piece, or of the rest of it, in s.
     """
-    signs = integrator.pars[program.parameter_count :]
-    parameters = integrator.pars[: program.parameter_count]
-    signs[:] = program.switch_signs(integrator.time, integrator.state, parameters)
+    parameters, signs = np.split(integrator.pars, [program.parameter_count])
+    timed = signs * program.timed
+    middle = program.switch_signs(integrator.time + horizon / 2, integrator.state, parameters, timed)
+    signs[:] = program.switch_signs(integrator.time, integrator.state, parameters, middle * program.timed)
     for _ in range(signs.size):
-        zero = signs == 0.0
+        zero = (signs == 0.0) & ~program.timed
         if not zero.any():
             return
         found = np.where(zero, _early_signs(program, integrator, horizon), signs)
@@ -41,15 +45,43 @@ def settle(program: Any, integrator: Any, horizon: float) -> None:
 
 
 def _early_signs(program: Any, integrator: Any, horizon: float) -> Array:
+    """Signs of the switches as early in a trial step as they show."""
     start, state, parameters = integrator.time, integrator.state.copy(), integrator.pars.copy()
     integrator.step(max_delta_t=horizon, write_tc=True)
-    early = start + EARLY * (integrator.time - start)
-    values = program.switch_values(early, np.array(integrator.update_d_output(early)), parameters)
+    step = integrator.time - start
+    signs = np.zeros(len(program.switches))
+    for part in EARLY:
+        first, second = (
+            np.sign(program.switch_values(time, np.array(integrator.update_d_output(time)), parameters))
+            for time in (start + part / 2 * step, start + part * step)
+        )
+        signs = np.where((signs == 0.0) & (first == second), second, signs)  # rounding would have no steady sign
     integrator.time = start
     integrator.state[:] = state
     integrator.pars[:] = parameters
     integrator.reset_cooldowns()
-    return np.asarray(np.sign(values))
+    return np.asarray(signs)
+
+
+def keeps_sides(program: Any, integrator: Any, parameters: Array, start: float) -> bool:
+    """Whether every switch stays on its side up to the end of the last step, which an event would have ended.
+
+    heyoka looks for events in the series of the switches. Where that shows nothing in its last two terms, as that of
+    sin(t^2) does, the step is too long for it.
+
+    Args:
+        program: a `codegen.heyoka.HeyokaProgram`.
+        integrator: its integrator after a step with its Taylor coefficients kept.
+        parameters: all parameters before the step, the signs included.
+        start: of the step, s.
+    """
+    if not program.switches:
+        return True
+    signs = parameters[program.parameter_count :]
+    times = start + INSIDE * (integrator.time - start)
+    states = [np.array(integrator.update_d_output(time)) for time in times]
+    values = np.array([program.switch_values(*at, parameters) for at in zip(times, states, strict=True)])
+    return bool((signs * values >= -WRONG_SIDE * np.abs(values).max(axis=0)).all())
 
 
 class Watch:
@@ -75,15 +107,16 @@ class Watch:
         values = self._program.switch_values(integrator.time, integrator.state, integrator.pars)
         signs = integrator.pars[self._program.parameter_count :]
         np.maximum(self._largest, np.abs(values), out=self._largest)
-        wrong = signs * values < -WRONG_SIDE * self._largest
+        # What switches by the time alone has its sign for the piece, and nothing can drive it back.
+        wrong = (signs * values < -WRONG_SIDE * self._largest) & ~self._program.timed
         if wrong.any():
             # Right at its event (heyoka still "cools" it down) a switch may be on the wrong side by rounding.
-            wrong &= [cooling is None for cooling in integrator.te_cooldowns]
+            wrong &= [cooling is None for cooling in integrator.te_cooldowns[: wrong.size]]
         self._short_steps = self._short_steps + 1 if integrator.time - self._last < self._short else 0
         before, self._last = self._last, integrator.time
         if wrong.any() or self._short_steps > CHATTER_STEPS:
-            suspects = wrong if wrong.any() else np.abs(values) <= np.abs(values).min()
-            condition = self._program.conditions[int(np.flatnonzero(suspects)[0])]
+            nearest = int(np.argmin(np.where(self._program.timed, np.inf, np.abs(values))))
+            condition = self._program.conditions[int(np.argmax(wrong)) if wrong.any() else nearest]
             self.reason = (
                 f"from t = {before:.9g} s on the motion sticks where the condition {condition} changes, because "
                 "the laws on both sides drive it back there. Give the law a smooth transition, such as "
@@ -92,4 +125,4 @@ class Watch:
             return False
         self.last_good = integrator.time, integrator.state.copy()
         # A switch that rested at zero and now leaves it needs its sign.
-        return not bool((values[signs == 0.0] != 0.0).any())
+        return not bool((values[(signs == 0.0) & ~self._program.timed] != 0.0).any())

@@ -18,7 +18,7 @@ from sympy.functions.elementary.piecewise import ExprCondPair
 from sympy.logic.boolalg import BooleanAtom, BooleanFunction
 
 from shaftwork.components.base import Component
-from shaftwork.components.branches import ACROSS, INTEGRAL
+from shaftwork.components.branches import ACROSS, HISTORY, INTEGRAL
 from shaftwork.components.laws import SYMBOLS, Interpolation, InterpolationSlope, Table, t
 from shaftwork.core.domains import Domain
 from shaftwork.core.errors import Problem, ShaftworkError
@@ -289,6 +289,7 @@ def _unreadable(name: str, law: sympy.Expr) -> _Fault | None:
 
 def _strange_symbols(template: BranchTemplate) -> set[sympy.Symbol]:
     found = template.law.free_symbols.union(*(coefficient.free_symbols for coefficient, _, _ in template.terms))
+    found -= {HISTORY} if template.line else set()
     return set(found - {*template.symbols} - _READS.get(template.kind, frozenset()))
 
 

@@ -6,6 +6,7 @@ of zero leaves no branch, a resistance of zero becomes a rigid joint, and neithe
 
 from __future__ import annotations
 
+import dataclasses
 import reprlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -17,10 +18,12 @@ from sympy import Expr, I, Integer, Symbol, nan, oo, zoo
 from shaftwork.components.base import Component, symbols_of
 from shaftwork.components.branches import (
     ACROSS,
+    HISTORY,
     INTEGRAL,
     AcrossLaw,
     AcrossStore,
     Branch,
+    DelayLine,
     End,
     IdealCoupling,
     ThroughLaw,
@@ -56,7 +59,8 @@ class BranchTemplate:
         ends: first and second end.
         terms: of a coupling, (coefficient, first end, second end); else empty.
         label: name of its through variable where the part has several.
-        symbols: the parameters that `law` and `terms` contain, in the order of their declaration.
+        symbols: the parameters that the expressions contain, in the order of their declaration.
+        line: of the history at an end of a line, its impedance and delay; the next branch of a line is its other end.
     """
 
     kind: Kind
@@ -65,6 +69,7 @@ class BranchTemplate:
     terms: tuple[tuple[Expr, End, End], ...]
     label: str
     symbols: tuple[Symbol, ...]
+    line: tuple[Expr, Expr] | None = None
 
     @property
     def has_integral(self) -> bool:
@@ -136,6 +141,14 @@ class _Resolver:
                     joint = rigid(ends or self._default).terms if kind is Kind.COUPLING else ()
                     where = (None, None) if joint else ends or self._default
                     yield self._template(kind, found, where, joint, label)
+            case DelayLine(impedance, delay, ends, label):
+                line = (_law(impedance, branch, number), _law(delay, branch, number))
+                for end in ends or self._default:
+                    yield self._template(Kind.CONDUCTANCE, line[0], (end, None), (), f"{label}_z_{end}")
+                    history = self._template(Kind.THROUGH_SOURCE, HISTORY, (end, None), (), f"{label}_{end}")
+                    read = frozenset().union(*(expression.free_symbols for expression in line))
+                    symbols = tuple(symbol for symbol in self._symbols if symbol in read)
+                    yield dataclasses.replace(history, symbols=symbols, line=line)
             case AcrossLaw(law, ends, label):
                 made = _law(law, branch, number)
                 yield self._template(Kind.ACROSS_SOURCE, made, ends or self._default, (), label)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
@@ -10,6 +11,7 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
+from shaftwork.network.netlist import Netlist
 
 OUTPUTS, MOST_OUTPUTS = 1001, 10_000_000
 """Output times when the user gives none, and the most that can be asked for."""
@@ -88,3 +90,25 @@ def output_times(t_eval: OutputTimes, start: float, end: float) -> Array | None:
     if not good or times[0] < start or times[-1] > end or (np.diff(times) <= 0).any():
         raise ParameterError(f"t_eval must hold strictly increasing times between {start:g} and {end:g} s.")
     return times
+
+
+def checked_parameter(netlist: Netlist, name: str, value: Any) -> float:
+    """A new value of a parameter "part.name", in SI and within its bounds.
+
+    Raises:
+        ParameterError: there is no such parameter, or the value is not admissible.
+    """
+    owner, _, parameter = name.rpartition(".")
+    part = next((placed.part for placed in netlist.placed if placed.part.name == owner), None)
+    if part is None or parameter not in part.declared:
+        parts = [placed.part for placed in netlist.placed] if part is None else [part]
+        known = ", ".join(f"{other.name}.{key}" for other in parts for key in other.declared)
+        raise ParameterError(f"There is no parameter '{name}'. There are: {known or 'none'}.")
+    number, objection = part.declared[parameter].magnitude(value)
+    if objection is None and not isinstance(number, float):
+        objection = "must be a number here: a law is part of the network, so build another network with it"
+    if objection is not None:
+        raise ParameterError(f"{type(part).__name__} '{owner}': {parameter} = {value!r} {objection}.")
+    if hasattr(part, "__post_init__"):  # what the part says of values that do not go together
+        dataclasses.replace(part, **{parameter: float(number)})  # type: ignore[arg-type]
+    return float(number)

@@ -55,7 +55,7 @@ def solve_loops(bound: BoundArrays, problem: Problem) -> tuple[Trajectory, str, 
     """
     assert bound.loops is not None  # noqa: S101 (the caller asks only then)
     loops, states = bound.loops, len(problem.x0)
-    start = loops.solve(problem.t0, problem.x0)
+    start = loops.solve(problem.sides(problem.t0)[1], problem.x0)
     if not np.isfinite(start).all():
         names = [bound.program.form.graph.part_of(branch).name for branch in bound.program.form.loop_laws]
         raise SimulationError(
@@ -73,7 +73,7 @@ def solve_loops(bound: BoundArrays, problem: Problem) -> tuple[Trajectory, str, 
 
     def jump(t: float, z: Array) -> Array:
         x = z[:states] if problem.jump is None else problem.jump(t, z[:states])
-        return np.concatenate([x, loops.solve(t, x)])
+        return np.concatenate([x, loops.solve(problem.sides(t)[1], x)])
 
     from shaftwork.integrate.sundials import solve_dae
 
@@ -82,7 +82,7 @@ def solve_loops(bound: BoundArrays, problem: Problem) -> tuple[Trajectory, str, 
         DaeProblem(
             residual=residual,
             x0=np.concatenate([problem.x0, start]),
-            derivative0=np.concatenate([bound.rhs(problem.t0, problem.x0), np.zeros_like(start)]),
+            derivative0=np.concatenate([bound.rhs(problem.sides(problem.t0)[1], problem.x0), np.zeros_like(start)]),
             algebraic=tuple(range(states, states + len(start))),
             t0=problem.t0,
             t_end=problem.t_end,
@@ -91,6 +91,7 @@ def solve_loops(bound: BoundArrays, problem: Problem) -> tuple[Trajectory, str, 
             rtol=problem.rtol,
             breakpoints=problem.breakpoints,
             jump=jump,
+            sides=problem.sides,
             t_eval=problem.t_eval,
             max_steps=problem.max_steps,
         )

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -16,7 +16,8 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.operating import initial_state, steady_state
-from shaftwork.components.laws import breakpoints, pieces_degree
+from shaftwork.codegen.switching import Switching
+from shaftwork.components.laws import pieces_degree
 from shaftwork.core.errors import CompileError, ParameterError, SimulationError
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import LinearInputs, Problem, Trajectory
@@ -25,6 +26,7 @@ from shaftwork.network.templates import Kind
 from shaftwork.pipeline.arguments import (
     OutputTimes,
     absolute_tolerances,
+    checked_parameter,
     output_times,
     relative_tolerance,
     time_span,
@@ -34,13 +36,17 @@ from shaftwork.pipeline.implicit import at_rest, solve_loops
 from shaftwork.reduction.form import StateForm
 from shaftwork.results.solution import Solution
 
+if TYPE_CHECKING:
+    from shaftwork.pipeline.analysis import Given, Names, Point, Time
+    from shaftwork.results.linear import LinearModel
+
 VARIANTS = 8
 """Models of other structure, and choices of an engine, that are kept for later calls."""
 SIMILAR = 5.0
 """An engine suits parameters that differ by less than this factor too: looking anew would cost more than the run."""
 NOMINAL = 1e-3
 """Absolute tolerance as a fraction of the relative one, for a speed of 1 rad/s (m/s, V)."""
-EngineName = Literal["auto", "scipy", "scipy-radau", "heyoka", "sundials", "exact"]
+EngineName = Literal["auto", "scipy", "scipy-radau", "heyoka", "sundials", "exact", "banded", "wave"]
 Rebuild = Callable[[Netlist], "Model"]
 
 
@@ -51,7 +57,6 @@ class _Prepared:
     p: Array
     bind: Callable[[Array], BoundArrays]
     rhs: Callable[[float, Array], Array]
-    breakpoints: tuple[float, ...]
     symbolic: Any
     linear: LinearInputs | None
     atol: Array
@@ -64,10 +69,6 @@ class _Prepared:
     def jacobian(self, t: float, x: Array) -> Any:
         """Of the right-hand side, sparse."""
         return self.bound.jacobian(t, x)
-
-    def impulse(self, t: float, x: Array) -> Array:
-        """The states after a breakpoint."""
-        return self.bound.impulse(t, x)
 
 
 class Model(CompiledModel):
@@ -134,12 +135,11 @@ class Model(CompiledModel):
             return self._variant(values).simulate(t_end, **options)
         prepared = self._prepare(self.vector(values) if values else self.defaults)
         span = time_span(t_start, t_end)
-        x0 = self._start(prepared, initial, span[0])
+        x0 = self._start(prepared, initial, span)
         problem = self._problem(prepared, span, x0, relative_tolerance(rtol), atol, t_eval, max_steps)
         if progress is not None:
             problem = dataclasses.replace(problem, rhs=watched_by(problem.rhs, progress))
         trajectory, name, why = self._solve(prepared, problem, engine)
-        started = tuple(time for time in prepared.breakpoints if time == span[0])
         return Solution(
             name=self.name,
             t=trajectory.t,
@@ -149,7 +149,7 @@ class Model(CompiledModel):
             why=why,
             statistics=trajectory.statistics,
             dense=trajectory.dense,
-            observer=ModelObserver(self.form, lambda: prepared.bound, (*started, *problem.breakpoints)),
+            observer=ModelObserver(self.form, lambda: prepared.bound, self.switching.timeline(prepared.p, *span)),
         )
 
     def steady_state(
@@ -172,8 +172,13 @@ class Model(CompiledModel):
         values = self._checked_all(parameters)
         if self._changes_structure(values):
             return self._variant(values).steady_state(t, initial=initial)
+        if self.form.waves:
+            raise ParameterError(
+                f"'{self.name}' has travelling waves, which never settle. Take model=Spectral(8) for the steady state, "
+                "which is the same."
+            )
         prepared = self._prepare(self.vector(values) if values else self.defaults)
-        when = t if math.isfinite(t) else max((0.0, *prepared.breakpoints)) + 1.0
+        when = t if math.isfinite(t) else max((0.0, *self.switching.known(prepared.p))) + 1.0
         start = initial_state(prepared.bound, initial or {}, when)
         if not math.isfinite(t) and (moving := prepared.bound.moving_sources(when)):
             raise SimulationError(
@@ -182,14 +187,40 @@ class Model(CompiledModel):
             )
         return dict(zip(self.states, steady_state(prepared.bound, start, when).tolist(), strict=True))
 
+    def linearize(
+        self, at: Point = None, *, inputs: Names = None, outputs: Names = None, t: Time = None, parameters: Given = None
+    ) -> LinearModel:
+        """Small motions about a point: A, B, C, D, modes and frequency response; nonlinear laws by their slopes.
+
+        Args:
+            at: `steady_state()`, speeds, twists and torques by name, or a motion at one time; by default rest.
+            inputs: what sources give, "motor.tau", "drive.omega"; by default all of it.
+            outputs: any quantities; by default the states.
+            t: time at which laws are read, s; by default that of the motion, or after their last breakpoint.
+            parameters: values that differ from the network's.
+
+        Raises:
+            SignalError: there is no such input or output.
+            SimulationError: a law has no finite slope at the point.
+        """
+        from shaftwork.pipeline.analysis import linearized
+
+        values = self._checked_all(parameters)
+        if self._changes_structure(values):
+            return self._variant(values).linearize(at, inputs=inputs, outputs=outputs, t=t)
+        p = self.vector(values)
+        return linearized(self, p, at, t, max((0.0, *self.switching.known(p))) + 1.0, inputs, outputs)
+
     def choose_engine(self, t_end: float, *, t_start: float = 0.0, rtol: float = 1e-8) -> tuple[str, str]:
         """The engine that "auto" takes for a motion, and why."""
         prepared, span = self._prepare(self.defaults), time_span(t_start, t_end)
-        x0 = self._start(prepared, None, span[0])
+        x0 = self._start(prepared, None, span)
         return self._engine(prepared, self._problem(prepared, span, x0, rtol, None, None, 1), "auto")
 
     def _solve(self, prepared: _Prepared, problem: Problem, engine: str) -> tuple[Trajectory, str, str]:
         """The run, the engine that made it, and why that one."""
+        if self.form.waves:
+            return self._solve_waves(prepared, problem, engine)
         if not self.states:
             return at_rest(problem)
         if self.form.loop_laws and engine in ("auto", "sundials"):
@@ -197,7 +228,22 @@ class Model(CompiledModel):
         name, why = self._engine(prepared, problem, engine)
         return choice.solve(problem, name, why, fallback=engine == "auto")
 
+    def _solve_waves(self, prepared: _Prepared, problem: Problem, engine: str) -> tuple[Trajectory, str, str]:
+        from shaftwork.pipeline.waves import solve_waves
+
+        if self.form.loop_laws:
+            raise ParameterError(
+                f"'{self.name}' has a travelling wave at a massless node with a nonlinear law. Give the node an "
+                "inertia, or take model=Spectral(16)."
+            )
+        steady = all(pieces_degree(law) == 0 for _, law in self._laws_of_time())
+        return solve_waves(prepared.bound, problem, engine, linear=self.linear, steady=steady)
+
     def _engine(self, prepared: _Prepared, problem: Problem, engine: str) -> tuple[str, str]:
+        if self.form.waves:
+            from shaftwork.pipeline.waves import WHY
+
+            return "wave", WHY
         if engine != "auto":
             return engine, "asked for"
         key = (problem.t0, problem.t_end, problem.rtol)
@@ -218,7 +264,7 @@ class Model(CompiledModel):
         t_eval: OutputTimes,
         max_steps: int,
     ) -> Problem:
-        inside = tuple(time for time in prepared.breakpoints if span[0] < time < span[1])
+        instants = self.switching.timeline(prepared.p, *span)
         return Problem(
             rhs=prepared.rhs,
             jacobian=prepared.jacobian,
@@ -228,8 +274,9 @@ class Model(CompiledModel):
             names=self.states,
             atol=rtol * prepared.atol if atol is None else absolute_tolerances(atol, len(x0)),
             rtol=rtol,
-            breakpoints=inside,
-            jump=prepared.impulse if self.form.has_impulses else None,
+            breakpoints=tuple(time for time in instants.times if span[0] < time < span[1]),
+            jump=(lambda t, x: prepared.bound.impulse(x, *instants.sides(t))) if self.form.has_impulses else None,
+            sides=instants.sides,
             t_eval=output_times(t_eval, *span),
             linear=prepared.linear,
             symbolic=prepared.symbolic,
@@ -244,7 +291,6 @@ class Model(CompiledModel):
                 p=p,
                 bind=self.bind,
                 rhs=self.bind(p).rhs if scalar is None else scalar.bind(p),
-                breakpoints=self._breakpoints(p),
                 symbolic=None if program is None else program.bind(p),
                 linear=self._linear_inputs(p),
                 atol=NOMINAL * self._nominal(self.arrays.assembly.coefficients(p)),
@@ -270,23 +316,20 @@ class Model(CompiledModel):
         kinds = (Kind.LAW, Kind.THROUGH_SOURCE, Kind.ACROSS_SOURCE)
         return [(b.index, b.template.law) for b in branches if b.template.kind in kinds]
 
-    def _breakpoints(self, p: Array) -> tuple[float, ...]:
-        graph = self.form.graph
-        times: set[float] = set()
-        for index, law in self._laws_of_time():
-            places = graph.part_of(index).parameters
-            values = {s: float(p[places[s.name]]) for s in graph.branches[index].template.symbols}
-            times.update(breakpoints(law, values))
-        return tuple(sorted(times))
+    @cached_property
+    def switching(self) -> Switching:
+        """What switches because of the time alone."""
+        return Switching(self.form)
 
-    def _start(self, prepared: _Prepared, initial: Mapping[str, float] | None, t0: float) -> Array:
+    def _start(self, prepared: _Prepared, initial: Mapping[str, float] | None, span: tuple[float, float]) -> Array:
         if initial is None and not self.form.has_impulses:
             return np.zeros(len(self.states))
-        return initial_state(prepared.bound, {} if initial is None else initial, t0)
+        _, after = self.switching.timeline(prepared.p, *span).sides(span[0])
+        return initial_state(prepared.bound, {} if initial is None else initial, after)
 
     def _linear_inputs(self, p: Array) -> LinearInputs | None:
         """The linear form, where the network is linear and its inputs are straight lines between breakpoints."""
-        if not self.linear or any(pieces_degree(law) is None for _, law in self._laws_of_time()):
+        if self.form.waves or not self.linear or any(pieces_degree(law) is None for _, law in self._laws_of_time()):
             return None
         rest, bound = np.zeros(len(self.states)), self.bind(p)
         return LinearInputs(bound.jacobian(0.0, rest).tocsr(), lambda t: bound.rhs(t, rest))
@@ -323,23 +366,7 @@ class Model(CompiledModel):
             return {}
         if not isinstance(parameters, Mapping):
             raise ParameterError(f"parameters = {parameters!r} must map names to values, such as {{'shaft.c': 3e4}}.")
-        return {str(name): self._checked(str(name), value) for name, value in parameters.items()}
-
-    def _checked(self, name: str, value: Any) -> float:
-        """A new parameter value in SI and within its bounds."""
-        owner, _, parameter = name.rpartition(".")
-        placed = next((item for item in self.netlist.placed if item.part.name == owner), None)
-        if placed is None or parameter not in placed.part.declared:
-            known = (
-                tuple(self.parameters) if placed is None else tuple(f"{owner}.{key}" for key in placed.part.declared)
-            )
-            raise ParameterError(f"There is no parameter '{name}'. There are: {', '.join(known) or 'none'}.")
-        number, objection = placed.part.declared[parameter].magnitude(value)
-        if objection is None and not isinstance(number, float):
-            objection = "must be a number here: a law is part of the network, so build another network with it"
-        if objection is not None:
-            raise ParameterError(f"{type(placed.part).__name__} '{owner}': {parameter} = {value!r} {objection}.")
-        return float(number)
+        return {str(name): checked_parameter(self.netlist, str(name), value) for name, value in parameters.items()}
 
     def _variant(self, values: Mapping[str, float]) -> Model:
         """The model of the same network with other values where these change its structure; the last few are kept."""

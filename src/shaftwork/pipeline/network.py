@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import gc
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 from shaftwork.core.errors import NetworkError, NetworkWarning, ParameterError, Problem, SignalError
 from shaftwork.equations.kirchhoff import kirchhoff
@@ -20,6 +20,12 @@ from shaftwork.pipeline.model import Model
 from shaftwork.reduction.diagnosis import diagnose
 from shaftwork.reduction.form import StateForm, state_form
 from shaftwork.results.solution import Solution
+
+if TYPE_CHECKING:
+    from shaftwork.pipeline.analysis import Point, Time
+    from shaftwork.results.campbell import Campbell
+    from shaftwork.results.frequency import FrequencyResponse
+    from shaftwork.results.modes import Modes
 
 LOOP = "algebraic loop"
 """The kind of problem that `algebraic_loops="solve"` accepts."""
@@ -84,6 +90,59 @@ class Network(NetworkBuilder):
     ) -> Solution:
         """Compile and integrate; the options are those of `compile` and of `Model.simulate`."""
         return self.compile(angles=angles, algebraic_loops=algebraic_loops).simulate(t_end, **options)
+
+    def modes(self, at: Point = None, count: int | None = None, *, t: Time = None) -> Modes:
+        """Natural frequencies, damping and shapes, at rest or about a point.
+
+        Args:
+            at: the point, as for `Model.linearize`.
+            count: the modes wanted, those of smallest |rate|; by default all.
+            t: time at which laws are read, s; by default after their last breakpoint.
+        """
+        return self.compile().linearize(at, inputs=(), t=t).modes(count)
+
+    def frequency_response(
+        self,
+        input: str,  # noqa: A002 (it is what it is)
+        output: str,
+        f: Any,
+        at: Point = None,
+        *,
+        t: Time = None,
+    ) -> FrequencyResponse:
+        """The complex amplitude of a quantity under a sinusoidal input of amplitude one, at rest or about a point.
+
+        Args:
+            input: what a source gives, "motor.tau".
+            output: any quantity, "shaft.tau".
+            f: (k,) frequencies, Hz.
+            at: the point, as for `Model.linearize`.
+            t: time at which laws are read, s; by default after their last breakpoint.
+        """
+        return self.compile().linearize(at, inputs=input, t=t).frequency_response(input, output, f)
+
+    def campbell(
+        self,
+        speeds: Any,
+        orders: Any = (1, 2, 3),
+        f_max: float | None = None,
+        *,
+        at: Point | Callable[[float], Point] = None,
+        count: int | None = None,
+    ) -> Campbell:
+        """Natural frequencies and excitation orders over the speed of a shaft, and where they meet.
+
+        Args:
+            speeds: (k,) rad/s, ascending.
+            orders: excitations per turn.
+            f_max: highest frequency of interest, Hz; by default the highest order at the highest speed.
+            at: the point, as for `Model.linearize`, or a function from the speed to the point.
+            count: the modes wanted, those of smallest |rate|; by default all.
+        """
+        from shaftwork.pipeline.analysis import campbell
+
+        model = self.compile()
+        return campbell(lambda point: model.linearize(point, inputs=()), speeds, orders, f_max, at, count)
 
     def save(self, path: str | Path) -> None:
         """Write the network to a text file from which `load` makes the same network.

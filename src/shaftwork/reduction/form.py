@@ -112,10 +112,15 @@ class StateForm:
         return tuple(dict.fromkeys((*read, *self.angles)))
 
     @cached_property
+    def waves(self) -> tuple[int, ...]:
+        """Histories at the ends of lines, both ends of a line in a row. They follow the states in x."""
+        return tuple(branch.index for branch in self.graph.branches if branch.template.line is not None)
+
+    @cached_property
     def outputs(self) -> tuple[int, ...]:
-        """Branches whose across variable is read: by a nonlinear law or by an integral."""
+        """Branches whose across variable is read: by a nonlinear law, by an integral or by a line."""
         laws = (*self.tree.links[Kind.LAW], *self.tree.tree[Kind.LAW])
-        return tuple(dict.fromkeys((*laws, *self.integrals)))
+        return tuple(dict.fromkeys((*laws, *self.integrals, *self.waves)))
 
     @property
     def has_impulses(self) -> bool:

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shaftwork.core.times import just_after, just_before
 from shaftwork.results.observer import Array, Observer
 
 NODES = 12
@@ -71,12 +70,10 @@ def energy_balance(observer: Observer, dense: Callable[[Array], Array], steps: A
 
 def _stored_on_both_sides(observer: Observer, dense: Callable[[Array], Array], steps: Array) -> tuple[Array, Array]:
     """Stored energy just before and at every time of `steps`; they differ where an input's jump is an impulse."""
-    states = dense(steps)
-    after = _total(observer.powers(np.array([just_after(time) for time in steps]), states)[0], len(steps))
-    earlier = np.array([steps[0], *(just_before(time) for time in steps[1:])])
-    before = _total(observer.powers(earlier, dense(earlier))[0], len(steps))
-    before[0] = after[0]
-    return before, after
+    # a time that is listed twice is read before what jumps there, and then after it
+    pairs = np.column_stack([np.nextafter(steps, steps[0]), steps])
+    stored = _total(observer.powers(np.repeat(steps, 2), dense(pairs.ravel()))[0], 2 * len(steps))
+    return stored[::2], stored[1::2]
 
 
 def _integrate(

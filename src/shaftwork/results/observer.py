@@ -28,12 +28,15 @@ class Observer(Protocol):
         """Every quantity that can be read along a part, "part.quantity": its unit and the places in m."""
         ...
 
-    def profile(self, name: str, t: Array, x: Array) -> Array:
-        """(k, places) a quantity along a part at times t (k,) with states x (k, n)."""
+    def profile(self, name: str, t: Array, x: Array, dense: Dense) -> Array:
+        """(k, places) a quantity along a part at times t (k,) with states x (k, n), with the motion behind them."""
         ...
 
     def powers(self, t: Array, x: Array) -> tuple[dict[str, Array], dict[str, Array], dict[str, Array]]:
-        """By part, at times t (k,) with states x (k, n): stored energy in J, lost power in W, supplied power in W."""
+        """By part, at times t (k,) with states x (k, n): stored energy in J, lost power in W, supplied power in W.
+
+        Of a time that is listed twice in a row the first is before whatever jumps there.
+        """
         ...
 
 

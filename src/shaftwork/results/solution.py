@@ -66,7 +66,7 @@ class Solution:
             SignalError: there is no such quantity; the message lists what the part has.
         """
         if isinstance(name, str) and name in self.observer.profiles:
-            return self.observer.profile(name, self.t, self.x)
+            return self.observer.profile(name, self.t, self.x, self.dense)
         return self.observer.signal(self._known(name), self.t, self.x)
 
     @property

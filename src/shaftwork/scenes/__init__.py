@@ -5,5 +5,7 @@ from __future__ import annotations
 from shaftwork.scenes.catalog import SCENES, Scene
 from shaftwork.scenes.crane import crane_start
 from shaftwork.scenes.shaft_chain import shaft_chain
+from shaftwork.scenes.shaft_step import shaft_step
+from shaftwork.scenes.ship_line import ship_line
 
-__all__ = ["SCENES", "Scene", "crane_start", "shaft_chain"]
+__all__ = ["SCENES", "Scene", "crane_start", "shaft_chain", "shaft_step", "ship_line"]

@@ -1,0 +1,318 @@
+"""Small motions about a point: laws replaced by their slopes there, inputs placed beside the sources.
+
+    x' = A x + B v + B1 v'
+
+in deviations from the point, with v the inputs. B1 is there where a prescribed speed drives an inertia rigidly, or a
+torque winds up springs in series: the derivative of the input then enters the equations.
+
+An input torque acts between the nodes of its source, parallel to whatever the source does by itself, also where its law
+is zero or depends on speed. So it is a branch of its own: one more link of the tree that is there already.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from difflib import get_close_matches
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from sympy import Integer
+
+from shaftwork.codegen.arrays import ArrayProgram, BoundArrays
+from shaftwork.codegen.elements import Array
+from shaftwork.codegen.law_slopes import input_slopes
+from shaftwork.codegen.model import CompiledModel
+from shaftwork.codegen.observer import ModelObserver
+from shaftwork.codegen.recovery import History, signals_of
+from shaftwork.components.base import Signal
+from shaftwork.core.errors import SignalError, SimulationError
+from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
+from shaftwork.network.templates import BranchTemplate, Kind
+from shaftwork.reduction.form import StateForm
+from shaftwork.reduction.gains import add
+from shaftwork.reduction.tree import Row
+
+Complex = NDArray[np.complexfloating[Any, Any]]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Place:
+    """Where an input enters: its part, its signal, and the branch, -1 where it has to be added."""
+
+    part: int
+    signal: Signal
+    branch: int
+
+
+def _inputs_of(graph: CircuitGraph, number: int) -> dict[str, _Place]:
+    """The inputs at a part: what it prescribes, or the torque that it gives; a plain name comes last."""
+    part = graph.parts[number]
+    prescribed = {
+        graph.branches[k].template.ends: k
+        for k in part.branches
+        if graph.branches[k].template.kind is Kind.ACROSS_SOURCE
+    }
+    own = signals_of(graph, part)
+    if prescribed:
+        across = ((name, made) for name, made in own.items() if made.kind == "across" and made.ends in prescribed)
+        return {f"{part.name}.{name}": _Place(number, made, prescribed[made.ends]) for name, made in across}
+    if part.component.role not in ("source", "loss"):
+        return {}
+    return {f"{part.name}.{name}": _Place(number, made, -1) for name, made in own.items() if made.kind == "through"}
+
+
+def source_inputs(graph: CircuitGraph) -> tuple[str, ...]:
+    """The inputs of all sources, in the order of the parts."""
+    names: list[str] = []
+    for number, part in enumerate(graph.parts):
+        if part.component.role == "source":
+            names.extend({place.signal: name for name, place in _inputs_of(graph, number).items()}.values())
+    return tuple(names)
+
+
+def _places(graph: CircuitGraph, names: Sequence[str]) -> tuple[_Place, ...]:
+    """Where the named inputs enter.
+
+    Raises:
+        SignalError: there is no such input.
+    """
+    known = {name: place for number in range(len(graph.parts)) for name, place in _inputs_of(graph, number).items()}
+    for name in names:
+        if name not in known:
+            close = get_close_matches(str(name), known, n=3) or tuple(known)[:12]
+            raise SignalError(
+                f"'{name}' is no input of '{graph.name}'. An input is what a source gives: "
+                f"{', '.join(close) or 'none'}. To excite another node, add a source there; its law may be 0."
+            )
+    return tuple(known[name] for name in names)
+
+
+def _with_inputs(form: StateForm, places: Sequence[_Place]) -> tuple[StateForm, tuple[int, ...]]:
+    """The form with a branch for every torque that is an input, and the branches of all inputs."""
+    graph, tree = form.graph, form.tree
+    branches, parts, loops, members = list(graph.branches), list(graph.parts), dict(tree.loops), []
+    for place in places:
+        if place.branch >= 0:
+            members.append(place.branch)
+            continue
+        index, part, ends = len(branches), parts[place.part], place.signal.ends
+        loops[index] = _loop(form, part, place.signal)
+        plus, minus = (GROUND if end is None else part.nodes[end] for end in ends)
+        template = BranchTemplate(Kind.THROUGH_SOURCE, Integer(0), ends, (), "", ())
+        branches.append(GraphBranch(index, place.part, template, plus, minus, ()))
+        parts[place.part] = dataclasses.replace(part, branches=(*part.branches, index))
+        members.append(index)
+    added = tuple(range(len(graph.branches), len(branches)))
+    if not added:
+        return form, tuple(members)
+    links = {**tree.links, Kind.THROUGH_SOURCE: (*tree.links[Kind.THROUGH_SOURCE], *added)}
+    return StateForm(
+        dataclasses.replace(graph, parts=tuple(parts), branches=tuple(branches)),
+        dataclasses.replace(tree, links=links, loops=loops),
+        form.angles,
+    ), tuple(members)
+
+
+def _loop(form: StateForm, part: GraphPart, signal: Signal) -> Row:
+    """The loop of a branch between the ends of a signal."""
+    for index in part.branches:
+        if index in form.tree.loops and form.graph.branches[index].template.ends == signal.ends:
+            return form.tree.loops[index]
+    rows = [{} if end is None or part.nodes[end] == GROUND else _potential(form, part, end) for end in signal.ends]
+    loop = dict(rows[0])
+    for key, factor in rows[1].items():
+        total = add(loop.pop(key, 0), -factor, [])
+        if not (isinstance(total, int) and total == 0):
+            loop[key] = total
+    return loop
+
+
+def _potential(form: StateForm, part: GraphPart, port: str) -> Row:
+    row = form.tree.potentials[part.nodes[port]]
+    if row is None:
+        node = form.graph.node_name(part.nodes[port])
+        raise SignalError(
+            f"'{part.name}' is no input: nothing ties its node '{node}' to the reference. Join it to a Ground."
+        )
+    return row
+
+
+class Linearization:
+    """A network near a point, as matrices and as a way to read every quantity of a small motion.
+
+    Args:
+        model: the compiled model.
+        p: parameter vector.
+        x: (n,) states at the point.
+        t: time at which laws are read, s.
+        inputs: names of the inputs.
+
+    Raises:
+        SignalError: there is no such input.
+        SimulationError: a law has no finite slope at the point.
+    """
+
+    def __init__(self, model: CompiledModel, p: Array, x: Array, t: float, inputs: Sequence[str]) -> None:
+        if model.form.waves:
+            shaft = model.form.graph.part_of(model.form.waves[0]).name
+            raise SimulationError(
+                f"Shaft '{shaft}' is a travelling wave, whose delay no matrix holds. Take model=Spectral(16) for "
+                f"it: its lowest frequencies are the same to rounding."
+            )
+        places = _places(model.form.graph, inputs)
+        form, branches = _with_inputs(model.form, places)
+        self._form, self._point = form, (t, x)
+        self._bound = model.bind(p) if form is model.form else ArrayProgram(form).bind(p)
+        self.states = tuple(state.name for state in form.states)
+        self.state_units = tuple(state.unit for state in form.states)
+        self.angles = len(form.integrals)
+        self.inputs = tuple(inputs)
+        part, order = self._bound.part, {int(k): row for row, k in enumerate(self._bound.program.assembly.inputs)}
+        rows = [order[branch] for branch in branches]
+        entries = ([float(place.signal.sign) for place in places], (rows, range(len(rows))))
+        self._enter = sparse.csr_array(entries, shape=(len(order), len(rows)))
+        self._by_state, self._by_input = input_slopes(self._bound, t, x, self._enter)
+        self.A = sparse.csr_array(part.A + part.B @ self._by_state)
+        self.B = (part.B @ self._by_input).toarray()
+        self.B1 = (part.B1 @ self._enter).toarray()
+        self.weights = _energy_weights(self._bound)
+
+    @cached_property
+    def _names(self) -> _Reader:
+        return _Reader(self._form, lambda: self._bound)
+
+    @cached_property
+    def units(self) -> Mapping[str, str]:
+        """Every quantity that can be read and its unit."""
+        return self._names.units
+
+    @cached_property
+    def profiles(self) -> Mapping[str, tuple[str, tuple[float, ...]]]:
+        """Every quantity that can be read along a part: its unit, and the places in m."""
+        return self._names.profiles
+
+    @cached_property
+    def nodes(self) -> Mapping[str, tuple[str, float]]:
+        """The across variable of every node that a part is joined to or that stores something: its unit and a place.
+
+        In the order of the parts, one after the other; those inside a shaft lie between its ends as they do there.
+        """
+        graph, form = self._form.graph, self._form
+        stores = {graph.branches[k].plus for k in (*form.across_states, *form.dependent_across)}
+        found: dict[int, float] = {}
+        place = -1.0
+        for part in graph.parts:
+            for node, step in _in_a_row(part, stores):
+                if node not in found and node != GROUND:
+                    place += step
+                    found[node] = place
+        across = {node: graph.domains[node].across for node in found}
+        return {f"{graph.nodes[node]}.{made.name}": (made.unit, found[node]) for node, made in across.items()}
+
+    @cached_property
+    def masses(self) -> tuple[tuple[str, str], ...]:
+        """(part, across variable of its node) for every across store, also those that are no states."""
+        graph, form = self._form.graph, self._form
+        found = []
+        for k in sorted((*form.across_states, *form.dependent_across)):
+            node = graph.branches[k].plus if graph.branches[k].plus != GROUND else graph.branches[k].minus
+            found.append((graph.part_of(k).name, f"{graph.nodes[node]}.{graph.domains[node].across.name}"))
+        return tuple(found)
+
+    def motion(self, x: Complex, v: Complex, v_rate: Complex) -> Callable[[str], Complex]:
+        """A function from the name of a quantity to its deviation (k,), along a part (k, places).
+
+        Args:
+            x: (n, k) deviations of the states.
+            v: (m, k) those of the inputs.
+            v_rate: (m, k) their derivatives by time.
+        """
+        state, given, rate = (np.hstack([each.real, each.imag]) for each in (x, v, v_rate))
+        u = self._by_state @ state + self._by_input @ given
+        change = self.A @ state + self.B @ given + self.B1 @ rate
+        history = _Deviations(self._bound, state, (u, self._enter @ rate, change), self._nominal)
+        count = x.shape[1]
+
+        def read(name: str) -> Complex:
+            self._names.motion = history
+            along = name in self.profiles
+            values = self._names.along(name) if along else self._names.signal(name, history.t, history.x.T)
+            return np.asarray(values[:count] + 1j * values[count:])
+
+        return read
+
+    @cached_property
+    def _nominal(self) -> History:
+        t, x = self._point
+        return History(self._bound, np.array([t]), x[None, :])
+
+
+def _in_a_row(part: GraphPart, stores: set[int]) -> list[tuple[int, float]]:
+    """The nodes of a part from its first end to its last, each with its distance from the one before, on average 1."""
+    first, *others = (part.nodes[port.name] for port in part.component.ports)
+    along = next((made for made in part.component.profiles().values() if made.kind == "across"), None)
+    if along is None:
+        inside = (node for node in part.nodes.values() if node in stores and node not in (first, *others))
+        return [(node, 1.0) for node in (first, *inside, *others)]
+    steps = np.diff(along.places)
+    nodes = [part.nodes[name] for (name,) in along.of]
+    return [(nodes[0], 1.0), *zip(nodes[1:], (steps / steps.mean()).tolist(), strict=True)]
+
+
+class _Deviations(History):
+    """All branch quantities of a small motion about a point."""
+
+    def __init__(self, bound: BoundArrays, x: Any, given: tuple[Any, Any, Any], nominal: History) -> None:
+        super().__init__(bound, np.zeros(x.shape[1]), x.T)
+        self._given, self._nominal = given, nominal
+
+    @property
+    def _inputs(self) -> tuple[Array, Array, Array]:
+        return self._given
+
+    def stored(self, part: GraphPart) -> Array:
+        energy = np.zeros(len(self.t))
+        for index in part.branches:
+            coefficient = self.bound.part.coefficients[index]
+            match self.form.graph.branches[index].template.kind:
+                case Kind.ACROSS_STORE:
+                    energy += coefficient * self._nominal.across[index] * self.across[index]
+                case Kind.THROUGH_STORE:
+                    energy += self._nominal.through[index] * self.through[index] / coefficient
+        return energy
+
+    def absorbed(self, part: GraphPart) -> Array:
+        about, power = self._nominal, np.zeros(len(self.t))
+        for k in part.branches:
+            power += about.across[k] * self.through[k] + about.through[k] * self.across[k]
+        return power
+
+
+class _Reader(ModelObserver):
+    """Reads small motions by name, one at a time."""
+
+    motion: History
+
+    def history(self, t: Array, x: Array) -> History:  # noqa: ARG002 (they are those of the motion)
+        return self.motion
+
+    def along(self, name: str) -> Array:
+        """(k, places) a quantity along a part by its name in `profiles`."""
+        return self.motion.profile(*self._profiles[name])
+
+
+def _energy_weights(bound: BoundArrays) -> Array:
+    """(n,) factors of the states with which the sum of squares is twice the stored energy, but for planetary gears.
+
+    What is rigidly joined to a store or in series with it counts with it. An angle stores nothing and keeps its size.
+    """
+    form, F, k = bound.program.form, bound.part.loops, bound.part.coefficients
+    C, L = list(form.across_states), list(form.through_states)
+    K, S = list(form.dependent_across), list(form.dependent_through)
+    inertia = k[C] + (F[C][:, K] ** 2) @ k[K]
+    compliance = 1 / k[L] + (F[S][:, L] ** 2).T @ (1 / k[S])
+    return np.concatenate([np.sqrt(inertia), np.sqrt(compliance), np.ones(len(form.integrals))])

@@ -1,0 +1,249 @@
+"""The instants at which the laws of a network jump or bend because of the time alone, found before the run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sympy import Expr, Symbol
+
+from shaftwork.codegen.code import scalar, vectorised
+from shaftwork.codegen.elements import Array
+from shaftwork.codegen.timeline import CLEARANCE, NOTHING, Timeline, timeline
+from shaftwork.components.laws import line, switches
+from shaftwork.components.laws import t as TIME
+from shaftwork.core.errors import ParameterError
+from shaftwork.network.graph import GraphPart
+from shaftwork.network.templates import Kind
+from shaftwork.reduction.form import StateForm
+
+# A law of time is looked at so many times, and again at four times as many, until it changes sides no more often.
+FEWEST_SAMPLES, MOST_SAMPLES = 2**12, 2**22
+RESOLVED = 8
+"""Samples that there must be for each change of side."""
+GOLDEN = (math.sqrt(5) - 1) / 2
+# Rounding of a linear argument, in units of its terms.
+ROUNDINGS = 8
+# An argument rounds badly where its terms cancel: it is looked at farther and farther from a change of side, up to this
+# part of the run and of the way to the next change, until it keeps its sides.
+FARTHEST, CLEAR = 1e-6, 1 / 8
+PROBES = np.array([1.0, 1.5, 2.0, 3.0, 4.0])
+KEPT = 8
+"""Timelines of other runs that are kept."""
+
+Sides = Callable[[Array], NDArray[np.intp]]
+"""From times (k,) to the sides of a switch (k,): numbers that differ where it jumps or bends."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Switch:
+    """An argument in laws of time, and the levels at which it switches.
+
+    Args:
+        part: whose law it is, for messages.
+        argument: the expression, for messages.
+        levels: increasing.
+        places: of its parameters in the parameter vector.
+        line: from their values to slope and offset, or None where the argument is not linear in time.
+        value: from times (k,) and their values to the argument (k,).
+    """
+
+    part: str
+    argument: Expr
+    levels: Array
+    places: tuple[int, ...]
+    line: Callable[..., Sequence[float]] | None
+    value: Callable[..., Any]
+
+
+class Switching:
+    """What switches in the laws of a network because of the time alone.
+
+    Args:
+        form: the state form.
+    """
+
+    def __init__(self, form: StateForm) -> None:
+        self._switches = tuple(_switches(form))
+        self._places = sorted({place for switch in self._switches for place in switch.places})
+        self._found: dict[tuple[bytes, float, float], Timeline] = {}
+
+    def known(self, p: Array) -> tuple[float, ...]:
+        """Times in s of switches that are linear in time, increasing: they are known without a run."""
+        times = {time for switch in self._switches if switch.line is not None for time, _ in _on_a_line(switch, p)}
+        return tuple(sorted(times))
+
+    def timeline(self, p: Array, t0: float, t_end: float) -> Timeline:
+        """The instants of a run from t0 to t_end in s with a parameter vector.
+
+        Law: a switch that is linear in time is solved for it. Any other is sampled at times that are spread without a
+        pattern, until four times as many show no more changes of side; where it only comes near its level it is
+        followed to its nearest approach. Each change is then bisected to the last digit.
+
+        Raises:
+            ParameterError: a law switches too often to be followed.
+        """
+        if not self._switches:
+            return NOTHING
+        key = (p[self._places].tobytes(), t0, t_end)
+        if key not in self._found:
+            found: list[tuple[float, float]] = []
+            for switch in self._switches:
+                found += _on_a_line(switch, p) if switch.line is not None else _searched(switch, p, t0, t_end)
+            while len(self._found) >= KEPT:
+                del self._found[next(iter(self._found))]
+            self._found[key] = timeline(found, t0, t_end)
+        return self._found[key]
+
+
+def _switches(form: StateForm) -> Iterator[_Switch]:
+    """The switches of time alone, each once."""
+    kinds = (Kind.LAW, Kind.THROUGH_SOURCE, Kind.ACROSS_SOURCE)
+    found: dict[Expr, tuple[tuple[Expr, Sequence[float]], ...]] = {}
+    seen: set[Any] = set()
+    for branch in form.graph.branches:
+        template, part = branch.template, form.graph.part_of(branch.index)
+        if template.kind not in kinds:
+            continue
+        if template.law not in found:
+            moving = switches(template.law) if template.law.has(TIME) else ()
+            found[template.law] = tuple((argument, levels) for argument, levels in moving if argument.has(TIME))
+        for argument, levels in found[template.law]:
+            symbols = tuple(symbol for symbol in template.symbols if argument.has(symbol))
+            places = tuple(part.parameters[symbol.name] for symbol in symbols)
+            key = (argument, tuple(levels), places)
+            if argument.free_symbols <= {TIME, *symbols} and key not in seen:
+                seen.add(key)
+                yield _made(part, argument, levels, symbols, places)
+
+
+def _made(
+    part: GraphPart, argument: Expr, levels: Sequence[float], symbols: tuple[Symbol, ...], places: tuple[int, ...]
+) -> _Switch:
+    straight = line(argument)
+    return _Switch(
+        part.name,
+        argument,
+        np.array(levels, dtype=float),
+        places,
+        None if straight is None else scalar(list(symbols), list(straight)),
+        vectorised((TIME, *symbols), argument),
+    )
+
+
+def _on_a_line(switch: _Switch, p: Array) -> list[tuple[float, float]]:
+    """Times in s at which a switch that is linear in time passes its levels, and the reach of their rounding."""
+    assert switch.line is not None  # noqa: S101 (the caller asks only then)
+    slope, offset = (float(number) for number in switch.line(*(float(p[place]) for place in switch.places)))
+    if slope == 0:
+        return []
+    with np.errstate(all="ignore"):
+        times = (switch.levels - offset) / slope + 0.0
+        reach = ROUNDINGS * np.finfo(float).eps * (np.abs(switch.levels) + abs(offset)) / abs(slope)
+    return [(time, far) for time, far in zip(times.tolist(), reach.tolist(), strict=True) if math.isfinite(time)]
+
+
+def _searched(switch: _Switch, p: Array, t0: float, t_end: float) -> list[tuple[float, float]]:
+    """Times in s at which a switch changes sides in a run, and the reach of their rounding."""
+    values = [float(p[place]) for place in switch.places]
+
+    def argument(t: Array) -> Array:
+        with np.errstate(all="ignore"):
+            return np.broadcast_to(np.asarray(switch.value(t, *values), dtype=float), t.shape)
+
+    def sides(t: Array) -> NDArray[np.intp]:
+        x = argument(t)
+        found = np.searchsorted(switch.levels, x, side="left") + np.searchsorted(switch.levels, x, side="right")
+        return np.where(np.isnan(x), -1, found)
+
+    t = _sampled(sides, t0, t_end)
+    if t is None:
+        raise ParameterError(
+            f"'{switch.part}': a law that changes with the sign of {switch.argument} switches too often between "
+            f"t = {t0:g} s and {t_end:g} s to be followed: more than {MOST_SAMPLES // RESOLVED} times, or without end. "
+            "Take a shorter run, or a smooth law."
+        )
+    if switch.levels.size == 1:
+        t = np.sort(np.append(t, _nearest(lambda at: np.abs(argument(at) - switch.levels[0]), t)))
+    return _changes(sides, t)
+
+
+def _sampled(sides: Sides, t0: float, t_end: float) -> Array | None:
+    """Times (k,) from t0 to t_end between which a switch changes sides at most once, or None."""
+    size, before = FEWEST_SAMPLES, -1
+    while size <= MOST_SAMPLES:
+        places = np.arange(size)
+        # An irregular grid has no frequency that it mistakes for another.
+        t = np.append(t0 + (t_end - t0) * ((places + places * GOLDEN % 1.0) / size), t_end)
+        changes = int(np.count_nonzero(np.diff(sides(t))))
+        if changes == before and changes * RESOLVED <= size:
+            return np.unique(t)
+        size, before = 4 * size, changes
+    return None
+
+
+def _nearest(distance: Callable[[Array], Array], t: Array) -> Array:
+    """The times of the least distances between the times (k,), by golden sections."""
+    x = distance(t)
+    valleys = 1 + np.flatnonzero((x[1:-1] < x[:-2]) & (x[1:-1] < x[2:]))
+    low, high = t[valleys - 1], t[valleys + 1]
+    for _ in range(80):
+        early, late = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+        left = distance(early) < distance(late)
+        low, high = np.where(left, low, early), np.where(left, late, high)
+    return np.asarray((low + high) / 2)
+
+
+def _changes(sides: Sides, t: Array) -> list[tuple[float, float]]:
+    """Times in s at which a switch changes sides between the times (k,), and the reach of their rounding."""
+    grain = math.ulp(max(abs(float(t[0])), abs(float(t[-1]))))
+    low, high, old, new = _bisected(sides, t, grain / 1024)
+    order = np.argsort(high)
+    low, high, old, new = low[order], high[order], old[order], new[order]
+    # A zero that is met exactly is a side of its own: two changes, and one instant.
+    apart = np.diff(high) > CLEARANCE * grain
+    first, last = np.append(True, apart)[: high.size], np.append(apart, True)[: high.size]
+    times, width, old, new = high[first], high[last] - high[first], old[first], new[last]
+    passed = old != new
+    times, width, old, new = times[passed], width[passed], old[passed], new[passed]
+    return list(zip(times.tolist(), (width + _reach(sides, t, times, old, new, grain)).tolist(), strict=True))
+
+
+def _bisected(sides: Sides, t: Array, grain: float) -> tuple[Array, Array, NDArray[np.intp], NDArray[np.intp]]:
+    """Every change of side between the times (k,): the last time before it, the first after it, and the two sides."""
+    at = sides(t)
+    changed = np.flatnonzero(np.diff(at))
+    low, high, old, new = t[changed], t[changed + 1], at[changed], at[changed + 1]
+    while True:
+        middle = low + (high - low) / 2
+        done = (high - low <= grain) | (middle <= low) | (middle >= high)
+        if done.all():
+            return low, high, old, new
+        here = sides(middle)
+        left, right = ~done & (old != here), ~done & (here != new)
+        low = np.concatenate([low[done], low[left], middle[right]])
+        high = np.concatenate([high[done], middle[left], high[right]])
+        old, new = (
+            np.concatenate([old[done], old[left], here[right]]),
+            np.concatenate([new[done], here[left], new[right]]),
+        )
+
+
+def _reach(sides: Sides, t: Array, times: Array, old: NDArray[np.intp], new: NDArray[np.intp], grain: float) -> Array:
+    """How far from the times (k,) of changes the sides are the old and the new ones, whatever the rounding, in s."""
+    gaps = np.diff(times, prepend=-np.inf, append=np.inf)
+    farthest = np.minimum(FARTHEST * (t[-1] - t[0]), CLEAR * np.minimum(gaps[:-1], gaps[1:]))
+    reach = np.full(times.shape, CLEARANCE * grain)
+    while True:
+        offsets = reach[:, None] * PROBES
+        early, late = np.maximum(times[:, None] - offsets, t[0]), np.minimum(times[:, None] + offsets, t[-1])
+        kept = (sides(early.ravel()).reshape(early.shape) == old[:, None]) | (early == t[0])
+        kept &= (sides(late.ravel()).reshape(late.shape) == new[:, None]) | (late == t[-1])
+        farther = ~kept.all(axis=1) & (4 * reach <= farthest)
+        if not farther.any():
+            return reach
+        reach[farther] *= 4

@@ -1,0 +1,1 @@
+"""The engine for networks whose shafts are travelling waves: between kinks, what arrives is known history."""

@@ -1,0 +1,59 @@
+"""Collocation on one panel: the nodes, and the polynomials through them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import legendre
+
+from shaftwork.integrate.problem import Array
+
+STAGES = 8
+
+# Gauss points of [-1, 1]: the values of all waves and states are kept there.
+POINTS = legendre.leggauss(STAGES)[0]
+# Values at the points (k, s) times this are the coefficients (k, s) of the Legendre polynomials.
+LEGENDRE = np.linalg.inv(legendre.legvander(POINTS, STAGES - 1)).T
+# Values at the points to powers of xi. The powers of a polynomial of Legendre coefficients that decay are harmless.
+POWERS = np.linalg.inv(np.vander(POINTS, increasing=True)).T
+# Value at the panel's start and at the points to powers of xi: the collocation polynomial of a state.
+STATE_POWERS = np.linalg.inv(np.vander(np.append(-1.0, POINTS), increasing=True)).T
+# Value, slope and curvature in xi at both ends of a panel, from the values at the points.
+_DERIVATIVES = np.array([[1.0, 0.0, 0.0], *([1.0, k, k * (k - 1.0)] for k in range(1, STAGES))])
+RIGHT = POWERS @ _DERIVATIVES
+LEFT = POWERS @ (_DERIVATIVES * (-1.0) ** np.subtract.outer(np.arange(STAGES), np.arange(3)))
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """A collocation scheme on [0, 1] that speaks to others in values at the Gauss points.
+
+    Args:
+        nodes: (s,) nodes in (0, 1].
+        matrix: (s, s) integrals of the node polynomials from 0 to each node.
+        close: (s,) weights of the nodes' increments in the increment over the whole panel.
+        bring: (s, s) values (k, s) at the Gauss points times this are values at the nodes.
+        give: (s, s) the way back.
+    """
+
+    nodes: Array
+    matrix: Array
+    close: Array
+    bring: Array
+    give: Array
+
+
+def _scheme(points: Array) -> Scheme:
+    basis = legendre.legvander(points, STAGES - 1)
+    integrals = np.column_stack([legendre.legval(points, legendre.legint(row, lbnd=-1)) for row in np.eye(STAGES)])
+    whole = np.append(2.0, np.zeros(STAGES - 1))
+    inverse = np.linalg.inv(basis)
+    matrix = integrals @ inverse / 2
+    bring = (basis @ LEGENDRE.T).T
+    return Scheme((1 + points) / 2, matrix, whole @ inverse / 2 @ np.linalg.inv(matrix), bring, np.linalg.inv(bring))
+
+
+# Gauss keeps quadratic energies; Radau IIA forgets what is infinitely fast within one panel.
+GAUSS = _scheme(POINTS)
+RADAU = _scheme(np.append(legendre.legroots([*np.zeros(STAGES - 1), -1.0, 1.0])[:-1], 1.0))

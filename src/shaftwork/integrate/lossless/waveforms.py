@@ -1,0 +1,152 @@
+"""Dense output: states and waves that are polynomials in each panel."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from shaftwork.integrate.lossless.collocation import POINTS, POWERS, STAGES, STATE_POWERS
+from shaftwork.integrate.lossless.lines import DelayProblem, DelayTrajectory, Lines, Past, past_of
+from shaftwork.integrate.pieces import both_sides
+from shaftwork.integrate.problem import Array
+
+
+@dataclass(frozen=True)
+class Polynomials:
+    """Functions that are polynomials in each panel, at any times.
+
+    Args:
+        starts: (m,) starts of the panels in s.
+        lengths: (m,) their lengths in s.
+        powers: (m, r, p) coefficients of the powers of xi, -1 at a panel's start and 1 at its end.
+        merge: times nearer than this, in s, are the same.
+    """
+
+    starts: Array
+    lengths: Array
+    powers: Array
+    merge: float
+
+    def __call__(self, times: Array, *, left: bool = False) -> Array:
+        """Values (k, r) at times (k,) in s; where panels meet those of the later one, or of the `left` one."""
+        side = -self.merge if left else self.merge
+        index = np.clip(np.searchsorted(self.starts, times + side, side="right") - 1, 0, None)
+        points = 2 * (times - self.starts[index]) / self.lengths[index] - 1
+        powers = np.vander(points, self.powers.shape[2], increasing=True)
+        return np.asarray(np.einsum("krp,kp->kr", self.powers[index], powers))
+
+
+@dataclass(frozen=True)
+class StatesDense:
+    """Dense output of the states.
+
+    Args:
+        states: (n,) polynomials of the states.
+        steps: (s,) ends of the panels in s, t0 first.
+    """
+
+    states: Polynomials
+    steps: Array
+
+    def __call__(self, times: Array) -> Array:
+        return self.states(np.atleast_1d(np.asarray(times, dtype=float)))
+
+
+@dataclass(frozen=True)
+class Ends:
+    """What the ends of the lines do at any time.
+
+    Args:
+        problem: which gives their speeds.
+        lines: which end receives what from where.
+        states: (n,) polynomials of the states.
+        waves: (q,) polynomials of the waves that leave the ends.
+    """
+
+    problem: DelayProblem
+    lines: Lines
+    states: Polynomials
+    waves: Polynomials
+
+    def __call__(self, times: Array, *, left: bool = False) -> tuple[Array, Array]:
+        """History torques (k, q) in N m and speeds (k, q) in rad/s at times (k,); at a kink after or `left` of it."""
+        times = np.atleast_1d(np.asarray(times, dtype=float))
+        h = np.empty((times.size, self.waves.powers.shape[1]))
+        # What arrives at the very end of the run is not of the run.
+        arriving = np.minimum(times, self.problem.t_end - 2 * self.waves.merge)
+        for delay, ends, partners in zip(self.lines.delays, self.lines.ends, self.lines.partners, strict=True):
+            h[:, ends] = -self.waves(arriving - delay, left=left)[:, partners]
+        inside = one_sided(self.problem, times, left=left)
+        return h, np.asarray(self.problem.speeds(inside, self.states(times, left=left).T, h.T)).T
+
+    def past(self, time: float) -> Past:
+        """What left the ends before a time in s, for a run that goes on from there."""
+        waves = self.waves
+        first = int(np.searchsorted(waves.starts, time - 2 * max(self.lines.delays), side="right")) - 1
+        last = int(np.searchsorted(waves.starts, time - waves.merge))
+        chosen = slice(max(first, 0), last)
+        starts, lengths = waves.starts[chosen], waves.lengths[chosen].copy()
+        values = waves.powers[chosen] @ np.vander(POINTS, STAGES, increasing=True).T
+        part = (time - starts[-1]) / lengths[-1]
+        lengths[-1] *= part
+        values[-1] = waves.powers[last - 1] @ np.vander((1 + POINTS) * part - 1, STAGES, increasing=True).T
+        return Past(starts, lengths, values)
+
+
+def one_sided(problem: DelayProblem, times: Array, *, left: bool = False) -> Array:
+    """Times (k,) in s, moved to the side of a breakpoint on which inputs are to be read."""
+    marks = np.array([problem.t0, *problem.breakpoints, problem.t_end])
+    before, after = np.array([problem.sides(mark) for mark in marks]).T
+    index = np.minimum(np.searchsorted(np.maximum(marks, after), times), marks.size - 1)
+    near = (np.minimum(marks, before)[index] <= times) & (times <= np.maximum(marks, after)[index])
+    early = (times < marks[index]) | left | (index == marks.size - 1)
+    return np.where(near, np.where(early, before[index], after[index]), times)
+
+
+@dataclass(frozen=True)
+class Panels:
+    """All panels of a run.
+
+    Args:
+        starts: (m,) in s.
+        lengths: (m,) in s.
+        states: (m, n, s + 1) at their starts and at the Gauss points.
+        waves: (m, q, s) that leave the ends, at the Gauss points.
+        pieces: of each smooth piece the number of panels up to its end, and the state (n,) there, before a jump.
+        merge: times nearer than this, in s, are the same.
+    """
+
+    starts: Array
+    lengths: Array
+    states: Array
+    waves: Array
+    pieces: tuple[tuple[int, Array], ...]
+    merge: float
+
+
+def trajectory(problem: DelayProblem, panels: Panels, statistics: Mapping[str, int]) -> DelayTrajectory:
+    """The panels of a run at the output times, and their dense output."""
+    past = past_of(problem)
+    waves = Polynomials(
+        np.concatenate([past.starts, panels.starts]),
+        np.concatenate([past.lengths, panels.lengths]),
+        np.concatenate([past.waves, panels.waves]) @ POWERS,
+        panels.merge,
+    )
+    steps = np.append(panels.starts, problem.t_end)
+    dense = StatesDense(Polynomials(panels.starts, panels.lengths, panels.states @ STATE_POWERS, panels.merge), steps)
+    ends = Ends(problem, Lines.of(problem.delays), dense.states, waves)
+    if problem.t_eval is not None:
+        t = np.asarray(problem.t_eval, dtype=float)
+        return DelayTrajectory(t, dense(t), dense, statistics, *ends(t), waves=ends, past=ends.past)
+    edges = pairwise([0, *(count for count, _ in panels.pieces)])
+    spans = [(slice(low, high), end) for (low, high), (_, end) in zip(edges, panels.pieces, strict=True)]
+    times = [steps[span.start : span.stop + 1] for span, _ in spans]
+    t, x = both_sides(problem, times, [np.vstack([panels.states[span, :, 0], end]) for span, end in spans])
+    left = np.append(np.diff(t) == 0, True)
+    h, v = ends(t)
+    h[left], v[left] = ends(t[left], left=True)
+    return DelayTrajectory(t, x, dense, statistics, h, v, waves=ends, past=ends.past)

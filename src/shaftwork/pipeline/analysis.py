@@ -1,0 +1,96 @@
+"""The frequency domain of a compiled network: the point, the slopes there, and the record of both."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from shaftwork.codegen.elements import Array
+from shaftwork.codegen.linear import Linearization, source_inputs
+from shaftwork.codegen.model import CompiledModel
+from shaftwork.codegen.operating import initial_state
+from shaftwork.core.errors import ParameterError
+from shaftwork.core.parameters import in_si
+from shaftwork.results import campbell as diagram
+from shaftwork.results.linear import LinearModel, linear_model
+from shaftwork.results.solution import Solution
+
+Given = Mapping[str, float] | None
+Point = Given | Solution
+Names = str | Sequence[str] | None
+Time = float | None
+
+
+def linearized(
+    model: CompiledModel, p: Array, at: Point, t: Time, settled: float, inputs: Names, outputs: Names
+) -> LinearModel:
+    """The network near a point.
+
+    Args:
+        model: the compiled model.
+        p: parameter vector.
+        at: speeds, twists and torques at the point, what is not named at rest; or a motion at one time; None for rest.
+        t: time at which the laws are read, s; None for that of the motion, or else `settled`.
+        settled: a time after which no law switches any more, s.
+        inputs: names; None for all sources.
+        outputs: names; None for the states.
+
+    Raises:
+        ParameterError: the point is none.
+        SignalError: there is no such quantity.
+        SimulationError: a law has no finite slope at the point.
+    """
+    named = source_inputs(model.form.graph) if inputs is None else _listed(inputs)
+    if isinstance(at, Solution):
+        time, x = _moment(model, at)
+        time = time if t is None else in_si("t", t, "s")
+    else:
+        time = settled if t is None else in_si("t", t, "s")
+        x = initial_state(model.bind(p), at if at is not None else {}, time)
+    slopes = Linearization(model, p, x, time, named)
+    return linear_model(model.form.graph.name, slopes, None if outputs is None else _listed(outputs), x, time)
+
+
+def campbell(
+    linearize: Callable[[Any], LinearModel],
+    speeds: Any,
+    orders: Any,
+    f_max: float | None,
+    at: Point | Callable[[float], Point],
+    count: int | None,
+) -> diagram.Campbell:
+    """The interference diagram, linearised at one point or, where `at` is a function of speed, at each.
+
+    Args:
+        linearize: from a point to the network near it.
+        speeds: (k,) rad/s, ascending.
+        orders: excitations per turn.
+        f_max: highest frequency of interest, Hz.
+        at: the point, or the point as a function of the speed.
+        count: the modes wanted.
+
+    Raises:
+        ParameterError: speeds or orders are not what they must be.
+    """
+    if callable(at):
+        return diagram.campbell(lambda n: linearize(at(n)).modes(count), speeds, orders, f_max, constant=False)
+    return diagram.campbell(lambda _: linearize(at).modes(count), speeds, orders, f_max, constant=True)
+
+
+def _listed(names: str | Sequence[str]) -> tuple[str, ...]:
+    return (names,) if isinstance(names, str) else tuple(names)
+
+
+def _moment(model: CompiledModel, motion: Solution) -> tuple[float, Array]:
+    if len(motion.t) != 1:
+        raise ParameterError(
+            f"at is a motion of {len(motion.t)} times; take one of them, such as at=sol.at([{motion.t[-1]:g}])."
+        )
+    states = tuple(state.name for state in model.form.states)
+    if motion.states != states:
+        raise ParameterError(
+            f"at is a motion of '{motion.name}' with other states. The states here are: {', '.join(states)}."
+        )
+    return float(motion.t[0]), np.asarray(motion.x[0], dtype=float)

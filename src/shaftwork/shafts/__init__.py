@@ -1,0 +1,1 @@
+"""Torsional shafts with distributed inertia: their description and their exact solutions."""

@@ -1,0 +1,60 @@
+"""Error over run time as a picture that says at a glance which model to use."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shaftwork.core.errors import MissingExtraError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from shaftwork.studies.work_precision import Trial, WorkPrecision
+
+MARKERS = "osD^vP*X<>"
+"""One for each kind of model."""
+FLOOR = 1e-12
+"""Errors below are drawn here: they are rounding."""
+
+
+def work_precision_figure(study: WorkPrecision) -> Figure:
+    """Two panels: error over CPU time, and error over the number of states; each curve is a kind of model."""
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise MissingExtraError("matplotlib", "plot", "WorkPrecision.plot()") from None
+    figure = Figure(figsize=(11, 5.4), layout="constrained")
+    axes = figure.subplots(1, 2, sharey=True)
+    families: dict[str, list[Trial]] = {}
+    for trial in study.trials:
+        if np.isfinite(trial.error):
+            families.setdefault(_family(trial), []).append(trial)
+    for (family, members), marker in zip(families.items(), MARKERS * len(families), strict=False):
+        errors = [max(trial.error, FLOOR) for trial in members]
+        costs = [1e3 * trial.cpu for trial in members]
+        sizes = [float(max(trial.states, 1)) for trial in members]
+        for axis, values in zip(axes, (costs, sizes), strict=True):
+            axis.loglog(values, errors, marker=marker, markersize=6, linewidth=1.3, label=family)
+            for trial, value, error in zip(members, values, errors, strict=True):
+                if size := _size(trial):
+                    axis.annotate(size, (value, error), (4, 4), textcoords="offset points", fontsize=7, alpha=0.75)
+    for axis, label in zip(axes, ("CPU time of a warm call in ms", "number of states"), strict=True):
+        axis.set_xlabel(label)
+        axis.grid(which="both", alpha=0.2)
+    axes[0].set_ylabel("largest error of the end torques / largest torque")
+    axes[0].text(0.02, 0.02, "better: down and left", transform=axes[0].transAxes, fontsize=8, alpha=0.7)
+    axes[1].legend(frameon=False, fontsize=8)
+    figure.suptitle(f"{study.name}: which model of '{study.shaft}' reaches which accuracy at which cost")
+    return figure
+
+
+def _family(trial: Trial) -> str:
+    name = trial.model.partition("(")[0]
+    return f"{name}, order 4" if "order=4" in trial.model else name
+
+
+def _size(trial: Trial) -> str:
+    digits = trial.model.partition("=")[2]
+    return digits.split(",")[0].rstrip(")") if trial.model.startswith(("Lumped", "Central", "Spectral")) else ""

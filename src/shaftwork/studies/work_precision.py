@@ -1,0 +1,225 @@
+"""Error against run time for the models of a shaft and the engines that solve them."""
+
+from __future__ import annotations
+
+import csv
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shaftwork.components.shaft_models import CentralDifference, Lumped, OneSpring, ShaftModel, Spectral, Wave
+from shaftwork.components.shafts import Shaft
+from shaftwork.core.errors import ParameterError, ShaftworkError
+from shaftwork.core.parameters import in_si
+from shaftwork.pipeline.model import Model
+from shaftwork.pipeline.network import Network
+from shaftwork.results.observer import Array
+from shaftwork.results.solution import Solution
+from shaftwork.studies.truth import QUANTITIES, Truth, quantities, truth, with_model
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LADDER: tuple[ShaftModel, ...] = (
+    OneSpring(),
+    *(Lumped(m) for m in (5, 10, 20, 40, 80, 160)),
+    *(CentralDifference(m) for m in (10, 20, 40, 80)),
+    *(CentralDifference(m, order=4) for m in (10, 20, 40)),
+    *(Spectral(n) for n in (2, 4, 8, 16, 32, 48)),
+    Wave(3),
+)
+"""The models and sizes that are compared where none are named."""
+POINTS, CALLS = 401, 5
+"""Output times, and warm calls of which the median counts."""
+MOST_STATES = 500
+"""Up to this many states natural frequencies are computed."""
+TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6)
+"""Errors for which the cheapest model is named."""
+MODES = 3
+"""Elastic natural frequencies that are compared."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One model with one engine.
+
+    Args:
+        model: as text, such as "Lumped(m=20)".
+        engine: name of the engine that ran.
+        states: number of states.
+        setup: CPU time from the network to the first result, less a warm call, s.
+        cpu: CPU time of a warm call with reading both end torques, s; the median of several.
+        errors: largest error of each quantity over its largest value, by name; of frequencies, relative to each.
+        why: why it failed; empty where it did not.
+    """
+
+    model: str
+    engine: str
+    states: int
+    setup: float
+    cpu: float
+    errors: dict[str, float]
+    why: str = ""
+
+    @property
+    def error(self) -> float:
+        """The larger error of the two end torques; infinite where it failed."""
+        return max(self.errors["tau_a"], self.errors["tau_b"]) if self.errors else np.inf
+
+
+@dataclass(frozen=True)
+class WorkPrecision:
+    """The comparison of models and engines.
+
+    Args:
+        name: of the network.
+        shaft: name of the shaft.
+        trials: in the order in which they were asked for.
+        truth: where the truth comes from, and its own error.
+    """
+
+    name: str
+    shaft: str
+    trials: tuple[Trial, ...]
+    truth: tuple[str, float]
+
+    def cheapest(self, tolerance: float) -> Trial | None:
+        """The trial of the least CPU time whose end torques are right to a tolerance."""
+        good = [trial for trial in self.trials if trial.error <= tolerance]
+        return min(good, key=lambda trial: trial.cpu, default=None)
+
+    @property
+    def advice(self) -> str:
+        """For each of some tolerances the cheapest model, a line each."""
+        lines = []
+        for tolerance in TOLERANCES:
+            best = self.cheapest(tolerance)
+            what = "none of these" if best is None else f"{best.model} on {best.engine}, {1e3 * best.cpu:.2g} ms"
+            lines.append(f"end torques to {tolerance:g}: {what}")
+        return "\n".join(lines)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the errors that were computed."""
+        return tuple(dict.fromkeys(name for trial in self.trials for name in trial.errors))
+
+    def __str__(self) -> str:
+        header = ["model", "engine", "states", "set-up ms", "CPU ms", *self.columns]
+        rows = [
+            [trial.model, trial.engine, str(trial.states), f"{1e3 * trial.setup:.0f}", f"{1e3 * trial.cpu:.2f}"]
+            + [f"{trial.errors[name]:.1e}" if name in trial.errors else "-" for name in self.columns]
+            + ([trial.why] if trial.why else [])
+            for trial in self.trials
+        ]
+        widths = [max(len(row[k]) for row in [header, *rows] if k < len(row)) for k in range(len(header))]
+        text = "\n".join(
+            "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=False)).rstrip()
+            + (f"  {row[-1]}" if len(row) > len(header) else "")
+            for row in [header, *rows]
+        )
+        return f"{self.name}, shaft '{self.shaft}', errors against {self.truth[0]} ({self.truth[1]:.0e})\n{text}"
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write every trial with all its errors."""
+        with Path(path).open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(["model", "engine", "states", "setup_s", "cpu_s", *self.columns, "why"])
+            for trial in self.trials:
+                errors = [trial.errors.get(name, "") for name in self.columns]
+                writer.writerow([trial.model, trial.engine, trial.states, trial.setup, trial.cpu, *errors, trial.why])
+
+    def plot(self) -> Figure:
+        """Error of the end torques over CPU time, a curve for each kind of model (extra `plot`)."""
+        from shaftwork.studies.picture import work_precision_figure
+
+        return work_precision_figure(self)
+
+
+def work_precision(
+    net: Network,
+    shaft: str,
+    *,
+    t_end: float,
+    models: Sequence[ShaftModel | str] = LADDER,
+    engines: Iterable[str] = ("auto",),
+    points: int = POINTS,
+) -> WorkPrecision:
+    """Solve a network with each model of one of its shafts, by each engine, and measure error and CPU time.
+
+    Args:
+        net: the network.
+        shaft: name of the shaft whose model changes.
+        t_end: end of the motion, s.
+        models: models, or their texts.
+        engines: engines by name.
+        points: number of output times.
+
+    Raises:
+        ParameterError: there is no such shaft.
+    """
+    shafts = [part.name for part in net.parts if isinstance(part, Shaft)]
+    if shaft not in shafts:
+        raise ParameterError(f"'{net.name}' has no shaft {shaft!r}. It has: {', '.join(shafts) or 'none'}.")
+    end = in_si("t_end", t_end, "s", above=0)
+    # the fronts of waves that start at zero pass at multiples of the delay; these times are none
+    t = end * (np.arange(1, points + 1) - 0.5) / points
+    known = truth(net, shaft, end, t)
+    trials = [
+        _trial(net, shaft, ShaftModel.read(model) if isinstance(model, str) else model, engine, end, t, known)
+        for model in models
+        for engine in engines
+    ]
+    return WorkPrecision(net.name, shaft, tuple(trials), (known.source, known.error))
+
+
+def _trial(net: Network, shaft: str, model: ShaftModel, engine: str, t_end: float, t: Array, known: Truth) -> Trial:
+    def call(compiled: Model) -> Solution:
+        solution = compiled.simulate(t_end, t_eval=t, engine=engine)  # type: ignore[arg-type]
+        solution[f"{shaft}.tau_a"], solution[f"{shaft}.tau_b"]
+        return solution
+
+    began = time.process_time()
+    try:
+        compiled = with_model(net, shaft, model).compile()
+        solution = call(compiled)
+        first = time.process_time() - began
+        times = []
+        for _ in range(CALLS):
+            began = time.process_time()
+            call(compiled)
+            times.append(time.process_time() - began)
+            if sum(times) > 1.0:
+                break
+    except ShaftworkError as error:
+        return Trial(_text(model), engine, 0, 0.0, np.inf, {}, str(error).splitlines()[0])
+    found = quantities(solution, shaft)
+    errors = {name: float(np.abs(found[name] - known.values[name]).max()) / _size(known, name) for name in QUANTITIES}
+    errors |= _frequency_errors(compiled, known.frequencies)
+    cpu = median(times)
+    return Trial(_text(model), solution.engine, len(compiled.states), first - cpu, cpu, errors)
+
+
+def _size(known: Truth, name: str) -> float:
+    """The largest value, of all torques or all speeds together, so that no quantity is judged by its own zero."""
+    kind = name.partition("_")[0]
+    family = [value for other, value in known.values.items() if other.startswith(kind)]
+    return float(max(np.abs(value).max() for value in family)) or 1.0
+
+
+def _frequency_errors(compiled: Model, exact: Array) -> dict[str, float]:
+    if compiled.form.waves or not exact.size or len(compiled.states) > MOST_STATES or not compiled.linear:
+        return {}
+    rates = np.linalg.eigvals(compiled.jacobian(0.0, np.zeros(len(compiled.states))).toarray())
+    found = np.abs(rates[np.abs(rates.imag) > 1e-6 * np.abs(rates).max()].imag) / (2 * np.pi)
+    if not found.size:
+        return {}
+    return {f"f_{k + 2}": float(np.abs(found / f - 1).min()) for k, f in enumerate(exact[:MODES])}
+
+
+def _text(model: ShaftModel) -> str:
+    return repr(model).replace(", ends='half'", "").replace(", order=2", "")

@@ -1,0 +1,148 @@
+"""Shafts as travelling waves inside networks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import shaftwork as sw
+from shaftwork.shafts.exact_motion import Torque, motion
+from shaftwork.shafts.line import Line, Section
+
+STEEL = {"density": 7900.0, "shear_modulus": 77.5e9}
+SECTION = Section.of_geometry(1.0, 0.02, **STEEL)
+
+
+def train(model: object, load: float = 0.11, drive: object = 12.7, **shaft: float) -> sw.Network:
+    """A motor with a step of torque, a shaft and a load."""
+    net = sw.Network("train")
+    net.add(sw.TorqueSource("motor", tau=drive), "m")
+    net.add(sw.Inertia("Je", J=0.025), "m")
+    net.add(sw.Shaft("line", length=1.0, diameter=0.02, **STEEL, **shaft, model=model), "m", "l")
+    net.add(sw.Inertia("Jm", J=load), "l")
+    return net
+
+
+def pulse(at_the_end: sw.Component | None) -> sw.Solution:
+    """A short torque on a light disc sends a wave of length 0.1 ms along the shaft; it is back after 0.64 ms."""
+    net = sw.Network("pulse")
+    net.add(sw.TorqueSource("motor", tau=sw.Step(1.0, start=0.0) - sw.Step(1.0, start=1e-4)), "m")
+    net.add(sw.Shaft("line", length=1.0, diameter=0.02, **STEEL, model=sw.Wave()), "m", "l")
+    if at_the_end is not None:
+        net.add(at_the_end, "l")
+    return net.simulate(9e-4, t_eval=np.linspace(0, 9e-4, 181))
+
+
+@pytest.mark.parametrize("load", [0.11, 0.025])
+def test_waves_are_the_exact_solution(load: float) -> None:
+    """Against characteristics with Radau collocation, which shares no code with the engine."""
+    sol = train(sw.Wave(), load).simulate(0.2, t_eval=401)
+    truth = motion(Line((SECTION,), (0.025, load)), [Torque(0, 12.7)], 0.2)
+    assert sol.engine == "wave"
+    for side, name in (("left", "line.tau_a"), ("right", "line.tau_b")):
+        expected = truth.torque_in(0, sol.t, side)
+        # the engine is asked for 1e-8
+        assert np.abs(sol[name] - expected).max() < 1e-8 * np.abs(expected).max()
+    for place, column in enumerate(sol.places["line.tau"]):
+        expected = truth.torque(column, sol.t, "left")
+        assert np.abs(sol["line.tau"][:, place] - expected).max() < 1e-8 * 21
+        np.testing.assert_allclose(sol["line.omega"][:, place], truth.speed(column, sol.t), atol=1e-7)
+
+
+def test_energy_is_kept_to_rounding() -> None:
+    assert train(sw.Wave()).simulate(0.2).energy_residual < 1e-12
+
+
+def test_a_matched_end_takes_every_wave() -> None:
+    """A damper of the shaft's impedance: nothing comes back to the motor's end."""
+    sol = pulse(sw.Damper("end", d=SECTION.impedance))
+    arrived = np.abs(sol["line.tau_b"]).max()
+    assert arrived == pytest.approx(1.0, rel=1e-12)
+    back = sol.t > 5e-4
+    assert np.abs(sol["line.omega_a"][back]).max() * SECTION.impedance < 1e-12
+
+
+def test_a_free_end_reflects_the_torque_with_the_opposite_sign_and_a_clamped_one_with_the_same() -> None:
+    """A free end doubles the speed and has no torque; a clamped one doubles the torque and has no speed."""
+    clamped, light = pulse(sw.Ground("wall")), pulse(sw.Damper("air", d=1e-9))
+    there = np.argmin(np.abs(clamped.t - 3.7e-4))
+    assert clamped["line.tau_b"][there] == pytest.approx(2.0, rel=1e-9)
+    assert light["line.omega_b"][there] == pytest.approx(2.0 / SECTION.impedance, rel=1e-6)
+    back = np.argmin(np.abs(clamped.t - 6.9e-4))
+    # at the free motor end the speed is doubled again, with the sign of the reflection
+    assert light["line.omega_a"][back] == pytest.approx(2.0 / SECTION.impedance, rel=1e-6)
+    assert clamped["line.omega_a"][back] == pytest.approx(-2.0 / SECTION.impedance, rel=1e-6)
+
+
+def test_a_nonlinear_motor_drives_waves() -> None:
+    """A Kloss motor with the law of the exact solution, which solves it by its own Newton iteration."""
+    net = sw.Network("kloss")
+    net.add(sw.KlossMotor("motor", tau_k=30.0, s_k=0.2, n_sync=1500), "m")
+    net.add(sw.Inertia("Je", J=0.025), "m")
+    net.add(sw.Shaft("line", length=1.0, diameter=0.02, **STEEL, model=sw.Wave()), "m", "l")
+    net.add(sw.Inertia("Jm", J=0.11), "l")
+    sol = net.simulate(0.1, t_eval=101)
+    omega_0 = 1500 * np.pi / 30
+
+    def kloss(_t: np.ndarray, omega: np.ndarray) -> np.ndarray:
+        slip = 1 - omega / omega_0
+        return 2 * 30.0 * slip * 0.2 / (slip**2 + 0.2**2)
+
+    truth = motion(Line((SECTION,), (0.025, 0.11)), [Torque(0, kloss, of_speed=True)], 0.1)
+    expected = truth.torque_in(0, sol.t, "right")
+    assert np.abs(sol["line.tau_b"] - expected).max() < 1e-7 * np.abs(expected).max()
+
+
+def test_two_shafts_of_incommensurate_length_meet_at_a_gear() -> None:
+    """Against the spectral model, whose end speeds are good to 1e-7 at degree 16, as those of degree 24 and 32 say."""
+
+    def geared(model: object) -> sw.Solution:
+        net = sw.Network("geared")
+        net.add(sw.KlossMotor("motor", tau_k=30.0, s_k=0.2, n_sync=1500), "m")
+        net.add(sw.Inertia("Je", J=0.025), "m")
+        net.add(sw.Shaft("first", length=1.0, diameter=0.02, **STEEL, model=model), "m", "x")
+        net.add(sw.Gear("gear", ratio=2.0), "x", "y")
+        net.add(sw.Shaft("second", length=np.sqrt(2) / 2, diameter=0.03, **STEEL, model=model), "y", "l")
+        net.add(sw.Inertia("Jm", J=0.3), "l")
+        return net.simulate(0.05, t_eval=51)
+
+    waves, reference = geared(sw.Wave()), geared(sw.Spectral(16))
+    for name in ("Je.omega", "Jm.omega"):
+        assert np.abs(waves[name] - reference[name]).max() < 1e-6 * np.abs(reference[name]).max()
+
+
+def test_bearing_friction_is_lumped() -> None:
+    """Right for motions slower than the delay: the decay of the lowest mode, not of the wave fronts."""
+    waves, reference = (train(model, friction=0.05).simulate(0.2) for model in (sw.Wave(), sw.Spectral(24)))
+    assert np.abs(waves["Jm.omega"] - reference["Jm.omega"]).max() < 1e-3 * reference["Jm.omega"].max()
+
+
+def test_another_diameter_needs_no_new_model() -> None:
+    model = train(sw.Wave()).compile()
+    thick = model.simulate(0.02, parameters={"line.diameter": 0.03}, t_eval=21)
+    section = Section.of_geometry(1.0, 0.03, **STEEL)
+    truth = motion(Line((section,), (0.025, 0.11)), [Torque(0, 12.7)], 0.02)
+    expected = truth.torque_in(0, thick.t, "left")
+    assert np.abs(thick["line.tau_a"] - expected).max() < 1e-8 * np.abs(expected).max()
+
+
+def test_a_turning_shaft_goes_on_turning() -> None:
+    sol = train(sw.Wave(), drive=0.0).simulate(0.05, initial={"Je.omega": 20.0, "Jm.omega": 20.0})
+    np.testing.assert_allclose(sol["Je.omega"], 20.0, rtol=1e-12)
+    np.testing.assert_allclose(sol["line.tau_a"], 0.0, atol=1e-9)
+
+
+def test_a_twisted_start_is_refused() -> None:
+    with pytest.raises(sw.ParameterError, match="both its ends must start with the same speed"):
+        train(sw.Wave()).simulate(0.05, initial={"Je.omega": 20.0})
+
+
+@pytest.mark.parametrize("engine", ["scipy", "heyoka", "sundials", "exact", "scipy-radau"])
+def test_engines_that_know_no_waves_are_refused(engine: str) -> None:
+    with pytest.raises(sw.ParameterError, match=r"knows no travelling waves.*Spectral"):
+        train(sw.Wave()).simulate(0.05, engine=engine)
+
+
+def test_internal_damping_and_waves_exclude_each_other() -> None:
+    with pytest.raises(sw.ParameterError, match=r"Shaft 'line': damping = 0\.1 with model=Wave\(\).*Spectral"):
+        train(sw.Wave(), damping=0.1)

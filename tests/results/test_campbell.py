@@ -1,0 +1,105 @@
+"""The interference diagram: crossings of constant and of moving natural frequencies with excitation orders."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import shaftwork as sw
+
+
+def _two_masses() -> sw.Network:
+    net = sw.Network("two masses")
+    net.add(sw.Inertia("J1", J=2.0), "a")
+    net.add(sw.Spring("shaft", c=1e4), "a", "b")
+    net.add(sw.Inertia("J2", J=3.0), "b")
+    return net
+
+
+def _stiffening() -> sw.Network:
+    """A disc on a spring that stiffens with the speed of another shaft: c = 900 + n^2, f(n) = sqrt(c / J) / 2 pi."""
+    net = sw.Network("stiffening")
+    net.add(sw.Inertia("rotor", J=1.0), "r")
+    net.add(sw.Inertia("disc", J=4.0), "d")
+    net.add(sw.TorqueSource("spring", tau=-900.0 * sw.phi - sw.phi**3 / 3.0), "d")
+    return net
+
+
+def test_constant_frequencies_cross_orders_where_the_closed_form_says() -> None:
+    f = np.sqrt(1e4 * (1 / 2 + 1 / 3)) / (2 * np.pi)
+    diagram = _two_masses().campbell(np.linspace(0.0, 100.0, 5), orders=(0.5, 1, 2, 6))
+    found = [(made.order, made.speed) for made in diagram.crossings]
+    wanted = [(6, 2 * np.pi * f / 6), (2, np.pi * f), (1, 2 * np.pi * f)]  # order 1/2 meets it at 183 rad/s
+    np.testing.assert_allclose(found, wanted, rtol=1e-13)
+    assert {made.mode for made in diagram.crossings} == {"mode 1"}
+    assert diagram.modes == ("mode 1",)
+    np.testing.assert_allclose(diagram.frequencies, f, rtol=1e-13)
+    np.testing.assert_allclose([made.frequency for made in diagram.crossings], f, rtol=1e-13)
+
+
+def test_the_highest_frequency_of_interest_limits_modes_and_crossings() -> None:
+    net = sw.scenes.shaft_chain(m=8)
+    diagram = net.campbell(np.linspace(0.0, 5000.0, 3), orders=(1, 2, 20), f_max=2000.0)
+    assert diagram.crossings
+    assert max(made.frequency for made in diagram.crossings) <= 2000.0
+    assert len(diagram.modes) == (net.modes().frequencies <= 2000.0).sum() - 1
+
+
+def test_frequencies_that_move_with_the_speed_are_met_exactly() -> None:
+    """(900 + n^2) / 4 = (k n)^2 at n = sqrt(900 / (4 k^2 - 1)): the linearised spring at the angle phi = n."""
+    diagram = _stiffening().campbell(np.linspace(1.0, 40.0, 14), orders=(1, 2), at=lambda n: {"spring.phi": n})
+    wanted = sorted((float(np.sqrt(900.0 / (4 * k**2 - 1))), float(k)) for k in (1, 2))
+    found = [(made.speed, made.order) for made in diagram.crossings]
+    np.testing.assert_allclose(found, wanted, rtol=1e-10)
+    assert diagram.frequencies.shape == (14, 1)
+    np.testing.assert_allclose(
+        2 * np.pi * diagram.frequencies[:, 0], np.sqrt((900 + diagram.speeds**2) / 4), rtol=1e-12
+    )
+
+
+def test_an_operating_point_may_be_the_same_at_all_speeds() -> None:
+    net = _stiffening()
+    diagram = net.campbell([0.0, 40.0], 1, at={"spring.phi": 40.0})
+    assert diagram.crossings[0].speed == pytest.approx(25.0, rel=1e-12)
+
+
+def test_a_mode_that_ceases_to_swing_has_no_frequency_there() -> None:
+    """A damper that grows with speed: from n = 20 on the spring is overdamped, and no order meets it."""
+    net = sw.Network("governed")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.Spring("s", c=100.0), "a", "wall")
+    net.add(sw.Ground("frame"), "wall")
+    net.add(sw.TorqueSource("brake", tau=-(sw.omega**2) / 2.0), "a")
+    diagram = net.campbell([5.0, 15.0, 25.0], 1, at=lambda n: {"J.omega": n})
+    np.testing.assert_array_equal(diagram.frequencies[:, 0] > 0, [True, True, False])
+    assert [made.order for made in diagram.crossings] == [1.0]  # at 10 rad/s
+
+
+def test_the_table_lists_speeds_in_both_units() -> None:
+    text = str(_two_masses().campbell([0.0, 100.0], (1, 2)))
+    assert "2 crossings from 0 to 100 rad/s" in text
+    assert "91.2871" in text
+    assert "871.728" in text
+
+
+@pytest.mark.parametrize("speeds", [[1.0], [2.0, 1.0], [-1.0, 1.0], [0.0, float("nan")], "fast", None], ids=repr)
+def test_speeds_that_do_not_ascend_are_named(speeds: Any) -> None:
+    with pytest.raises(sw.ParameterError, match="two or more speeds in rad/s, ascending"):
+        _two_masses().campbell(speeds)
+
+
+@pytest.mark.parametrize(("orders", "said"), [((), "one or more"), ((1, 0), "orders = 0"), ("x", "orders = 'x'")])
+def test_orders_that_are_none_are_named(orders: Any, said: str) -> None:
+    with pytest.raises(sw.ParameterError, match=said):
+        _two_masses().campbell([0.0, 1.0], orders)
+
+
+def test_the_picture_has_a_line_for_each_mode_and_order_and_a_dot_for_each_crossing() -> None:
+    pytest.importorskip("matplotlib")
+    diagram = _two_masses().campbell([0.0, 100.0], (1, 2, 3), f_max=20.0)
+    (axis,) = diagram.plot().axes
+    assert len(axis.lines) == 1 + 3 + 1
+    assert len(axis.lines[-1].get_xdata()) == len(diagram.crossings)
+    np.testing.assert_allclose(axis.lines[-1].get_xdata(), [made.speed * 30 / np.pi for made in diagram.crossings])

@@ -1,0 +1,65 @@
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from shaftwork.core.errors import ParameterError
+from shaftwork.shafts.line import Line, Section
+
+SHAFT = Section.of_geometry(1.0, 0.02)
+
+
+def test_a_hollow_section_is_the_solid_one_less_its_bore() -> None:
+    hollow, bore, solid = (Section.of_geometry(2.0, *d) for d in ((0.03, 0.02), (0.02,), (0.03,)))
+    # A subtraction of two numbers of like size: a few roundings.
+    assert hollow.inertia == pytest.approx(solid.inertia - bore.inertia, rel=1e-15)
+    assert hollow.stiffness == pytest.approx(solid.stiffness - bore.stiffness, rel=1e-15)
+
+
+def test_delay_and_impedance_are_those_of_the_material() -> None:
+    # Popenda 2019, (15): v = (G / rho)^0.5; Z = J' v. Square roots and products: a few roundings.
+    speed = math.sqrt(77.5e9 / 7900)
+    assert SHAFT.delay == pytest.approx(1.0 / speed, rel=1e-15)
+    assert SHAFT.impedance == pytest.approx(SHAFT.inertia * speed, rel=1e-15)
+
+
+def test_a_gear_keeps_the_delay_and_divides_the_impedance_by_its_ratio_squared() -> None:
+    seen = SHAFT.seen_through_gear(3.0)
+    assert seen.delay == pytest.approx(SHAFT.delay, rel=1e-15)
+    assert seen.impedance == pytest.approx(SHAFT.impedance / 9, rel=1e-15)
+
+
+def test_a_station_at_a_junction_belongs_to_the_side_that_is_asked_for() -> None:
+    line = Line((SHAFT, SHAFT), (0.0, 0.0, 0.0))
+    assert line.locate(1.0, "left") == (0, 1.0)
+    assert line.locate(1.0, "right") == (1, 0.0)
+    assert line.locate(0.0, "left") == (0, 0.0)
+    assert line.locate(line.length, "right") == (1, 1.0)
+
+
+def test_a_station_that_misses_a_junction_by_a_rounding_is_the_junction() -> None:
+    line = Line((Section.of_geometry(0.1, 0.02), Section.of_geometry(0.2, 0.02)), (0.0, 0.0, 0.0))
+    assert line.locate(0.3 - 2**-54, "right") == line.locate(0.1 + 0.2, "right")
+    assert line.locate(math.nextafter(0.1, 0.0)) == (1, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "text"),
+    [
+        (lambda: Section(0.0, 1.0, 1.0), "length of a section.*above 0"),
+        (lambda: Section(1.0, 1.0, math.inf), "stiffness of a section.*finite"),
+        (lambda: Section(1.0, 1.0, 1.0, damping=-1.0), "damping of a section.*at least 0"),
+        (lambda: Section.of_geometry(1.0, 0.02, 0.02), "inner_diameter.*less than its diameter"),
+        (lambda: Line((), (0.0,)), "at least one section"),
+        (lambda: Line((SHAFT,), (0.0,)), "1 sections has 2 junctions.*1 discs are given"),
+        (lambda: Line((SHAFT,), (0.0, -1.0)), "disc of a line.*at least 0"),
+        (lambda: Line((SHAFT,), (0.0, 0.0), ends=("free", "pinned")), "'free' and 'clamped'"),  # type: ignore[arg-type]
+        (lambda: Line((SHAFT,), (0.0, 0.0)).locate(1.1), "station 1.1 m is outside"),
+        (lambda: Line((SHAFT,), (0.0, 0.0)).junction(2), "junctions 0 to 1"),
+    ],
+)
+def test_what_is_no_line_is_refused_with_the_reason(wrong: Any, text: str) -> None:
+    with pytest.raises(ParameterError, match=text):
+        wrong()

@@ -1,0 +1,100 @@
+"""The comparison of shaft models: its truth, its errors, and what it says when a model fails."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sympy
+
+import shaftwork as sw
+from shaftwork.studies.truth import QUANTITIES, truth, with_model
+from shaftwork.studies.work_precision import work_precision
+
+SMALL = (sw.OneSpring(), sw.Lumped(10), sw.Lumped(20), sw.CentralDifference(10), sw.Spectral(8), sw.Wave(3))
+
+
+def test_the_truth_of_a_train_is_that_of_characteristics_and_waves_agree() -> None:
+    net, t = sw.scenes.shaft_step(), np.linspace(0.001, 0.05, 50)
+    known = truth(net, "line", 0.05, t)
+    assert known.source == "characteristics"
+    waves = with_model(net, "line", sw.Wave(3)).simulate(0.05, t_eval=t, rtol=1e-11)
+    for name in ("tau_a", "tau_b", "omega_a", "omega_b"):
+        assert np.abs(waves[f"line.{name}"] - known.values[name]).max() < 1e-9 * np.abs(known.values[name]).max()
+    assert np.abs(waves["line.tau"][:, 1] - known.values["tau_mid"]).max() < 1e-8
+
+
+def test_the_truth_knows_a_shaft_that_is_wired_backwards() -> None:
+    def wired(*nodes: str) -> sw.Network:
+        net = sw.Network("train")
+        net.add(sw.TorqueSource("motor", tau=5 * sympy.sin(300 * sw.t)), "m")
+        net.add(sw.Inertia("Je", J=0.025), "m")
+        net.add(sw.Shaft("line", length=1.0, diameter=0.02), *nodes)
+        net.add(sw.Inertia("Jm", J=0.11), "l")
+        return net
+
+    t = np.linspace(0.001, 0.02, 20)
+    there, back = (truth(wired(*nodes), "line", 0.02, t).values for nodes in (("m", "l"), ("l", "m")))
+    np.testing.assert_allclose(back["tau_a"], -there["tau_b"], atol=1e-12)
+    np.testing.assert_allclose(back["omega_a"], there["omega_b"], atol=1e-12)
+    np.testing.assert_allclose(back["tau_mid"], -there["tau_mid"], atol=1e-12)
+
+
+def test_other_networks_have_other_truths() -> None:
+    t = np.linspace(0.001, 0.01, 10)
+    damped = sw.scenes.shaft_step(damping=1.0)
+    assert truth(damped, "line", 0.01, t).source == "Spectral(64)"
+    net = sw.Network("motor")
+    net.add(sw.KlossMotor("motor", tau_k=30.0, s_k=0.2, n_sync=1500), "m")
+    net.add(sw.Inertia("Je", J=0.025), "m")
+    net.add(sw.Shaft("line", length=1.0, diameter=0.02), "m", "l")
+    net.add(sw.Inertia("Jm", J=0.11), "l")
+    assert truth(net, "line", 0.01, t).source == "travelling waves"
+
+
+def test_the_study_ranks_the_models_as_their_orders_say() -> None:
+    study = work_precision(sw.scenes.shaft_step(), "line", t_end=0.05, models=SMALL, points=101)
+    trial = {found.model: found for found in study.trials}
+    assert set(QUANTITIES) <= set(study.columns)
+    assert trial["Wave(places=3)"].error < 1e-8
+    # frequencies: second order, and central differences four times worse at equal size
+    assert trial["Lumped(m=10)"].errors["f_3"] / trial["Lumped(m=20)"].errors["f_3"] == pytest.approx(4, rel=0.05)
+    assert trial["CentralDifference(m=10)"].errors["f_3"] / trial["Lumped(m=10)"].errors["f_3"] == pytest.approx(
+        4, rel=0.05
+    )
+    assert trial["Spectral(n=8)"].errors["f_3"] < 1e-9
+    assert trial["Spectral(n=8)"].error < trial["Lumped(m=20)"].error < trial["OneSpring()"].error
+    best = study.cheapest(1e-6)
+    assert best is not None
+    assert best.model == "Wave(places=3)"
+    assert study.cheapest(1e-15) is None
+    assert "end torques to 1e-06: Wave(places=3) on wave" in study.advice
+
+
+def test_a_model_that_fails_is_a_row_with_its_reason(tmp_path: Path) -> None:
+    models = (sw.Wave(), sw.Spectral(4))
+    study = work_precision(sw.scenes.shaft_step(), "line", t_end=0.01, models=models, engines=("scipy",), points=11)
+    failed, good = study.trials
+    assert "knows no travelling waves" in failed.why
+    assert np.isinf(failed.error)
+    assert good.engine == "scipy"
+    study.to_csv(tmp_path / "study.csv")
+    rows = list(csv.DictReader((tmp_path / "study.csv").read_text(encoding="utf-8").splitlines()))
+    assert [row["model"] for row in rows] == ["Wave(places=5)", "Spectral(n=4)"]
+    assert float(rows[1]["tau_a"]) == good.errors["tau_a"]
+    assert study.plot().axes[0].get_xlabel() == "CPU time of a warm call in ms"
+
+
+def test_an_unknown_shaft_is_answered_with_those_there_are() -> None:
+    with pytest.raises(sw.ParameterError, match=r"no shaft 'axle'\. It has: line"):
+        work_precision(sw.scenes.shaft_step(), "axle", t_end=0.1)
+
+
+def test_the_ship_line_is_solved_alike_by_waves_and_by_polynomials() -> None:
+    """Smooth torque: the spectral model of degree 8 is good to 1e-6 of the speeds."""
+    waves, smooth = (sw.scenes.ship_line(model).simulate(2.0, t_eval=201) for model in (sw.Wave(), sw.Spectral(12)))
+    for name in ("propeller.omega", "flywheel.omega"):
+        assert np.abs(waves[name] - smooth[name]).max() < 1e-6 * np.abs(smooth[name]).max()
+    assert np.abs(waves["shaft2.tau_a"] - smooth["shaft2.tau_a"]).max() < 2e-3 * np.abs(smooth["shaft2.tau_a"]).max()
