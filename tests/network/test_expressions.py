@@ -50,7 +50,14 @@ def _larger(inner: st.SearchStrategy) -> st.SearchStrategy:
     )
 
 
-EXPRESSIONS = st.recursive(st.one_of(LEAVES, FLOATS), _larger, max_leaves=6)
+def _is_of_moderate_size(expression: sympy.Basic) -> bool:
+    """Whether its constants may be an argument of a sine: of 1e1000000, sympy takes minutes to find it."""
+    return all(abs(number) < 1e12 for number in expression.atoms(sympy.Float, sympy.Integer, sympy.Rational))
+
+
+EXPRESSIONS = st.recursive(
+    st.one_of(LEAVES, FLOATS), lambda inner: _larger(inner.filter(_is_of_moderate_size)), max_leaves=6
+)
 
 
 @settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow])
@@ -60,7 +67,7 @@ def test_every_expression_in_the_grammar_reads_back_as_itself(data: st.DataObjec
         expression = data.draw(EXPRESSIONS)
     except (TypeError, ValueError):  # sympy refuses to compare imaginary numbers
         reject()
-    assume(grammar.fault_of(expression) is None and not expression.has(sympy.I))
+    assume(grammar.fault_of(expression) is None and not expression.has(sympy.I, sympy.AccumBounds))
     assume(expression.is_extended_real is not False or expression.free_symbols)
     try:
         text = write(expression)

@@ -146,3 +146,13 @@ def test_engines_that_know_no_waves_are_refused(engine: str) -> None:
 def test_internal_damping_and_waves_exclude_each_other() -> None:
     with pytest.raises(sw.ParameterError, match=r"Shaft 'line': damping = 0\.1 with model=Wave\(\).*Spectral"):
         train(sw.Wave(), damping=0.1)
+
+
+def test_the_engine_for_waves_is_for_waves_and_names_are_checked_without_states_too() -> None:
+    with pytest.raises(sw.ParameterError, match=r"no engine 'wave' here.*is for networks with a shaft of model=Wave"):
+        train(sw.Lumped(3)).simulate(0.05, engine="wave")
+    net = sw.Network("prescribed")
+    net.add(sw.SpeedSource("drive", omega=3.0), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    with pytest.raises(sw.ParameterError, match="no engine 'nonsense'"):
+        net.simulate(1.0, engine="nonsense")

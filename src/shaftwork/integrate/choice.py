@@ -127,6 +127,17 @@ def solve(
         return load("scipy")(problem), "scipy", NOT_ANALYTIC
 
 
+def check(name: str) -> None:
+    """Refuse the name of an engine that there is not, or not for networks without waves.
+
+    Raises:
+        ParameterError: no engine has this name.
+    """
+    if name not in ("auto", *ENGINES):
+        only = " The engine 'wave' is for networks with a shaft of model=Wave()." if name == "wave" else ""
+        raise ParameterError(f"There is no engine {name!r} here. Take one of: auto, {', '.join(ENGINES)}.{only}")
+
+
 def load(name: str) -> Engine:
     """The function of an engine.
 
@@ -134,9 +145,8 @@ def load(name: str) -> Engine:
         ParameterError: no engine has this name.
         MissingExtraError: the engine's library is not installed.
     """
-    entry = ENGINES.get(name)
-    if entry is None:
-        raise ParameterError(f"There is no engine {name!r}. Take one of: auto, {', '.join(ENGINES)}.")
+    check(name)
+    entry = ENGINES[name]
     if not entry.installed:
         raise MissingExtraError(entry.distribution, entry.extra, f"engine={name!r}")
     module, function = entry.function.split(":")

@@ -221,6 +221,7 @@ class Model(CompiledModel):
         """The run, the engine that made it, and why that one."""
         if self.form.waves:
             return self._solve_waves(prepared, problem, engine)
+        choice.check(engine)
         if not self.states:
             return at_rest(problem)
         if self.form.loop_laws and engine in ("auto", "sundials"):

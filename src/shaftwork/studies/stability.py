@@ -1,0 +1,263 @@
+"""What every shaft model and every engine does where drives are extreme, and whether it says so."""
+
+from __future__ import annotations
+
+import csv
+import re
+import time
+import warnings
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from shaftwork.components.shaft_models import ShaftModel, Wave
+from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError
+from shaftwork.integrate.choice import ENGINES, available
+from shaftwork.pipeline.model import NOMINAL, Model
+from shaftwork.results.observer import Array
+from shaftwork.studies.stability_cases import CASES, TORQUE, Case
+from shaftwork.studies.stability_truth import QUANTITIES, Motion, exact, predicted
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+RIGHT = 1e-2
+"""Largest error of what is right, of the largest torque or speed."""
+SAME = 1e-3
+"""Largest deviation of a run from what its model must do, and largest residual of its energy balance."""
+MOST_BALANCED = 500
+"""Up to so many states, where all of the motion is output, the energy balance is drawn for the engine "auto"."""
+
+Verdict = Literal["right", "coarse", "warned", "refused", "failed", "too long", "unknown", "wrong"]
+VERDICTS: tuple[Verdict, ...] = ("right", "coarse", "warned", "refused", "failed", "too long", "unknown", "wrong")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What one model does with one engine in one case.
+
+    Args:
+        case: name of the case.
+        model: as text, such as "Lumped(m=10)".
+        engine: the engine that was asked for.
+        ran: the engine that ran; empty where none did.
+        verdict: "right": the error is at most `RIGHT`; "coarse": it is larger, and it is the error that the model has
+            by its definition; "warned": it is neither, and a warning was given; "refused": no run was begun, for the
+            reason given; "failed": a run was ended, for the reason given; "too long": the steps that were allowed were
+            not enough; "unknown": it is not right, and what its model must do is not known (a spring without an inertia
+            at its end, more than 200 elements); "wrong": none of these, without a word.
+        error: largest of the errors of end torques and speeds, of the largest torque or speed; NaN without a run.
+        expected: that error of the model's own motion; NaN where that is not known.
+        deviation: of the run from the model's own motion; NaN where that is not known.
+        energy: what the energy balance of the run leaves over, of the work done; NaN where it is not drawn.
+        cpu: CPU time of the run, s.
+        why: the reason of a refusal or failure, or the warning.
+    """
+
+    case: str
+    model: str
+    engine: str
+    ran: str
+    verdict: Verdict
+    error: float = np.nan
+    expected: float = np.nan
+    deviation: float = np.nan
+    energy: float = np.nan
+    cpu: float = 0.0
+    why: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.verdict} {self.error:.0e}" if np.isfinite(self.error) else self.verdict
+
+
+@dataclass(frozen=True)
+class Stability:
+    """The table.
+
+    Args:
+        cells: case by case, model by model, engine by engine.
+    """
+
+    cells: tuple[Cell, ...]
+
+    @property
+    def wrong(self) -> tuple[Cell, ...]:
+        """What is wrong without a word."""
+        return tuple(cell for cell in self.cells if cell.verdict == "wrong")
+
+    @property
+    def engines(self) -> tuple[str, ...]:
+        """The engines that were asked for."""
+        return tuple(dict.fromkeys(cell.engine for cell in self.cells))
+
+    @property
+    def rows(self) -> dict[tuple[str, str], dict[str, Cell]]:
+        """By case and model, then by engine."""
+        made: dict[tuple[str, str], dict[str, Cell]] = {}
+        for cell in self.cells:
+            made.setdefault((cell.case, cell.model), {})[cell.engine] = cell
+        return made
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Every reason why a run was refused, failed or took too long, once."""
+        return tuple(dict.fromkeys(f"{cell.verdict}: {cell.why}" for cell in self.cells if cell.why))
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of cells by verdict."""
+        return {verdict: sum(cell.verdict == verdict for cell in self.cells) for verdict in VERDICTS}
+
+    def __str__(self) -> str:
+        table = [["case", "model", *self.engines]]
+        for (case, model), row in self.rows.items():
+            table.append([case, model, *(str(row[name]) if name in row else "" for name in self.engines)])
+        widths = [max(len(row[k]) for row in table) for k in range(len(table[0]))]
+        lines = [
+            "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in table
+        ]
+        counts = ", ".join(f"{count} {verdict}" for verdict, count in self.counts.items() if count)
+        return "\n".join([*lines, "", f"{len(self.cells)} cells: {counts}; wrong without a warning: {len(self.wrong)}"])
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write every cell with all that is known about it."""
+        names = tuple(Cell.__dataclass_fields__)
+        with Path(path).open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(names)
+            writer.writerows([getattr(cell, name) for name in names] for cell in self.cells)
+
+    def plot(self) -> Figure:
+        """The table as a coloured matrix (extra `plot`)."""
+        from shaftwork.studies.stability_picture import stability_figure
+
+        return stability_figure(self)
+
+
+def stability(
+    cases: Sequence[Case | str] = CASES,
+    models: Sequence[ShaftModel | str] = (),
+    engines: Iterable[str] = (),
+) -> Stability:
+    """Run extreme drives with every shaft model and every engine, and judge each run by what is independent of it.
+
+    The truth is that of characteristics or of the exact two-port; the error that a model may have is that of its own
+    matrices, exponentiated. A run that is neither right nor as coarse as its model must be, and that says nothing, is
+    wrong.
+
+    Args:
+        cases: cases, or names of those in `CASES`.
+        models: models or their texts; by default those of each case.
+        engines: engines by name; by default "auto" and all that are installed.
+
+    Raises:
+        ParameterError: there is no such case, model or engine.
+    """
+    asked = tuple(engines) or ("auto", *(name for name in ENGINES if available(name)), "wave")
+    if unknown := [name for name in asked if name not in (*ENGINES, "auto", "wave")]:
+        raise ParameterError(f"There is no engine {unknown[0]!r}. Take some of: auto, {', '.join(ENGINES)}, wave.")
+    read = tuple(ShaftModel.read(model) if isinstance(model, str) else model for model in models)
+    cells: list[Cell] = []
+    for case in [_named(case) if isinstance(case, str) else case for case in cases]:
+        truth = exact(case)
+        for model in read or case.models:
+            cells += _row(case, model, [name for name in asked if name in (case.engines or asked)], truth)
+    return Stability(tuple(cells))
+
+
+def _named(name: str) -> Case:
+    for case in CASES:
+        if case.name == name:
+            return case
+    raise ParameterError(f"There is no case {name!r}. There are: {', '.join(case.name for case in CASES)}.")
+
+
+def _row(case: Case, model: ShaftModel, engines: Sequence[str], truth: Motion) -> list[Cell]:
+    """One model with each engine."""
+    own = truth if isinstance(model, Wave) else predicted(case, model)
+    label = (case.name, _text(model))
+    try:
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            compiled = case.network(model).compile()
+    except ShaftworkError as error:
+        return [Cell(*label, engine, "", "refused", why=_first_line(error)) for engine in engines]
+    warned = "; ".join(str(warning.message) for warning in said)
+    return [_cell(case, label, compiled, engine, truth, own, warned) for engine in engines]
+
+
+def _cell(
+    case: Case, label: tuple[str, str], compiled: Model, engine: str, truth: Motion, own: Motion | None, warned: str
+) -> Cell:
+    began = time.process_time()
+    try:
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            run = compiled.simulate(case.t_end, t_eval=case.times, engine=engine, max_steps=case.steps)  # type: ignore[arg-type]
+            found = {name: run[f"line.{name}"] for name in QUANTITIES}
+            cpu = time.process_time() - began
+            balanced = engine == "auto" and not case.periods and len(compiled.states) <= MOST_BALANCED
+            energy = run.energy_residual if balanced else np.nan
+    except SimulationError as error:
+        why = _first_line(error)
+        verdict: Verdict = "too long" if re.search(r"steps (were|are) not enough", why) else "failed"
+        return Cell(*label, engine, "", verdict, cpu=time.process_time() - began, why=why)
+    except ShaftworkError as error:
+        return Cell(*label, engine, "", "refused", why=_first_line(error))
+    why = "; ".join(filter(None, [warned, *(str(warning.message) for warning in said)]))
+    measured, expected, deviation = distances(found, truth, own)
+    verdict = judge(measured, deviation, energy, truth.error, warned=bool(why))
+    return Cell(*label, engine, run.engine, verdict, measured, expected, deviation, energy, cpu, why)
+
+
+def distances(found: dict[str, Array], truth: Motion, own: Motion | None) -> tuple[float, float, float]:
+    """Of a run from the truth, of its model's own motion from the truth, and of the run from that motion.
+
+    All are the largest over time and quantities, of the largest torque or speed of the truth and of the model's own
+    motion, and no less than the motor's torque and the speed that the absolute tolerance of a run is made for.
+    """
+    sizes = {"tau": TORQUE, "omega": NOMINAL}
+    for known in (truth, own or truth):
+        for name, values in known.values.items():
+            kind = name.partition("_")[0]
+            sizes[kind] = max(sizes[kind], float(np.abs(values).max()))
+
+    def distance(one: dict[str, Array], other: dict[str, Array]) -> float:
+        gaps = [np.abs(one[name] - other[name]).max() / sizes[name.partition("_")[0]] for name in QUANTITIES]
+        return float(np.max(gaps))
+
+    if own is None:
+        return distance(found, truth.values), np.nan, np.nan
+    return distance(found, truth.values), distance(own.values, truth.values), distance(found, own.values)
+
+
+def judge(error: float, deviation: float, energy: float, uncertainty: float, *, warned: bool) -> Verdict:
+    """The verdict on a run that ended.
+
+    Args:
+        error: distance from the truth.
+        deviation: distance from the model's own motion, NaN where that is not known.
+        energy: what the energy balance leaves over, NaN where it is not drawn.
+        uncertainty: error of the truth itself.
+        warned: whether a warning was given.
+    """
+    sound = np.isfinite(error) and not energy > SAME and not deviation > SAME + uncertainty
+    if sound and error <= RIGHT + uncertainty:
+        return "right"
+    if sound and deviation <= SAME + uncertainty:
+        return "coarse"
+    if warned:
+        return "warned"
+    return "unknown" if sound and np.isnan(deviation) else "wrong"
+
+
+def _first_line(error: Exception) -> str:
+    lines = str(error).splitlines()
+    return " ".join(line.strip() for line in lines[:2])
+
+
+def _text(model: ShaftModel) -> str:
+    return repr(model).replace(", ends='half'", "").replace(", order=2", "")

@@ -1,0 +1,263 @@
+"""What an extreme drive really does, and what a model of its shaft must do by its own definition.
+
+Neither uses the network, its equations or an engine, so that what they say is evidence.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.linalg import expm
+
+from shaftwork.components.shaft_models import OneSpring, Rigid, ShaftModel, Wave
+from shaftwork.results.observer import Array
+from shaftwork.shafts.exact_motion import Torque, motion
+from shaftwork.shafts.exact_response import Complex, laplace_response
+from shaftwork.shafts.line import Line, Section
+from shaftwork.studies.stability_cases import TORQUE, Case
+
+QUANTITIES = ("tau_a", "tau_b", "omega_a", "omega_b")
+MOST_PREDICTED = 200
+"""Up to so many elements the motion of a model is computed by its own definition."""
+TERMS = 16384
+"""Of the Fourier series that inverts a Laplace transform."""
+DECAY = 12.0
+"""Its abscissa times its period: what it repeats is exp(-2 DECAY) of the motion."""
+MASSLESS = 1e-13
+"""Inertia of a spring that is written as a section, of that of the shaft."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """End torques and speeds of a shaft at the times of a case.
+
+    Args:
+        values: (k,) by name.
+        error: estimate of their own error, of the largest torque or speed.
+        source: where they come from.
+    """
+
+    values: dict[str, Array]
+    error: float
+    source: str
+
+
+def exact(case: Case) -> Motion:
+    """The motion of the continuous shaft.
+
+    Without damping and springs by characteristics, to rounding; after a pulse on a free shaft it repeats itself, so
+    late times are early ones. Otherwise by the exact two-port in s, inverted by a Fourier series.
+
+    Source: Dubner and Abate, Numerical inversion of Laplace transforms, 1968.
+    """
+    if case.damping or case.spring:
+        return _by_transform(case)
+    line = _line(case)
+    late = case.t_end - 6 * case.section.delay if case.periods else 0.0
+    t = case.times - late
+    kinks = (case.rise * case.section.delay,) if case.form in ("pulse", "ramp") else ()
+    found = motion(line, [Torque(0, lambda t: _torque(case, t), kinks)], case.t_end - late)
+    values = {
+        "tau_a": found.torque_in(0, t, "left"),
+        "tau_b": found.torque_in(0, t, "right"),
+        "omega_a": found.junction_speed(0, t),
+        "omega_b": found.junction_speed(1, t),
+    }
+    return Motion(values, found.error, "characteristics")
+
+
+def _line(case: Case) -> Line:
+    """The shaft, and a spring behind it as a section that hardly weighs anything."""
+    section, ends = case.section, ("free", "clamped" if case.clamped else "free")
+    sections, discs, dampers = [section], [case.drive * case.inertia], [0.0]
+    if case.spring:
+        sections.append(Section(1.0, MASSLESS * case.inertia, case.spring * section.stiffness / section.length))
+        discs.append(0.0)
+        dampers.append(0.0)
+    loads = (*discs, case.load * case.inertia), (*dampers, case.damper * section.impedance)
+    return Line(tuple(sections), *loads, ends=ends)  # type: ignore[arg-type]
+
+
+def _by_transform(case: Case) -> Motion:
+    t, period = case.times, 2 * case.t_end
+    s = np.asarray((DECAY + 1j * np.pi * np.arange(TERMS)) / period, dtype=np.complex128)
+    response, ends = laplace_response(_line(case), s, 0), np.array([0.0, case.section.length])
+    transforms = _transform(case, s)[:, None] * np.hstack([response.torques(ends, "left"), response.speeds(ends)])
+    transforms[0] /= 2
+    waves = np.exp(np.outer(t, s))
+    values, coarser = ((waves[:, :count] @ transforms[:count]).real / period for count in (TERMS, TERMS // 2))
+    sizes = np.repeat([np.abs(values[:, :2]).max(), np.abs(values[:, 2:]).max()], 2)
+    error = float((np.abs(values - coarser).max(axis=0) / sizes).max())
+    return Motion(dict(zip(QUANTITIES, values.T, strict=True)), error, "exact two-port")
+
+
+def _torque(case: Case, t: Array) -> Array:
+    """Of the motor, N m."""
+    rise = case.rise * case.section.delay
+    match case.form:
+        case "step":
+            return np.full_like(t, TORQUE)
+        case "pulse":
+            return np.asarray(TORQUE * (t < rise))
+        case "ramp":
+            return np.asarray(TORQUE * np.minimum(t / rise, 1.0))
+        case "sine":
+            return np.asarray(TORQUE * (1 - np.cos(2 * np.pi / rise * t)))
+
+
+def _transform(case: Case, s: Complex) -> Complex:
+    """Of the torque, (k,)."""
+    rise = case.rise * case.section.delay
+    turn = 2 * np.pi / rise
+    match case.form:
+        case "step":
+            return TORQUE / s
+        case "pulse":
+            return np.asarray(-TORQUE * np.expm1(-s * rise) / s)
+        case "ramp":
+            return np.asarray(-TORQUE * np.expm1(-s * rise) / (s**2 * rise))
+        case "sine":
+            return TORQUE * turn**2 / (s * (s**2 + turn**2))
+
+
+@dataclass(frozen=True)
+class _Chain:
+    """A model of the shaft in its drive, as masses, springs and dashpots.
+
+    Args:
+        masses: (n,) inertia of each speed, kg m^2.
+        shares: (n,) of that, what belongs to the shaft.
+        twists: (k, n) rate of twist of each spring.
+        springs: (k,) stiffness.
+        dashpots: (k,) beside the springs.
+        brakes: (n,) against the ground.
+        far: (n,) omega_b as a sum of the speeds, of which omega_a is the first; nothing where that end is held.
+    """
+
+    masses: Array
+    shares: Array
+    twists: Array
+    springs: Array
+    dashpots: Array
+    brakes: Array
+    far: Array
+
+
+def predicted(case: Case, model: ShaftModel) -> Motion | None:
+    """The motion that a model has by its definition, or None where it has none of its own or is too large.
+
+    The matrices are written down here from the nodes, stations and weights of the model, in coordinates whose square is
+    the energy, and exponentiated.
+    """
+    if (at_rest := _without_states(case, model)) is not None:
+        return Motion(dict(zip(QUANTITIES, at_rest, strict=True)), 0.0, repr(model))
+    chain = None if isinstance(model, Wave) else _chain(case, model)
+    if chain is None or not (chain.masses > 0).all():
+        return None
+    matrix, drive = _in_energy_coordinates(chain)
+    n, size = len(chain.masses), len(matrix)
+    states = _propagated(case, matrix, drive)
+    y, torque = states[:, :size], TORQUE * states[:, size]
+    speeds = y[:, :n] / np.sqrt(chain.masses)
+    rates = (y @ matrix.T + np.outer(torque, drive))[:, :n] / np.sqrt(chain.masses)
+    tau_a = torque - case.drive * case.inertia * rates[:, 0]
+    values = {
+        "tau_a": tau_a,
+        "tau_b": tau_a - rates @ chain.shares,
+        "omega_a": speeds[:, 0],
+        "omega_b": speeds @ chain.far,
+    }
+    return Motion(values, 0.0, repr(model))
+
+
+def _without_states(case: Case, model: ShaftModel) -> tuple[Array, ...] | None:
+    """The quantities where the torque of the motor goes through to a wall, or to a brake that alone takes it."""
+    torque = _torque(case, case.times)
+    if isinstance(model, Rigid) and case.clamped:
+        return torque, torque, np.zeros_like(torque), np.zeros_like(torque)
+    if isinstance(model, OneSpring) and case.drive == case.load == 0 < case.damper and case.form in ("step", "pulse"):
+        speed = torque / (case.damper * case.section.impedance)
+        return torque, torque, speed, speed
+    return None
+
+
+def _chain(case: Case, model: ShaftModel) -> _Chain | None:
+    section = case.section
+    parts = _parts(model)
+    if parts is None:
+        return None
+    shares, lengths, weights = parts
+    springs, dashpots = (value / (section.length * lengths) for value in (section.stiffness, section.damping))
+    last = len(shares) - 1
+    far = np.eye(1, last + 1, last)[0]
+    if case.spring and isinstance(model, OneSpring):  # two springs in a row, without an inertia between them
+        springs, far = springs * case.spring / (1 + case.spring), np.array([1.0, case.spring]) / (1 + case.spring)
+    elif case.spring:
+        weights = np.block([[weights, np.zeros((len(lengths), 1))], [np.eye(1, last + 1, last), -np.ones((1, 1))]])
+        springs = np.append(springs, case.spring * section.stiffness / section.length)
+        shares, dashpots, far, last = np.append(shares, 0.0), np.append(dashpots, 0.0), np.append(far, 0.0), last + 1
+    shares = shares * case.inertia
+    masses, brakes = shares.copy(), np.zeros(len(shares))
+    masses[0] += case.drive * case.inertia
+    masses[last] += case.load * case.inertia
+    brakes[last] = case.damper * section.impedance
+    kept = last if case.clamped else last + 1
+    held = (masses[:kept], shares[:kept], weights[:, :kept], springs, dashpots, brakes[:kept])
+    return _Chain(*held, np.zeros(kept) if case.clamped else far)
+
+
+def _parts(model: ShaftModel) -> tuple[Array, Array, Array] | None:
+    """Shares of the inertia, shares of the length, and weights; None where there are too many."""
+    if isinstance(model, Rigid):
+        return np.ones(1), np.ones(0), np.zeros((0, 1))
+    if isinstance(model, OneSpring):
+        return np.zeros(2), np.ones(1), np.array([[1.0, -1.0]])
+    mesh = model.mesh()
+    if len(mesh.nodes) > MOST_PREDICTED:
+        return None
+    weights = np.zeros((len(mesh.lengths), len(mesh.nodes)))
+    for k, row in enumerate(mesh.weights):
+        for j, weight in row:
+            weights[k, j] += weight
+    return np.array(mesh.inertias), np.array(mesh.lengths), weights
+
+
+def _in_energy_coordinates(chain: _Chain) -> tuple[Array, Array]:
+    """Matrix and drive of y' = matrix y + drive torque, y = (sqrt(mass) speed, torque / sqrt(stiffness))."""
+    root = np.sqrt(chain.masses)
+    joints = np.sqrt(chain.springs)[:, None] * chain.twists / root
+    losses = (chain.twists.T * chain.dashpots) @ chain.twists / np.outer(root, root) + np.diag(
+        chain.brakes / chain.masses
+    )
+    matrix = np.block([[-losses, -joints.T], [joints, np.zeros((len(joints), len(joints)))]])
+    drive = np.zeros(len(matrix))
+    drive[0] = 1 / root[0]
+    return matrix, drive
+
+
+def _propagated(case: Case, matrix: Array, drive: Array) -> Array:
+    """States (k, n + 3) at the times of a case; the last three make the torque: its value, sine, and one."""
+    size, rise = len(drive), case.rise * case.section.delay
+    whole = np.zeros((size + 3, size + 3))
+    whole[:size, :size], whole[:size, size] = matrix, TORQUE * drive
+    if case.form == "sine":
+        whole[size, size + 1] = whole[size + 1, size + 2] = 2 * np.pi / rise
+        whole[size + 1, size] = -2 * np.pi / rise
+    state = np.concatenate([np.zeros(size), [float(case.form in ("step", "pulse")), 0.0, 1.0]])
+    if case.form == "ramp":
+        whole[size, size + 2] = 1 / rise
+    jumps = (rise,) if case.form in ("pulse", "ramp") and rise < case.t_end else ()
+    made: dict[str, Array] = {}
+    found = {}
+    for start, end in pairwise(sorted({0.0, *case.times, *jumps})):
+        key = f"{end - start:.9e}"  # equal intervals differ by the rounding of their ends
+        if key not in made:
+            made[key] = expm(whole * (end - start))
+        state = made[key] @ state
+        if end in jumps:
+            state[size], whole[size, size + 2] = float(case.form == "ramp"), 0.0
+            made.clear()
+        found[end] = state
+    return np.array([found[time] for time in case.times])
