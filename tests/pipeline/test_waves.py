@@ -156,3 +156,16 @@ def test_the_engine_for_waves_is_for_waves_and_names_are_checked_without_states_
     net.add(sw.Inertia("J", J=1.0), "a")
     with pytest.raises(sw.ParameterError, match="no engine 'nonsense'"):
         net.simulate(1.0, engine="nonsense")
+
+
+def test_the_laws_at_the_ends_print_impedance_and_wave() -> None:
+    latex = train(sw.Wave()).equations().latex(form="kirchhoff")
+    assert r"\tau_{a,\mathrm{line}} &= " in latex
+    assert r"\sqrt{\rho_{\mathrm{line}} \, G_{\mathrm{line}}}" in latex
+    assert r" + h_{a,\mathrm{line}}" in latex
+
+
+def test_the_energy_of_a_wave_is_no_quantity_of_one_instant() -> None:
+    sol = train(sw.Wave()).simulate(0.01)
+    assert "line.energy" not in sol.names
+    assert "line.power" in sol.names

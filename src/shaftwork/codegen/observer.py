@@ -54,7 +54,10 @@ class ModelObserver:
         units |= {name: _unit(signal) for name, (_, signal) in self._signals.items()}
         units |= {s.name: s.unit for s in self._form.states if s.kind == "integral"}
         units |= {f"{part.name}.power": "W" for part in self._graph.parts}
-        return units | {f"{part.name}.energy": "J" for part in self._graph.parts}
+        # what waves hold is not in the states of one instant
+        waves = {self._graph.branches[branch].part for branch in self._form.waves}
+        held = (part for number, part in enumerate(self._graph.parts) if number not in waves)
+        return units | {f"{part.name}.energy": "J" for part in held}
 
     def history(self, t: Array, x: Array) -> History:
         """All branch quantities along a trajectory; the last one asked for is kept."""

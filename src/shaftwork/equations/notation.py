@@ -188,6 +188,9 @@ def _quantity_letters(form: StateForm, quantities: Quantities) -> Iterator[tuple
         if made.template.kind is Kind.ACROSS_SOURCE:
             domain = quantities.domain((made.plus, made.minus))
             yield made.part, _letter(quantities.integral(made.index), domain.integral)
+        if made.template.line is not None:
+            mark = made.template.label.partition("_")[2]
+            yield made.part, Letter(quantities.history(made.index).name, "h", mark, "N*m", "wave that arrives at")
         if made.terms:
             quantity = quantities.multiplier_quantity(made.index)
             label = quantities.multiplier_label(made.index)

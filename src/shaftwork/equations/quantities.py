@@ -95,7 +95,14 @@ class Quantities:
     def law(self, branch: int) -> Expr:
         """Coefficient or law of a branch in the parameters of the network."""
         made = self.graph.branches[branch]
+        if made.template.line is not None:
+            return self.history(branch)
         return self.graph.in_network_symbols(made.template.law, made)
+
+    def history(self, branch: int) -> Symbol:
+        """What arrives at an end of a line."""
+        made = self.graph.branches[branch]
+        return Symbol(f"{self.graph.parts[made.part].name}.{made.template.label}", real=True)
 
     def node(self, number: int) -> Expr:
         """The across variable of a node: that of the store or source which joins it to the reference, else its own."""

@@ -144,7 +144,7 @@ class _Resolver:
             case DelayLine(impedance, delay, ends, label):
                 line = (_law(impedance, branch, number), _law(delay, branch, number))
                 for end in ends or self._default:
-                    yield self._template(Kind.CONDUCTANCE, line[0], (end, None), (), f"{label}_z_{end}")
+                    yield self._template(Kind.CONDUCTANCE, line[0], (end, None), (), str(end))
                     history = self._template(Kind.THROUGH_SOURCE, HISTORY, (end, None), (), f"{label}_{end}")
                     read = frozenset().union(*(expression.free_symbols for expression in line))
                     symbols = tuple(symbol for symbol in self._symbols if symbol in read)
