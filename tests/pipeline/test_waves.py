@@ -130,6 +130,8 @@ def test_a_turning_shaft_goes_on_turning() -> None:
     sol = train(sw.Wave(), drive=0.0).simulate(0.05, initial={"Je.omega": 20.0, "Jm.omega": 20.0})
     np.testing.assert_allclose(sol["Je.omega"], 20.0, rtol=1e-12)
     np.testing.assert_allclose(sol["line.tau_a"], 0.0, atol=1e-9)
+    np.testing.assert_allclose(sol["line.omega"], 20.0, rtol=1e-12)  # also before the first wave has crossed
+    np.testing.assert_allclose(sol["line.tau"], 0.0, atol=1e-9)
 
 
 def test_a_twisted_start_is_refused() -> None:

@@ -89,11 +89,13 @@ def along_lines(bound: BoundArrays, part: GraphPart, profile: Profile, t: Array,
 
 
 def _leaving(bound: BoundArrays, end: int, impedance: float, times: Array, dense: Dense) -> Array:
-    """The wave that leaves an end at some times: 2 Z v + h, nothing before the start."""
+    """The wave that leaves an end at some times: 2 Z v + h, and Z v of the steady turning before the start."""
     begun = times >= dense.steps[0]
     inside = np.where(begun, times, dense.steps[0])
     order = np.argsort(inside, kind="stable")
     history = History(bound, inside[order], dense(inside[order]))
     values = np.empty(len(times))
     values[order] = 2 * impedance * history.across[end] + history.through[end]
-    return np.where(begun, values, 0.0)
+    first = dense.steps[:1]
+    arriving = History(bound, first, dense(first)).through[end][0]  # what left the other end before the start
+    return np.where(begun, values, -arriving)
