@@ -37,7 +37,7 @@ BLOCK = re.compile(r"^```(?P<language>\w+)\n(?P<body>.*?)^```$", re.MULTILINE | 
 MADE_PART = re.compile(r"(?P<start><!-- made: (?P<name>[\w ]+) -->\n).*?(?P<end><!-- end -->)", re.DOTALL)
 OUTPUT = ("text", "toml", "latex")
 """Languages of the blocks that hold what the block before them printed."""
-FAMILIES = ("rotation", "shafts", "translation", "sources", "loads", "machines", "electrical")
+FAMILIES = ("rotation", "contacts", "shafts", "translation", "sources", "loads", "machines", "electrical")
 """The modules of components in the order in which they are shown."""
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 NOISE, TOLERANCE = 1e-9, 0.02

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
         ThroughLaw,
         ThroughStore,
     )
+    from shaftwork.components.contacts import *
     from shaftwork.components.electrical import *
     from shaftwork.components.laws import Ramp, Step, Table, omega, phi, psi, s, t, u, v
     from shaftwork.components.loads import *
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from shaftwork.components.sources import *
     from shaftwork.components.translation import *
     from shaftwork.core.errors import (
+        AccuracyWarning,
         CompileError,
         MissingExtraError,
         ModelFileError,
@@ -69,6 +71,7 @@ _HOME = {
     ),
     "shaftwork.components.laws": ("Ramp", "Step", "Table", "omega", "phi", "psi", "s", "t", "u", "v"),
     "shaftwork.core.errors": (
+        "AccuracyWarning",
         "CompileError",
         "MissingExtraError",
         "ModelFileError",

@@ -268,4 +268,4 @@ def test_a_travelling_wave_is_refused_with_the_model_that_can_be_linearised() ->
         (sw.Inertia("J2", J=0.2), ("b",)),
     )
     with pytest.raises(sw.SimulationError, match=r"Shaft 'line' is a travelling wave.*model=Spectral\(16\)"):
-        net.modes()
+        net.compile().linearize()

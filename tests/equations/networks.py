@@ -11,6 +11,8 @@ from shaftwork.components.laws import omega, phi, t
 from shaftwork.components.loads import CoulombLoad, ViscousLoad
 from shaftwork.components.machines import DCMachine, KlossMotor
 from shaftwork.components.rotation import Damper, Gear, Ground, Inertia, PlanetaryGear, Spring
+from shaftwork.components.shaft_models import ShaftModel
+from shaftwork.components.shafts import Shaft
 from shaftwork.components.sources import ForceSource, SpeedSource, TorqueSource
 from shaftwork.components.translation import Drum, Mass, TranslationalDamper, TranslationalSpring, Wheel
 from shaftwork.equations.kirchhoff import kirchhoff
@@ -46,6 +48,16 @@ def crane() -> NetworkBuilder:
     net.add(Spring("shaft", c=24206.0, d=14.0), "rotor", "wheel")
     net.add(Inertia("J2", J=62.5), "wheel")
     net.add(CoulombLoad("load", tau=22.4), "wheel")
+    return net
+
+
+def shaft(model: ShaftModel, **values: float) -> NetworkBuilder:
+    net = NetworkBuilder("shaft")
+    net.add(TorqueSource("motor", tau=12.7), "motor end")
+    net.add(Inertia("Je", J=0.025), "motor end")
+    steel = {"length": 1.0, "diameter": 0.02, "density": 7900.0, "shear_modulus": 77.5e9}
+    net.add(Shaft("line", **steel, **values, model=model, symbol=""), "motor end", "load end")
+    net.add(Inertia("Jm", J=0.11), "load end")
     return net
 
 

@@ -19,13 +19,14 @@ from shaftwork.components.electrical import Resistor, VoltageSource
 from shaftwork.components.laws import omega
 from shaftwork.components.machines import DCMachine
 from shaftwork.components.rotation import Damper, Inertia, Spring
+from shaftwork.components.shaft_models import CentralDifference, Lumped, ShaftModel, Wave
 from shaftwork.components.sources import TorqueSource
 from shaftwork.core.errors import CompileError, ShaftworkError
 from shaftwork.core.parameters import parameter
 from shaftwork.equations.printing import printed_number
 from shaftwork.equations.widths import printed_width
 from shaftwork.network.builder import NetworkBuilder
-from tests.equations.networks import MECHANICAL, crane, dc_drive, equations_of, hoist, mixed_train, train
+from tests.equations.networks import MECHANICAL, crane, dc_drive, equations_of, hoist, mixed_train, shaft, train
 
 ROOT = Path(__file__).parents[2]
 compiles = pytest.mark.skipif(shutil.which("pdflatex") is None, reason="pdflatex is not installed")
@@ -162,6 +163,46 @@ def test_a_general_row_stands_for_exactly_the_rows_that_it_replaces() -> None:
     small = equations_of(train(5)).latex(form="kirchhoff")
     third = general[1].replace("k-1", "2").replace("{k}", "{3}")
     assert third in small
+
+
+def test_central_differences_are_printed_as_in_the_source() -> None:
+    """Popenda 2019, (20)-(23) without damping, C' = 1 / S'_c."""
+    text = equations_of(shaft(CentralDifference(10, closure="printed"))).latex(form="state")
+    machine, speed, torque = (
+        rf"\frac{{d {letter}}}{{d t}} &= " for letter in (r"\omega_{\mathrm{e}}", r"\omega_{k}", r"\tau_{k}")
+    )
+    for line in (
+        machine + r"\frac{1}{J_{\mathrm{e}}} \left( \tau_{\mathrm{motor}} - \tau_{1} \right)",
+        speed
+        + r"\frac{1}{2 \, J' \, \Delta x} \left( \tau_{k-1} - \tau_{k+1} \right) \qquad \text{for } k = 2, \dots, 8",
+        torque
+        + r"\frac{C'}{2 \, \Delta x} \left( \omega_{k-1} - \omega_{k+1} \right) \qquad \text{for } k = 2, \dots, 8",
+        r"J' &= \rho \, I_{p}",
+        r"C' &= G \, I_{p}",
+        r"\Delta x &= \frac{L}{10}",
+    ):
+        assert text.count(line) == 1, line
+
+
+def test_derived_quantities_have_values_units_and_one_definition() -> None:
+    equations = equations_of(shaft(Lumped(5), damping=0.3))
+    document = equations.document()
+    assert document.count(r"C' &= G \, I_{p}") == 1
+    assert r"$C'$ & stiffness of unit length & line & $1217.37$ & $\mathrm{N\,m^2/rad}$" in document
+    assert r"\pi \, d^{4}" not in document.replace(r"I_{p} &= \frac{\pi \, d^{4}}{32}", "")
+    numbers = equations.latex(values=True)
+    assert "C'" not in numbers
+    assert r"\frac{d \tau_{c,k}}{d t} &= 6086.84 \, \Delta \omega_{k}" in numbers
+
+
+@compiles
+@pytest.mark.parametrize(
+    "model", [Lumped(5), CentralDifference(6), CentralDifference(6, closure="printed"), Wave()], ids=repr
+)
+def test_a_document_about_a_shaft_keeps_inside_its_margins(model: ShaftModel, tmp_path: Path) -> None:
+    damping = {} if isinstance(model, Wave) else {"damping": 0.3}
+    log = compile_latex(equations_of(shaft(model, **damping)).document(), tmp_path)
+    assert max(overfull(log), default=0.0) < 10.0
 
 
 def test_values_replace_the_symbols_of_parameters() -> None:

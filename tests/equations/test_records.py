@@ -4,20 +4,47 @@ from __future__ import annotations
 
 import math
 import random
+from collections.abc import Iterator
+from typing import Any, ClassVar
+from unittest import mock
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from sympy import Expr, Symbol
 
+from shaftwork.components.base import REGISTRY, Component, Derived, Port, component
+from shaftwork.components.branches import ACROSS, AcrossStore, Branch
 from shaftwork.components.rotation import Gear, Inertia, Spring
+from shaftwork.components.shaft_models import (
+    CentralDifference,
+    Lumped,
+    OneSpring,
+    Rigid,
+    ShaftModel,
+    Spectral,
+    Wave,
+)
 from shaftwork.components.sources import TorqueSource
+from shaftwork.core.errors import ShaftworkError
+from shaftwork.core.parameters import parameter
 from shaftwork.equations.kirchhoff import kirchhoff
 from shaftwork.equations.quantities import rate_of
 from shaftwork.equations.records import Equations
 from shaftwork.network.builder import NetworkBuilder
 from shaftwork.reduction.form import state_form
 from shaftwork.reduction.rows import BlockTooLargeError, explicit_rows
-from tests.equations.networks import MECHANICAL, crane, dc_drive, equations_of, from_pieces, graph_of, hoist, train
+from tests.equations.networks import (
+    MECHANICAL,
+    crane,
+    dc_drive,
+    equations_of,
+    from_pieces,
+    graph_of,
+    hoist,
+    shaft,
+    train,
+)
 from tests.strategies import Network, networks
 
 
@@ -50,7 +77,7 @@ def assert_agrees_with_compiled_rows(equations: Equations) -> None:
         return
     known = known_quantities(equations)
     chance = random.Random(1)  # noqa: S311 - any numbers will do
-    values = {symbol(name): value for name, value in equations.form.graph.parameters.items()}
+    values = {symbol(name): value for name, value in equations.values.items()}
     values |= {state: chance.uniform(-1, 1) for state in rows.states} | {symbol("t"): 0.7}
     for row, rate in zip(equations.states, rows.rates, strict=True):
         printed, compiled = float(resolved(row.rate, known).xreplace(values)), float(rate.xreplace(values))
@@ -65,6 +92,75 @@ def largest(expression: Expr, values: dict[Symbol, float]) -> float:
 @pytest.mark.parametrize("name", [*MECHANICAL, "dc drive"])
 def test_printed_rates_are_the_compiled_rates(name: str) -> None:
     assert_agrees_with_compiled_rows(equations_of(MECHANICAL[name]() if name in MECHANICAL else dc_drive()))
+
+
+SHAFTS = (
+    OneSpring(),
+    Lumped(3),
+    Lumped(3, ends="full"),
+    CentralDifference(3),
+    CentralDifference(4, 2, "printed"),
+    Spectral(3),
+)
+
+
+@pytest.mark.parametrize("model", [Rigid(), *SHAFTS], ids=repr)
+@pytest.mark.parametrize("bore", [0.0, 0.01])
+def test_rates_in_letters_of_derived_quantities_are_the_compiled_rates(model: ShaftModel, bore: float) -> None:
+    assert_agrees_with_compiled_rows(equations_of(shaft(model, inner_diameter=bore, damping=0.3, friction=0.1)))
+
+
+@pytest.mark.parametrize("model", SHAFTS, ids=repr)
+def test_the_geometry_of_a_shaft_stands_in_the_definitions_alone(model: ShaftModel) -> None:
+    equations = equations_of(shaft(model))
+    geometry = {symbol(f"line.{name}") for name in ("diameter", "density", "shear_modulus")}
+    for row in equations.rows:
+        assert geometry.isdisjoint(row.left.free_symbols | row.right.free_symbols)
+    polar = np.pi * 0.02**4 / 32
+    expected = {"line.area_moment": polar, "line.line_inertia": 7900 * polar, "line.line_stiffness": 77.5e9 * polar}
+    found = {name: value for name, value in equations.values.items() if name not in equations.form.graph.parameters}
+    for name, value in expected.items():
+        if name in found or not isinstance(model, OneSpring):
+            assert found[name] == pytest.approx(value, rel=1e-14)
+
+
+def test_only_derived_quantities_that_occur_are_defined() -> None:
+    names = {
+        repr(model): [made.name for made in equations_of(shaft(model)).definitions] for model in (*SHAFTS[:1], Wave())
+    }
+    assert names == {
+        "OneSpring()": ["line.area_moment", "line.line_stiffness"],
+        "Wave(places=5)": ["line.area_moment", "line.impedance"],
+    }
+    assert not equations_of(crane()).definitions
+
+
+def test_computations_know_no_derived_quantities() -> None:
+    form = state_form(graph_of(shaft(CentralDifference(3))))
+    allowed = {symbol(name) for name in form.graph.parameters}
+    for branch in form.graph.branches:
+        assert form.graph.in_network_symbols(branch.template.law, branch).free_symbols <= allowed | {ACROSS}
+
+
+def test_a_derived_quantity_does_not_take_the_name_of_a_parameter() -> None:
+    with mock.patch.dict(REGISTRY):
+
+        @component
+        class Twice(Component):
+            J: float = parameter("kg*m^2", "inertia")
+
+            ports: ClassVar[tuple[Port, ...]] = (Port("a"),)
+
+            def derived(self, p: Any) -> Iterator[Derived]:
+                yield Derived("J", 2 * p.J, "kg*m^2", "twice", "K")
+
+            def branches(self, p: Any) -> Iterator[Branch]:
+                yield AcrossStore(p.J)
+
+        net = NetworkBuilder("twice")
+        net.add(Twice("two", J=1.0), "a")
+        with pytest.raises(ShaftworkError, match="Twice: 'J' is derived, but exists already"):
+            graph_of(net)
 
 
 @settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])

@@ -94,3 +94,13 @@ def test_the_protocol_loads_no_numerical_library():
 def test_every_engine_of_the_table_can_be_loaded():
     for name in choice.ENGINES:
         assert callable(choice.load(name))
+
+
+@pytest.mark.parametrize("engine", ["auto", "exact", "scipy"])
+def test_a_run_that_another_engine_makes_does_not_load_heyoka(engine: str) -> None:
+    code = (
+        "import sys, shaftwork as sw; net = sw.Network('drive'); net.add(sw.TorqueSource('m', tau=1.0), 'a'); "
+        f"net.add(sw.Inertia('J', J=1.0), 'a'); net.simulate(1.0, engine={engine!r}); print('heyoka' in sys.modules)"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "False"

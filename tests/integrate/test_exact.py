@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+import shaftwork as sw
 from shaftwork.integrate import exact
+from shaftwork.integrate.modal import find_modes
 from shaftwork.integrate.problem import LinearInputs, Problem
 
 
@@ -131,3 +133,60 @@ def test_its_own_grid_is_refined_nowhere_and_needs_no_output_times():
     trajectory = exact.solve(replace(problem, t_eval=None))
     speeds, _ = chain_solution(3, 1e2, trajectory.t)
     assert np.abs(trajectory.x[:, :3] - speeds).max() < 1e-12
+
+
+MODELS = [
+    sw.OneSpring(),
+    sw.Lumped(10),
+    sw.Lumped(40),
+    sw.Lumped(100),
+    sw.CentralDifference(40),
+    sw.CentralDifference(20, order=4),
+    sw.Spectral(16),
+]
+
+
+@pytest.mark.parametrize("load", [0.11, 0.025])
+@pytest.mark.parametrize("model", MODELS, ids=str)
+def test_a_lossless_shaft_keeps_its_energy_for_100000_periods(model, load):
+    """The shaft of Popenda 2019. The first mode turns 1e5 times, the highest 1e7 times and more."""
+    shaft = sw.Shaft("line", length=1.8, diameter=0.028, density=7860.0, shear_modulus=77.5e9, model=model)
+    net = sw.Network("free")
+    net.add(sw.Inertia("Je", J=0.025), "a")
+    net.add(shaft, "a", "b")
+    net.add(sw.Gear("gear", ratio=2.0), "b", "c")
+    net.add(sw.Inertia("Jm", J=4 * load), "c")
+    period = 1 / min(f for f in net.modes().frequencies if f > 1.0)
+    late = np.append(0.0, 1e5 * period + np.linspace(0.0, period, 50))
+    run = net.simulate(late[-1], t_eval=late, engine="exact", initial={"Je.omega": 1.0})
+    # Each state is as exact as its frequency; only the roundings of the sum of squares are left.
+    stored = run.energy.stored
+    assert np.abs(stored - stored[0]).max() < 1e-13 * stored[0]
+    assert run.energy_residual < 1e-13
+
+
+def test_the_modes_of_a_lossless_network_lose_nothing_and_are_complete():
+    """A chain with more torques than speeds and one with more speeds than torques, side by side: three at rest."""
+    held = np.array([[1.0, -1.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0], [0.0, 1.0, -1.0], [1.0, 0.0, 0.0]])
+    free = np.array([[1.0, -1.0, 0.0], [0.0, 5.0, -5.0]])
+    coupling = np.block([[held, np.zeros((5, 3))], [np.zeros((2, 3)), free]])
+    inertias, springs = np.geomspace(1e-3, 10.0, 6), np.geomspace(1e2, 1e6, 7)
+    matrix = np.zeros((13, 13))
+    matrix[:6, 6:], matrix[6:, :6] = -coupling.T / inertias[:, None], springs[:, None] * coupling
+    modes = find_modes(matrix)
+    assert modes is not None
+    assert (modes.values.real == 0.0).all()
+    assert (modes.values == 0.0).sum() == 3
+    again = ((modes.vectors * modes.values) @ modes.inverse).real
+    assert np.abs(again - matrix).max() < 1e-13 * np.abs(matrix).max()
+    assert np.abs((modes.vectors @ modes.inverse).real - np.eye(13)).max() < 1e-13
+
+
+@pytest.mark.parametrize("spoilt", [(0, 0), (0, 1), (2, 0)], ids=["damping", "one-sided", "ring of speeds"])
+def test_what_is_not_lossless_keeps_its_own_decay(spoilt):
+    matrix = np.array([[0.0, -1.0, 0.0], [4.0, 0.0, -2.0], [0.0, 3.0, 0.0]])
+    matrix[spoilt] -= 0.5
+    modes = find_modes(matrix)
+    assert modes is not None
+    expected = np.linalg.eigvals(matrix)
+    assert np.abs(modes.values.real).max() == pytest.approx(np.abs(expected.real).max(), abs=1e-14)

@@ -71,6 +71,16 @@ def test_the_study_ranks_the_models_as_their_orders_say() -> None:
     assert best.model == "Wave(places=3)"
     assert study.cheapest(1e-15) is None
     assert "end torques to 1e-06: Wave(places=3) on wave" in study.advice
+    # up to 3.9 kHz the shaft has three modes; central differences show two of them twice, one spring has one
+    extra = {name: each.extra_modes for name, each in trial.items()}
+    assert extra == {
+        "OneSpring()": -2,
+        "Lumped(m=10)": 0,
+        "Lumped(m=20)": 0,
+        "CentralDifference(m=10)": 2,
+        "Spectral(n=8)": 0,
+        "Wave(places=3)": None,
+    }
 
 
 def test_a_model_that_fails_is_a_row_with_its_reason(tmp_path: Path) -> None:

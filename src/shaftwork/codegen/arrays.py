@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy import sparse
 
-from shaftwork.codegen.elements import Array
+from shaftwork.codegen.elements import Array, GainMatrix, potential_matrix
 from shaftwork.codegen.inputs import Inputs
 from shaftwork.codegen.loops import LoopSolver
 from shaftwork.codegen.matrices import LinearPart, MatrixAssembly
@@ -30,6 +31,11 @@ class ArrayProgram:
         self.reading = self.inputs.reading()
         self.loop_places = np.array([order.index(branch) for branch in form.loop_laws], dtype=np.intp)
         self.loop_in_tree = np.array([branch in form.tree.tree[Kind.LAW] for branch in form.loop_laws], dtype=bool)
+
+    @cached_property
+    def potentials(self) -> GainMatrix:
+        """(nodes, branches): the across variable of every node from those of the tree branches."""
+        return potential_matrix(self.form)
 
     def bind(self, p: Array) -> BoundArrays:
         """The program with its matrices made for one parameter vector."""

@@ -59,7 +59,7 @@ class Inputs:
 
     @staticmethod
     def _group(made: TemplateGroup, place: Any, output: Any, integral: Any) -> _Group:
-        is_wave = made.template.line is not None
+        is_wave = made.template.is_history
         law = INTEGRAL if is_wave else made.template.law  # both are read from x
         symbols = (TIME, ACROSS, INTEGRAL, *made.template.symbols)
         members = [int(branch) for branch in made.branches]

@@ -28,6 +28,7 @@ from shaftwork.codegen.law_slopes import input_slopes
 from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.recovery import History, signals_of
+from shaftwork.codegen.waves import Dense
 from shaftwork.components.base import Signal
 from shaftwork.core.errors import SignalError, SimulationError
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
@@ -102,7 +103,7 @@ def _with_inputs(form: StateForm, places: Sequence[_Place]) -> tuple[StateForm, 
         index, part, ends = len(branches), parts[place.part], place.signal.ends
         loops[index] = _loop(form, part, place.signal)
         plus, minus = (GROUND if end is None else part.nodes[end] for end in ends)
-        template = BranchTemplate(Kind.THROUGH_SOURCE, Integer(0), ends, (), "", ())
+        template = BranchTemplate(Kind.THROUGH_SOURCE, Integer(0), ends, (), "", (), Integer(0))
         branches.append(GraphBranch(index, place.part, template, plus, minus, ()))
         parts[place.part] = dataclasses.replace(part, branches=(*part.branches, index))
         members.append(index)
@@ -150,35 +151,48 @@ class Linearization:
         x: (n,) states at the point.
         t: time at which laws are read, s.
         inputs: names of the inputs.
+        arriving: (q,) what arrives at the ends of lines at the point; its deviations are further inputs, after the
+            named ones. Without it there must be no line.
 
     Raises:
         SignalError: there is no such input.
-        SimulationError: a law has no finite slope at the point.
+        SimulationError: a law has no finite slope at the point, or a line has a delay that no matrix holds.
     """
 
-    def __init__(self, model: CompiledModel, p: Array, x: Array, t: float, inputs: Sequence[str]) -> None:
-        if model.form.waves:
+    def __init__(
+        self, model: CompiledModel, p: Array, x: Array, t: float, inputs: Sequence[str], arriving: Array | None = None
+    ) -> None:
+        if model.form.waves and arriving is None:
             shaft = model.form.graph.part_of(model.form.waves[0]).name
             raise SimulationError(
-                f"Shaft '{shaft}' is a travelling wave, whose delay no matrix holds. Take model=Spectral(16) for "
-                f"it: its lowest frequencies are the same to rounding."
+                f"Shaft '{shaft}' is a travelling wave, whose delay no matrix holds. Its modes and its frequency "
+                f"response are those of net.modes() and net.frequency_response(); for matrices take model=Spectral(16)."
             )
         places = _places(model.form.graph, inputs)
         form, branches = _with_inputs(model.form, places)
+        x = x if arriving is None else np.concatenate([x, arriving])
         self._form, self._point = form, (t, x)
         self._bound = model.bind(p) if form is model.form else ArrayProgram(form).bind(p)
+        if self._bound.loops is not None and (solved := model.bind(p).loops) is not None:
+            self._bound.loops.start_from(solved.solve(t, x))  # the same of several solutions
         self.states = tuple(state.name for state in form.states)
         self.state_units = tuple(state.unit for state in form.states)
         self.angles = len(form.integrals)
         self.inputs = tuple(inputs)
         part, order = self._bound.part, {int(k): row for row, k in enumerate(self._bound.program.assembly.inputs)}
-        rows = [order[branch] for branch in branches]
-        entries = ([float(place.signal.sign) for place in places], (rows, range(len(rows))))
+        rows = [order[branch] for branch in (*branches, *form.waves)]
+        entries = (
+            [*(float(place.signal.sign) for place in places), *[1.0] * len(form.waves)],
+            (rows, range(len(rows))),
+        )
         self._enter = sparse.csr_array(entries, shape=(len(order), len(rows)))
         self._by_state, self._by_input = input_slopes(self._bound, t, x, self._enter)
         self.A = sparse.csr_array(part.A + part.B @ self._by_state)
         self.B = (part.B @ self._by_input).toarray()
         self.B1 = (part.B1 @ self._enter).toarray()
+        ends = [form.outputs.index(branch) for branch in form.waves]
+        self.C = sparse.csr_array(part.C[ends] + part.D[ends] @ self._by_state)
+        self.D = (part.D[ends] @ self._by_input).toarray()
         self.weights = _energy_weights(self._bound)
 
     @cached_property
@@ -220,8 +234,13 @@ class Linearization:
         found = []
         for k in sorted((*form.across_states, *form.dependent_across)):
             node = graph.branches[k].plus if graph.branches[k].plus != GROUND else graph.branches[k].minus
-            found.append((graph.part_of(k).name, f"{graph.nodes[node]}.{graph.domains[node].across.name}"))
+            if node != GROUND:  # the end of a shaft that is held
+                found.append((graph.part_of(k).name, f"{graph.nodes[node]}.{graph.domains[node].across.name}"))
         return tuple(found)
+
+    def swinging(self, s: Complex, x: Complex, v: Complex) -> Callable[[str], Complex]:
+        """`motion` where everything goes as exp(s t), s (k,)."""
+        return self.motion(x, v, s * v)
 
     def motion(self, x: Complex, v: Complex, v_rate: Complex) -> Callable[[str], Complex]:
         """A function from the name of a quantity to its deviation (k,), along a part (k, places).
@@ -255,11 +274,11 @@ def _in_a_row(part: GraphPart, stores: set[int]) -> list[tuple[int, float]]:
     """The nodes of a part from its first end to its last, each with its distance from the one before, on average 1."""
     first, *others = (part.nodes[port.name] for port in part.component.ports)
     along = next((made for made in part.component.profiles().values() if made.kind == "across"), None)
-    if along is None:
+    if along is None or along.lines:
         inside = (node for node in part.nodes.values() if node in stores and node not in (first, *others))
         return [(node, 1.0) for node in (first, *inside, *others)]
     steps = np.diff(along.places)
-    nodes = [part.nodes[name] for (name,) in along.of]
+    nodes = [part.nodes[name] for ((_, name),) in along.of]
     return [(nodes[0], 1.0), *zip(nodes[1:], (steps / steps.mean()).tolist(), strict=True)]
 
 
@@ -299,6 +318,13 @@ class _Reader(ModelObserver):
 
     def history(self, t: Array, x: Array) -> History:  # noqa: ARG002 (they are those of the motion)
         return self.motion
+
+    def signal(self, name: str, t: Array, x: Array, dense: Dense | None = None) -> Array:
+        """(k,) a quantity by its name in `units`; the energy of a part is that in its stores, lines apart."""
+        owner, _, quantity = name.rpartition(".")
+        if quantity == "energy" and name not in self._signals:
+            return self.motion.stored(next(part for part in self._graph.parts if part.name == owner))
+        return super().signal(name, t, x, dense)
 
     def along(self, name: str) -> Array:
         """(k, places) a quantity along a part by its name in `profiles`."""

@@ -75,7 +75,7 @@ class LoopSolver:
         inputs, part = self._inputs, self._part
         known = inputs.values(t, np.zeros(inputs.outputs), x, self._p) * inputs.of_time
         known[self.places] = a
-        y = part.C @ x + self._D @ known
+        y = part.C @ x[: inputs.states] + self._D @ known
         g = inputs.values(t, y, x, self._p)
         u = g.copy()
         u[self.places] = a
@@ -86,8 +86,9 @@ class LoopSolver:
         _, u, g = self.inputs_at(t, x, a)
         left, size = a - g[self.places], np.abs(a) + np.abs(g[self.places])
         if self._tree.any():
-            left[self._tree] = self._P @ x + self._Q @ u - g[self.places[self._tree]]
-            terms = np.abs(self._P) @ np.abs(x) + np.abs(self._Q) @ np.abs(u)
+            states = x[: self._inputs.states]
+            left[self._tree] = self._P @ states + self._Q @ u - g[self.places[self._tree]]
+            terms = np.abs(self._P) @ np.abs(states) + np.abs(self._Q) @ np.abs(u)
             size[self._tree] = terms + np.abs(g[self.places[self._tree]])
         return left, size + np.finfo(float).tiny
 

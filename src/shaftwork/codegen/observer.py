@@ -11,11 +11,15 @@ from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.recovery import History, signals_of
 from shaftwork.codegen.timeline import NOTHING, Timeline
-from shaftwork.codegen.waves import Dense, along_lines
+from shaftwork.codegen.waves import Carrying, Dense, along_lines
 from shaftwork.components.base import Profile, Signal
 from shaftwork.core.domains import ROTATION
+from shaftwork.core.errors import SignalError
 from shaftwork.network.graph import CircuitGraph, GraphPart
 from shaftwork.reduction.form import StateForm
+
+LARGEST_HISTORY = 2_000_000
+"""Values, branches by times, of a trajectory whose branch quantities are made all at once."""
 
 
 class ModelObserver:
@@ -54,10 +58,7 @@ class ModelObserver:
         units |= {name: _unit(signal) for name, (_, signal) in self._signals.items()}
         units |= {s.name: s.unit for s in self._form.states if s.kind == "integral"}
         units |= {f"{part.name}.power": "W" for part in self._graph.parts}
-        # what waves hold is not in the states of one instant
-        waves = {self._graph.branches[branch].part for branch in self._form.waves}
-        held = (part for number, part in enumerate(self._graph.parts) if number not in waves)
-        return units | {f"{part.name}.energy": "J" for part in held}
+        return units | {f"{part.name}.energy": "J" for part in self._graph.parts}
 
     def history(self, t: Array, x: Array) -> History:
         """All branch quantities along a trajectory; the last one asked for is kept."""
@@ -66,18 +67,55 @@ class ModelObserver:
             self._last = (key, History(self._bind(), self._instants.one_sided(t), x))
         return self._last[1]
 
-    def signal(self, name: str, t: Array, x: Array) -> Array:
-        """(k,) a quantity by its name in `units`."""
-        history = self.history(t, x)
+    def _read(self, t: Array, x: Array, read: Callable[[History], Array]) -> Array:
+        """What is read of a trajectory; of a large one in blocks of times, since all branches take much memory."""
+        rows = max(1, LARGEST_HISTORY // max(1, len(self._graph.branches)))
+        if len(t) <= rows:
+            return read(self.history(t, x))
+        times, bound = self._instants.one_sided(t), self._bind()
+        blocks = (slice(first, first + rows) for first in range(0, len(t), rows))
+        return np.concatenate([read(History(bound, times[block], x[block])) for block in blocks])
+
+    def signal(self, name: str, t: Array, x: Array, dense: Dense | None = None) -> Array:
+        """(k,) a quantity by its name in `units`; the energy of waves is read from the motion behind the states.
+
+        Raises:
+            SignalError: such an energy, and no motion.
+        """
         if name in self._signals:
-            return history.signal(*self._signals[name])
+            return self._read(t, x, lambda history: history.signal(*self._signals[name]))
         if name in self._integrals:
             return np.asarray(x[:, self._integrals[name]])
         if name in self._nodes:
-            return np.asarray(history.potentials[self._nodes[name]])
+            return self._read(t, x, lambda history: np.asarray(history.potentials[self._nodes[name]]))
         owner, quantity = name.rsplit(".", 1)
         part = next(part for part in self._graph.parts if part.name == owner)
-        return history.absorbed(part) if quantity == "power" else history.stored(part)
+        if quantity == "power":
+            return self._read(t, x, lambda history: history.absorbed(part))
+        stored = self._read(t, x, lambda history: history.stored(part))
+        return stored if part not in self._lines else stored + self._in_waves(t, dense)[owner]
+
+    @cached_property
+    def _lines(self) -> tuple[GraphPart, ...]:
+        """For each line the part that it belongs to."""
+        return tuple(self._graph.part_of(end) for end in self._form.waves[::2])
+
+    def _in_waves(self, t: Array, dense: Dense | None) -> dict[str, Array]:
+        """Energy (k,) on its way in the lines of each part that has lines.
+
+        Raises:
+            SignalError: there are lines, and no motion along them.
+        """
+        if not self._lines:
+            return {}
+        if not isinstance(dense, Carrying):
+            raise SignalError(
+                "The energy of a wave is on its way, and one instant does not tell it. Read it of a motion."
+            )
+        held: dict[str, Array] = {}
+        for part, column in zip(self._lines, dense.held(t).T, strict=True):
+            held[part.name] = held.get(part.name, 0.0) + column
+        return held
 
     @cached_property
     def _profiles(self) -> dict[str, tuple[GraphPart, Profile]]:
@@ -88,25 +126,34 @@ class ModelObserver:
     def profiles(self) -> Mapping[str, tuple[str, tuple[float, ...]]]:
         """Every quantity that can be read along a part: its unit, and the places in m from the part's first end."""
         return {
-            name: (made.domain.across.unit if made.kind == "across" else made.domain.through.unit, made.places)
-            for name, (_, made) in self._profiles.items()
+            name: (
+                made.domain.across.unit if made.kind == "across" else made.domain.through.unit,
+                tuple(float(self._bind().p[part.parameters[made.length]]) * share for share in made.places),
+            )
+            for name, (part, made) in self._profiles.items()
         }
 
     def profile(self, name: str, t: Array, x: Array, dense: Dense) -> Array:
         """(k, places) a quantity along a part by its name in `profiles`."""
         part, profile = self._profiles[name]
-        if profile.shares:
+        if profile.lines:
             return along_lines(self._bind(), part, profile, t, dense)
-        return self.history(t, x).profile(part, profile)
+        return self._read(t, x, lambda history: history.profile(part, profile))
 
-    def powers(self, t: Array, x: Array) -> tuple[dict[str, Array], dict[str, Array], dict[str, Array]]:
-        """Stored energy, lost power and supplied power by part."""
+    def stored(self, t: Array, x: Array, dense: Dense) -> dict[str, Array]:
+        """Stored energy by part."""
         history = History(self._bind(), self._instants.one_sided(t), x)
         parts = self._graph.parts
         stored = {part.name: history.stored(part) for part in parts if part.component.role != "source"}
+        return stored | {name: stored[name] + held for name, held in self._in_waves(t, dense).items()}
+
+    def powers(self, t: Array, x: Array) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Lost power and supplied power by part."""
+        history = History(self._bind(), self._instants.one_sided(t), x)
+        parts = self._graph.parts
         lost = {part.name: history.lost(part) for part in parts if part.component.role != "source"}
         supplied = {part.name: -history.lost(part) for part in parts if part.component.role == "source"}
-        return stored, lost, supplied
+        return lost, supplied
 
 
 def _unit(signal: Signal) -> str:

@@ -11,6 +11,7 @@ from scipy.sparse.linalg import MatrixRankWarning, lsqr, splu
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.observer import ModelObserver
+from shaftwork.codegen.recovery import History
 from shaftwork.core.errors import ParameterError, SignalError, SimulationError
 from shaftwork.core.parameters import in_si
 from shaftwork.core.times import just_after
@@ -30,7 +31,8 @@ def initial_state(bound: BoundArrays, given: Mapping[str, float], t0: float) -> 
 
     Rest is that before the sources come on: where a prescribed speed is there from the start, its impulse has been
     given to the inertias joined to it rigidly. A value may be given for any speed or twist, also of a part whose store
-    is dependent; what it leaves open is filled with the smallest possible motion.
+    is dependent; what it leaves open is filled with the smallest possible motion. Along a long shaft the given speed
+    runs straight from the one end to the other.
 
     Args:
         bound: the array program.
@@ -43,13 +45,16 @@ def initial_state(bound: BoundArrays, given: Mapping[str, float], t0: float) -> 
     """
     names = [state.name for state in bound.program.form.states]
     place = {name: k for k, name in enumerate(names)}
-    x = bound.impulse(np.zeros(len(names)), None, just_after(t0))
+    x = rest = bound.impulse(np.zeros(len(names)), None, just_after(t0))
     if not isinstance(given, Mapping):
         raise ParameterError(f"initial = {given!r} must map quantities to values, such as {{'J1.omega': 3.0}}.")
     units = ModelObserver(bound.program.form, lambda: bound).units
     numbers = {
         str(name): in_si(f"the start value of '{name}'", value, units.get(name, "1")) for name, value in given.items()
     }
+    if not numbers:
+        return x
+    x = rest.copy()
     for name, value in numbers.items():
         if name in place:
             x[place[name]] = value
@@ -57,7 +62,31 @@ def initial_state(bound: BoundArrays, given: Mapping[str, float], t0: float) -> 
     if indirect:
         free = [k for k, name in enumerate(names) if name not in given]
         _fill(bound, names, indirect, free, t0, x)
+    inside = _inside_shafts(bound, names, given, t0, x - rest)
+    if inside:
+        x[list(inside)] += list(inside.values())
+        if indirect:
+            _fill(bound, names, indirect, [k for k in free if k not in inside], t0, x)
     return x
+
+
+def _inside_shafts(
+    bound: BoundArrays, names: list[str], given: Mapping[str, float], t0: float, change: Array
+) -> dict[int, float]:
+    """For each state that is a speed inside a shaft, and not given, the speed between those given to the ends."""
+    form = bound.program.form
+    owner = {form.graph.branches[branch].plus: k for k, branch in enumerate(form.across_states)}
+    potentials = History(bound, np.array([just_after(t0)]), change[None, :]).potentials[:, 0]
+    found: dict[int, float] = {}
+    for part in form.graph.parts:
+        for profile in part.component.profiles().values():
+            if profile.kind == "across" and not profile.lines and len(profile.of) > 2:
+                nodes = [part.nodes[name] for ((_, name),) in profile.of]
+                first, last = potentials[nodes[0]], potentials[nodes[-1]]
+                for node, share in zip(nodes[1:-1], profile.places[1:-1], strict=True):
+                    if node in owner and names[owner[node]] not in given:
+                        found[owner[node]] = float(first + share * (last - first))
+    return found
 
 
 def _fill(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
-from shaftwork.codegen.elements import Array, potential_matrix
+from shaftwork.codegen.elements import Array
 from shaftwork.components.base import Profile, Signal
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart
 from shaftwork.network.templates import Kind
@@ -76,7 +76,7 @@ class History:
     @cached_property
     def potentials(self) -> Array:
         """(nodes + 1, k) across variables of the nodes against the reference, which is the last row."""
-        nodes = potential_matrix(self.form)(self.bound.p) @ np.where(self._is_tree[:, None], self.across, 0.0)
+        nodes = self.bound.program.potentials(self.bound.p) @ np.where(self._is_tree[:, None], self.across, 0.0)
         return np.vstack([nodes, np.zeros((1, len(self.t)))])
 
     @property
@@ -104,7 +104,8 @@ class History:
     def lost(self, part: GraphPart) -> Array:
         """(k,) power that a part takes in without storing it, W; negative where it supplies."""
         kinds = (Kind.CONDUCTANCE, Kind.LAW, Kind.THROUGH_SOURCE, Kind.ACROSS_SOURCE)
-        members = (k for k in part.branches if self.form.graph.branches[k].template.kind in kinds)
+        branches = self.form.graph.branches
+        members = (k for k in part.branches if branches[k].template.kind in kinds and not branches[k].template.line)
         return np.asarray(sum((self.across[k] * self.through[k] for k in members), start=np.zeros(len(self.t))))
 
     def signal(self, part: GraphPart, signal: Signal) -> Array:
@@ -123,17 +124,17 @@ class History:
 
     def profile(self, part: GraphPart, profile: Profile) -> Array:
         """(k, places) a quantity along the part."""
-        if profile.kind == "across":
-            return self.potentials[[part.nodes[name] for (name,) in profile.of]].T
         branches = self.form.graph.branches
         labels = {branches[k].template.label: k for k in part.branches}
         columns = np.zeros((len(self.t), len(profile.of)))
-        for place, members in enumerate(profile.of):
-            if (port := members[0].removeprefix("-")) in part.nodes:
-                columns[:, place] = self._through_port(part, port) * (-1.0 if members[0] != port else 1.0)
-            else:
-                found = [labels[label] for label in members if label in labels]  # no damping has left no branch
-                columns[:, place] = self.through[found].sum(axis=0)
+        for place, terms in enumerate(profile.of):
+            for factor, name in terms:
+                if profile.kind == "across":
+                    columns[:, place] += factor * self.potentials[part.nodes[name]]
+                elif name in part.nodes:
+                    columns[:, place] += factor * self._through_port(part, name)
+                elif name in labels:  # no damping has left no branch
+                    columns[:, place] += factor * self.through[labels[name]]
         return columns
 
     def _store(self, part: GraphPart) -> int:

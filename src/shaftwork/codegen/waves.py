@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from sympy import Expr
@@ -25,6 +25,15 @@ class Dense(Protocol):
 
     def __call__(self, times: Array) -> Array:
         """(k, n) at times (k,)."""
+        ...
+
+
+@runtime_checkable
+class Carrying(Protocol):
+    """What a motion of a network with lines can tell besides."""
+
+    def held(self, times: Array) -> Array:
+        """(k, lines) energy in J that is on its way in each line at times (k,)."""
         ...
 
 
@@ -77,8 +86,8 @@ def along_lines(bound: BoundArrays, part: GraphPart, profile: Profile, t: Array,
     """
     lines = dict(zip(bound.program.form.waves[::2], zip(*WaveSystem(bound).lines, strict=True), strict=True))
     labels = {bound.program.form.graph.branches[k].template.label: k for k in part.branches}
-    made = np.empty((len(t), len(profile.shares)))
-    for place, ((label,), share) in enumerate(zip(profile.of, profile.shares, strict=True)):
+    made = np.empty((len(t), len(profile.lines)))
+    for place, (label, share) in enumerate(profile.lines):
         first = labels[f"{label}_a" if f"{label}_a" in labels else f"{label}_middle"]
         second = labels[f"{label}_b" if f"{label}_b" in labels else f"{label}_middle"]
         impedance, delay = lines[first]

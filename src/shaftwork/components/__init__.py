@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from shaftwork.components import electrical, loads, machines, rotation, shafts, sources, translation
+from shaftwork.components import contacts, electrical, loads, machines, rotation, shafts, sources, translation
 from shaftwork.components.base import REGISTRY, Component, Port, Signal, component
 from shaftwork.components.laws import Table
 
@@ -13,6 +13,7 @@ __all__ = [
     "Signal",
     "Table",
     "component",
+    "contacts",
     "electrical",
     "loads",
     "machines",

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any, ClassVar, Literal, Self, TypeVar, dataclass_transform, get_args
 
+from sympy import Expr
+
 from shaftwork.components.branches import Branch, End
 from shaftwork.core.domains import ELECTRICAL, ROTATION, Domain
 from shaftwork.core.errors import ParameterError, ShaftworkError
@@ -48,19 +50,41 @@ class Profile:
     """A quantity along a part, read at several places at once.
 
     Args:
-        kind: "across" (speed of nodes) or "through" (sum of branches).
-        places: (k,) where, in m from the first end, ascending.
-        of: for each place the node's name, or the labels of the branches; a port's name stands for what the shaft takes
-            in there, with "-" before it for what it gives; of a line (`shares`) its label.
+        kind: "across" (of nodes) or "through" (of branches).
+        places: (k,) where, as shares of the way from the first end, ascending.
+        length: the parameter that is the length of the way.
+        of: for each place the sum that it is, as (factor, name): the name of a node, the label of a branch, or a port,
+            which stands for what the part takes in there.
         domain: of the quantity.
-        shares: where the part is a line that waves travel along, the place as a share of the way from its first end.
+        lines: for a part of lines that waves travel along, instead of `of`: for each place the label of its line, and
+            the share of the way along that line.
     """
 
     kind: Literal["across", "through"]
     places: tuple[float, ...]
-    of: tuple[tuple[str, ...], ...]
+    length: str
+    of: tuple[tuple[tuple[float, str], ...], ...]
     domain: Domain
-    shares: tuple[float, ...] = ()
+    lines: tuple[tuple[str, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class Derived:
+    """A quantity that follows from a part's parameters, and that stands in its printed laws as a letter.
+
+    Args:
+        name: under which `Component.branches` finds it, `p.name`.
+        law: in the parameters and in those derived before it.
+        unit: SI unit.
+        meaning: a few words.
+        latex: the letter.
+    """
+
+    name: str
+    law: Expr
+    unit: str
+    meaning: str
+    latex: str
 
 
 @dataclass(frozen=True)
@@ -91,6 +115,13 @@ class Component:
     def branches(self, p: Any) -> Iterator[Branch]:
         """Yield the branches; `p.name` is the symbol of parameter `name` (0 where its value is exactly zero)."""
         raise NotImplementedError
+
+    def derived(self, p: Any) -> Iterator[Derived]:  # noqa: ARG002
+        """Yield the quantities by whose letters the laws are printed; each is `p.name` from then on. By default none.
+
+        Equations list those that occur with their definitions; computations know the parameters alone.
+        """
+        yield from ()
 
     def signals(self) -> dict[str, Signal]:
         """The quantities that can be read from the part; by default all that its ports and stores define."""

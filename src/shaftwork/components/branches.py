@@ -10,8 +10,9 @@ A label names the branch's own variable where its part has several, that of an a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
-from sympy import Expr, Integer, Symbol
+from sympy import Expr, Function, Integer, Symbol
 
 ACROSS = Symbol("across", real=True)
 """The across variable of the branch in whose law it stands."""
@@ -20,6 +21,16 @@ INTEGRAL = Symbol("integral", real=True)
 
 HISTORY = Symbol("history", real=True)
 """What has come from the other end of the line in whose law it stands."""
+
+
+class Delayed(Function):  # type: ignore[misc]
+    """An expression as it was some time ago, for print: (expression, time in s)."""
+
+    nargs = 2
+
+    def _latex(self, printer: Any) -> str:
+        return rf"\left[ {printer.doprint(self.args[0])} \right]_{{t - {printer.doprint(self.args[1])}}}"
+
 
 End = str | None
 """A port or an inner node of the component; None is the reference of the domain (speed zero)."""

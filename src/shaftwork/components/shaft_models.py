@@ -1,14 +1,4 @@
-"""How a long shaft becomes finitely many speeds and torques: the exchangeable models of a `Shaft`.
-
-Every model but the wave is the same construction. The speeds omega_j stand at nodes x_j, each with a share of the
-shaft's inertia; the torques tau_k stand at stations y_k, each with a share of its length and so of its compliance. One
-matrix of weights w joins them, in both equations:
-
-    d(tau_k)/dt / (C' / l_k) = sum_j w_kj omega_j,     J' h_j d(omega_j)/dt = - sum_k w_kj tau_k + torque at the ends.
-
-Because it is the same matrix, the energy of the shaft changes by the powers at its two ends and by nothing else,
-whatever the weights are.
-"""
+"""How a long shaft becomes finitely many speeds and torques: the exchangeable models of a `Shaft`."""
 
 from __future__ import annotations
 
@@ -19,33 +9,21 @@ from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.polynomial.legendre import Legendre, leggauss, legvander
 
+from shaftwork.components.shaft_meshes import (
+    SUMMATION_BY_PARTS,
+    Mesh,
+    central,
+    central_as_printed,
+    chain,
+    spectral,
+)
 from shaftwork.core.errors import ParameterError
 
 MOST_ELEMENTS = 100_000
 """Elements of a model; more is a typing error."""
 MOST_SPECTRAL = 200
 """Degree up to which the nodes and weights are right to rounding; beyond it, join several shafts."""
-
-
-@dataclass(frozen=True, eq=False)
-class Mesh:
-    """A shaft of unit length as speeds at nodes and torques at stations.
-
-    Args:
-        nodes: (n,) places of the speeds, from 0 to 1.
-        inertias: (n,) share of the inertia at each; they sum to 1.
-        stations: (k,) places of the torques.
-        lengths: (k,) share of the length, and so of the compliance, of each; they sum to 1.
-        weights: for each torque the nodes and factors that its rate of twist is the sum of.
-    """
-
-    nodes: tuple[float, ...]
-    inertias: tuple[float, ...]
-    stations: tuple[float, ...]
-    lengths: tuple[float, ...]
-    weights: tuple[tuple[tuple[int, float], ...], ...]
 
 
 @dataclass(frozen=True)
@@ -132,60 +110,63 @@ class Lumped(ShaftModel):
         _one_of(self, "ends", ("half", "full"))
 
     def _mesh(self) -> Mesh:
-        m = self.m
-        half = 0.5 / m
-        full = 1 / (m + 1)
-        return Mesh(
-            nodes=tuple(k / m for k in range(m + 1)),
-            inertias=(half, *[1 / m] * (m - 1), half) if self.ends == "half" else (full,) * (m + 1),
-            stations=tuple((k + 0.5) / m for k in range(m)),
-            lengths=(1 / m,) * m,
-            weights=tuple(((k, 1.0), (k + 1, -1.0)) for k in range(m)),
-        )
+        return chain(self.m, half_ends=self.ends == "half")
 
 
 @dataclass(frozen=True)
 class CentralDifference(ShaftModel):
-    """Central differences for speed and torque at the same m + 1 equidistant nodes.
+    """Central differences for speed and torque at the same equidistant nodes.
 
-    Inside the shaft the equations are (20) and (21) of Popenda 2019 without damping. He leaves the closure at the ends
-    open; here it is by summation by parts, which keeps the energy balance exactly: one-sided differences over half a
-    cell at order 2, Strand's boundary rows at order 4. Speeds at odd nodes know torques at even ones only, so half of
-    the modes are spurious.
+    Inside the shaft, with Delta x = L / m:
+
+        J' d(omega_k)/dt = - (tau_{k+1} - tau_{k-1}) / (2 Delta x)
+                           + D' (omega_{k+1} - 2 omega_k + omega_{k-1}) / Delta x^2
+        d(tau_k)/dt / C' = - (omega_{k+1} - omega_{k-1}) / (2 Delta x)
+
+    The lossless part is (20) and (21) of Popenda 2019. Speeds at odd nodes know torques at even ones only, so half of
+    the modes are spurious; the damping, which joins neighbours, damps those most. His (20) carries the damping on the
+    torque, (D' / J') times its second difference, which is the same partial differential equation but asks for torques
+    beyond the ends; to take their slope for zero there would lose the damping at a heavy end and not converge. He
+    prints the second difference in (19) over 2 Delta x^2, which halves the damping.
 
     Args:
         m: number of intervals.
-        order: 2 or 4.
+        order: 2 or 4, of the differences of torque and speed; that of the damping is 2.
+        closure: at the ends, "sbp" or "printed". "sbp" is summation by parts: torques at all m + 1 nodes, one-sided
+            differences over half a cell at order 2, Strand's boundary rows at order 4. "printed" reads (20)-(23) as
+            they stand, torques at the m - 1 inner nodes: the machines see the torques next to them, as in (22) and
+            (23), which stand for the undefined ones of (21) too; the speeds at the ends enter by
+            omega_0 - (omega_1 + omega_2) / 2 over 1.5 Delta x, the one row that then makes no energy. The ends have no
+            inertia of the shaft, which is too light by one part in m: first order. Speeds that alternate from node to
+            node twist nothing, a spurious motion of frequency zero. Order 2 alone.
+        second_difference: of the damping, "consistent" or "printed", which has half of it whatever m is.
 
     Source: Popenda 2019, (16)-(23); Strand, Summation by parts for finite difference approximations for d/dx, 1994.
     """
 
     m: int = 20
     order: int = 2
+    closure: str = "sbp"
+    second_difference: str = "consistent"
 
     purpose: ClassVar[str] = "speeds and torques at the same nodes; spurious modes"
 
     def __post_init__(self) -> None:
-        _one_of(self, "order", (2, 4))
-        _whole(self, "m", 2 if self.order == 2 else 2 * len(_FOURTH_NORM), MOST_ELEMENTS)
+        _one_of(self, "order", tuple(SUMMATION_BY_PARTS))
+        _one_of(self, "closure", ("sbp", "printed"))
+        _one_of(self, "second_difference", ("consistent", "printed"))
+        if self.closure == "printed" and self.order != 2:
+            raise ParameterError(
+                f"{self!r}: the printed closure is of order 2. Leave order out, or take closure='sbp'."
+            )
+        _, norm, _ = SUMMATION_BY_PARTS[self.order]
+        _whole(self, "m", 2 * len(norm) if self.closure == "sbp" else 3, MOST_ELEMENTS)
 
     def _mesh(self) -> Mesh:
-        m = self.m
-        inside, norm, rows = (_SECOND, _SECOND_NORM, _SECOND_ROWS) if self.order == 2 else _FOURTH_ALL
-        shares = [1.0] * (m + 1)
-        shares[: len(norm)], shares[m + 1 - len(norm) :] = norm, norm[::-1]
-        weights = []
-        for k in range(m + 1):
-            if k < len(rows):
-                row = [(j, -q) for j, q in enumerate(rows[k])]
-            elif k > m - len(rows):
-                row = [(m - j, q) for j, q in enumerate(rows[m - k])][::-1]
-            else:
-                row = [(k + offset, -q) for offset, q in inside]
-            weights.append(tuple((j, weight) for j, weight in row if weight))
-        places = tuple(k / m for k in range(m + 1))
-        parts = tuple(share / m for share in shares)
-        return Mesh(nodes=places, inertias=parts, stations=places, lengths=parts, weights=tuple(weights))
+        damper = 1.0 if self.second_difference == "consistent" else 2.0
+        if self.closure == "printed":
+            return central_as_printed(self.m, damper)
+        return central(self.m, self.order, damper)
 
 
 @dataclass(frozen=True)
@@ -210,16 +191,7 @@ class Spectral(ShaftModel):
         _whole(self, "n", 1, MOST_SPECTRAL)
 
     def _mesh(self) -> Mesh:
-        nodes, inertias = lobatto(self.n)
-        stations, lengths = leggauss(self.n)
-        slopes = -_derivative(nodes, stations) * lengths[:, None]
-        return Mesh(
-            nodes=tuple(((nodes + 1) / 2).tolist()),
-            inertias=tuple((inertias / 2).tolist()),
-            stations=tuple(((stations + 1) / 2).tolist()),
-            lengths=tuple((lengths / 2).tolist()),
-            weights=tuple(tuple(enumerate(row)) for row in slopes.tolist()),
-        )
+        return spectral(self.n)
 
 
 @dataclass(frozen=True)
@@ -304,40 +276,6 @@ def _frequency_error(model: ShaftModel, half_waves: float) -> float:
 
 
 MODELS: tuple[type[ShaftModel], ...] = (Rigid, OneSpring, Lumped, CentralDifference, Spectral, Wave, Auto)
-
-# Interior stencils as (offset, factor), and the first rows and norm of the boundary closure, times the interval.
-_SECOND = ((-1, -1 / 2), (1, 1 / 2))
-_SECOND_NORM = (1 / 2,)
-_SECOND_ROWS = ((-1 / 2, 1 / 2),)
-_FOURTH = ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12))
-_FOURTH_NORM = (17 / 48, 59 / 48, 43 / 48, 49 / 48)
-_FOURTH_ROWS = (
-    (-1 / 2, 59 / 96, -1 / 12, -1 / 32),
-    (-59 / 96, 0.0, 59 / 96),
-    (1 / 12, -59 / 96, 0.0, 59 / 96, -1 / 12),
-    (1 / 32, 0.0, -59 / 96, 0.0, 2 / 3, -1 / 12),
-)
-_FOURTH_ALL = (_FOURTH, _FOURTH_NORM, _FOURTH_ROWS)
-
-
-@lru_cache(maxsize=32)
-def lobatto(degree: int) -> tuple[Any, Any]:
-    """Nodes of [-1, 1] and weights (degree + 1,) of the quadrature of Gauss and Lobatto."""
-    polynomial = Legendre.basis(degree)
-    inner = polynomial.deriv().roots() if degree > 1 else np.empty(0)
-    for _ in range(2):  # the roots of a series are good to some ten digits, Newton's method does the rest
-        inner = inner - polynomial.deriv()(inner) / polynomial.deriv(2)(inner) if degree > 1 else inner
-    nodes = np.concatenate([[-1.0], np.sort(inner.real), [1.0]])
-    nodes = (nodes - nodes[::-1]) / 2
-    return nodes, 2 / (degree * (degree + 1) * polynomial(nodes) ** 2)
-
-
-def _derivative(nodes: Any, places: Any) -> Any:
-    """Matrix (places, nodes) from values at nodes to the slopes of their polynomial at other places."""
-    degree = len(nodes) - 1
-    slopes = np.stack([Legendre.basis(k).deriv()(places) for k in range(degree + 1)], axis=1)
-    matrix: Any = np.linalg.solve(legvander(nodes, degree).T, slopes.T).T
-    return matrix - matrix.sum(axis=1, keepdims=True) / (degree + 1)  # a rigid rotation twists nothing, to the last bit
 
 
 def _whole(model: ShaftModel, name: str, least: int, most: int) -> None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from typing import Any
 
 from sympy import Expr, Float, Rational, pi, sqrt
 
-from shaftwork.components.base import Component, Port, Profile, Signal, component
+from shaftwork.components.base import Component, Derived, Port, Profile, Signal, component
 from shaftwork.components.branches import (
     ACROSS,
     AcrossStore,
@@ -21,12 +21,14 @@ from shaftwork.components.branches import (
     ThroughStore,
     rigid,
 )
-from shaftwork.components.shaft_models import Auto, Lumped, Mesh, OneSpring, Rigid, ShaftModel, Wave
+from shaftwork.components.shaft_meshes import Mesh, Row
+from shaftwork.components.shaft_models import Auto, Lumped, OneSpring, Rigid, ShaftModel, Wave
 from shaftwork.core.domains import ROTATION
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter
 
 _ENDS = ("a", "b")
+_Sum = tuple[tuple[float, str], ...]
 
 
 @component
@@ -79,13 +81,13 @@ class Shaft(Component):
         )
 
     def inner_ports(self) -> tuple[Port, ...]:
-        """The speeds between the ends, and the rates of twist that more than two speeds make up."""
+        """The speeds between the ends, and the rates of twist that are no difference of two speeds."""
         if isinstance(self.resolved, Rigid | OneSpring):
             return ()
         if isinstance(self.resolved, Wave):
             return (Port("middle"),) if self.friction else ()
         mesh = self.resolved.mesh()
-        twists = (f"twist{k}" for k, row in enumerate(mesh.weights) if not _is_difference(row))
+        twists = (f"twist{k}" for k, row in enumerate(mesh.weights, mesh.first) if not _is_difference(row))
         return tuple(Port(name) for name in (*_names(mesh)[1:-1], *twists))
 
     def signals(self) -> dict[str, Signal]:
@@ -100,83 +102,111 @@ class Shaft(Component):
 
     def profiles(self) -> dict[str, Profile]:
         """Speed and torque along the shaft."""
-        ends = (0.0, self.length)
-        if isinstance(self.resolved, Rigid | OneSpring):
-            return {
-                "tau": Profile("through", ends, (("a",), ("-b",)), ROTATION),
-                "omega": Profile("across", ends, (("a",), ("b",)), ROTATION),
-            }
         if isinstance(self.resolved, Wave):
-            shares = [k / (self.resolved.places - 1) for k in range(self.resolved.places)]
-            lines = (("h", 0.0, 1.0),) if not self.friction else (("h1", 0.0, 0.5), ("h2", 0.5, 1.0))
-            label = {share: next(line for line in lines if share <= line[2]) for share in shares}
-            of = tuple((label[share][0],) for share in shares)
-            within = tuple((share - label[share][1]) / (label[share][2] - label[share][1]) for share in shares)
-            places = tuple(share * self.length for share in shares)
+            places = tuple(k / (self.resolved.places - 1) for k in range(self.resolved.places))
+            lines = tuple(_on_a_line(share, halves=bool(self.friction)) for share in places)
             return {
-                "tau": Profile("through", places, of, ROTATION, within),
-                "omega": Profile("across", places, of, ROTATION, within),
+                "tau": Profile("through", places, "length", (), ROTATION, lines),
+                "omega": Profile("across", places, "length", (), ROTATION, lines),
             }
-        mesh = self.resolved.mesh()
-        inside = [(y * self.length, (f"tau_c_{k}", f"tau_d_{k}")) for k, y in enumerate(mesh.stations) if 0 < y < 1]
-        places, of = zip((0.0, ("a",)), *inside, (self.length, ("-b",)), strict=True)
-        nodes = tuple((name,) for name in _names(mesh))
+        speeds: list[tuple[float, _Sum]] = [(0.0, ((1.0, "a"),)), (1.0, ((1.0, "b"),))]
+        inside: list[tuple[float, _Sum]] = []
+        if not isinstance(self.resolved, Rigid | OneSpring):
+            mesh = self.resolved.mesh()
+            speeds = [(x, ((1.0, name),)) for x, name in zip(mesh.nodes, _names(mesh), strict=True)]
+            inside = [(y, _torque(mesh, k)) for k, y in enumerate(mesh.stations, mesh.first) if 0 < y < 1]
+        torques = ((0.0, ((1.0, "a"),)), *inside, (1.0, ((-1.0, "b"),)))
         return {
-            "tau": Profile("through", places, of, ROTATION),
-            "omega": Profile("across", tuple(x * self.length for x in mesh.nodes), nodes, ROTATION),
+            "tau": Profile("through", *_columns(torques), ROTATION),
+            "omega": Profile("across", *_columns(speeds), ROTATION),
         }
 
-    def branches(self, p: Any) -> Iterator[Branch]:
+    def derived(self, p: Any) -> Iterator[Derived]:
+        """What Popenda 2019 writes the equations in: J', C' = 1 / S'_c, Delta x; and the impedance of waves."""
         area = pi * (p.diameter**4 - p.inner_diameter**4) / 32
-        inertia, stiffness = p.density * area * p.length, p.shear_modulus * area / p.length
+        yield Derived("area_moment", area, "m^4", "polar moment of area", "I_p")
+        yield Derived("line_inertia", p.density * p.area_moment, "kg*m", "inertia per length", "J'")
+        yield Derived("line_stiffness", p.shear_modulus * p.area_moment, "N*m^2/rad", "stiffness of unit length", "C'")
+        yield Derived(
+            "impedance", sqrt(p.density * p.shear_modulus) * p.area_moment, "N*m*s/rad", "wave impedance", "Z"
+        )
+        yield Derived("delay", p.length * sqrt(p.density / p.shear_modulus), "s", "travel time of a wave", "T")
+        if not isinstance(self.resolved, Rigid | OneSpring | Wave):
+            yield Derived(
+                "interval", p.length / self.resolved.mesh().intervals, "m", "length of an interval", r"\Delta x"
+            )
+
+    def branches(self, p: Any) -> Iterator[Branch]:
         match self.resolved:
             case Rigid():
-                yield AcrossStore(inertia, ("a", None))
+                yield AcrossStore(p.line_inertia * p.length, ("a", None))
                 yield rigid(_ENDS)
             case OneSpring():
-                yield ThroughStore(stiffness, _ENDS, "tau_c")
+                yield ThroughStore(p.line_stiffness / p.length, _ENDS, "tau_c")
                 yield ThroughLaw(p.damping / p.length * ACROSS, _ENDS)
             case Wave():
-                yield from self._waves(p, area)
+                yield from self._waves(p)
             case _:
-                yield from self._distributed(p, inertia, stiffness)
+                yield from self._distributed(p)
 
-    def _waves(self, p: Any, area: Expr) -> Iterator[Branch]:
-        impedance, delay = area * sqrt(p.density * p.shear_modulus), p.length * sqrt(p.density / p.shear_modulus)
+    def _waves(self, p: Any) -> Iterator[Branch]:
         if p.friction == 0:
-            yield DelayLine(impedance, delay, _ENDS)
+            yield DelayLine(p.impedance, p.delay, _ENDS)
             return
         friction = p.friction * p.length
         for name, share in (("a", Rational(1, 4)), ("middle", Rational(1, 2)), ("b", Rational(1, 4))):
-            yield ThroughLaw(friction * share * ACROSS, (name, None), f"tau_d_{name}")
-        yield DelayLine(impedance, delay / 2, ("a", "middle"), "h1")
-        yield DelayLine(impedance, delay / 2, ("middle", "b"), "h2")
+            yield ThroughLaw(friction * share * ACROSS, (name, None), f"tau_{name}")
+        yield DelayLine(p.impedance, p.delay / 2, ("a", "middle"), "h1")
+        yield DelayLine(p.impedance, p.delay / 2, ("middle", "b"), "h2")
 
-    def _distributed(self, p: Any, inertia: Expr, stiffness: Expr) -> Iterator[Branch]:
+    def _distributed(self, p: Any) -> Iterator[Branch]:
         mesh = self.resolved.mesh()
         names = _names(mesh)
-        friction, damping = p.friction * p.length, p.damping / p.length
-        at_nodes = {
-            share: (inertia * _number(share), friction * _number(share)) for share in dict.fromkeys(mesh.inertias)
+        unit = p.interval if mesh.intervals > 1 else p.length
+        at_node = {
+            share: (p.line_inertia * unit * _number(share), p.friction * unit * _number(share) * ACROSS)
+            for share in dict.fromkeys(mesh.inertias)
         }
         for name, share in zip(names, mesh.inertias, strict=True):
-            capacity, bearing = at_nodes[share]
+            capacity, bearing = at_node[share]
             yield AcrossStore(capacity, (name, None), f"omega_{name}")
-            yield ThroughLaw(bearing * ACROSS, (name, None))
+            yield ThroughLaw(bearing, (name, None))
         between = {
-            share: (stiffness / _number(share), damping / _number(share) * ACROSS)
-            for share in dict.fromkeys(mesh.lengths)
+            share: (p.line_stiffness / (unit * _number(share)), p.damping / (unit * _number(share)) * ACROSS)
+            for share in dict.fromkeys((*mesh.lengths, *mesh.dampers))
         }
-        for k, (row, share) in enumerate(zip(mesh.weights, mesh.lengths, strict=True)):
+        for k, (row, share) in enumerate(zip(mesh.weights, mesh.lengths, strict=True), mesh.first):
             ends: tuple[End, End] = (f"twist{k}", None)
             if _is_difference(row):
                 ends = (names[row[0][0]], names[row[1][0]])
             else:
                 terms = tuple((_number(weight), names[j], None) for j, weight in row)
                 yield IdealCoupling(((_number(-1.0), *ends), *terms), f"twist_{k}")
-            store, law = between[share]
+            store, damper = between[share]
             yield ThroughStore(store, ends, f"tau_c_{k}")
-            yield ThroughLaw(law, ends, f"tau_d_{k}")
+            if not mesh.dampers:
+                yield ThroughLaw(damper, ends, f"tau_d_{k}")
+        for k, share in enumerate(mesh.dampers):
+            _, damper = between[share]
+            yield ThroughLaw(damper, (names[k], names[k + 1]), f"tau_d_{k}")
+
+
+def _columns(entries: Sequence[tuple[float, _Sum]]) -> tuple[tuple[float, ...], str, tuple[_Sum, ...]]:
+    """Places, the length that they are shares of, and what is read at each."""
+    return tuple(place for place, _ in entries), "length", tuple(terms for _, terms in entries)
+
+
+def _torque(mesh: Mesh, k: int) -> _Sum:
+    """The torque of a number: that of its spring, and of the damper beside it or the mean of those next to it."""
+    spring = (1.0, f"tau_c_{k}")
+    return (spring, (0.5, f"tau_d_{k - 1}"), (0.5, f"tau_d_{k}")) if mesh.dampers else (spring, (1.0, f"tau_d_{k}"))
+
+
+def _on_a_line(share: float, *, halves: bool) -> tuple[str, float]:
+    """The line of a wave that a share of the way lies on, and the share of the way along that line."""
+    if not halves:
+        return "h", share
+    return ("h1", 2 * share) if share <= 0.5 else ("h2", 2 * share - 1)
 
 
 def _names(mesh: Mesh) -> list[str]:
@@ -184,7 +214,7 @@ def _names(mesh: Mesh) -> list[str]:
     return ["a", *(str(k) for k in range(1, len(mesh.nodes) - 1)), "b"]
 
 
-def _is_difference(row: tuple[tuple[int, float], ...]) -> bool:
+def _is_difference(row: Row) -> bool:
     return [weight for _, weight in row] == [1.0, -1.0]
 
 

@@ -54,6 +54,10 @@ class NetworkWarning(UserWarning):
     """A network can be assembled, but probably does not do what its author expects."""
 
 
+class AccuracyWarning(UserWarning):
+    """A result is less accurate than was asked; says by how much and why."""
+
+
 class ModelFileError(ShaftworkError, ValueError):
     """A model file or an expression in it cannot be read."""
 

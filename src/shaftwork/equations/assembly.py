@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from sympy import Add, Expr, Integer, Mul
 
-from shaftwork.components.branches import ACROSS, INTEGRAL
+from shaftwork.components.branches import ACROSS, HISTORY, INTEGRAL
 from shaftwork.equations.quantities import Flow, Quantities, rate_of
 from shaftwork.network.graph import GROUND
 from shaftwork.network.templates import Kind
@@ -184,6 +184,12 @@ class Assembly:
         if stiffness.is_Pow and stiffness.exp == -1:
             return sides(stiffness.base * rate, (across,))
         return sides(rate, (stiffness * across,))
+
+    def law_of_history(self, branch: int, other: int) -> Sides:
+        """What arrives at an end of a line: what left the other end a delay ago."""
+        across = self.quantities.across(self.ends(other))
+        law = self.quantities.printed(branch).xreplace({ACROSS: across, HISTORY: self.quantities.history(other)})
+        return sides(self.quantities.history(branch), (law,))
 
     def law_of_source(self, branch: int) -> Sides:
         """A prescribed across variable."""

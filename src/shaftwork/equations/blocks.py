@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import zip_longest
 from typing import TYPE_CHECKING
 
 from sympy import Add, Expr, Integer, Symbol, preorder_traversal
@@ -63,6 +64,13 @@ class Blocks:
         yield Block("Speeds around the loops", tuple(self._lines(equations.loops)))
         yield Block("Ideal couplings", tuple(self._lines(equations.couplings)))
         yield Block("Laws of the parts", tuple(self._laws()))
+
+    def derived(self) -> Block:
+        """The definitions of the letters that stand for several parameters; nothing where numbers are printed."""
+        definitions = {} if self.values else self.equations.definitions
+        return Block(
+            "Derived quantities", tuple(self.writer.line(sides(symbol, (law,))) for symbol, law in definitions.items())
+        )
 
     def state(self, *, laws: bool = True) -> Iterator[Block]:
         """Rates of the states, what stands in them, and what was eliminated.
@@ -125,7 +133,7 @@ class Blocks:
         parameters = {letter.name for letter in self.equations.letters if letter.parameter}
         order = sorted(names, key=lambda name: name not in parameters)
         ordered = with_rates({name: names[name] for name in order})
-        values = graph.parameters if self.values else {}
+        values = self.equations.values if self.values else {}
         printed = {**ordered, **_dotted(self.equations)}
         angles = map(self.equations.assembly.quantities.angle, range(len(graph.nodes)))
         last = {name for name in printed if name.startswith("der(")} | {angle.name for angle in angles}
@@ -222,9 +230,10 @@ def _dotted(equations: Equations) -> dict[str, str]:
 
 
 def _matrix_width(line: Line) -> float:
-    """Width of a matrix: that of its widest row, and the room between its columns."""
-    rows = line.pieces[0].split(r"\\")
-    return max(printed_width(row) + 1.8 * row.count("&") for row in rows) + 2.0
+    """Width of a matrix: that of its columns, and the room between them."""
+    rows = (row.split("&") for row in line.pieces[0].split(r"\\"))
+    columns = list(zip_longest(*rows, fillvalue=""))
+    return sum(max(map(printed_width, column)) for column in columns) + 1.8 * (len(columns) - 1) + 2.0
 
 
 def _with_indices(sentence: str) -> str:

@@ -95,6 +95,10 @@ class _Writer:
                     yield LawEquation(*self.origin((branch,)), partial(self.assembly.law_of_store, branch))
                 elif self.assembly.kind(branch) is Kind.ACROSS_SOURCE:
                     yield LawEquation(*self.origin((branch,)), partial(self.assembly.law_of_source, branch))
+        ends = self.form.waves
+        for first, second in zip(ends[::2], ends[1::2], strict=True):
+            for end, other in ((first, second), (second, first)):
+                yield LawEquation(*self.origin((end, other)), partial(self.assembly.law_of_history, end, other))
 
     def couplings(self) -> Iterator[CouplingEquation]:
         for branch in self.graph.branches:

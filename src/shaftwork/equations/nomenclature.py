@@ -20,7 +20,7 @@ Cells = tuple[str, ...]
 
 def nomenclature(equations: Equations) -> str:
     """The table of the variables that the equations contain, and that of the parameters."""
-    names, values = equations.symbol_names, equations.form.graph.parameters
+    names, values = equations.symbol_names, equations.values
     states = {state.name for state in equations.form.states}
     used = states | {symbol.name for row in equations.rows for symbol in row.left.free_symbols | row.right.free_symbols}
     variables = [
@@ -41,7 +41,7 @@ def nomenclature(equations: Equations) -> str:
     ]
     tables = (
         table(_columns(48, 40, 38, 21), ("Variable", "Meaning", "Of", "Unit"), variables),
-        table(_columns(34, 38, 31, 20, 20), ("Parameter", "Meaning", "Of", "Value", "Unit"), parameters),
+        table(_columns(34, 38, 30, 21, 20), ("Parameter", "Meaning", "Of", "Value", "Unit"), parameters),
     )
     return "\n".join(filter(None, tables))
 

@@ -9,7 +9,9 @@ from itertools import count
 
 from sympy import Symbol
 
+from shaftwork.components.base import Derived
 from shaftwork.core.domains import ELECTRICAL, Quantity
+from shaftwork.core.parameters import Parameter
 from shaftwork.equations.quantities import Quantities, running_number
 from shaftwork.equations.spelling import GREEK, chosen_subscript, escaped
 from shaftwork.network.graph import GraphPart
@@ -146,12 +148,18 @@ def _parts(form: StateForm, quantities: Quantities) -> Iterator[tuple[str, Named
 
 
 def _parameters(part: GraphPart) -> Iterator[Letter]:
-    for name in part.parameters:
-        declared = part.component.declared[name]
+    """Those of the parameters, then those that are derived from them."""
+    declarations: list[Parameter | Derived] = [part.component.declared[name] for name in part.parameters]
+    for declared in (*declarations, *part.derived):
         base, _, mark = declared.latex.partition("_")
         mark = mark[1:-1] if mark.startswith("{") and mark.endswith("}") else mark
         yield Letter(
-            f"{part.name}.{name}", _upright(base), _upright(mark), declared.unit, declared.meaning, parameter=True
+            f"{part.name}.{declared.name}",
+            _upright(base),
+            _upright(mark),
+            declared.unit,
+            declared.meaning,
+            parameter=True,
         )
 
 
@@ -188,7 +196,7 @@ def _quantity_letters(form: StateForm, quantities: Quantities) -> Iterator[tuple
         if made.template.kind is Kind.ACROSS_SOURCE:
             domain = quantities.domain((made.plus, made.minus))
             yield made.part, _letter(quantities.integral(made.index), domain.integral)
-        if made.template.line is not None:
+        if made.template.is_history:
             mark = made.template.label.partition("_")[2]
             yield made.part, Letter(quantities.history(made.index).name, "h", mark, "N*m", "wave that arrives at")
         if made.terms:

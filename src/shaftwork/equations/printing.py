@@ -133,6 +133,9 @@ class Writer:
             return [self._signed(factor * term) for term in terms]
         if self._valued(factor) == 1:
             return [self._signed(term) for term in terms]
+        sizes = [abs(term.as_coeff_Mul()[0]) for term in terms]
+        if sizes.count(sizes[0]) == len(sizes):  # a half of every term is a half before the bracket
+            factor, terms = factor * sizes[0], tuple(term / sizes[0] for term in terms)
         inside = [self._signed(term) for term in terms]
         inside[0] = inside[0].removeprefix("+ ")
         inside[0] = rf"{self._signed(factor)} {OPENS} {inside[0]}"

@@ -93,11 +93,19 @@ class Quantities:
         return self.graph.domains[max(ends)]
 
     def law(self, branch: int) -> Expr:
-        """Coefficient or law of a branch in the parameters of the network."""
+        """Coefficient or law of a branch in the parameters and derived quantities of the network."""
+        return self.history(branch) if self.graph.branches[branch].template.is_history else self.printed(branch)
+
+    def printed(self, branch: int) -> Expr:
+        """The same; of a wave that arrives, what left the other end."""
         made = self.graph.branches[branch]
-        if made.template.line is not None:
-            return self.history(branch)
-        return self.graph.in_network_symbols(made.template.law, made)
+        return made.template.printed.xreplace(self._of_network[made.part])
+
+    @cached_property
+    def _of_network(self) -> tuple[dict[Symbol, Symbol], ...]:
+        """For each part its own symbols of parameters and derived quantities, and those of the network."""
+        names = [(part, (*part.parameters, *(made.name for made in part.derived))) for part in self.graph.parts]
+        return tuple({Symbol(k, real=True): self.graph.symbol_of(part, k) for k in own} for part, own in names)
 
     def history(self, branch: int) -> Symbol:
         """What arrives at an end of a line."""
@@ -227,10 +235,14 @@ class Quantities:
             branch = self.graph.branches[index]
             if branch.template.kind not in (Kind.COUPLING, Kind.ACROSS_STORE):
                 together.setdefault((branch.plus, branch.minus), []).append(index)
-        for (plus, minus), branches in together.items():
-            label = self._label(self.graph.branches[branches[0]]) if len(together) > 1 else ""
-            label = running_number(label) or label
-            yield Flow(number, tuple(branches), plus, minus, self._sign(part, branches), label)
+        labels = [
+            self._label(self.graph.branches[branches[0]]) if len(together) > 1 else "" for branches in together.values()
+        ]
+        numbers = [running_number(label) or label for label in labels]
+        alike = len(set(numbers)) < len(numbers)  # springs and dampers in different places: the numbers do not do
+        for ((plus, minus), branches), label, brief in zip(together.items(), labels, numbers, strict=True):
+            made = label.removeprefix(f"{self.domain((plus, minus)).through.name}_") if alike else brief
+            yield Flow(number, tuple(branches), plus, minus, self._sign(part, branches), made)
 
     def _sign(self, part: GraphPart, branches: list[int]) -> int:
         """The sign of the signal of the same name, so that both mean the same torque."""

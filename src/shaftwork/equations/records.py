@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
-from sympy import Add, Eq, Expr, Symbol
+from sympy import Add, Eq, Expr, Float, Symbol
 
 from shaftwork.equations.assembly import Assembly, Group, Sides
 from shaftwork.equations.notation import Letter, notation
@@ -210,6 +210,24 @@ class Equations:
     def symbol_names(self) -> Mapping[str, str]:
         """LaTeX of every symbol by the symbol's name."""
         return self._notation[0]
+
+    @cached_property
+    def definitions(self) -> Mapping[Symbol, Expr]:
+        """Derived quantities, such as an inertia per length, in parameters and in those defined before."""
+        graph, found = self.form.graph, {}
+        for part in graph.parts:
+            for made in part.derived:
+                own = {symbol: graph.symbol_of(part, symbol.name) for symbol in made.law.free_symbols}
+                found[graph.symbol_of(part, made.name)] = made.law.xreplace(own)
+        return found
+
+    @cached_property
+    def values(self) -> Mapping[str, float]:
+        """Every parameter and derived quantity by the name of its symbol, in SI."""
+        known = dict(self.form.graph.parameters)
+        for symbol, law in self.definitions.items():
+            known[symbol.name] = float(law.xreplace({each: Float(known[each.name]) for each in law.free_symbols}))
+        return known
 
     @cached_property
     def second_order(self) -> SecondOrder:

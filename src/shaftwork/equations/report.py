@@ -64,7 +64,7 @@ def blocks_of(equations: Equations, form: Form | None, *, values: bool) -> tuple
             made = (*blocks.kirchhoff(), *blocks.state(laws=False))
         case _:
             raise ShaftworkError(f"There is no form {form!r}; take 'kirchhoff', 'state' or 'second-order'.")
-    return tuple(block for block in made if block.lines)
+    return tuple(block for block in (*made, blocks.derived()) if block.lines)
 
 
 def _content(block: Block) -> str:
@@ -77,7 +77,7 @@ def document(equations: Equations, *, values: bool = False) -> str:
     """A LaTeX document that compiles as it is."""
     blocks = Blocks(equations, values)
     sections = {
-        "Kirchhoff's equations": _section(blocks.kirchhoff()),
+        "Kirchhoff's equations": _section((*blocks.kirchhoff(), blocks.derived())),
         "State form": _section(blocks.state(laws=False)),
         "Second-order form": _second_order(blocks),
         "Nomenclature": nomenclature(equations),

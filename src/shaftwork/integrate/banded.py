@@ -98,8 +98,9 @@ def is_undamped(problem: Problem) -> bool:
 class _Arc:
     """The polynomial of one step."""
 
-    def __init__(self, method: ShiftedCollocation, start: StepStart, length: float, modes: Array) -> None:
-        self._method, self._start, self._length, self._modes = method, start, length, modes
+    def __init__(self, run: _Run, start: StepStart, length: float, modes: Array) -> None:
+        method = self._method = run.method
+        self._stages, self._start, self._length, self._modes = run.stages, start, length, modes
         # The slope that the system has at the start, where the polynomial need not meet it, less the polynomial's own.
         self.defect = length * start.rate - method.at_start @ modes
 
@@ -108,16 +109,25 @@ class _Arc:
         """State (n,) at the end of the step."""
         return np.asarray(self._start.x + self._method.at_end[0] @ self._modes)
 
+    @cached_property
+    def _correction(self) -> Array:
+        """The defect of what the step resolves.
+
+        That of a stiff motion is its decay times the error of the state at the start. The polynomial forgets this
+        error, and the bump of the defect would spread it over the step: most of the torque of a strong damper.
+        """
+        return self._stages.quieted(self.defect, self._length, self._start.scale)
+
     @property
     def rate(self) -> Array:
         """Slope (n,) at the end of the step."""
         return np.asarray(self._method.at_end[1] @ self._modes) / self._length
 
     def at(self, times: Array) -> Array:
-        """States (k, n) at times (k,) of the step."""
+        """States (k, n) at times (k,) of the step, before the next one is tried."""
         theta = (times - self._start.t) / self._length
         states = self._method.increments(theta) @ self._modes
-        states += np.multiply.outer(self._method.bump(theta), self.defect)
+        states += np.multiply.outer(self._method.bump(theta), self._correction)
         states += self._start.x
         return np.asarray(states)
 
@@ -195,7 +205,7 @@ class _Run:
             modes = self.stages.modes(start, length, expected)
         except np.linalg.LinAlgError:
             return None
-        return None if modes is None else _Arc(self.method, start, length, modes)
+        return None if modes is None else _Arc(self, start, length, modes)
 
     def _open(self, piece: Piece, x: Array) -> StepStart:
         self.outputs.start(piece.start, x)

@@ -66,6 +66,16 @@ class ShiftedCollocation:
         return _integrals(theta, self.nodal[:, None])[:, 0]
 
     @cached_property
+    def quieting(self) -> complex:
+        """The weight w for which F(z) = Re(w / (pole - z)), of the first pole and a real z, is 1 + O(z^2), and O(1/z).
+
+        F(h J) takes stiff parts out of a vector and leaves what a step resolves.
+        """
+        pole = complex(self.poles[0])
+        first, second = 1 / pole, 1 / pole**2
+        return complex(*np.linalg.solve([[first.real, -first.imag], [second.real, -second.imag]], [1.0, 0.0]))
+
+    @cached_property
     def peak(self) -> float:
         """Largest value of `bump`."""
         return float(np.abs(self.bump(np.linspace(0.0, 1.0, PEAK_POINTS))).max())

@@ -69,6 +69,9 @@ class Stages(Protocol):
             LinAlgError: a matrix is singular.
         """
 
+    def quieted(self, defect: Array, step: float, scale: Array) -> Array:
+        """The defect (n,) of the last step, without its stiff parts where these exceed the tolerance (n,)."""
+
     def reason(self, reason: str) -> str:
         """The reason of a failure, with what is known more of it."""
 
@@ -85,7 +88,7 @@ class _Factors:
     """The factorisations of pole / h - J for one step length."""
 
     def __init__(self, method: ShiftedCollocation, matrix: ShiftedMatrix) -> None:
-        self._poles = method.poles
+        self._method, self._poles = method, method.poles
         self._matrix = matrix
         self._step = 0.0
         self._solvers: list[Solver] = []
@@ -107,6 +110,13 @@ class _Factors:
             solution = solver(vector)
             found[number], found[len(self._poles) + number] = solution.real, solution.imag
         return found
+
+    def quieted(self, defect: Array, step: float, scale: Array, jacobian: Any) -> Array:
+        """F(h J) of a defect (n,), see `ShiftedCollocation.quieting`, by the factors of the last step."""
+        if (step * np.abs(jacobian @ defect) <= scale).all():
+            return defect
+        right = np.asarray(self._method.quieting / step * defect, dtype=np.complex128)
+        return np.asarray(self._solvers[0](right).real)
 
 
 class LinearStages(Stages):
@@ -152,6 +162,9 @@ class LinearStages(Stages):
             right += np.multiply.outer(self._of_slope, step * slope)
         return self._factors.solve(step, right)
 
+    def quieted(self, defect: Array, step: float, scale: Array) -> Array:
+        return self._factors.quieted(defect, step, scale, self._matrix)
+
     def reason(self, reason: str) -> str:
         return reason
 
@@ -170,6 +183,7 @@ class NewtonStages(Stages):
         self._factors = _Factors(method, matrix)
         self._at_nodes = method.increments(method.nodes)
         self._guard: GuardedFunctions
+        self._jacobian: Any = None
         self._last: tuple[float, float, Array] | None = None
         self._wanted = True
         self._contraction = 1.0
@@ -204,11 +218,15 @@ class NewtonStages(Stages):
             self._last = start.t, step, found
         return found
 
+    def quieted(self, defect: Array, step: float, scale: Array) -> Array:
+        return self._factors.quieted(defect, step, scale, self._jacobian)
+
     def reason(self, reason: str) -> str:
         return self._guard.reason(reason)
 
     def _load(self, start: StepStart) -> None:
-        self._factors.load(self._guard.jacobian(start.t, start.x))
+        self._jacobian = self._guard.jacobian(start.t, start.x)
+        self._factors.load(self._jacobian)
         self._jacobians += 1
         self._wanted, self._contraction = False, 1.0
 

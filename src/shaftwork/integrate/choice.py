@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import warnings
 from dataclasses import dataclass
 
-from shaftwork.core.errors import MissingExtraError, ParameterError
+from shaftwork.core.errors import AccuracyWarning, MissingExtraError, ParameterError
 from shaftwork.integrate.problem import Engine, Problem, Trajectory
 
 # Why scipy goes on where heyoka stopped.
@@ -67,6 +68,10 @@ CVODE_STEP, RADAU_STEP = 5e-5, 2e-3
 STABLE, TRANSIENT_STEPS, STEPS_PER_RADIAN = 5.0, 300.0, 20.0
 
 
+# Of these no run is so long that the rounding of speeds spoils torques: the stiffness bounds their steps.
+EXPLICIT = ("heyoka", "scipy")
+
+
 def choose(problem: Problem) -> tuple[str, str]:
     """The engine that suits a problem, and why, in one sentence.
 
@@ -81,7 +86,7 @@ def choose(problem: Problem) -> tuple[str, str]:
             return "exact", "The system is linear with inputs of straight pieces, so it is propagated exactly."
         if _is_chain(problem):
             return "banded", f"The system is a long linear chain: exact propagation would take about {seconds:.2g} s."
-    compiled = problem.symbolic is not None and ENGINES["heyoka"].installed
+    compiled = ENGINES["heyoka"].installed and problem.program is not None
     stiff = _stiff(problem, compiled=compiled)
     if stiff is not None:
         return stiff
@@ -114,10 +119,18 @@ def solve(
         ParameterError: no engine has this name.
         MissingExtraError: the engine's library is not installed.
         SimulationError: the engine failed.
+
+    Warns:
+        AccuracyWarning: dampers are so strong that the rounding of speeds spoils their torques.
     """
+    from shaftwork.integrate.cancellation import rounding
+
     name, reason = choose(problem) if engine == "auto" else (engine, f"The engine {engine!r} was asked for.")
     if name != "heyoka" or not (fallback or engine == "auto"):
-        return load(name)(problem), name, why or reason
+        trajectory = load(name)(problem)
+        if name not in EXPLICIT and (lost := rounding(problem, trajectory.t, trajectory.x)) is not None:
+            warnings.warn(lost, AccuracyWarning, stacklevel=4)
+        return trajectory, name, why or reason
     run = load(name)
     from shaftwork.integrate.heyoka_taylor import SeriesError
 

@@ -46,7 +46,7 @@ def solve(problem: Problem) -> Trajectory:
     """
     if importlib.util.find_spec("heyoka") is None:
         raise MissingExtraError("heyoka", "fast", "engine='heyoka'")
-    if problem.symbolic is None:
+    if problem.program is None:
         raise SimulationError(
             "The heyoka engine needs the equations as a heyoka program, and this problem has none. Use engine='scipy'."
         )
@@ -62,10 +62,10 @@ class _Run:
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        self.program = problem.symbolic.program
+        self.program = problem.program.program
         tolerance = min(max(problem.rtol, TIGHTEST_TOLERANCE), LOOSEST_TOLERANCE)
         self.integrator = self.program.integrator(tolerance)
-        self.parameters = problem.symbolic.parameters
+        self.parameters = problem.program.parameters
         self.state: Array = np.array(problem.x0, dtype=float)
         self.start = self.state
         self.steps = 0

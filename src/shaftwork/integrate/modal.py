@@ -15,6 +15,8 @@ Complex = NDArray[np.complex128]
 # The modes may multiply rounding errors by this much; a defective matrix is far beyond.
 LARGEST_CONDITION = 1e4
 SERIES_TERMS = 20
+# In the scale of energy a lossless matrix is skew up to this part of its entries: each state on the way there rounds.
+SKEW = 1e-12
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,9 @@ class Modes:
 
 def find_modes(matrix: Any) -> Modes | None:
     """The modes of a dense (n, n) matrix, or None where they are too badly conditioned to be of use."""
+    lossless = _lossless_halves(matrix)
+    if lossless is not None:
+        return _lossless_modes(matrix, *lossless)
     values, vectors = np.linalg.eig(matrix)
     if np.linalg.cond(vectors) > LARGEST_CONDITION:
         return None
@@ -56,6 +61,53 @@ def find_modes(matrix: Any) -> Modes | None:
     kept = values.imag >= 0
     weights = np.where(values.imag > 0, 2.0, 1.0)[kept]
     return Modes(values[kept].astype(complex), vectors[:, kept] * weights, inverse[kept])
+
+
+def _lossless_halves(matrix: Array) -> tuple[Array, NDArray[np.bool_]] | None:
+    """The scale (n,) of the states whose squares add up to the energy, and which of them are speeds; or None.
+
+    A lossless network exchanges energy between speeds and torques alone: x_i' = a_ij x_j and x_j' = a_ji x_i give to
+    the one what they take from the other. Scales that make all pairs a_ij = -a_ji follow from state to state.
+    """
+    n = len(matrix)
+    scale, speeds, reached = np.ones(n), np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+    if (matrix * matrix.T > 0).any() or ((matrix == 0) != (matrix.T == 0)).any():
+        return None
+    for first in range(n):
+        waiting = [] if reached[first] else [first]
+        reached[first] = True
+        while waiting:
+            i = waiting.pop()
+            found = np.flatnonzero((matrix[i] != 0) & ~reached)
+            scale[found] = scale[i] * np.sqrt(-matrix[found, i] / matrix[i, found])
+            speeds[found], reached[found] = not speeds[i], True
+            waiting.extend(found.tolist())
+    scaled = matrix * scale / scale[:, None]
+    if (np.abs(scaled + scaled.T) > SKEW * np.abs(scaled)).any() or scaled[np.equal.outer(speeds, speeds)].any():
+        return None
+    return scale, speeds
+
+
+def _lossless_modes(matrix: Array, scale: Array, speeds: NDArray[np.bool_]) -> Modes:
+    """Of v' = -B^T u, u' = B v, by B = U S V^T: the frequencies are S, real to the last bit, so no energy is lost.
+
+    An eigenvalue of a general decomposition has a real part of some roundings, which in time adds up.
+    """
+    halves = np.flatnonzero(speeds), np.flatnonzero(~speeds)
+    coupling = (matrix * scale / scale[:, None])[np.ix_(halves[1], halves[0])]
+    left, sizes, right = np.linalg.svd(coupling)
+    moving = sizes > sizes.max(initial=0.0) * len(matrix) * np.finfo(float).eps
+    rank, n = int(moving.sum()), len(matrix)
+    rows = np.zeros((n - rank, n), dtype=complex)
+    rows[: right.shape[0], halves[0]] = right
+    rows[:rank, halves[1]] = 1j * left.T[:rank]
+    rows[:rank] /= np.sqrt(2)
+    rows[right.shape[0] :, halves[1]] = left.T[rank:]
+    values = np.zeros(n - rank, dtype=complex)
+    values[:rank] = 1j * sizes[:rank]
+    weights = np.where(values.imag > 0, 2.0, 1.0)
+    vectors = rows.conj().T * weights * scale[:, None]
+    return Modes(values, vectors.astype(complex), (rows / scale).astype(complex))
 
 
 def _integrals(z: Complex) -> tuple[Complex, Complex]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -49,7 +50,8 @@ class Problem:
         t_eval: strictly increasing output times in [t0, t_end], or None for the engine's own steps. At a breakpoint the
             state after the jump is the output.
         linear: the same system in linear form when it is one, else None.
-        symbolic: the same system as a heyoka program with its parameters (`codegen.heyoka.BoundProgram`), else None.
+        symbolic: the same system as a heyoka program with its parameters (`codegen.heyoka.BoundProgram`), a function
+            that makes this where an engine asks for it, or None where there is none.
         max_steps: an engine gives up, with a reason, after this many steps.
     """
 
@@ -68,6 +70,11 @@ class Problem:
     linear: LinearInputs | None = None
     symbolic: Any = None
     max_steps: int = 10_000_000
+
+    @cached_property
+    def program(self) -> Any:
+        """The heyoka program of `symbolic`, or None: runs of other engines do not even load heyoka."""
+        return self.symbolic() if callable(self.symbolic) else self.symbolic
 
 
 @dataclass(frozen=True)

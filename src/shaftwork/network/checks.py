@@ -289,7 +289,7 @@ def _unreadable(name: str, law: sympy.Expr) -> _Fault | None:
 
 def _strange_symbols(template: BranchTemplate) -> set[sympy.Symbol]:
     found = template.law.free_symbols.union(*(coefficient.free_symbols for coefficient, _, _ in template.terms))
-    found -= {HISTORY} if template.line else set()
+    found -= {HISTORY} if template.is_history else set()
     return set(found - {*template.symbols} - _READS.get(template.kind, frozenset()))
 
 

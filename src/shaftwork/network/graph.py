@@ -10,7 +10,7 @@ from typing import Any
 import networkx as nx
 from sympy import Expr, Symbol
 
-from shaftwork.components.base import Component
+from shaftwork.components.base import Component, Derived
 from shaftwork.components.branches import End
 from shaftwork.components.laws import Table, as_expression
 from shaftwork.core.domains import ROTATION, Domain
@@ -44,12 +44,16 @@ class GraphBranch:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GraphPart:
-    """A part with its nodes by port name, the places of its parameters in the parameter vector, and its branches."""
+    """A part with its nodes by port name, the places of its parameters in the parameter vector, and its branches.
+
+    The derived quantities are those in whose letters its laws are printed.
+    """
 
     component: Component
     nodes: Mapping[str, int]
     parameters: Mapping[str, int]
     branches: tuple[int, ...]
+    derived: tuple[Derived, ...]
 
     @property
     def name(self) -> str:
@@ -98,7 +102,7 @@ class CircuitGraph:
         return self.parts[self.branches[branch].part]
 
     def symbol_of(self, part: GraphPart, name: str) -> Symbol:
-        """The symbol of a parameter in the equations of the whole network."""
+        """The symbol of a parameter or derived quantity in the equations of the whole network."""
         return Symbol(f"{part.name}.{name}", real=True)
 
     def in_network_symbols(self, expression: Expr, branch: GraphBranch) -> Expr:
@@ -186,7 +190,7 @@ def build_graph(netlist: Netlist) -> CircuitGraph:
         nodes = _port_nodes(item.placed, table)
         first = len(branches)
         branches.extend(_place(made, first + k, len(parts), nodes) for k, made in enumerate(template.branches))
-        parts.append(GraphPart(part, nodes, places, tuple(range(first, len(branches)))))
+        parts.append(GraphPart(part, nodes, places, tuple(range(first, len(branches))), template.derived))
     names = tuple(table.numbers)[1:]
     return CircuitGraph(
         netlist.name, names, tuple(table.domains), tuple(parts), tuple(branches), parameters, tuple(zeros)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
 
 from shaftwork.components.base import Component
 
@@ -24,3 +26,16 @@ class Netlist:
 
     name: str
     placed: tuple[Placed, ...]
+
+    def with_values(self, values: Mapping[str, Any]) -> Netlist:
+        """The same parts with some parameters, "part.name", replaced."""
+        by_part: dict[str, dict[str, Any]] = {}
+        for name, value in values.items():
+            owner, _, parameter = name.rpartition(".")
+            by_part.setdefault(owner, {})[parameter] = value
+
+        def changed(item: Placed) -> Placed:
+            new = by_part.get(item.part.name)
+            return item if new is None else Placed(replace(item.part, **new), item.nodes)
+
+        return Netlist(self.name, tuple(changed(item) for item in self.placed))

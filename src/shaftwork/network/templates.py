@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import dataclasses
 import reprlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, get_args
 
 from sympy import Expr, I, Integer, Symbol, nan, oo, zoo
 
-from shaftwork.components.base import Component, symbols_of
+from shaftwork.components.base import Component, Derived, symbols_of
 from shaftwork.components.branches import (
     ACROSS,
     HISTORY,
@@ -23,6 +23,7 @@ from shaftwork.components.branches import (
     AcrossLaw,
     AcrossStore,
     Branch,
+    Delayed,
     DelayLine,
     End,
     IdealCoupling,
@@ -60,7 +61,9 @@ class BranchTemplate:
         terms: of a coupling, (coefficient, first end, second end); else empty.
         label: name of its through variable where the part has several.
         symbols: the parameters that the expressions contain, in the order of their declaration.
-        line: of the history at an end of a line, its impedance and delay; the next branch of a line is its other end.
+        printed: the law as equations print it, in letters of derived quantities.
+        line: at an end of a line, its impedance and delay: of the conductance and of the history, whose law is
+            `HISTORY`; the next two branches of a line are its other end.
     """
 
     kind: Kind
@@ -69,6 +72,7 @@ class BranchTemplate:
     terms: tuple[tuple[Expr, End, End], ...]
     label: str
     symbols: tuple[Symbol, ...]
+    printed: Expr
     line: tuple[Expr, Expr] | None = None
 
     @property
@@ -76,16 +80,22 @@ class BranchTemplate:
         """Whether the law reads the angle, position or flux linkage of its branch."""
         return bool(self.law.has(INTEGRAL))
 
+    @property
+    def is_history(self) -> bool:
+        """Whether it is what has come from the other end of a line."""
+        return bool(self.law == HISTORY)
+
 
 _Resolved = tuple[Kind, Expr]
 
 
 @dataclass(frozen=True, eq=False)
 class Template:
-    """All branches of a component with a given pattern of zero parameters."""
+    """All branches of a component with a given pattern of zero parameters, and the derived quantities in their laws."""
 
     branches: tuple[BranchTemplate, ...]
     parameters: tuple[str, ...]
+    derived: tuple[Derived, ...]
 
 
 def substitution(part: Component) -> dict[Any, Any]:
@@ -108,13 +118,41 @@ def make_template(part: Component, values: Mapping[str, Any]) -> Template:
         else:
             placed[name] = value.xreplace(translate) if isinstance(value, Expr) else value
     known = {Symbol(name, real=True): name for name, value in values.items() if isinstance(value, float) and value}
-    resolver = _Resolver(_default_ends(part), tuple(known))
+    p = symbols_of(placed)
+    derived = tuple(_derived(part, p))
+    resolver = _Resolver(_default_ends(part), tuple(known), _in_parameters(derived))
     branches = tuple(
-        made
-        for number, branch in enumerate(part.branches(symbols_of(placed)), 1)
-        for made in resolver.templates(branch, number)
+        made for number, branch in enumerate(part.branches(p), 1) for made in resolver.templates(branch, number)
     )
-    return Template(branches, tuple(known.values()))
+    return Template(branches, tuple(known.values()), _occurring(derived, resolver.printed))
+
+
+def _derived(part: Component, p: Any) -> Iterator[Derived]:
+    """The derived quantities of a part, each given to `p` as a symbol, or as the number 0 where it is that."""
+    for made in part.derived(p):
+        if hasattr(p, made.name):
+            raise ShaftworkError(f"{type(part).__name__}: {made.name!r} is derived, but exists already. Rename it.")
+        setattr(p, made.name, Symbol(made.name, real=True) if made.law != 0 else Integer(0))
+        if made.law != 0:
+            yield made
+
+
+def _in_parameters(derived: tuple[Derived, ...]) -> dict[Symbol, Expr]:
+    laws: dict[Symbol, Expr] = {}
+    for made in derived:
+        laws[Symbol(made.name, real=True)] = made.law.xreplace(laws)
+    return laws
+
+
+def _occurring(derived: tuple[Derived, ...], laws: Iterable[Expr]) -> tuple[Derived, ...]:
+    """Those that stand in the laws, or in the law of one that does."""
+    found = set[Symbol]().union(*(law.free_symbols for law in laws))  # only asked for membership
+    kept: list[Derived] = []
+    for made in reversed(derived):
+        if Symbol(made.name, real=True) in found:
+            found |= made.law.free_symbols
+            kept.append(made)
+    return tuple(reversed(kept))
 
 
 class _Resolver:
@@ -123,12 +161,18 @@ class _Resolver:
     Args:
         default: ends of a branch that names none.
         symbols: symbols of the parameters, in the order of their declaration.
+        derived: laws of the derived quantities in the parameters.
     """
 
-    def __init__(self, default: tuple[End, End], symbols: tuple[Symbol, ...]) -> None:
-        self._default, self._symbols = default, symbols
+    def __init__(self, default: tuple[End, End], symbols: tuple[Symbol, ...], derived: Mapping[Symbol, Expr]) -> None:
+        self._default, self._symbols, self._derived = default, symbols, derived
         self._known: dict[Any, tuple[_Resolved, ...]] = {}
-        self._read: dict[Any, tuple[Symbol, ...]] = {}
+        self._read: dict[Any, tuple[tuple[Expr, ...], tuple[Symbol, ...]]] = {}
+
+    @property
+    def printed(self) -> Iterable[Expr]:
+        """Every law so far, as equations print it."""
+        return (law for laws in self._read for law in laws)
 
     def templates(self, branch: Branch, number: int) -> Iterator[BranchTemplate]:
         """None when the law vanishes, a rigid joint when it is infinite, two when it is affine."""
@@ -142,13 +186,14 @@ class _Resolver:
                     where = (None, None) if joint else ends or self._default
                     yield self._template(kind, found, where, joint, label)
             case DelayLine(impedance, delay, ends, label):
-                line = (_law(impedance, branch, number), _law(delay, branch, number))
+                impedance, delay = _law(impedance, branch, number), _law(delay, branch, number)
+                line, symbols = self._in_parameters(impedance, delay)
+                arrived = -Delayed(2 * impedance * ACROSS + HISTORY, delay)
                 for end in ends or self._default:
-                    yield self._template(Kind.CONDUCTANCE, line[0], (end, None), (), str(end))
+                    impedes = self._template(Kind.CONDUCTANCE, impedance, (end, None), (), str(end))
                     history = self._template(Kind.THROUGH_SOURCE, HISTORY, (end, None), (), f"{label}_{end}")
-                    read = frozenset().union(*(expression.free_symbols for expression in line))
-                    symbols = tuple(symbol for symbol in self._symbols if symbol in read)
-                    yield dataclasses.replace(history, symbols=symbols, line=line)
+                    yield dataclasses.replace(impedes, line=(line[0], line[1]))
+                    yield dataclasses.replace(history, symbols=symbols, printed=arrived, line=(line[0], line[1]))
             case AcrossLaw(law, ends, label):
                 made = _law(law, branch, number)
                 yield self._template(Kind.ACROSS_SOURCE, made, ends or self._default, (), label)
@@ -170,11 +215,17 @@ class _Resolver:
     def _template(
         self, kind: Kind, law: Expr, ends: tuple[End, End], terms: tuple[tuple[Expr, End, End], ...], label: str
     ) -> BranchTemplate:
-        key = (law, *(coefficient for coefficient, _, _ in terms))
-        if key not in self._read:
-            found = law.free_symbols.union(*(coefficient.free_symbols for coefficient, _, _ in terms))
-            self._read[key] = tuple(made for made in self._symbols if made in found)
-        return BranchTemplate(kind, law, ends, terms, label, self._read[key])
+        (known, *factors), symbols = self._in_parameters(law, *(coefficient for coefficient, _, _ in terms))
+        placed = tuple((factor, plus, minus) for factor, (_, plus, minus) in zip(factors, terms, strict=True))
+        return BranchTemplate(kind, known, ends, placed, label, symbols, law)
+
+    def _in_parameters(self, *laws: Expr) -> tuple[tuple[Expr, ...], tuple[Symbol, ...]]:
+        """Laws without derived quantities, and the symbols in them."""
+        if laws not in self._read:
+            known = tuple(law.xreplace(self._derived) for law in laws)
+            found = frozenset().union(*(law.free_symbols for law in known))
+            self._read[laws] = known, tuple(made for made in self._symbols if made in found)
+        return self._read[laws]
 
 
 def _law(law: Any, branch: Branch, number: int) -> Expr:

@@ -14,13 +14,19 @@ from shaftwork.codegen.operating import initial_state
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
 from shaftwork.results import campbell as diagram
+from shaftwork.results.exact import ExactModel
 from shaftwork.results.linear import LinearModel, linear_model
+from shaftwork.results.modes import Modes
 from shaftwork.results.solution import Solution
 
 Given = Mapping[str, float] | None
 Point = Given | Solution
 Names = str | Sequence[str] | None
 Time = float | None
+SmallMotions = Callable[[Point, Time, Names], LinearModel | ExactModel]
+"""From a point, a time and names of inputs to the network near that point."""
+BEYOND = 1.2
+"""Modes without number are followed up to so many times the end of a diagram."""
 
 
 def linearized(
@@ -42,19 +48,33 @@ def linearized(
         SignalError: there is no such quantity.
         SimulationError: a law has no finite slope at the point.
     """
-    named = source_inputs(model.form.graph) if inputs is None else _listed(inputs)
-    if isinstance(at, Solution):
-        time, x = _moment(model, at)
-        time = time if t is None else in_si("t", t, "s")
-    else:
-        time = settled if t is None else in_si("t", t, "s")
-        x = initial_state(model.bind(p), at if at is not None else {}, time)
+    named = input_names(model, inputs)
+    time, x = operating_point(model, p, at, t, settled)
     slopes = Linearization(model, p, x, time, named)
     return linear_model(model.form.graph.name, slopes, None if outputs is None else _listed(outputs), x, time)
 
 
+def input_names(model: CompiledModel, inputs: Names) -> tuple[str, ...]:
+    """The inputs asked for; None asks for all sources."""
+    return source_inputs(model.form.graph) if inputs is None else _listed(inputs)
+
+
+def operating_point(model: CompiledModel, p: Array, at: Point, t: Time, settled: float) -> tuple[float, Array]:
+    """Time and states (n,) at a point; arguments as for `linearized`.
+
+    Raises:
+        ParameterError: the point is none.
+        SignalError: there is no such quantity.
+    """
+    if isinstance(at, Solution):
+        time, x = _moment(model, at)
+        return time if t is None else in_si("t", t, "s"), x
+    time = settled if t is None else in_si("t", t, "s")
+    return time, initial_state(model.bind(p), at if at is not None else {}, time)
+
+
 def campbell(
-    linearize: Callable[[Any], LinearModel],
+    near: SmallMotions,
     speeds: Any,
     orders: Any,
     f_max: float | None,
@@ -64,7 +84,7 @@ def campbell(
     """The interference diagram, linearised at one point or, where `at` is a function of speed, at each.
 
     Args:
-        linearize: from a point to the network near it.
+        near: from a point to the network near it.
         speeds: (k,) rad/s, ascending.
         orders: excitations per turn.
         f_max: highest frequency of interest, Hz.
@@ -74,9 +94,12 @@ def campbell(
     Raises:
         ParameterError: speeds or orders are not what they must be.
     """
-    if callable(at):
-        return diagram.campbell(lambda n: linearize(at(n)).modes(count), speeds, orders, f_max, constant=False)
-    return diagram.campbell(lambda _: linearize(at).modes(count), speeds, orders, f_max, constant=True)
+
+    def modes(speed: float, top: float) -> Modes:
+        model = near(at(speed) if callable(at) else at, None, ())
+        return model.modes(count, None if isinstance(model, LinearModel) or count is not None else BEYOND * top)
+
+    return diagram.campbell(modes, speeds, orders, f_max, constant=not callable(at))
 
 
 def _listed(names: str | Sequence[str]) -> tuple[str, ...]:

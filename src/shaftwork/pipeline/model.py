@@ -6,7 +6,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -21,7 +21,7 @@ from shaftwork.components.laws import pieces_degree
 from shaftwork.core.errors import CompileError, ParameterError, SimulationError
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import LinearInputs, Problem, Trajectory
-from shaftwork.network.netlist import Netlist, Placed
+from shaftwork.network.netlist import Netlist
 from shaftwork.network.templates import Kind
 from shaftwork.pipeline.arguments import (
     OutputTimes,
@@ -38,6 +38,7 @@ from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.analysis import Given, Names, Point, Time
+    from shaftwork.pipeline.waves import WaveStart
     from shaftwork.results.linear import LinearModel
 
 VARIANTS = 8
@@ -57,7 +58,7 @@ class _Prepared:
     p: Array
     bind: Callable[[Array], BoundArrays]
     rhs: Callable[[float, Array], Array]
-    symbolic: Any
+    symbolic: Callable[[], Any]
     linear: LinearInputs | None
     atol: Array
 
@@ -135,11 +136,11 @@ class Model(CompiledModel):
             return self._variant(values).simulate(t_end, **options)
         prepared = self._prepare(self.vector(values) if values else self.defaults)
         span = time_span(t_start, t_end)
-        x0 = self._start(prepared, initial, span)
+        x0, waves = self._start(prepared, initial, span)
         problem = self._problem(prepared, span, x0, relative_tolerance(rtol), atol, t_eval, max_steps)
         if progress is not None:
             problem = dataclasses.replace(problem, rhs=watched_by(problem.rhs, progress))
-        trajectory, name, why = self._solve(prepared, problem, engine)
+        trajectory, name, why = self._solve(prepared, problem, waves, engine)
         return Solution(
             name=self.name,
             t=trajectory.t,
@@ -173,12 +174,9 @@ class Model(CompiledModel):
         if self._changes_structure(values):
             return self._variant(values).steady_state(t, initial=initial)
         if self.form.waves:
-            raise ParameterError(
-                f"'{self.name}' has travelling waves, which never settle. Take model=Spectral(8) for the steady state, "
-                "which is the same."
-            )
+            return self._twin.steady_state(t, initial=initial, parameters=values)
         prepared = self._prepare(self.vector(values) if values else self.defaults)
-        when = t if math.isfinite(t) else max((0.0, *self.switching.known(prepared.p))) + 1.0
+        when = t if math.isfinite(t) else self.settled(prepared.p)
         start = initial_state(prepared.bound, initial or {}, when)
         if not math.isfinite(t) and (moving := prepared.bound.moving_sources(when)):
             raise SimulationError(
@@ -201,7 +199,7 @@ class Model(CompiledModel):
 
         Raises:
             SignalError: there is no such input or output.
-            SimulationError: a law has no finite slope at the point.
+            SimulationError: a law has no finite slope at the point, or a shaft is a wave, which no matrix holds.
         """
         from shaftwork.pipeline.analysis import linearized
 
@@ -209,18 +207,24 @@ class Model(CompiledModel):
         if self._changes_structure(values):
             return self._variant(values).linearize(at, inputs=inputs, outputs=outputs, t=t)
         p = self.vector(values)
-        return linearized(self, p, at, t, max((0.0, *self.switching.known(p))) + 1.0, inputs, outputs)
+        return linearized(self, p, at, t, self.settled(p), inputs, outputs)
+
+    def settled(self, p: Array) -> float:
+        """A time in s after which no law switches any more, for a parameter vector."""
+        return max((0.0, *self.switching.known(p))) + 1.0
 
     def choose_engine(self, t_end: float, *, t_start: float = 0.0, rtol: float = 1e-8) -> tuple[str, str]:
         """The engine that "auto" takes for a motion, and why."""
         prepared, span = self._prepare(self.defaults), time_span(t_start, t_end)
-        x0 = self._start(prepared, None, span)
+        x0, _ = self._start(prepared, None, span)
         return self._engine(prepared, self._problem(prepared, span, x0, rtol, None, None, 1), "auto")
 
-    def _solve(self, prepared: _Prepared, problem: Problem, engine: str) -> tuple[Trajectory, str, str]:
+    def _solve(
+        self, prepared: _Prepared, problem: Problem, waves: WaveStart | None, engine: str
+    ) -> tuple[Trajectory, str, str]:
         """The run, the engine that made it, and why that one."""
         if self.form.waves:
-            return self._solve_waves(prepared, problem, engine)
+            return self._solve_waves(prepared, problem, waves, engine)
         choice.check(engine)
         if not self.states:
             return at_rest(problem)
@@ -229,7 +233,9 @@ class Model(CompiledModel):
         name, why = self._engine(prepared, problem, engine)
         return choice.solve(problem, name, why, fallback=engine == "auto")
 
-    def _solve_waves(self, prepared: _Prepared, problem: Problem, engine: str) -> tuple[Trajectory, str, str]:
+    def _solve_waves(
+        self, prepared: _Prepared, problem: Problem, start: WaveStart | None, engine: str
+    ) -> tuple[Trajectory, str, str]:
         from shaftwork.pipeline.waves import solve_waves
 
         if self.form.loop_laws:
@@ -238,7 +244,7 @@ class Model(CompiledModel):
                 "inertia, or take model=Spectral(16)."
             )
         steady = all(pieces_degree(law) == 0 for _, law in self._laws_of_time())
-        return solve_waves(prepared.bound, problem, engine, linear=self.linear, steady=steady)
+        return solve_waves(prepared.bound, problem, start, engine, linear=self.linear, steady=steady)
 
     def _engine(self, prepared: _Prepared, problem: Problem, engine: str) -> tuple[str, str]:
         if self.form.waves:
@@ -287,12 +293,12 @@ class Model(CompiledModel):
     def _prepare(self, p: Array) -> _Prepared:
         key = p.tobytes()
         if self._prepared is None or self._prepared[0] != key:
-            scalar, program = self.scalar, self._program
+            scalar = self.scalar
             made = _Prepared(
                 p=p,
                 bind=self.bind,
                 rhs=self.bind(p).rhs if scalar is None else scalar.bind(p),
-                symbolic=None if program is None else program.bind(p),
+                symbolic=cache(lambda: None if self._program is None else self._program.bind(p)),
                 linear=self._linear_inputs(p),
                 atol=NOMINAL * self._nominal(self.arrays.assembly.coefficients(p)),
             )
@@ -322,11 +328,26 @@ class Model(CompiledModel):
         """What switches because of the time alone."""
         return Switching(self.form)
 
-    def _start(self, prepared: _Prepared, initial: Mapping[str, float] | None, span: tuple[float, float]) -> Array:
+    def _start(
+        self, prepared: _Prepared, initial: Mapping[str, float] | None, span: tuple[float, float]
+    ) -> tuple[Array, WaveStart | None]:
+        """The states at the start, and the waves where they are not at rest."""
         if initial is None and not self.form.has_impulses:
-            return np.zeros(len(self.states))
+            return np.zeros(len(self.states)), None
         _, after = self.switching.timeline(prepared.p, *span).sides(span[0])
-        return initial_state(prepared.bound, {} if initial is None else initial, after)
+        if not self.form.waves:
+            return initial_state(prepared.bound, {} if initial is None else initial, after), None
+        from shaftwork.pipeline.waves import start_of_waves
+
+        given = dict(zip(self.parameters, prepared.p.tolist(), strict=True))
+        return start_of_waves(self.form, self._twin.bind(self._twin.vector(given)), initial or {}, after)
+
+    @cached_property
+    def _twin(self) -> Model:
+        """The network with springs in place of its waves: it stands and turns steadily as they do."""
+        from shaftwork.pipeline.waves import twin
+
+        return self._rebuild(twin(self.netlist))
 
     def _linear_inputs(self, p: Array) -> LinearInputs | None:
         """The linear form, where the network is linear and its inputs are straight lines between breakpoints."""
@@ -373,22 +394,7 @@ class Model(CompiledModel):
         """The model of the same network with other values where these change its structure; the last few are kept."""
         key = tuple(sorted(values.items()))
         if key not in self._variants:
-            self._variants[key] = self._rebuild(_replaced(self.netlist, values))
+            self._variants[key] = self._rebuild(self.netlist.with_values(values))
         while len(self._variants) > VARIANTS:
             del self._variants[next(iter(self._variants))]
         return self._variants[key]
-
-
-def _replaced(netlist: Netlist, values: Mapping[str, float]) -> Netlist:
-    """The netlist with parameters "part.name" replaced."""
-    by_part: dict[str, dict[str, Any]] = {}
-    for name, value in values.items():
-        owner, _, parameter = name.rpartition(".")
-        by_part.setdefault(owner, {})[parameter] = value
-    placed = tuple(
-        Placed(dataclasses.replace(item.part, **by_part[item.part.name]), item.nodes)
-        if item.part.name in by_part
-        else item
-        for item in netlist.placed
-    )
-    return Netlist(netlist.name, placed)

@@ -22,7 +22,7 @@ from shaftwork.reduction.form import StateForm, state_form
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
-    from shaftwork.pipeline.analysis import Point, Time
+    from shaftwork.pipeline.analysis import Point, SmallMotions, Time
     from shaftwork.results.campbell import Campbell
     from shaftwork.results.frequency import FrequencyResponse
     from shaftwork.results.modes import Modes
@@ -56,18 +56,43 @@ class Network(NetworkBuilder):
         """
         return _sound(self.netlist()).graph
 
-    def equations(self) -> Equations:
-        """Kirchhoff's node and loop equations, laws, states and what was eliminated.
+    def expanded(self) -> Self:
+        """The network with every long shaft written out part by part: inertias, springs and dampers of their own.
+
+        The nodes inside a shaft "line" are "line 1", "line 2", ...; the parts there "line J 1", "line c 1", "line d 1".
 
         Raises:
             NetworkError: the network cannot be assembled; lists every reason.
+            ParameterError: a shaft's model is no chain of springs, as `Lumped` is.
         """
-        return kirchhoff(_sound(self.netlist()))
+        from shaftwork.pipeline.expansion import expanded
 
-    def compile(self, *, angles: Sequence[str] = (), algebraic_loops: Literal["refuse", "solve"] = "refuse") -> Model:
+        netlist = self.netlist()
+        return self._of(expanded(netlist, _sound(netlist).graph))
+
+    def equations(self, *, expand: bool = False) -> Equations:
+        """Kirchhoff's node and loop equations, laws, states and what was eliminated.
+
+        Args:
+            expand: of the network with its shafts written out part by part.
+
+        Raises:
+            NetworkError: the network cannot be assembled; lists every reason.
+            ParameterError: `expand`, and a shaft's model is no chain of springs, as `Lumped` is.
+        """
+        return self.expanded().equations() if expand else kirchhoff(_sound(self.netlist()))
+
+    def compile(
+        self,
+        *,
+        angles: Sequence[str] = (),
+        algebraic_loops: Literal["refuse", "solve"] = "refuse",
+        expand: bool = False,
+    ) -> Model:
         """The fast model.
 
         Args:
+            expand: of the network with its shafts written out part by part.
             angles: parts whose angle (position, flux linkage) is recorded, besides those that a law reads.
             algebraic_loops: a nonlinear law at a massless node is refused with its name, or solved together with the
                 motion (slower, and the solution need not be the only one).
@@ -75,6 +100,8 @@ class Network(NetworkBuilder):
         Raises:
             NetworkError: the network cannot be assembled; lists every reason.
         """
+        if expand:
+            return self.expanded().compile(angles=angles, algebraic_loops=algebraic_loops)
         if algebraic_loops not in ("refuse", "solve"):
             raise ParameterError(f"algebraic_loops = {algebraic_loops!r} must be 'refuse' or 'solve'.")
         asked = (angles,) if isinstance(angles, str) else tuple(angles)
@@ -91,15 +118,25 @@ class Network(NetworkBuilder):
         """Compile and integrate; the options are those of `compile` and of `Model.simulate`."""
         return self.compile(angles=angles, algebraic_loops=algebraic_loops).simulate(t_end, **options)
 
-    def modes(self, at: Point = None, count: int | None = None, *, t: Time = None) -> Modes:
+    def modes(
+        self,
+        at: Point = None,
+        count: int | None = None,
+        *,
+        f_max: float | None = None,
+        exact: bool = False,
+        t: Time = None,
+    ) -> Modes:
         """Natural frequencies, damping and shapes, at rest or about a point.
 
         Args:
             at: the point, as for `Model.linearize`.
-            count: the modes wanted, those of smallest |rate|; by default all.
+            count: the modes wanted, those of smallest |rate|; by default all, of exact shafts 10 or all up to f_max.
+            f_max: the largest |rate| / 2 pi, Hz; by default there is none.
+            exact: every shaft but a rigid one and one spring is taken as it is, without a mesh; a wave always is.
             t: time at which laws are read, s; by default after their last breakpoint.
         """
-        return self.compile().linearize(at, inputs=(), t=t).modes(count)
+        return self._small_motions(exact=exact)(at, t, ()).modes(count, f_max)
 
     def frequency_response(
         self,
@@ -108,6 +145,7 @@ class Network(NetworkBuilder):
         f: Any,
         at: Point = None,
         *,
+        exact: bool = False,
         t: Time = None,
     ) -> FrequencyResponse:
         """The complex amplitude of a quantity under a sinusoidal input of amplitude one, at rest or about a point.
@@ -117,9 +155,10 @@ class Network(NetworkBuilder):
             output: any quantity, "shaft.tau".
             f: (k,) frequencies, Hz.
             at: the point, as for `Model.linearize`.
+            exact: every shaft but a rigid one and one spring is taken as it is, without a mesh; a wave always is.
             t: time at which laws are read, s; by default after their last breakpoint.
         """
-        return self.compile().linearize(at, inputs=input, t=t).frequency_response(input, output, f)
+        return self._small_motions(exact=exact)(at, t, input).frequency_response(input, output, f)
 
     def campbell(
         self,
@@ -129,6 +168,7 @@ class Network(NetworkBuilder):
         *,
         at: Point | Callable[[float], Point] = None,
         count: int | None = None,
+        exact: bool = False,
     ) -> Campbell:
         """Natural frequencies and excitation orders over the speed of a shaft, and where they meet.
 
@@ -138,11 +178,16 @@ class Network(NetworkBuilder):
             f_max: highest frequency of interest, Hz; by default the highest order at the highest speed.
             at: the point, as for `Model.linearize`, or a function from the speed to the point.
             count: the modes wanted, those of smallest |rate|; by default all.
+            exact: every shaft but a rigid one and one spring is taken as it is, without a mesh; a wave always is.
         """
         from shaftwork.pipeline.analysis import campbell
 
-        model = self.compile()
-        return campbell(lambda point: model.linearize(point, inputs=()), speeds, orders, f_max, at, count)
+        return campbell(self._small_motions(exact=exact), speeds, orders, f_max, at, count)
+
+    def _small_motions(self, *, exact: bool) -> SmallMotions:
+        from shaftwork.pipeline.exact import small_motions
+
+        return small_motions(self.compile(), lambda changed: _compiled(changed, (), LOOP), every=exact)
 
     def save(self, path: str | Path) -> None:
         """Write the network to a text file from which `load` makes the same network.
@@ -159,7 +204,10 @@ class Network(NetworkBuilder):
         Raises:
             ModelFileError: the file cannot be read as a network; says where and why.
         """
-        netlist = read_netlist(path)
+        return cls._of(read_netlist(path))
+
+    @classmethod
+    def _of(cls, netlist: Netlist) -> Self:
         made = cls(netlist.name)
         for placed in netlist.placed:
             made.add(placed.part, *placed.nodes)

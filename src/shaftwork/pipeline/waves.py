@@ -2,28 +2,44 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
+from shaftwork.codegen.observer import ModelObserver
+from shaftwork.codegen.operating import initial_state
+from shaftwork.codegen.recovery import History
 from shaftwork.codegen.waves import WaveSystem
+from shaftwork.components.base import Component
+from shaftwork.components.shaft_models import Lumped, Wave
+from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import ParameterError
+from shaftwork.core.times import just_after
 from shaftwork.integrate.lossless.engine import solve
 from shaftwork.integrate.lossless.lines import DelayProblem, DelayTrajectory
 from shaftwork.integrate.problem import Problem, Trajectory
+from shaftwork.network.netlist import Netlist, Placed
+from shaftwork.network.templates import Kind
+from shaftwork.reduction.form import StateForm
 
-EQUAL = 1e-9
-"""Speeds of the two ends of a line are equal up to this part of the largest."""
 WHY = "Shafts are travelling waves, so states and delays are solved together."
 
 
 @dataclass(frozen=True)
 class _StatesAndWaves:
-    """Dense output of the states, with the histories behind them."""
+    """Dense output of the states, with the histories behind them.
+
+    Args:
+        found: by the engine.
+        impedances: (lines,) in N m s.
+    """
 
     found: DelayTrajectory
+    impedances: Array
 
     @property
     def steps(self) -> Array:
@@ -32,15 +48,78 @@ class _StatesAndWaves:
     def __call__(self, times: Array) -> Array:
         return np.hstack([self.found.dense(times), self.found.waves(times)[0]])
 
+    def held(self, times: Array) -> Array:
+        """(k, lines) energy in J in each line at times (k,): the waves f and g in it hold (f^2 + g^2) / (4 Z)."""
+        squares = self.found.squares(times)
+        return np.asarray((squares[:, ::2] + squares[:, 1::2]) / (4 * self.impedances))
+
+
+@dataclass(frozen=True)
+class WaveStart:
+    """How lines start: their speed runs straight from end to end, their torque is the same all along.
+
+    Args:
+        speeds: (2 lines,) of the ends, rad/s.
+        torques: (lines,) that the first end takes in, N m.
+    """
+
+    speeds: Array
+    torques: Array
+
+
+def twin(netlist: Netlist) -> Netlist:
+    """The network with a spring or two in place of every wave, which stands and turns steadily as the waves do."""
+
+    def stiff(part: Component) -> Component:
+        if not isinstance(part, Shaft) or not isinstance(part.model, Wave):
+            return part
+        return dataclasses.replace(part, model=Lumped(1 if part.friction == 0 else 2))
+
+    return Netlist(netlist.name, tuple(Placed(stiff(item.part), item.nodes) for item in netlist.placed))
+
+
+def start_of_waves(
+    form: StateForm, twin: BoundArrays, given: Mapping[str, float], t0: float
+) -> tuple[Array, WaveStart]:
+    """States (n,) and waves from which a network starts: those of its twin.
+
+    Args:
+        form: of the network.
+        twin: array program of its twin.
+        given: start values by name, also those that the twin alone knows: the torque along a shaft.
+        t0: start time, s; where something jumps there, a time after it.
+
+    Raises:
+        SignalError: there is no such quantity.
+        ParameterError: values are not finite or contradict each other.
+    """
+    x = initial_state(twin, given, t0)
+    motion = np.vstack([initial_state(twin, {}, t0), x])
+    times = np.full(2, just_after(t0))
+    observer, history = ModelObserver(twin.program.form, lambda: twin), History(twin, times, motion)
+    states = np.array([observer.signal(state.name, times, motion)[1] for state in form.states])
+    graph, speeds, torques = twin.program.form.graph, [], []
+    springs = [b for b in graph.branches if b.template.kind is Kind.THROUGH_STORE and _is_wave(form, b.part)]
+    for spring in springs:
+        # What sources have jolted at the start has not yet run along the shaft.
+        speeds += [history.potentials[node, 1] - history.potentials[node, 0] for node in (spring.plus, spring.minus)]
+        torques.append(history.through[spring.index, 1])
+    return states, WaveStart(np.array(speeds), np.array(torques))
+
+
+def _is_wave(form: StateForm, part: int) -> bool:
+    return any(form.graph.branches[end].part == part for end in form.waves)
+
 
 def solve_waves(
-    bound: BoundArrays, problem: Problem, engine: str, *, linear: bool, steady: bool
+    bound: BoundArrays, problem: Problem, start: WaveStart | None, engine: str, *, linear: bool, steady: bool
 ) -> tuple[Trajectory, str, str]:
     """Solve a problem whose model has lines; the histories of their ends follow the states in the result.
 
     Args:
         bound: the array program.
         problem: states, times and tolerances.
+        start: of the lines; None for rest.
         engine: "auto" or "wave".
         linear: whether the laws are linear with constant coefficients.
         steady: whether nothing depends on time between breakpoints.
@@ -56,7 +135,6 @@ def solve_waves(
         )
     system = WaveSystem(bound)
     impedances, delays = system.lines
-    turning = _turning(system, problem, impedances) if np.any(problem.x0) else np.zeros(len(impedances))
     found = solve(
         DelayProblem(
             rhs=system.rhs,
@@ -77,31 +155,9 @@ def solve_waves(
             max_steps=problem.max_steps,
             linear=linear,
             steady=steady,
-            speed0=turning,
+            speeds0=None if start is None else start.speeds,
+            torque0=None if start is None else start.torques,
         )
     )
     x = np.hstack([found.x, found.h])
-    return Trajectory(found.t, x, _StatesAndWaves(found), found.statistics), "wave", WHY
-
-
-def _turning(system: WaveSystem, problem: Problem, impedances: Array) -> Array:
-    """The speed (lines,) with which each line turns, untwisted, before the start: that of its two ends.
-
-    Raises:
-        ParameterError: the start values twist a line.
-    """
-    time, x = np.array([problem.t0]), problem.x0[:, None]
-
-    def ends(speeds: Array) -> Array:
-        return system.speeds(time, x, -np.repeat(impedances * speeds, 2)[:, None])[:, 0]
-
-    rest = ends(np.zeros(len(impedances)))
-    columns = np.array([ends(unit) - rest for unit in np.eye(len(impedances))]).T
-    found = np.linalg.lstsq(np.repeat(np.eye(len(impedances)), 2, axis=0) - columns, rest, rcond=None)[0]
-    gap = np.abs(ends(found) - np.repeat(found, 2)).max()
-    if gap > EQUAL * np.abs(rest).max():
-        raise ParameterError(
-            "A shaft with model=Wave() starts untwisted, so both its ends must start with the same speed. "
-            "Give equal start values, or take model=Spectral(16), which may start twisted."
-        )
-    return np.asarray(found)
+    return Trajectory(found.t, x, _StatesAndWaves(found, impedances), found.statistics), "wave", WHY

@@ -114,7 +114,7 @@ class StateForm:
     @cached_property
     def waves(self) -> tuple[int, ...]:
         """Histories at the ends of lines, both ends of a line in a row. They follow the states in x."""
-        return tuple(branch.index for branch in self.graph.branches if branch.template.line is not None)
+        return tuple(branch.index for branch in self.graph.branches if branch.template.is_history)
 
     @cached_property
     def outputs(self) -> tuple[int, ...]:

@@ -80,7 +80,7 @@ class Campbell:
 
 
 def campbell(
-    modes_at: Callable[[float], Modes], speeds: Any, orders: Any, f_max: float | None, *, constant: bool
+    modes_at: Callable[[float, float], Modes], speeds: Any, orders: Any, f_max: float | None, *, constant: bool
 ) -> Campbell:
     """The interference diagram of a network.
 
@@ -88,7 +88,7 @@ def campbell(
     longer changes.
 
     Args:
-        modes_at: the modes at a speed in rad/s.
+        modes_at: the modes at a speed in rad/s, those up to a frequency in Hz at least.
         speeds: (k,) rad/s, ascending.
         orders: excitations per turn, each above 0.
         f_max: highest frequency of interest, Hz; by default the highest order at the highest speed.
@@ -99,7 +99,11 @@ def campbell(
     """
     n, lines = _ascending(speeds), _orders(orders)
     top = float(max(lines) * n[-1] / (2 * np.pi)) if f_max is None else in_si("f_max", f_max, "Hz", above=0)
-    found = [modes_at(float(n[0]))] * len(n) if constant else [modes_at(float(speed)) for speed in n]
+
+    def modes(speed: float) -> Modes:
+        return modes_at(speed, top)
+
+    found = [modes(float(n[0]))] * len(n) if constant else [modes(float(speed)) for speed in n]
     rates, names = _tracked(found)
     table = np.where(rates.imag > 0, np.abs(rates), 0.0) / (2 * np.pi)
     shown = np.array(((table > 0) & (table <= top)).any(axis=0))
@@ -108,7 +112,7 @@ def campbell(
         Crossing(speed, order, kept[mode], float(order * speed / (2 * np.pi)))
         for mode in range(len(kept))
         for order in lines
-        for speed in _meeting(modes_at, n, table[:, mode], order, constant=constant)
+        for speed in _meeting(modes, n, table[:, mode], order, constant=constant)
     ]
     inside = sorted(
         (made for made in crossings if made.frequency <= top), key=lambda made: (made.speed, made.order, made.frequency)
@@ -141,13 +145,18 @@ def _orders(orders: Any) -> tuple[float, ...]:
 
 
 def _tracked(found: Sequence[Modes]) -> tuple[Any, tuple[str, ...]]:
-    """(k, modes) rates, each column one mode followed from speed to speed by its nearest rate; 0 where it is absent."""
-    tracks = [found[0].rates]
+    """(k, modes) rates, each column one mode followed from speed to speed by its nearest rate; 0 where it is absent.
+
+    The distance of two rates counts as a fraction of both, so that a mode that leaves at an end of the diagram moves no
+    other.
+    """
     size = max(len(modes) for modes in found)
     tracks = [np.pad(modes.rates, (0, size - len(modes))) for modes in found]
     for k, (before, after) in enumerate(pairwise(tracks)):
         if before is not after:
-            _, order = linear_sum_assignment(np.abs(before[:, None] - after[None, :]))
+            sizes = np.abs(before)[:, None] + np.abs(after)[None, :]
+            distances = np.abs(before[:, None] - after[None, :]) / np.where(sizes > 0, sizes, 1.0)
+            _, order = linear_sum_assignment(distances)
             tracks[k + 1] = after[order]
     names = next(modes for modes in found if len(modes) == size).names
     return np.array(tracks), names

@@ -6,12 +6,11 @@ residual measures the error of the integration, independent of any reference.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from shaftwork.results.observer import Array, Observer
+from shaftwork.results.observer import Array, Dense, Observer
 
 NODES = 12
 """Gauss points in one panel."""
@@ -46,7 +45,7 @@ class EnergyBalance:
         return float(gap / size) if size else 0.0
 
 
-def energy_balance(observer: Observer, dense: Callable[[Array], Array], steps: Array) -> EnergyBalance:
+def energy_balance(observer: Observer, dense: Dense, steps: Array) -> EnergyBalance:
     """Integrate the powers over every step with Gauss' formula, on panels halved until the work no longer changes.
 
     Args:
@@ -68,22 +67,20 @@ def energy_balance(observer: Observer, dense: Callable[[Array], Array], steps: A
     return EnergyBalance(steps, after, supplied + impulses, lost, work + float(np.abs(after - before).sum()))
 
 
-def _stored_on_both_sides(observer: Observer, dense: Callable[[Array], Array], steps: Array) -> tuple[Array, Array]:
+def _stored_on_both_sides(observer: Observer, dense: Dense, steps: Array) -> tuple[Array, Array]:
     """Stored energy just before and at every time of `steps`; they differ where an input's jump is an impulse."""
     # a time that is listed twice is read before what jumps there, and then after it
     pairs = np.column_stack([np.nextafter(steps, steps[0]), steps])
-    stored = _total(observer.powers(np.repeat(steps, 2), dense(pairs.ravel()))[0], 2 * len(steps))
+    stored = _total(observer.stored(np.repeat(steps, 2), dense(pairs.ravel()), dense), 2 * len(steps))
     return stored[::2], stored[1::2]
 
 
-def _integrate(
-    observer: Observer, dense: Callable[[Array], Array], steps: Array, panels: int
-) -> tuple[Array, Array, float]:
+def _integrate(observer: Observer, dense: Dense, steps: Array, panels: int) -> tuple[Array, Array, float]:
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
     edges = (steps[:-1, None] + np.diff(steps)[:, None] * np.linspace(0, 1, panels + 1)[:-1]).ravel()
     half = np.repeat(np.diff(steps) / panels / 2, panels)
     times = (edges[:, None] + half[:, None] * (nodes + 1)).ravel()
-    _, lost, supplied = observer.powers(times, dense(times))
+    lost, supplied = observer.powers(times, dense(times))
     weight = (half[:, None] * weights).ravel()
 
     def running(power: Array) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import reprlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from scipy.sparse.linalg import splu
 
 from shaftwork.core.errors import MissingExtraError, ParameterError, SignalError
 from shaftwork.results.observer import Array
-from shaftwork.results.slopes import Complex, Slopes
+from shaftwork.results.slopes import Complex, Motions, Slopes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -121,6 +121,18 @@ def frequencies(f: Any) -> Array:
     return given
 
 
+class System(Protocol):
+    """The states of a network under one input that swings as exp(s t)."""
+
+    def nearness(self, s: complex) -> float:
+        """The distance from s within which an eigenvalue is hit, 1/s."""
+        ...
+
+    def solve(self, s: Complex) -> tuple[Complex, NDArray[np.bool_]]:
+        """States (n, k) at frequencies s (k,), and where an eigenvalue is hit (their states are not to be used)."""
+        ...
+
+
 def frequency_response(title: str, slopes: Slopes, names: tuple[str, str], f: Any) -> FrequencyResponse:
     """The response of one quantity to one input.
 
@@ -130,6 +142,25 @@ def frequency_response(title: str, slopes: Slopes, names: tuple[str, str], f: An
     Args:
         title: of the network.
         slopes: the network near the point.
+        names: of the input, one of `slopes.inputs`, and of the output.
+        f: frequencies, Hz.
+
+    Raises:
+        ParameterError: f holds no positive, finite numbers.
+        SignalError: there is no such input or output.
+    """
+    return response(title, slopes, lambda number: _Matrices(slopes, number), names, f)
+
+
+def response(
+    title: str, slopes: Motions, system: Callable[[int], System], names: tuple[str, str], f: Any
+) -> FrequencyResponse:
+    """The response of one quantity to one input, from a system that gives the states.
+
+    Args:
+        title: of the network.
+        slopes: the network near the point.
+        system: of one input, by its number.
         names: of the input, one of `slopes.inputs`, and of the output.
         f: frequencies, Hz.
 
@@ -148,14 +179,14 @@ def frequency_response(title: str, slopes: Slopes, names: tuple[str, str], f: An
     def read(s: Complex, x: Complex) -> Complex:
         v = np.zeros((len(slopes.inputs), len(s)), dtype=complex)
         v[number] = 1.0
-        return slopes.motion(x, v, s * v)(output)
+        return slopes.swinging(s, x, v)(output)
 
     unit = slopes.units.get(source, "1")
-    values = _values(slopes, number, 2j * np.pi * given, read)
+    values = _values(system(number), len(slopes.states), 2j * np.pi * given, read)
     return FrequencyResponse(title, source, output, (unit, slopes.units[output]), given, values)
 
 
-def unknown_output(title: str, slopes: Slopes, name: Any) -> SignalError:
+def unknown_output(title: str, slopes: Motions, name: Any) -> SignalError:
     """The error for an output that is no quantity of the network, with those that are near it."""
     owner = str(name).rpartition(".")[0]
     own = [known for known in slopes.units if known.rpartition(".")[0] == owner]
@@ -164,11 +195,10 @@ def unknown_output(title: str, slopes: Slopes, name: Any) -> SignalError:
     return SignalError(f"No quantity {reprlib.repr(name)} in '{title}'. {what}: {', '.join(listed)}.")
 
 
-def _values(slopes: Slopes, number: int, s: Complex, read: Callable[[Complex, Complex], Complex]) -> Complex:
+def _values(system: System, states: int, s: Complex, read: Callable[[Complex, Complex], Complex]) -> Complex:
     """The response at complex frequencies s, chunk by chunk; where a pole is hit, by its limit."""
-    system = _System(slopes, number)
     values, hit = np.empty(len(s), dtype=complex), np.zeros(len(s), dtype=bool)
-    chunk = max(1, ENTRIES // max(1, 4 * len(slopes.states)))
+    chunk = max(1, ENTRIES // max(1, 4 * states))
     for first in range(0, len(s), chunk):
         here = slice(first, first + chunk)
         x, hit[here] = system.solve(s[here])
@@ -178,7 +208,7 @@ def _values(slopes: Slopes, number: int, s: Complex, read: Callable[[Complex, Co
     return values
 
 
-def _limit(system: _System, s: complex, read: Callable[[Complex, Complex], Complex]) -> complex:
+def _limit(system: System, s: complex, read: Callable[[Complex, Complex], Complex]) -> complex:
     """The response at a natural frequency: infinite, or finite where input or output does not take part in the mode.
 
     A pole turns its sign there, so the difference of both sides grows towards it, and without one it vanishes.
@@ -191,7 +221,7 @@ def _limit(system: _System, s: complex, read: Callable[[Complex, Complex], Compl
     return complex((above + below) / 2)
 
 
-class _System:
+class _Matrices:
     """(s I - A) x = (B + s B1) v for one input, in states of equal units."""
 
     def __init__(self, slopes: Slopes, number: int) -> None:
@@ -215,11 +245,8 @@ class _System:
         right = np.empty((len(s), size, 2), dtype=complex)
         right[:, :, 0], right[:, :, 1] = self._level + np.multiply.outer(s, self._rate), self._probe
         solved = self._dense(s, right) if size <= DENSE else self._sparse(s, right)
-        near = np.array([self.nearness(value) for value in s])
-        length = np.linalg.norm(solved[:, :, 1], axis=1)
-        hit = ~(length * near <= np.linalg.norm(self._probe))  # also where it is NaN
-        solved[hit] = 0.0
-        return solved[:, :, 0].T / self._weights[:, None], np.asarray(hit)
+        found, hit = without_hits(solved, self._probe, np.array([self.nearness(value) for value in s]))
+        return found / self._weights[:, None], hit
 
     def _dense(self, s: Complex, right: Complex) -> Complex:
         matrices = s[:, None, None] * np.eye(len(self._weights)) - self._matrix.toarray()
@@ -237,6 +264,19 @@ class _System:
             except RuntimeError:  # exactly singular
                 solved[k] = np.nan
         return solved
+
+
+def without_hits(solved: Complex, probe: Array, near: Array) -> tuple[Complex, NDArray[np.bool_]]:
+    """The states (n, k), and where an eigenvalue is hit; their states are made 0.
+
+    Args:
+        solved: (k, n, 2) the states, and the solution for a right-hand side that takes part in every mode.
+        probe: (n,) that right-hand side.
+        near: (k,) the distance within which an eigenvalue is hit.
+    """
+    length = np.linalg.norm(solved[:, :, 1], axis=1)
+    hit = ~(length * near <= np.linalg.norm(probe))  # also where it is NaN
+    return np.where(hit, 0.0, solved[:, :, 0].T), np.asarray(hit)
 
 
 def _bode(response: FrequencyResponse) -> Figure:

@@ -115,17 +115,18 @@ class LinearModel:
         rows = [x[own[name]] if name in own else read(name).real for name in self.outputs]
         return np.array(rows).reshape(len(self.outputs), x.shape[1])
 
-    def modes(self, count: int | None = None) -> Modes:
+    def modes(self, count: int | None = None, f_max: float | None = None) -> Modes:
         """Frequencies, damping and shapes of the free motions.
 
         Args:
             count: the modes wanted, those of smallest |rate|; by default all.
+            f_max: the largest |rate| / 2 pi, Hz; by default there is none.
 
         Raises:
-            ParameterError: the count is no number of modes, or the network is too large for all.
+            ParameterError: count or f_max is out of its range, or the network is too large for all modes.
             SimulationError: the lowest modes of a large network were not found.
         """
-        return find_modes(self.title, self.slopes, count)
+        return find_modes(self.title, self.slopes, count, f_max)
 
     def frequency_response(self, input: str, output: str, f: Any) -> FrequencyResponse:  # noqa: A002
         """The complex amplitude of a quantity under a sinusoidal input of amplitude one.

@@ -11,9 +11,10 @@ import numpy as np
 from scipy import sparse
 
 from shaftwork.core.errors import MissingExtraError, ParameterError, SignalError
+from shaftwork.core.parameters import in_si
 from shaftwork.results.eigenvalues import eigenmodes
 from shaftwork.results.observer import Array
-from shaftwork.results.slopes import Complex, Slopes
+from shaftwork.results.slopes import Complex, Motions, Slopes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,7 +46,7 @@ class Modes:
     names: tuple[str, ...]
     rates: Complex
     vectors: Complex
-    slopes: Slopes
+    slopes: Motions
 
     def __len__(self) -> int:
         return len(self.rates)
@@ -73,7 +74,7 @@ class Modes:
         The largest speed in a mode is 1; where the motions have several units, in that with the most kinetic energy.
         """
         none = np.zeros((len(self.slopes.inputs), len(self)), dtype=complex)
-        return _Shapes(self, self.slopes.motion(self.vectors, none, none))
+        return _Shapes(self, self.slopes.swinging(self.rates, self.vectors, none))
 
     @property
     def table(self) -> tuple[tuple[str, float, float, complex, str], ...]:
@@ -129,7 +130,7 @@ class _Shapes(Mapping[str, Complex]):
         return len({**self._slopes.units, **self._slopes.profiles})
 
 
-def find_modes(title: str, slopes: Slopes, count: int | None = None) -> Modes:
+def find_modes(title: str, slopes: Slopes, count: int | None = None, f_max: float | None = None) -> Modes:
     """The modes of a network near a point.
 
     Law: the eigenvalues and eigenvectors of A.
@@ -138,22 +139,55 @@ def find_modes(title: str, slopes: Slopes, count: int | None = None) -> Modes:
         title: of the network.
         slopes: the network near the point.
         count: the modes wanted, those of smallest |rate|; by default all.
+        f_max: the largest |rate| / 2 pi, Hz; by default there is none.
 
     Raises:
-        ParameterError: the count is no number of modes, or the network is too large for all.
+        ParameterError: count or f_max is out of its range, or the network is too large for all modes.
         SimulationError: the lowest modes of a large network were not found.
     """
-    if count is not None and (isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1):
-        raise ParameterError(f"count = {count!r} must be a number of modes, 1 or more; leave it out for all.")
+    count, top = checked_count(count), largest_rate(f_max)
     kept, following = _that_act(slopes)
     weights = slopes.weights[kept]
     scaled = sparse.diags_array(weights) @ slopes.A[kept][:, kept] @ sparse.diags_array(1 / weights)
-    rates, shapes = eigenmodes(sparse.csr_array(scaled), None if count is None else int(count))
+    rates, shapes = eigenmodes(sparse.csr_array(scaled), count)
     vectors = np.zeros((len(slopes.states), len(rates)), dtype=complex)
     vectors[kept] = shapes / weights[:, None]
     vectors[following] = (slopes.A @ vectors)[following] * (rates != 0) / np.where(rates == 0, 1.0, rates)
+    below = np.abs(rates) <= top
+    return modes_of(title, slopes, rates[below], vectors[:, below])
+
+
+def largest_rate(f_max: float | None) -> float:
+    """|rate| in 1/s of a highest frequency in Hz that a user gave; infinite for None.
+
+    Raises:
+        ParameterError: it is no frequency.
+    """
+    return np.inf if f_max is None else 2 * np.pi * in_si("f_max", f_max, "Hz", above=0)
+
+
+def checked_count(count: int | None) -> int | None:
+    """A number of modes that a user gave.
+
+    Raises:
+        ParameterError: it is none.
+    """
+    if count is not None and (isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1):
+        raise ParameterError(f"count = {count!r} must be a number of modes, 1 or more; leave it out for all.")
+    return None if count is None else int(count)
+
+
+def modes_of(title: str, slopes: Motions, rates: Complex, vectors: Complex) -> Modes:
+    """The record of motions that go as exp(rate t): in order, with names, each of size one.
+
+    Args:
+        title: of the network.
+        slopes: the network near the point.
+        rates: (k,) 1/s, with imaginary part 0 or above.
+        vectors: (n, k) the states in each mode, of any size.
+    """
     order = np.lexsort((np.abs(rates), rates.imag > 0, rates != 0))
-    rates, vectors = rates[order], _scaled(slopes, vectors[:, order])
+    rates, vectors = rates[order], _scaled(slopes, rates[order], vectors[:, order])
     return Modes(title, _names(slopes, rates, vectors), rates, vectors, slopes)
 
 
@@ -164,10 +198,10 @@ def _that_act(slopes: Slopes) -> tuple[Any, Any]:
     return np.flatnonzero(read), np.flatnonzero(~read)
 
 
-def _scaled(slopes: Slopes, vectors: Complex) -> Complex:
+def _scaled(slopes: Motions, rates: Complex, vectors: Complex) -> Complex:
     """The shapes with their largest speed, in the unit with the most kinetic energy, equal to 1."""
     none = np.zeros((len(slopes.inputs), vectors.shape[1]), dtype=complex)
-    read = slopes.motion(vectors, none, none)
+    read = slopes.swinging(rates, vectors, none)
     units = np.array(slopes.state_units)
     energy = np.abs(vectors * slopes.weights[:, None]) ** 2
     by_unit = {unit: energy[units == unit].sum(axis=0) for unit in _speed_units(slopes)}
@@ -185,7 +219,7 @@ def _scaled(slopes: Slopes, vectors: Complex) -> Complex:
     return made
 
 
-def _names(slopes: Slopes, rates: Complex, vectors: Complex) -> tuple[str, ...]:
+def _names(slopes: Motions, rates: Complex, vectors: Complex) -> tuple[str, ...]:
     standing = iter(_standing(slopes, vectors[:, rates == 0]))
     names: list[str] = []
     counts = {"decay": 0, "growth": 0, "mode": 0}
@@ -199,12 +233,12 @@ def _names(slopes: Slopes, rates: Complex, vectors: Complex) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _standing(slopes: Slopes, vectors: Complex) -> Iterator[str]:
+def _standing(slopes: Motions, vectors: Complex) -> Iterator[str]:
     """Names for what does not change: the parts that move together, or else those that hold a torque."""
     if not vectors.size:
         return
     none = np.zeros((len(slopes.inputs), vectors.shape[1]), dtype=complex)
-    read = slopes.motion(vectors, none, none)
+    read = slopes.swinging(np.zeros(vectors.shape[1], dtype=complex), vectors, none)
     speeds = np.array([np.abs(read(node)) for _, node in slopes.masses]).reshape(-1, vectors.shape[1])
     for speed, vector in zip(speeds.T, vectors.T, strict=True):
         moving = [slopes.masses[k][0] for k in np.flatnonzero(speed > MOVES)]
@@ -256,5 +290,5 @@ def _plot(modes: Modes, numbers: tuple[int, ...]) -> Figure:
     return figure
 
 
-def _speed_units(slopes: Slopes) -> tuple[str, ...]:
+def _speed_units(slopes: Motions) -> tuple[str, ...]:
     return tuple(dict.fromkeys(unit for unit, _ in slopes.nodes.values()))

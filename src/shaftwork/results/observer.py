@@ -19,8 +19,8 @@ class Observer(Protocol):
         """Every quantity that can be read, "part.quantity" or "node.quantity", and its unit."""
         ...
 
-    def signal(self, name: str, t: Array, x: Array) -> Array:
-        """(k,) a quantity at times t (k,) with states x (k, n)."""
+    def signal(self, name: str, t: Array, x: Array, dense: Dense) -> Array:
+        """(k,) a quantity at times t (k,) with states x (k, n), with the motion behind them."""
         ...
 
     @property
@@ -32,11 +32,15 @@ class Observer(Protocol):
         """(k, places) a quantity along a part at times t (k,) with states x (k, n), with the motion behind them."""
         ...
 
-    def powers(self, t: Array, x: Array) -> tuple[dict[str, Array], dict[str, Array], dict[str, Array]]:
-        """By part, at times t (k,) with states x (k, n): stored energy in J, lost power in W, supplied power in W.
+    def stored(self, t: Array, x: Array, dense: Dense) -> dict[str, Array]:
+        """By part, stored energy in J at times t (k,) with states x (k, n), with the motion behind them.
 
         Of a time that is listed twice in a row the first is before whatever jumps there.
         """
+        ...
+
+    def powers(self, t: Array, x: Array) -> tuple[dict[str, Array], dict[str, Array]]:
+        """By part, at times t (k,) with states x (k, n): lost power in W, supplied power in W."""
         ...
 
 

@@ -67,7 +67,7 @@ class Solution:
         """
         if isinstance(name, str) and name in self.observer.profiles:
             return self.observer.profile(name, self.t, self.x, self.dense)
-        return self.observer.signal(self._known(name), self.t, self.x)
+        return self.observer.signal(self._known(name), self.t, self.x, self.dense)
 
     @property
     def places(self) -> Mapping[str, Array]:

@@ -51,8 +51,10 @@ def work_precision_figure(study: WorkPrecision) -> Figure:
 
 
 def _family(trial: Trial) -> str:
-    name = trial.model.partition("(")[0]
-    return f"{name}, order 4" if "order=4" in trial.model else name
+    """The model without its size."""
+    name, _, arguments = trial.model.rstrip(")").partition("(")
+    _, comma, choices = arguments.partition(",")
+    return f"{name}{comma}{choices}"
 
 
 def _size(trial: Trial) -> str:

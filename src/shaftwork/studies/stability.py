@@ -260,4 +260,7 @@ def _first_line(error: Exception) -> str:
 
 
 def _text(model: ShaftModel) -> str:
-    return repr(model).replace(", ends='half'", "").replace(", order=2", "")
+    text = repr(model)
+    for default in (", ends='half'", ", order=2", ", closure='sbp'", ", second_difference='consistent'"):
+        text = text.replace(default, "")
+    return text

@@ -141,7 +141,20 @@ _SIZES = ("auto", "exact", "sundials", "banded")
 CASES: tuple[Case, ...] = (
     *(Case(f"stiffness ratio {r:g}", form="ramp", rise=4.0, spring=r) for r in (1e-9, 1e-4, 1.0, 1e4, 1e8, 1e12)),
     *(Case(f"inertia ratio {r:g}", form="ramp", rise=4.0, load=r) for r in (1e-9, 1e-4, 1.0, 1e4, 1e9)),
-    *(Case(f"damping ratio {z:g}", form="ramp", rise=4.0, damping=z) for z in (1e-6, 0.05, 1.0, 100.0)),
+    *(Case(f"damping ratio {z:g}", form="ramp", rise=4.0, damping=z) for z in (1e-6, 0.05, 1.0, 100.0, 1e4)),
+    # explicit engines only run these to their end where there is but one spring and they may take many steps
+    *(
+        Case(
+            f"one spring, damping ratio {z:g}",
+            form="ramp",
+            rise=1.0,
+            delays=3.0,
+            damping=z,
+            models=(OneSpring(),),
+            steps=100_000,
+        )
+        for z in (10.0, 100.0, 1e3, 1e4)
+    ),
     Case("m = 2", models=(Lumped(2), CentralDifference(2), Spectral(2))),
     Case("m = 100", models=(Lumped(100), CentralDifference(100), Spectral(32)), engines=_SIZES, delays=8.0),
     Case("m = 1000", form="ramp", models=(Lumped(1000),), engines=("auto", "banded"), delays=4.0),

@@ -131,7 +131,8 @@ class _Chain:
         shares: (n,) of that, what belongs to the shaft.
         twists: (k, n) rate of twist of each spring.
         springs: (k,) stiffness.
-        dashpots: (k,) beside the springs.
+        slips: (j, n) speed of each dashpot.
+        dashpots: (j,) damping.
         brakes: (n,) against the ground.
         far: (n,) omega_b as a sum of the speeds, of which omega_a is the first; nothing where that end is held.
     """
@@ -140,6 +141,7 @@ class _Chain:
     shares: Array
     twists: Array
     springs: Array
+    slips: Array
     dashpots: Array
     brakes: Array
     far: Array
@@ -159,9 +161,8 @@ def predicted(case: Case, model: ShaftModel) -> Motion | None:
     matrix, drive = _in_energy_coordinates(chain)
     n, size = len(chain.masses), len(matrix)
     states = _propagated(case, matrix, drive)
-    y, torque = states[:, :size], TORQUE * states[:, size]
-    speeds = y[:, :n] / np.sqrt(chain.masses)
-    rates = (y @ matrix.T + np.outer(torque, drive))[:, :n] / np.sqrt(chain.masses)
+    torque = TORQUE * states[:, 2 * size]
+    speeds, rates = (states[:, first : first + n] / np.sqrt(chain.masses) for first in (0, size))
     tau_a = torque - case.drive * case.inertia * rates[:, 0]
     values = {
         "tau_a": tau_a,
@@ -188,8 +189,8 @@ def _chain(case: Case, model: ShaftModel) -> _Chain | None:
     parts = _parts(model)
     if parts is None:
         return None
-    shares, lengths, weights = parts
-    springs, dashpots = (value / (section.length * lengths) for value in (section.stiffness, section.damping))
+    shares, lengths, weights, gaps, slips = parts
+    springs, dashpots = section.stiffness / (section.length * lengths), section.damping / (section.length * gaps)
     last = len(shares) - 1
     far = np.eye(1, last + 1, last)[0]
     if case.spring and isinstance(model, OneSpring):  # two springs in a row, without an inertia between them
@@ -197,38 +198,48 @@ def _chain(case: Case, model: ShaftModel) -> _Chain | None:
     elif case.spring:
         weights = np.block([[weights, np.zeros((len(lengths), 1))], [np.eye(1, last + 1, last), -np.ones((1, 1))]])
         springs = np.append(springs, case.spring * section.stiffness / section.length)
-        shares, dashpots, far, last = np.append(shares, 0.0), np.append(dashpots, 0.0), np.append(far, 0.0), last + 1
+        shares, far, slips, last = (
+            np.append(shares, 0.0),
+            np.append(far, 0.0),
+            np.pad(slips, ((0, 0), (0, 1))),
+            last + 1,
+        )
     shares = shares * case.inertia
     masses, brakes = shares.copy(), np.zeros(len(shares))
     masses[0] += case.drive * case.inertia
     masses[last] += case.load * case.inertia
     brakes[last] = case.damper * section.impedance
     kept = last if case.clamped else last + 1
-    held = (masses[:kept], shares[:kept], weights[:, :kept], springs, dashpots, brakes[:kept])
+    held = (masses[:kept], shares[:kept], weights[:, :kept], springs, slips[:, :kept], dashpots, brakes[:kept])
     return _Chain(*held, np.zeros(kept) if case.clamped else far)
 
 
-def _parts(model: ShaftModel) -> tuple[Array, Array, Array] | None:
-    """Shares of the inertia, shares of the length, and weights; None where there are too many."""
+def _parts(model: ShaftModel) -> tuple[Array, Array, Array, Array, Array] | None:
+    """Shares of inertia and of length, weights of springs; lengths and weights of dashpots. None where too many."""
     if isinstance(model, Rigid):
-        return np.ones(1), np.ones(0), np.zeros((0, 1))
+        return np.ones(1), np.ones(0), np.zeros((0, 1)), np.ones(0), np.zeros((0, 1))
     if isinstance(model, OneSpring):
-        return np.zeros(2), np.ones(1), np.array([[1.0, -1.0]])
+        across = np.array([[1.0, -1.0]])
+        return np.zeros(2), np.ones(1), across, np.ones(1), across
     mesh = model.mesh()
-    if len(mesh.nodes) > MOST_PREDICTED:
+    count = len(mesh.nodes)
+    if count > MOST_PREDICTED:
         return None
-    weights = np.zeros((len(mesh.lengths), len(mesh.nodes)))
+    weights = np.zeros((len(mesh.lengths), count))
     for k, row in enumerate(mesh.weights):
         for j, weight in row:
             weights[k, j] += weight
-    return np.array(mesh.inertias), np.array(mesh.lengths), weights
+    shares, lengths, gaps = (np.array(part) / mesh.intervals for part in (mesh.inertias, mesh.lengths, mesh.dampers))
+    if not gaps.size:
+        return shares, lengths, weights, lengths, weights
+    return shares, lengths, weights, gaps, np.eye(count - 1, count) - np.eye(count - 1, count, 1)
 
 
 def _in_energy_coordinates(chain: _Chain) -> tuple[Array, Array]:
     """Matrix and drive of y' = matrix y + drive torque, y = (sqrt(mass) speed, torque / sqrt(stiffness))."""
     root = np.sqrt(chain.masses)
     joints = np.sqrt(chain.springs)[:, None] * chain.twists / root
-    losses = (chain.twists.T * chain.dashpots) @ chain.twists / np.outer(root, root) + np.diag(
+    losses = (chain.slips.T * chain.dashpots) @ chain.slips / np.outer(root, root) + np.diag(
         chain.brakes / chain.masses
     )
     matrix = np.block([[-losses, -joints.T], [joints, np.zeros((len(joints), len(joints)))]])
@@ -238,16 +249,23 @@ def _in_energy_coordinates(chain: _Chain) -> tuple[Array, Array]:
 
 
 def _propagated(case: Case, matrix: Array, drive: Array) -> Array:
-    """States (k, n + 3) at the times of a case; the last three make the torque: its value, sine, and one."""
+    """States (k, 2 n + 3) at the times of a case: y, y', and three that make the torque: its value, sine, and one.
+
+    y' obeys the same equation as y. Taken from y it would have the errors of y times the fastest decay.
+    """
     size, rise = len(drive), case.rise * case.section.delay
-    whole = np.zeros((size + 3, size + 3))
-    whole[:size, :size], whole[:size, size] = matrix, TORQUE * drive
+    rates, torque = slice(size, 2 * size), 2 * size
+    whole = np.zeros((torque + 3, torque + 3))
+    whole[:size, rates], whole[rates, rates] = np.eye(size), matrix
     if case.form == "sine":
-        whole[size, size + 1] = whole[size + 1, size + 2] = 2 * np.pi / rise
-        whole[size + 1, size] = -2 * np.pi / rise
-    state = np.concatenate([np.zeros(size), [float(case.form in ("step", "pulse")), 0.0, 1.0]])
+        whole[torque, torque + 1] = whole[torque + 1, torque + 2] = 2 * np.pi / rise
+        whole[torque + 1, torque] = -2 * np.pi / rise
     if case.form == "ramp":
-        whole[size, size + 2] = 1 / rise
+        whole[torque, torque + 2] = 1 / rise
+    whole[rates, torque:] = np.outer(TORQUE * drive, whole[torque, torque:])
+    state = np.zeros(torque + 3)
+    state[torque], state[torque + 2] = float(case.form in ("step", "pulse")), 1.0
+    state[rates] = TORQUE * drive * state[torque]
     jumps = (rise,) if case.form in ("pulse", "ramp") and rise < case.t_end else ()
     made: dict[str, Array] = {}
     found = {}
@@ -257,7 +275,9 @@ def _propagated(case: Case, matrix: Array, drive: Array) -> Array:
             made[key] = expm(whole * (end - start))
         state = made[key] @ state
         if end in jumps:
-            state[size], whole[size, size + 2] = float(case.form == "ramp"), 0.0
+            before, state[torque] = state[torque], float(case.form == "ramp")
+            state[rates] += TORQUE * drive * (state[torque] - before)
+            whole[: torque + 1, torque + 2] = 0.0
             made.clear()
         found[end] = state
     return np.array([found[time] for time in case.times])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -55,6 +56,8 @@ class Trial:
         setup: CPU time from the network to the first result, less a warm call, s.
         cpu: CPU time of a warm call with reading both end torques, s; the median of several.
         errors: largest error of each quantity over its largest value, by name; of frequencies, relative to each.
+        extra_modes: oscillating modes, up to halfway between the highest frequency that is judged and the next, less
+            those of the exact shaft: spurious ones, or missing ones where negative; None where unknown.
         why: why it failed; empty where it did not.
     """
 
@@ -64,6 +67,7 @@ class Trial:
     setup: float
     cpu: float
     errors: dict[str, float]
+    extra_modes: int | None = None
     why: str = ""
 
     @property
@@ -109,10 +113,11 @@ class WorkPrecision:
         return tuple(dict.fromkeys(name for trial in self.trials for name in trial.errors))
 
     def __str__(self) -> str:
-        header = ["model", "engine", "states", "set-up ms", "CPU ms", *self.columns]
+        header = ["model", "engine", "states", "set-up ms", "CPU ms", *self.columns, "extra modes"]
         rows = [
             [trial.model, trial.engine, str(trial.states), f"{1e3 * trial.setup:.0f}", f"{1e3 * trial.cpu:.2f}"]
             + [f"{trial.errors[name]:.1e}" if name in trial.errors else "-" for name in self.columns]
+            + ["-" if trial.extra_modes is None else f"{trial.extra_modes}"]
             + ([trial.why] if trial.why else [])
             for trial in self.trials
         ]
@@ -128,10 +133,11 @@ class WorkPrecision:
         """Write every trial with all its errors."""
         with Path(path).open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
-            writer.writerow(["model", "engine", "states", "setup_s", "cpu_s", *self.columns, "why"])
+            writer.writerow(["model", "engine", "states", "setup_s", "cpu_s", *self.columns, "extra_modes", "why"])
             for trial in self.trials:
                 errors = [trial.errors.get(name, "") for name in self.columns]
-                writer.writerow([trial.model, trial.engine, trial.states, trial.setup, trial.cpu, *errors, trial.why])
+                last = ("" if trial.extra_modes is None else trial.extra_modes, trial.why)
+                writer.writerow([trial.model, trial.engine, trial.states, trial.setup, trial.cpu, *errors, *last])
 
     def plot(self) -> Figure:
         """Error of the end torques over CPU time, a curve for each kind of model (extra `plot`)."""
@@ -196,12 +202,16 @@ def _trial(net: Network, shaft: str, model: ShaftModel, engine: str, t_end: floa
             if sum(times) > 1.0:
                 break
     except ShaftworkError as error:
-        return Trial(_text(model), engine, 0, 0.0, np.inf, {}, str(error).splitlines()[0])
+        return Trial(_text(model), engine, 0, 0.0, np.inf, {}, why=str(error).splitlines()[0])
     found = quantities(solution, shaft)
     errors = {name: float(np.abs(found[name] - known.values[name]).max()) / _size(known, name) for name in QUANTITIES}
-    errors |= _frequency_errors(compiled, known.frequencies)
+    exact, present = known.frequencies, _frequencies(compiled)
+    extra = None
+    if present is not None and len(exact) > MODES:
+        errors |= {f"f_{k + 2}": float(np.abs(present / f - 1).min()) for k, f in enumerate(exact[:MODES])}
+        extra = int((present < exact[MODES - 1 : MODES + 1].mean()).sum()) - MODES
     cpu = median(times)
-    return Trial(_text(model), solution.engine, len(compiled.states), first - cpu, cpu, errors)
+    return Trial(_text(model), solution.engine, len(compiled.states), first - cpu, cpu, errors, extra)
 
 
 def _size(known: Truth, name: str) -> float:
@@ -211,15 +221,17 @@ def _size(known: Truth, name: str) -> float:
     return float(max(np.abs(value).max() for value in family)) or 1.0
 
 
-def _frequency_errors(compiled: Model, exact: Array) -> dict[str, float]:
-    if compiled.form.waves or not exact.size or len(compiled.states) > MOST_STATES or not compiled.linear:
-        return {}
+def _frequencies(compiled: Model) -> Array | None:
+    """Natural frequencies in Hz of a network that has some and is small enough, the rigid motion left out."""
+    if compiled.form.waves or len(compiled.states) > MOST_STATES or not compiled.linear:
+        return None
     rates = np.linalg.eigvals(compiled.jacobian(0.0, np.zeros(len(compiled.states))).toarray())
-    found = np.abs(rates[np.abs(rates.imag) > 1e-6 * np.abs(rates).max()].imag) / (2 * np.pi)
-    if not found.size:
-        return {}
-    return {f"f_{k + 2}": float(np.abs(found / f - 1).min()) for k, f in enumerate(exact[:MODES])}
+    found = rates.imag[rates.imag > 1e-6 * np.abs(rates).max()] / (2 * np.pi)
+    return found if found.size else None
 
 
 def _text(model: ShaftModel) -> str:
-    return repr(model).replace(", ends='half'", "").replace(", order=2", "")
+    """The model with its size and what differs from the default, so that a row is short."""
+    fields = dataclasses.fields(model)
+    shown = [f for k, f in enumerate(fields) if k == 0 or getattr(model, f.name) != f.default]
+    return f"{type(model).__name__}({', '.join(f'{f.name}={getattr(model, f.name)!r}' for f in shown)})"

@@ -11,8 +11,8 @@ from shaftwork.integrate.problem import Array
 
 STAGES = 8
 
-# Gauss points of [-1, 1]: the values of all waves and states are kept there.
-POINTS = legendre.leggauss(STAGES)[0]
+# Gauss points of [-1, 1], where the values of all waves and states are kept, and their weights.
+POINTS, WEIGHTS = legendre.leggauss(STAGES)
 # Values at the points (k, s) times this are the coefficients (k, s) of the Legendre polynomials.
 LEGENDRE = np.linalg.inv(legendre.legvander(POINTS, STAGES - 1)).T
 # Values at the points to powers of xi. The powers of a polynomial of Legendre coefficients that decay are harmless.
@@ -57,3 +57,11 @@ def _scheme(points: Array) -> Scheme:
 # Gauss keeps quadratic energies; Radau IIA forgets what is infinitely fast within one panel.
 GAUSS = _scheme(POINTS)
 RADAU = _scheme(np.append(legendre.legroots([*np.zeros(STAGES - 1), -1.0, 1.0])[:-1], 1.0))
+
+
+def squared(powers: Array, to: Array) -> Array:
+    """Integrals (k, q) from -1 to some places (k,) of squares of polynomials, of coefficients (k, q, s)."""
+    half = (to + 1) / 2
+    places = (POINTS + 1) * half[:, None] - 1
+    values = powers @ (places[:, None, :] ** np.arange(powers.shape[2])[:, None])
+    return np.asarray(half[:, None] * (values**2 @ WEIGHTS))

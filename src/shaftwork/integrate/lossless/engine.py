@@ -116,7 +116,7 @@ class _March:
         if cut is not None and not short:
             return cut
         found = self._solve(GAUSS, start, length, arrived)
-        if found is None or not self._scales.resolved(found[0], self._x):
+        if found is None or not self._resolves(start, length, arrived, *found):
             if not short:
                 return start + length / 2
             if self._floor > self._rtol * self._shortest:
@@ -127,6 +127,15 @@ class _March:
             raise self._failure(start, self._stages.reason)
         self._accept(start, length, *found)
         return None
+
+    def _resolves(self, start: float, length: float, arrived: Array, rows: Array, end: Array) -> bool:
+        """Whether a panel leaves out less than the tolerance, between the Gauss points and before the first one."""
+        if not self._scales.resolved(rows, self._x):
+            return False
+        if self._problem.linear or not self._x.size:
+            return True
+        unseen = self._stages.unseen(start, length, self._x, end, rows[self._ends :], arrived)
+        return bool((unseen <= RESOLVED * self._scales.tolerance[self._ends :]).all())
 
     def _solve(self, scheme: Scheme, start: float, length: float, arrived: Array) -> tuple[Array, Array] | None:
         """Waves, then states (q + n, s) at the Gauss points, and the state (n,) at the end."""

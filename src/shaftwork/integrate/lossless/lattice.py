@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.core.errors import SimulationError
-from shaftwork.integrate.lossless.collocation import GAUSS, STAGES, STATE_POWERS
-from shaftwork.integrate.lossless.lines import DelayProblem, DelayTrajectory, past_of
+from shaftwork.integrate.lossless.collocation import GAUSS, POWERS, STAGES, STATE_POWERS, WEIGHTS
+from shaftwork.integrate.lossless.lines import DelayProblem, DelayTrajectory, Past, past_of
 from shaftwork.integrate.lossless.panel_maps import PanelMap
 from shaftwork.integrate.lossless.scales import RESOLVED, Scales, left_out
 from shaftwork.integrate.lossless.waveforms import Panels, trajectory
@@ -38,6 +38,8 @@ class Run:
         waves: (m, q, s) that leave the ends.
         arrived: (m, q, s) history torques.
         ends: state before each breakpoint and at the end of the last panel.
+        squares: (m, q) integrals of the squared wave that leaves each end, over the delay before a panel's start; only
+            where they were asked for.
     """
 
     numbers: Numbers
@@ -46,6 +48,7 @@ class Run:
     waves: Array
     arrived: Array
     ends: list[Array]
+    squares: Array = field(default_factory=lambda: np.empty((0, 0)))
 
 
 class Lattice:
@@ -76,12 +79,20 @@ class Lattice:
         self.lags = np.repeat(np.array(multiples) * self.size, 2)
         self.reach = int(self.lags.max())
         self.partners = np.arange(self._q) ^ 1
-        self._before = past_of(problem).waves[0]
+        self._before = self._waves_before(past_of(problem))
         ends = self.panels(np.array([*problem.breakpoints, problem.t_end])).tolist()
         if self.time(ends[-1]) < problem.t_end - self.near:
             ends[-1] += 1
         self.edges = [0, *ends]
         self.count = ends[-1]
+
+    def _waves_before(self, past: Past) -> Array:
+        """What left the ends before t0, told by one panel: (reach, q, s) at the Gauss points of the lattice."""
+        panels = np.arange(-self.reach, 0)
+        nodes = self.times(panels)[:, None] + self.lengths[panels % self.size, None] * GAUSS.nodes
+        places = 2 * (nodes - past.starts[0]) / past.lengths[0] - 1
+        values = (past.waves[0] @ POWERS) @ np.vander(places.ravel(), STAGES, increasing=True).T
+        return np.asarray(values.reshape(self._q, self.reach, STAGES).swapaxes(0, 1))
 
     @property
     def near(self) -> float:
@@ -96,6 +107,10 @@ class Lattice:
         """Start times of panels in s."""
         periods, places = np.divmod(panels, self.size)
         return np.asarray(self.problem.t0 + (periods * self._period + self._offsets[places]), dtype=float)
+
+    def weights(self, panels: Numbers) -> Array:
+        """Weights (..., s) in s of the values at the Gauss points in an integral over each panel."""
+        return np.asarray(self.lengths[panels % self.size, None] / 2 * WEIGHTS)
 
     def panels(self, times: Array) -> Numbers:
         """The panels in which times (k,) in s lie, the later ones where two meet."""
@@ -222,7 +237,7 @@ class Lattice:
         problem = self.problem
         rows = np.concatenate([run.waves, run.states], axis=1)
         largest = np.maximum.accumulate(np.abs(rows).max(axis=2), axis=0)
-        largest = np.maximum(largest, np.abs(np.concatenate([self._before[:, 0], problem.x0])))
+        largest = np.maximum(largest, np.concatenate([np.abs(self._before).max(axis=(0, 2)), np.abs(problem.x0)]))
         scales = Scales(problem.impedances, problem.atol_waves, problem.atol, rtol)
         with np.errstate(invalid="ignore"):
             fits = np.all(left_out(rows, run.starts) <= RESOLVED * scales.tolerances(largest), axis=1)
@@ -231,6 +246,11 @@ class Lattice:
             panel = int(np.argmin(finite))
             raise self.failure(panel, run.starts[panel], "a wave or a state is not finite")
         return [not fits[run.numbers % self.size == place].all() for place in range(self.size)]
+
+    def wrinkles(self, run: Run) -> float:
+        """The part of the largest wave that panels leave out, about."""
+        rows = np.concatenate([run.waves, run.states], axis=1)
+        return float(left_out(rows, run.starts)[:, : self._q].max() / np.abs(run.waves).max())
 
     def trajectory(self, run: Run, times: Array | None) -> DelayTrajectory:
         """What was found in the first panels, or in all, at times (k,) in s or at the ends of the panels."""

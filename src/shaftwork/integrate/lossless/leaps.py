@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shaftwork.integrate.lossless.collocation import POWERS, STAGES, STATE_POWERS
+from shaftwork.integrate.lossless.collocation import POWERS, STAGES, STATE_POWERS, squared
 from shaftwork.integrate.lossless.lattice import Lattice, Numbers, Run
 from shaftwork.integrate.lossless.lines import DelayTrajectory
 from shaftwork.integrate.lossless.waveforms import one_sided
@@ -54,20 +54,24 @@ class Leaps:
             self._panels(np.column_stack(pasts[low : low + SIDE_BY_SIDE]), steps[low : low + SIDE_BY_SIDE])
             for low in range(0, len(panels), SIDE_BY_SIDE)
         ]
-        starts, waves, arrived = (np.concatenate(part) for part in zip(*parts, strict=True))
+        starts, waves, arrived, squares = (np.concatenate(part) for part in zip(*parts, strict=True))
         inputs = np.broadcast_to(self._input, (len(panels), self._input.shape[1]))
         states = self._lattice.inside(panels, starts, arrived, inputs)
-        return Run(panels, starts, states, waves, arrived, [])
+        return Run(panels, starts, states, waves, arrived, [], squares)
 
-    def _panels(self, pasts: Array, steps: Numbers) -> tuple[Array, Array, Array]:
-        """Start states, waves and history torques of panels that are some steps (c,) after their pasts (z, c)."""
+    def _panels(self, pasts: Array, steps: Numbers) -> tuple[Array, Array, Array, Array]:
+        """Start states, waves, history torques and squares of panels some steps (c,) after their pasts (z, c)."""
         lattice, column = self._lattice, np.arange(steps.size)
         window = pasts[self._n :].reshape(*self._shape, steps.size)
         states, waves = lattice.march(self.first, pasts[: self._n], window, self._drive[: steps.max() + 1])
         waves = np.concatenate([window, waves])
         lagging = steps[:, None] + lattice.reach - lattice.lags
         arrived = -waves[lagging, lattice.partners, :, column[:, None]]
-        return states[steps, :, column], waves[steps + lattice.reach, :, :, column], arrived
+        weights = lattice.weights(self.first + steps[:, None] - lattice.reach + np.arange(lattice.reach))
+        before = waves[steps[:, None] + np.arange(lattice.reach), :, :, column[:, None]]
+        within = np.arange(lattice.reach)[:, None] >= lattice.reach - lattice.lags
+        squares = np.einsum("crqs,crs,rq->cq", before**2, weights, within)
+        return states[steps, :, column], waves[steps + lattice.reach, :, :, column], arrived, squares
 
 
 class Far:
@@ -95,6 +99,20 @@ class Far:
         """History torques and speeds (k, q) of the ends."""
         return self.all(times)[1:]
 
+    def squares(self, times: Array) -> Array:
+        """Integrals (k, q) over the last delay of the squared wave that leaves each end, up to times (k,)."""
+        panels = self._lattice.panels(times)
+        late = panels >= self._leaps.first
+        found = np.empty((times.size, self._lattice.partners.size))
+        found[~late] = self._near.squares(times[~late])
+        if late.any():
+            run, index, place = self._panels_at(times[late], panels[late])
+            lengths = self._lattice.lengths[run.numbers[index] % self._lattice.size]
+            left, came = (squared((rows @ POWERS)[index], place) for rows in (run.waves, run.arrived))
+            # What arrives at an end is what left its partner a delay before.
+            found[late] = run.squares[index] + (left - came[:, self._lattice.partners]) * lengths[:, None] / 2
+        return found
+
     def all(self, times: Array) -> tuple[Array, Array, Array]:
         """States (k, n), history torques (k, q) and speeds (k, q) at times (k,)."""
         times = np.atleast_1d(np.asarray(times, dtype=float))
@@ -109,12 +127,17 @@ class Far:
         return x_all, h_all, v_all
 
     def _late(self, times: Array, panels: Numbers) -> tuple[Array, Array, Array]:
-        lattice, problem = self._lattice, self._lattice.problem
-        numbers, index = np.unique(panels, return_inverse=True)
-        run = self._leaps.run(numbers)
-        place = 2 * (times - lattice.times(panels)) / lattice.lengths[panels % lattice.size] - 1
+        problem = self._lattice.problem
+        run, index, place = self._panels_at(times, panels)
         powers = np.vander(place, STAGES + 1, increasing=True)
         states = np.concatenate([run.starts[:, :, None], run.states], axis=2) @ STATE_POWERS
         x = np.einsum("knp,kp->kn", states[index], powers)
         h = np.einsum("kqp,kp->kq", (run.arrived @ POWERS)[index], powers[:, :-1])
         return x, h, np.asarray(problem.speeds(one_sided(problem, times), x.T, h.T)).T
+
+    def _panels_at(self, times: Array, panels: Numbers) -> tuple[Run, Numbers, Array]:
+        """The panels in which times (k,) lie, solved once each; for each time its panel among them, and its place."""
+        numbers, index = np.unique(panels, return_inverse=True)
+        lattice = self._lattice
+        place = 2 * (times - lattice.times(panels)) / lattice.lengths[panels % lattice.size] - 1
+        return self._leaps.run(numbers), index, place

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.core.times import around
-from shaftwork.integrate.lossless.collocation import STAGES
+from shaftwork.integrate.lossless.collocation import POINTS
 from shaftwork.integrate.problem import Array, Trajectory
 
 
@@ -46,9 +46,9 @@ class DelayProblem:
         t0, t_end, names, atol, rtol, breakpoints, jump, sides, t_eval, max_steps: as in `Problem`; a step is a panel.
         linear: whether rhs and speeds are affine in x and h, with constant matrices.
         steady: whether, between breakpoints, rhs and speeds do not depend on the time.
-        speed0: (q / 2,) speed of each line before t0 in rad/s; None for rest.
-        torque0: (q / 2,) torque in each line before t0 in N m, that which its node a gives to it; None for none.
-        past: what left the ends before t0, in place of speed0 and torque0: a run goes on where another one ended.
+        speeds0: (q,) speed of each end at t0 in rad/s, along a line straight from the one to the other; None for rest.
+        torque0: (q / 2,) torque along each line at t0 in N m, that which its node a gives to it; None for none.
+        past: what left the ends before t0, in place of speeds0 and torque0: a run goes on where another one ended.
         atol_waves: absolute tolerance of 2 Z v + h in N m; rtol is relative to the largest of each line so far.
     """
 
@@ -70,7 +70,7 @@ class DelayProblem:
     max_steps: int = 10_000_000
     linear: bool = False
     steady: bool = False
-    speed0: Array | None = None
+    speeds0: Array | None = None
     torque0: Array | None = None
     atol_waves: float = 0.0
     past: Past | None = None
@@ -84,12 +84,15 @@ class DelayTrajectory(Trajectory):
         h: (k, q) history torques in N m at the times t.
         v: (k, q) speeds of the ends in rad/s at the times t.
         waves: both at any times (k,) in s; at a kink those after it.
+        squares: from times (k,) in s to integrals (k, q) over the last delay, in (N m)^2 s, of the squared wave that
+            leaves an end.
         past: from a time in s to the past of a run that goes on from there; None after a run in leaps.
     """
 
     h: Array = field(default_factory=lambda: np.empty((0, 0)))
     v: Array = field(default_factory=lambda: np.empty((0, 0)))
     waves: Callable[[Array], tuple[Array, Array]] = field(kw_only=True)
+    squares: Callable[[Array], Array] = field(kw_only=True)
     past: Callable[[float], Past] | None = field(kw_only=True)
 
 
@@ -116,12 +119,16 @@ class Lines:
 
 
 def past_of(problem: DelayProblem) -> Past:
-    """What left the ends before t0; of lines that turn steadily it is Z v + tau at a and Z v - tau at b."""
+    """What left the ends before t0: Z v + tau at a and Z v - tau at b, with v where the wave has come by t0."""
     if problem.past is not None:
         return problem.past
-    rest = np.zeros(problem.impedances.size)
-    turning = problem.impedances * (rest if problem.speed0 is None else problem.speed0)
-    torque = rest if problem.torque0 is None else problem.torque0
-    waves = np.column_stack([turning + torque, turning - torque]).ravel()
+    size = problem.impedances.size
+    speeds = np.zeros(2 * size) if problem.speeds0 is None else problem.speeds0
+    torque = np.zeros(size) if problem.torque0 is None else problem.torque0
     reach = 2 * float(problem.delays.max())
-    return Past(np.array([problem.t0 - reach]), np.array([reach]), np.repeat(waves[None, :, None], STAGES, axis=2))
+    ago = reach * (1 - POINTS) / 2
+    change = speeds[np.arange(2 * size) ^ 1] - speeds
+    along = speeds[:, None] + change[:, None] * ago / np.repeat(problem.delays, 2)[:, None]
+    torques = np.column_stack([torque, -torque]).ravel()
+    waves = np.repeat(problem.impedances, 2)[:, None] * along + torques[:, None]
+    return Past(np.array([problem.t0 - reach]), np.array([reach]), waves[None])

@@ -10,7 +10,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from shaftwork.integrate.lossless.collocation import GAUSS, STAGES, Scheme
+from shaftwork.integrate.lossless.collocation import GAUSS, LEFT, POINTS, RIGHT, STAGES, Scheme
 from shaftwork.integrate.lossless.lines import DelayProblem
 from shaftwork.integrate.problem import Array
 
@@ -20,6 +20,11 @@ CONVERGED, SLOW, ITERATIONS = 1e-4, 0.1, 15
 LARGEST_DENSE = 400
 # Panels of as many lengths keep their factors.
 LARGEST_STORE = 256
+# The part of a panel before its first Gauss point, and values at the points to those at both ends.
+UNSEEN = (1 + POINTS[0]) / 2
+_ENDS = np.column_stack([LEFT[:, 0], RIGHT[:, 0]])
+# Increments at the Gauss points to rates there, for a panel of unit length.
+_TO_RATES = np.linalg.inv(GAUSS.matrix).T
 
 
 class Stages:
@@ -58,6 +63,25 @@ class Stages:
         times = np.minimum(np.maximum(start + length * scheme.nodes, self._low), self._high)
         stages = self._newton(scheme, times, length, x, largest, h) if x.size else np.empty((0, STAGES))
         return None if stages is None else (stages, self._problem.speeds(times, stages, h))
+
+    def unseen(self, start: float, length: float, x: Array, end: Array, stages: Array, h: Array) -> Array:
+        """What may happen to the states (n,) between the ends of a panel and the Gauss points next to them.
+
+        A law may switch there. Then the rates at the end are not those that the Gauss points foretell.
+
+        Args:
+            start: of the panel in s.
+            length: of the panel in s.
+            x: (n,) state at its start.
+            end: (n,) state at its end.
+            stages: (n, s) states at the Gauss points.
+            h: (q, s) history torques there.
+        """
+        rates = (stages - x[:, None]) @ _TO_RATES / length
+        times = np.clip([start, start + length], self._low, self._high)
+        found = self._problem.rhs(times, np.column_stack([x, end]), h @ _ENDS)
+        self.counts["rhs"] += 2
+        return np.asarray(np.abs(found - rates @ _ENDS).max(axis=1) * length * UNSEEN)
 
     def _newton(self, scheme: Scheme, times: Array, length: float, x: Array, largest: Array, h: Array) -> Array | None:
         problem, start = self._problem, x[:, None]

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
-from shaftwork.integrate.lossless.collocation import POINTS, POWERS, STAGES, STATE_POWERS
+from shaftwork.integrate.lossless.collocation import POINTS, POWERS, STAGES, STATE_POWERS, squared
 from shaftwork.integrate.lossless.lines import DelayProblem, DelayTrajectory, Lines, Past, past_of
 from shaftwork.integrate.pieces import both_sides
 from shaftwork.integrate.problem import Array
@@ -82,6 +83,28 @@ class Ends:
         inside = one_sided(self.problem, times, left=left)
         return h, np.asarray(self.problem.speeds(inside, self.states(times, left=left).T, h.T)).T
 
+    def squares(self, times: Array) -> Array:
+        """Integrals (k, q) over the last delay, up to times (k,), of the squared wave that leaves each end.
+
+        The panels in it are summed for each time anew: a difference of running sums would lose digits in a long run.
+        """
+        waves = self.waves
+        whole = squared(waves.powers, np.ones(len(waves.starts))) * waves.lengths[:, None] / 2
+        found = np.empty((times.size, waves.powers.shape[1]))
+        last, late = self._begun(times)
+        for delay, ends in zip(self.lines.delays, self.lines.ends, strict=True):
+            first, early = self._begun(times - delay)
+            rows = np.array([whole[low:high, ends].sum(axis=0) for low, high in zip(first, last, strict=True)])
+            found[:, ends] = rows + (late - early)[:, ends]
+        return found
+
+    def _begun(self, times: Array) -> tuple[NDArray[np.intp], Array]:
+        """The panels (k,) in which times lie, and the integrals (k, q) of squares from their starts up to the times."""
+        waves = self.waves
+        index = np.clip(np.searchsorted(waves.starts, times + waves.merge, side="right") - 1, 0, None)
+        places = 2 * (times - waves.starts[index]) / waves.lengths[index] - 1
+        return index, squared(waves.powers[index], places) * waves.lengths[index, None] / 2
+
     def past(self, time: float) -> Past:
         """What left the ends before a time in s, for a run that goes on from there."""
         waves = self.waves
@@ -141,7 +164,9 @@ def trajectory(problem: DelayProblem, panels: Panels, statistics: Mapping[str, i
     ends = Ends(problem, Lines.of(problem.delays), dense.states, waves)
     if problem.t_eval is not None:
         t = np.asarray(problem.t_eval, dtype=float)
-        return DelayTrajectory(t, dense(t), dense, statistics, *ends(t), waves=ends, past=ends.past)
+        return DelayTrajectory(
+            t, dense(t), dense, statistics, *ends(t), waves=ends, squares=ends.squares, past=ends.past
+        )
     edges = pairwise([0, *(count for count, _ in panels.pieces)])
     spans = [(slice(low, high), end) for (low, high), (_, end) in zip(edges, panels.pieces, strict=True)]
     times = [steps[span.start : span.stop + 1] for span, _ in spans]
@@ -149,4 +174,4 @@ def trajectory(problem: DelayProblem, panels: Panels, statistics: Mapping[str, i
     left = np.append(np.diff(t) == 0, True)
     h, v = ends(t)
     h[left], v[left] = ends(t[left], left=True)
-    return DelayTrajectory(t, x, dense, statistics, h, v, waves=ends, past=ends.past)
+    return DelayTrajectory(t, x, dense, statistics, h, v, waves=ends, squares=ends.squares, past=ends.past)

@@ -1,0 +1,150 @@
+"""Where the speeds and torques of a shaft's model stand, and the weights that join them.
+
+Every model but the wave is the same construction. The speeds omega_j stand at nodes x_j, each with a share of the
+shaft's inertia; the torques tau_k stand at stations y_k, each with a share of its length and so of its compliance. One
+matrix of weights w joins them, in both equations:
+
+    d(tau_k)/dt / (C' / l_k) = sum_j w_kj omega_j,     J' h_j d(omega_j)/dt = - sum_k w_kj tau_k + torque at the ends.
+
+Because it is the same matrix, the energy of the shaft changes by the powers at its two ends and by nothing else,
+whatever the weights are. Internal damping only takes energy: a damper stands beside each torque, or between each two
+neighbouring speeds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.polynomial.legendre import Legendre, leggauss, legvander
+
+Row = tuple[tuple[int, float], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A shaft as speeds at nodes and torques at stations.
+
+    Args:
+        intervals: how many times the unit of all shares goes into the shaft.
+        nodes: (n,) places of the speeds, from 0 to 1.
+        inertias: (n,) the length whose inertia is at each; they sum to the shaft, less what a closure leaves out.
+        stations: (k,) places of the torques.
+        lengths: (k,) the length whose compliance is that of each; they sum to the shaft.
+        weights: for each torque the nodes and factors that its rate of twist is the sum of.
+        dampers: (n - 1,) length of the damper between each two neighbouring speeds, where torque k stands at node k;
+            empty where a damper stands beside each torque, with its length.
+        first: number of the first torque.
+    """
+
+    intervals: int
+    nodes: tuple[float, ...]
+    inertias: tuple[float, ...]
+    stations: tuple[float, ...]
+    lengths: tuple[float, ...]
+    weights: tuple[Row, ...]
+    dampers: tuple[float, ...] = ()
+    first: int = 0
+
+
+def chain(m: int, *, half_ends: bool) -> Mesh:
+    """Springs between m + 1 inertias, with half cells at its ends or all inertias alike."""
+    return Mesh(
+        intervals=m,
+        nodes=tuple(k / m for k in range(m + 1)),
+        inertias=(0.5, *[1.0] * (m - 1), 0.5) if half_ends else (m / (m + 1),) * (m + 1),
+        stations=tuple((k + 0.5) / m for k in range(m)),
+        lengths=(1.0,) * m,
+        weights=tuple(((k, 1.0), (k + 1, -1.0)) for k in range(m)),
+    )
+
+
+# Interior stencils as (offset, factor), and the first rows and norm of the boundary closure, times the interval.
+_SECOND = (((-1, -1 / 2), (1, 1 / 2)), (1 / 2,), ((-1 / 2, 1 / 2),))
+_FOURTH = (
+    ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12)),
+    (17 / 48, 59 / 48, 43 / 48, 49 / 48),
+    (
+        (-1 / 2, 59 / 96, -1 / 12, -1 / 32),
+        (-59 / 96, 0.0, 59 / 96),
+        (1 / 12, -59 / 96, 0.0, 59 / 96, -1 / 12),
+        (1 / 32, 0.0, -59 / 96, 0.0, 2 / 3, -1 / 12),
+    ),
+)
+SUMMATION_BY_PARTS = {2: _SECOND, 4: _FOURTH}
+"""By order: stencil, norm and boundary rows. Source: Strand 1994."""
+
+
+def central(m: int, order: int, damper: float) -> Mesh:
+    """Speeds and torques at m + 1 nodes, closed by summation by parts; dampers of a given length."""
+    inside, norm, rows = SUMMATION_BY_PARTS[order]
+    shares = [1.0] * (m + 1)
+    shares[: len(norm)], shares[m + 1 - len(norm) :] = norm, norm[::-1]
+    weights = []
+    for k in range(m + 1):
+        if k < len(rows):
+            row = [(j, -q) for j, q in enumerate(rows[k])]
+        elif k > m - len(rows):
+            row = [(m - j, q) for j, q in enumerate(rows[m - k])][::-1]
+        else:
+            row = [(k + offset, -q) for offset, q in inside]
+        weights.append(tuple((j, weight) for j, weight in row if weight))
+    places = tuple(k / m for k in range(m + 1))
+    return Mesh(m, places, tuple(shares), places, tuple(shares), tuple(weights), (damper,) * m)
+
+
+def central_as_printed(m: int, damper: float) -> Mesh:
+    """Speeds at m + 1 nodes, torques at the m - 1 between the ends, whose speeds have no inertia of the shaft.
+
+    The rows of the first and last torque are those that make, transposed, the equations of the speeds as printed.
+    """
+    first = ((0, 1.0), (1, -0.5), (2, -0.5))
+    inside = (((k - 1, 0.5), (k + 1, -0.5)) for k in range(2, m - 1))
+    last = ((m - 2, 0.5), (m - 1, 0.5), (m, -1.0))
+    return Mesh(
+        intervals=m,
+        nodes=tuple(k / m for k in range(m + 1)),
+        inertias=(0.0, *[1.0] * (m - 1), 0.0),
+        stations=tuple(k / m for k in range(1, m)),
+        lengths=(1.5, *[1.0] * (m - 3), 1.5),
+        weights=(first, *inside, last),
+        dampers=(damper,) * m,
+        first=1,
+    )
+
+
+def spectral(degree: int) -> Mesh:
+    """Speeds at the nodes of Gauss and Lobatto, torques at those of Gauss."""
+    nodes, inertias = lobatto(degree)
+    stations, lengths = leggauss(degree)
+    slopes = -_derivative(nodes, stations) * lengths[:, None]
+    return Mesh(
+        intervals=1,
+        nodes=tuple(((nodes + 1) / 2).tolist()),
+        inertias=tuple((inertias / 2).tolist()),
+        stations=tuple(((stations + 1) / 2).tolist()),
+        lengths=tuple((lengths / 2).tolist()),
+        weights=tuple(tuple(enumerate(row)) for row in slopes.tolist()),
+    )
+
+
+@lru_cache(maxsize=32)
+def lobatto(degree: int) -> tuple[Any, Any]:
+    """Nodes of [-1, 1] and weights (degree + 1,) of the quadrature of Gauss and Lobatto."""
+    polynomial = Legendre.basis(degree)
+    inner = polynomial.deriv().roots() if degree > 1 else np.empty(0)
+    for _ in range(2):  # the roots of a series are good to some ten digits, Newton's method does the rest
+        inner = inner - polynomial.deriv()(inner) / polynomial.deriv(2)(inner) if degree > 1 else inner
+    nodes = np.concatenate([[-1.0], np.sort(inner.real), [1.0]])
+    nodes = (nodes - nodes[::-1]) / 2
+    return nodes, 2 / (degree * (degree + 1) * polynomial(nodes) ** 2)
+
+
+def _derivative(nodes: Any, places: Any) -> Any:
+    """Matrix (places, nodes) from values at nodes to the slopes of their polynomial at other places."""
+    degree = len(nodes) - 1
+    slopes = np.stack([Legendre.basis(k).deriv()(places) for k in range(degree + 1)], axis=1)
+    matrix: Any = np.linalg.solve(legvander(nodes, degree).T, slopes.T).T
+    return matrix - matrix.sum(axis=1, keepdims=True) / (degree + 1)  # a rigid rotation twists nothing, to the last bit

@@ -1,0 +1,116 @@
+"""What is lost where a strong damper gives its torque as a small difference of large parts.
+
+Such a torque is d * omega_1 - d * omega_2. What a tolerance or the rounding of numbers leaves open in the speeds comes
+back in it, times d.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from shaftwork.integrate.problem import Array, Problem
+from shaftwork.integrate.stiffness import LARGEST_EIGENVALUES, balance, scale_by
+
+# So many states of a run tell what its dampers take.
+SAMPLES = 8
+# Where torques may be off by this part because of the rounding of speeds, a run says so.
+WORTH_SAYING = 1e-4
+
+
+def cancellation(problem: Problem, times: Array, states: Array) -> float:
+    """How much larger than the torques of a run are the parts of which dampers make them up; at least 1.
+
+    Torques count that dampers give, that springs give at the speeds of the run, and that reach them within it.
+
+    Args:
+        problem: what was solved.
+        times: (k,) some times of the run, s.
+        states: (k, n) then.
+    """
+    return _largest(problem, times, states, springs=True)
+
+
+def rounding(problem: Problem, times: Array, states: Array) -> str | None:
+    """What to say where the rounding of the speeds alone spoils the torques of dampers, or None.
+
+    Args:
+        problem, times, states: as in `cancellation`.
+    """
+    duration, eps = problem.t_end - problem.t0, float(np.finfo(float).eps)
+    most = max(float(part.sizes.sum(axis=1).max(initial=0.0)) for part in _parts(problem, times[:1], states[:1]))
+    if not most * duration * eps > WORTH_SAYING:
+        return None
+    part = eps * _largest(problem, times, states, springs=False)
+    if part < WORTH_SAYING:
+        return None
+    return (
+        f"strong damping: dampers couple speeds so strongly that the rounding of these speeds alone may change torques "
+        f"by a part of {part:.1g}. Make such a coupling rigid: leave the damper out and wire its ends to one node."
+    )
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A Jacobian in the scale of `balance`, taken apart.
+
+    Two states that push each other apart, a_ij and a_ji of opposite sign, are joined by a spring; all else damps.
+
+    Args:
+        damping: (n, n).
+        sizes: (n, n) of its entries.
+        oscillation: (n,) row sums of the springs, rad/s.
+        scale: (n,) of the states.
+    """
+
+    damping: Any
+    sizes: Any
+    oscillation: Array
+    scale: Array
+
+
+def _largest(problem: Problem, times: Array, states: Array, *, springs: bool) -> float:
+    chosen = np.unique(np.linspace(0, times.size - 1, SAMPLES).astype(int))
+    made, found, other = (np.full(problem.x0.size, np.finfo(float).tiny) for _ in range(3))
+    slowest = 1 / (problem.t_end - problem.t0)
+    parts = _parts(problem, times[chosen], states[chosen])
+    for part, state in zip(parts, states[chosen], strict=True):
+        x = state / part.scale
+        made = np.maximum(made, part.sizes @ np.abs(x))
+        found = np.maximum(found, np.abs(part.damping @ x))
+        other = np.maximum(other, (np.maximum(slowest, part.oscillation) if springs else slowest) * np.abs(x))
+    return float(np.max(made / np.maximum(found, other), initial=1.0))
+
+
+def _parts(problem: Problem, times: Array, states: Array) -> list[_Part]:
+    """Of the Jacobian at each time, all in one scale; of a linear system once for all runs."""
+    linear = problem.linear
+    if linear is not None:
+        if "cancellation" not in linear.found:
+            linear.found["cancellation"] = _split([linear.A])[0]
+        return [linear.found["cancellation"]] * times.size
+    if problem.jacobian is None:
+        nothing = np.zeros((problem.x0.size, problem.x0.size))
+        return [_Part(nothing, nothing, nothing.sum(axis=0), nothing.sum(axis=0) + 1)] * times.size
+    return _split([problem.jacobian(float(t), x) for t, x in zip(times, states, strict=True)])
+
+
+def _split(matrices: list[Any]) -> list[_Part]:
+    rows = [sparse.csr_array(matrix) for matrix in matrices]
+    for matrix in rows:
+        matrix.data[~np.isfinite(matrix.data)] = 0.0  # a slope at a point where the law has none
+    scale = balance(sum(abs(matrix) for matrix in rows))
+    parts = []
+    for matrix in rows:
+        scaled = scale_by(matrix, scale)
+        if scale.size <= LARGEST_EIGENVALUES:
+            scaled = scaled.toarray()  # by far the faster
+            springs = np.where(scaled * scaled.T < 0, scaled, 0.0)
+        else:
+            springs = scaled * (scaled.multiply(scaled.T) < 0)
+        damping = scaled - springs
+        parts.append(_Part(damping, abs(damping), np.asarray(abs(springs).sum(axis=1)), scale))
+    return parts

@@ -1,0 +1,200 @@
+"""Networks with exact shafts in the frequency domain: which shafts, at which point, and the meshes to start from."""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from shaftwork.codegen.elements import Array
+from shaftwork.codegen.linear import Linearization
+from shaftwork.codegen.observer import ModelObserver
+from shaftwork.codegen.operating import initial_state
+from shaftwork.codegen.recovery import History
+from shaftwork.components.shaft_models import MOST_SPECTRAL, OneSpring, Rigid, Spectral, Wave
+from shaftwork.components.shafts import Shaft
+from shaftwork.core.errors import NetworkWarning, ParameterError
+from shaftwork.network.graph import resolve
+from shaftwork.network.netlist import Netlist, Placed
+from shaftwork.pipeline.analysis import Names, Point, SmallMotions, Time, input_names, operating_point
+from shaftwork.pipeline.model import Model
+from shaftwork.results.exact import ExactModel, ExactSlopes
+from shaftwork.results.exact_lines import ExactLines
+from shaftwork.results.modes import Modes, find_modes
+from shaftwork.results.solution import Solution
+
+Compile = Callable[[Netlist], Model]
+OWN = Spectral(16)
+"""The mesh in place of a wave where quantities are named and operating points are read."""
+PER_HALF_WAVE, BESIDES, REFINED = 2.0, 8, 1.4
+"""Degree of a mesh that starts a search to some nine digits: for each half wave, besides, and finer at each attempt."""
+MESHES = 4
+"""Meshes that are kept for later points."""
+
+
+def small_motions(model: Model, compiled: Compile, *, every: bool) -> SmallMotions:
+    """The way from a point to the network near it: by matrices, or with exact shafts where there are any.
+
+    Args:
+        model: the network as it is.
+        compiled: makes the model of a changed netlist.
+        every: whether all its shafts are exact, or those alone that are waves.
+    """
+    shafts = exact_shafts(model.netlist, every=every)
+    if shafts:
+        return ExactNetwork(model, compiled, shafts).near
+    return lambda at, t, inputs: model.linearize(at, inputs=inputs, t=t)
+
+
+def exact_shafts(netlist: Netlist, *, every: bool) -> dict[str, Shaft]:
+    """The shafts that are taken without a mesh, by name."""
+    shafts = {placed.part.name: placed.part for placed in netlist.placed if isinstance(placed.part, Shaft)}
+    without = Rigid | OneSpring
+    return {
+        name: shaft
+        for name, shaft in shafts.items()
+        if isinstance(shaft.resolved, Wave) or (every and not isinstance(shaft.resolved, without))
+    }
+
+
+class ExactNetwork:
+    """A network with some shafts exact, compiled once for many points.
+
+    Args:
+        model: the network as it is.
+        compiled: makes the model of a changed netlist.
+        shafts: the exact ones, by name, in the order of the network.
+    """
+
+    def __init__(self, model: Model, compiled: Compile, shafts: Mapping[str, Shaft]) -> None:
+        self._model, self._compiled, self._shafts = model, compiled, shafts
+        self._meshes: dict[tuple[int, ...], Model] = {}
+
+    @cached_property
+    def _own(self) -> Model:
+        """The network with meshes, as it is but for waves."""
+        waves = {name: shaft for name, shaft in self._shafts.items() if isinstance(shaft.resolved, Wave)}
+        return self._with({name: dataclasses.replace(shaft, model=OWN) for name, shaft in waves.items()})
+
+    @cached_property
+    def _open(self) -> Model:
+        """The network in which the exact shafts are lossless waves: an impedance beside a history at each end."""
+        lossless: dict[str, Any] = {"model": Wave(), "damping": 0.0, "friction": 0.0}
+        return self._with({name: dataclasses.replace(shaft, **lossless) for name, shaft in self._shafts.items()})
+
+    def _with(self, shafts: Mapping[str, Shaft]) -> Model:
+        """The network with shafts replaced. Its warnings are those of the network itself, already given."""
+        if not shafts:
+            return self._model
+        placed = tuple(Placed(shafts.get(item.part.name, item.part), item.nodes) for item in self._model.netlist.placed)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", NetworkWarning)
+            return self._compiled(Netlist(self._model.name, placed))
+
+    @cached_property
+    def _values(self) -> tuple[Mapping[str, float], ...]:
+        """The parameters of the exact shafts in SI."""
+        return tuple(resolve(Placed(shaft, ()))[0].values for shaft in self._shafts.values())
+
+    @cached_property
+    def lines(self) -> ExactLines:
+        """The exact shafts."""
+        rows = []
+        for p in self._values:
+            area = np.pi * (p["diameter"] ** 4 - p["inner_diameter"] ** 4) / 32
+            stiffness, impedance = p["shear_modulus"] * area, area * np.sqrt(p["density"] * p["shear_modulus"])
+            delay = p["length"] * np.sqrt(p["density"] / p["shear_modulus"])
+            rows.append((delay, impedance, p["friction"] * p["length"] / (2 * impedance), p["damping"] / stiffness))
+        return ExactLines(tuple(self._shafts), *np.array(rows).T)
+
+    def near(self, at: Point, t: Time = None, inputs: Names = ()) -> ExactModel:
+        """The network near a point; arguments as for `Model.linearize`.
+
+        Raises:
+            SignalError: there is no such input.
+            SimulationError: a law has no finite slope at the point.
+        """
+        if isinstance(at, Solution) and self._own is not self._model:
+            t, at = float(at.t[-1]) if t is None else t, _values_of(at, self.lines.names)
+        p = self._own.vector()
+        time, x = operating_point(self._own, p, at, t, self._own.settled(p))
+        values = self._read(time, x)
+        names = input_names(self._own, inputs)
+        slopes = ExactSlopes(
+            open=self._opened(values, time, names, History(self._own.bind(), np.array([time]), x[None, :])),
+            lines=self.lines,
+            meshed=Linearization(self._own, p, x, time, ()),
+            profiles=ModelObserver(self._model.form, self._model.bind).profiles,
+            lengths=tuple(p["length"] for p in self._values),
+        )
+        return ExactModel(self._model.name, slopes, lambda radius, attempt: self._starts(values, time, radius, attempt))
+
+    def _read(self, time: float, x: Array) -> dict[str, float]:
+        """The states of the open network at the point, and speeds and torques of the ends of the shafts."""
+        own = {name: k for k, name in enumerate(self._own.states)}
+        observer = ModelObserver(self._own.form, self._own.bind)
+        ends = (
+            f"{name}.{quantity}_{end}" for name in self.lines.names for quantity in ("omega", "tau") for end in "ab"
+        )
+        at = (np.array([time]), x[None, :])
+        return {
+            name: float(x[own[name]]) if name in own else float(observer.signal(name, *at)[0])
+            for name in (*self._open.states, *ends)
+        }
+
+    def _opened(
+        self, values: Mapping[str, float], time: float, inputs: tuple[str, ...], point: History
+    ) -> Linearization:
+        """The open network at the point, its algebraic loops solved as they are there."""
+        graph = self._open.form.graph
+        own = {part.name: part.branches for part in point.form.graph.parts}
+        loops = self._open.bind().loops
+        if loops is not None:
+            parts = ((k, graph.part_of(k)) for k in self._open.form.loop_laws)
+            same = [own[part.name][part.branches.index(k)] for k, part in parts]
+            loops.start_from(point.through[same, 0])
+        x = np.array([values[name] for name in self._open.states])
+        arriving = [
+            sign * values[f"{name}.tau_{end}"] - impedance * values[f"{name}.omega_{end}"]
+            for name, impedance in zip(self.lines.names, self.lines.impedance.tolist(), strict=True)
+            for end, sign in (("a", 1.0), ("b", -1.0))
+        ]
+        return Linearization(self._open, self._open.vector(), x, time, inputs, np.array(arriving))
+
+    def _starts(self, values: Mapping[str, float], time: float, radius: float, attempt: int) -> Modes:
+        """The modes of the network with meshes that are right for |rate| up to a radius."""
+        model = self._meshed(radius, attempt)
+        torques = tuple(f"{name}.tau_{end}" for name in self.lines.names for end in "ab")
+        given = {name: value for name, value in values.items() if name not in torques}
+        x = np.zeros(len(model.states)) if model.linear else initial_state(model.bind(), given, time)
+        return find_modes(model.name, Linearization(model, model.vector(), x, time, ()))
+
+    def _meshed(self, radius: float, attempt: int) -> Model:
+        waves = self.lines.half_waves(radius)
+        degrees = tuple(int(n) for n in np.ceil((PER_HALF_WAVE * waves + BESIDES) * REFINED**attempt))
+        if max(degrees) > MOST_SPECTRAL:
+            shaft = self.lines.names[int(waves.argmax())]
+            raise ParameterError(
+                f"Up to {radius / (2 * np.pi):.4g} Hz there are {waves.max():.0f} half waves along shaft '{shaft}', "
+                f"more than are sought for. Give a smaller f_max or count, or divide the shaft into several in a row."
+            )
+        if degrees not in self._meshes:
+            made = self._with(
+                {
+                    name: dataclasses.replace(shaft, model=Spectral(degree))
+                    for (name, shaft), degree in zip(self._shafts.items(), degrees, strict=True)
+                }
+            )
+            self._meshes = dict([*self._meshes.items(), (degrees, made)][-MESHES:])
+        return self._meshes[degrees]
+
+
+def _values_of(motion: Solution, shafts: tuple[str, ...]) -> dict[str, float]:
+    """The last time of a motion with waves, by speeds, twists and torques that a mesh has too."""
+    names = (*motion.states, *(f"{name}.omega_{end}" for name in shafts for end in "ab"))
+    own = {name: k for k, name in enumerate(motion.states)}
+    return {name: float(motion.x[-1, own[name]] if name in own else motion[name][-1]) for name in names}

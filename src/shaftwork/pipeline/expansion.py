@@ -1,0 +1,77 @@
+"""Long shafts written out part by part: the chain that the array stands for, as a network of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from sympy import Expr
+
+from shaftwork.components.base import Component
+from shaftwork.components.rotation import Damper, Inertia, Spring
+from shaftwork.components.shafts import Shaft
+from shaftwork.core.errors import ParameterError
+from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
+from shaftwork.network.netlist import REFERENCE, Netlist, Placed
+from shaftwork.network.templates import Kind
+
+
+def expanded(netlist: Netlist, graph: CircuitGraph) -> Netlist:
+    """The network with an inertia, a spring or a damper for everything inside its shafts.
+
+    Args:
+        netlist: of the network.
+        graph: of the same network.
+
+    Raises:
+        ParameterError: a shaft is no chain of springs.
+    """
+    made: list[Placed] = []
+    for item, part in zip(netlist.placed, graph.parts, strict=True):
+        made += _chain(item, part, graph) if isinstance(item.part, Shaft) else [item]
+    return Netlist(netlist.name, tuple(made))
+
+
+def _chain(item: Placed, part: GraphPart, graph: CircuitGraph) -> list[Placed]:
+    """The parts of a shaft, from its first end to its second."""
+    name, branches = item.part.name, [graph.branches[k] for k in part.branches]
+    if any(branch.terms or branch.template.line is not None for branch in branches):
+        raise ParameterError(
+            f"Shaft '{name}': model={item.part.values['model']!r} is no chain of springs, so it cannot be written out "
+            "part by part. Lumped(m) can."
+        )
+    names = {number: node.replace(".", " ") for number, node in enumerate(graph.nodes)} | {GROUND: REFERENCE}
+    coefficients = _coefficients(branches, graph)
+    joined: dict[tuple[int, int], dict[Kind, float]] = {}
+    for branch in branches:
+        here = joined.setdefault((branch.plus, branch.minus), {})
+        here[branch.template.kind] = here.get(branch.template.kind, 0.0) + coefficients[branch.index]
+    return [
+        Placed(made, (names[plus],) if isinstance(made, Inertia) else (names[plus], names[minus]))
+        for (plus, minus), laws in joined.items()
+        for made in _parts(name, names[plus], names[minus], laws)
+    ]
+
+
+def _parts(shaft: str, plus: str, minus: str, laws: Mapping[Kind, float]) -> Iterator[Component]:
+    here = plus.removeprefix(f"{shaft} ")
+    stiffness, damping = laws.get(Kind.THROUGH_STORE), laws.get(Kind.CONDUCTANCE)
+    if (inertia := laws.get(Kind.ACROSS_STORE)) is not None:
+        yield Inertia(f"{shaft} J {here}", J=inertia)
+    if stiffness is not None:
+        yield Spring(f"{shaft} c {here}", c=stiffness, d=damping or 0.0)
+    elif damping is not None:
+        to = "" if minus == REFERENCE else f" {minus.removeprefix(f'{shaft} ')}"
+        yield Damper(f"{shaft} d {here}{to}", d=damping)
+
+
+def _coefficients(branches: list[GraphBranch], graph: CircuitGraph) -> dict[int, float]:
+    """The value of each branch's capacity, stiffness or conductance; laws that many share are evaluated once."""
+    known: dict[Expr, float] = {}
+    for branch in branches:
+        law = branch.template.law
+        if law not in known:
+            in_network = graph.in_network_symbols(law, branch)
+            known[law] = float(
+                in_network.evalf(25, subs={s: graph.parameters[s.name] for s in in_network.free_symbols})
+            )
+    return {branch.index: known[branch.template.law] for branch in branches}

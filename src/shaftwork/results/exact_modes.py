@@ -1,0 +1,177 @@
+"""Modes of a network with exact shafts: started from a mesh, refined on the exact shafts, and counted.
+
+The mesh says about where the rates are and how many lie together. Each is then a root of the exact problem to rounding,
+and the argument principle counts the roots of that problem, which knows no mesh: where both numbers agree none is lost,
+doubled or spurious.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shaftwork.core.errors import ParameterError, SimulationError
+from shaftwork.results.exact_problem import ExactProblem
+from shaftwork.results.modes import Modes, checked_count, largest_rate, modes_of
+from shaftwork.results.observer import Array
+from shaftwork.results.slopes import Complex
+
+if TYPE_CHECKING:
+    from shaftwork.results.exact import ExactSlopes
+
+MODES = 10
+"""Modes where nobody says how many."""
+WIDER = 1.3
+"""The mesh is right up to so many times the largest rate wanted: the circle for the count passes a gap between."""
+BELOW = 0.5
+"""Modes are sought up to this fraction of the rate at which, without number, they crowd."""
+TOGETHER = 1e-6
+"""Starts that differ by less than this fraction are refined together."""
+ROOM = 1.001
+"""A circle for a number of modes reaches so many times as far as the next one."""
+APART = 0.5
+"""Roots stay apart by at least this fraction of the distance of their starts."""
+ATTEMPTS = 3
+
+Starts = Callable[[float, int], Modes]
+"""The modes of the network with meshes that are right for |rate| up to a radius, the finer the later the attempt."""
+
+
+def find_exact_modes(
+    title: str, slopes: ExactSlopes, starts: Starts, count: int | None = None, f_max: float | None = None
+) -> Modes:
+    """The modes of smallest |rate|.
+
+    Args:
+        title: of the network.
+        slopes: the network near the point.
+        starts: see `Starts`.
+        count: the modes wanted; by default 10, or all up to f_max.
+        f_max: the largest |rate| / 2 pi, Hz.
+
+    Raises:
+        ParameterError: count or f_max is out of its range, or modes without number crowd below it.
+        SimulationError: it cannot be settled that all modes were found.
+    """
+    asked, limit = checked_count(count), BELOW * slopes.lines.crowding
+    if f_max is not None:
+        radius = largest_rate(f_max)
+        if radius > limit:
+            raise _crowded(slopes, f"f_max = {f_max:g} Hz")
+        return _lowest(_settled(title, slopes, starts, radius), asked)
+    enough = MODES if asked is None else asked
+    radius = min(np.pi * enough / float(slopes.lines.delay.sum()), limit)
+    while slopes.lines.half_waves(radius).sum() > 1.01 * enough:  # a mode for each half wave, roughly
+        radius /= 2
+    sizes = np.sort(np.abs(starts(WIDER * radius, 0).rates))
+    if len(sizes) > enough and sizes[enough] > 0:  # no farther than these few are, which the mesh knows
+        radius = min(radius, ROOM * float(sizes[enough]))
+    while True:
+        found = _settled(title, slopes, starts, radius)
+        if len(found) >= enough or (asked is None and radius == limit):
+            return _lowest(found, enough)
+        if radius == limit:
+            raise _crowded(slopes, f"count = {enough}")
+        radius = min(2 * radius, limit)
+
+
+def _lowest(modes: Modes, count: int | None) -> Modes:
+    kept = np.argsort(np.abs(modes.rates), kind="stable")[:count]
+    return modes_of(modes.title, modes.slopes, modes.rates[kept], modes.vectors[:, kept])
+
+
+def _crowded(slopes: ExactSlopes, asked: str) -> ParameterError:
+    shaft = slopes.lines.names[int(slopes.lines.damping.argmax())]
+    most = 0.99 * BELOW * slopes.lines.crowding / (2 * np.pi)  # also with the digits that are shown
+    return ParameterError(
+        f"{asked}: the internal damping of shaft '{shaft}' makes modes without number whose rates crowd at "
+        f"-C'/D' = {-slopes.lines.crowding:.4g} 1/s. All modes can be named up to f_max = {most:.4g} Hz."
+    )
+
+
+def _settled(title: str, slopes: ExactSlopes, starts: Starts, radius: float) -> Modes:
+    """All modes with |rate| up to a radius."""
+    for attempt in range(ATTEMPTS):
+        mesh = starts(WIDER * radius, attempt)
+        outer = _gap(np.abs(mesh.rates), radius)
+        inside = np.flatnonzero(np.abs(mesh.rates) < outer)
+        problem, kept, following = _problem(slopes)
+        try:
+            rates, found = _refined(problem, mesh.rates[inside][mesh.rates[inside] != 0])
+        except SimulationError:
+            continue
+        standing = inside[mesh.rates[inside] == 0]
+        complete = problem.count(outer) == len(standing) + np.where(rates.imag > 0, 2, 1).sum()
+        if not complete:
+            continue
+        weights = slopes.weights[:, None]
+        vectors = np.zeros((len(weights), len(rates)), dtype=complex)
+        vectors[np.concatenate([kept, np.arange(len(slopes.open.states), len(weights))])] = found
+        vectors /= weights
+        _follow(slopes, following, rates, vectors)
+        rates = np.concatenate([np.zeros(len(standing), dtype=complex), rates])
+        vectors = np.hstack([_standing(slopes, mesh, standing), vectors])
+        below = np.abs(rates) <= radius
+        return modes_of(title, slopes, rates[below], vectors[:, below])
+    raise SimulationError(
+        f"The modes of '{title}' up to {radius / (2 * np.pi):.6g} Hz could not be settled: those found from a mesh "
+        f"differ in number from the exact ones. Ask for another f_max, or take model=Spectral(32) and exact=False."
+    )
+
+
+def _gap(sizes: Array, radius: float) -> float:
+    """The middle of the widest gap between the sizes from a radius to WIDER times it."""
+    edges = np.sort(np.concatenate([[radius, WIDER * radius], sizes[(sizes > radius) & (sizes < WIDER * radius)]]))
+    first = int(np.diff(np.log(edges)).argmax())
+    return float(np.sqrt(edges[first] * edges[first + 1]))
+
+
+def _problem(slopes: ExactSlopes) -> tuple[ExactProblem, NDArray[np.intp], NDArray[np.intp]]:
+    """The problem without angles that are only recorded; the states that it has, and those that follow."""
+    matrix = slopes.open.A
+    reads = np.asarray(abs(matrix).sum(axis=0) + abs(slopes.open.C).sum(axis=0)).ravel() > 0
+    reads[: len(reads) - slopes.open.angles] = True
+    kept, following = np.flatnonzero(reads), np.flatnonzero(~reads)
+    return ExactProblem(slopes.open, slopes.lines, slopes.weights, kept), kept, following
+
+
+def _refined(problem: ExactProblem, starts: Complex) -> tuple[Complex, Complex]:
+    """The roots next to the starts and their vectors.
+
+    Raises:
+        SimulationError: two starts have led to one root, or one to none.
+    """
+    groups: list[list[int]] = []
+    for k in np.lexsort((starts.real, starts.imag)).tolist():
+        near = groups and abs(starts[groups[-1][0]] - starts[k]) <= TOGETHER * abs(starts[k])
+        groups[-1].append(k) if near else groups.append([k])
+    order = np.array([k for group in groups for k in group], dtype=np.intp)
+    if not groups:
+        return starts, np.zeros((problem.unknowns, 0), dtype=complex)
+    found = [problem.roots(starts[group]) for group in groups]
+    rates = np.concatenate([root for root, _ in found])
+    label = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
+    before, after = (np.abs(each[:, None] - each[None, :]) for each in (starts[order], rates))
+    if ((after < APART * before) & (label[:, None] != label)).any():
+        raise SimulationError("Two modes of the mesh are one mode of the shafts.")
+    return rates, np.hstack([vectors for _, vectors in found])
+
+
+def _standing(slopes: ExactSlopes, mesh: Modes, columns: NDArray[np.intp]) -> Complex:
+    """What does not change at all, in which nothing moves along a shaft: as on the mesh, (n, k)."""
+    own = {name: k for k, name in enumerate(mesh.slopes.states)}
+    rows = [mesh.vectors[own[name]] if name in own else mesh.shapes[name] for name in slopes.open.states]
+    middle = ((f"{name}.{quantity}" for quantity in ("omega", "tau")) for name in slopes.lines.names)
+    rows += [(mesh.shapes[f"{made}_a"] + mesh.shapes[f"{made}_b"]) / 2 for shaft in middle for made in shaft]
+    return np.array(rows).reshape(len(rows), len(mesh))[:, columns]
+
+
+def _follow(slopes: ExactSlopes, following: NDArray[np.intp], rates: Complex, vectors: Complex) -> None:
+    """Enter the angles that are only recorded, which have no rate of their own."""
+    states = len(slopes.open.states)
+    arriving = slopes.arriving(rates, vectors)
+    change = slopes.open.A @ vectors[:states] + slopes.open.B[:, len(slopes.inputs) :] @ arriving
+    vectors[following] = change[following] / rates

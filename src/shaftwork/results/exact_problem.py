@@ -1,0 +1,150 @@
+"""The nonlinear eigenvalue problem of a network with exact shafts: its matrix, its roots, and how many they are."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shaftwork.core.errors import SimulationError
+from shaftwork.results.exact_lines import ExactLines
+from shaftwork.results.observer import Array
+from shaftwork.results.slopes import Complex, OpenSlopes
+
+ENTRIES = 1_000_000
+"""Numbers of matrices held at once."""
+ITERATIONS, CONVERGED, SETTLED = 30, 1e-15, 1e-9
+"""Steps to a root; found where a step is below the first fraction of it, or below the second and shrinks no more."""
+POINTS = (256, 512, 1024, 2048, 4096, 8192, 16384)
+"""Points on a half circle for the count of the roots in it; two numbers of points must agree."""
+WHOLE = 0.01
+"""A count is whole when it is nearer to a whole number than this."""
+
+
+class ExactProblem:
+    """M(s) u = 0 in variables of equal units, with rows such that M'(s) is of size one.
+
+    Args:
+        slopes: the network without its shafts.
+        lines: the shafts.
+        weights: (n,) factors of x, V and W with which they have equal units.
+        kept: the states x that have modes; None for all.
+    """
+
+    def __init__(
+        self, slopes: OpenSlopes, lines: ExactLines, weights: Array, kept: NDArray[np.intp] | None = None
+    ) -> None:
+        states, inputs = slopes.A.shape[0], len(slopes.inputs)
+        kept = np.arange(states) if kept is None else kept
+        rows = np.repeat(np.sqrt(lines.impedance / lines.delay), 2)[:, None]
+        w = weights[kept][:, None]
+        self._lines, self._scale = lines, 1 / weights[states:]
+        self._A = w * slopes.A[kept][:, kept].toarray() / w.T
+        self._C = rows * slopes.C[:, kept].toarray() / w.T
+        self._arriving, self._through = w * slopes.B[kept, inputs:], rows * slopes.D[:, inputs:]
+        self._rows = rows
+        self._level = np.vstack([w * slopes.B[kept, :inputs], rows * slopes.D[:, :inputs]])
+        self._rate = np.vstack([w * slopes.B1[kept, :inputs], np.zeros((len(rows), inputs))])
+        self._states, self.unknowns = len(kept), len(kept) + len(rows)
+        self.size = float(max([*abs(self._A).sum(axis=0), *(1 / lines.delay)]))
+
+    def matrix(self, s: Complex) -> Complex:
+        """M (k, n, n) at s (k,)."""
+        made = self._joined(*self._lines.ends(s))
+        made[:, : self._states, : self._states] -= self._A
+        made[:, self._states :, : self._states] = -self._C
+        diagonal = np.arange(self._states)
+        made[:, diagonal, diagonal] += s[:, None]
+        return made
+
+    def slope(self, s: Complex) -> Complex:
+        """d M / d s (k, n, n)."""
+        made = self._joined(*self._lines.end_slopes(s))
+        diagonal = np.arange(self._states)
+        made[:, diagonal, diagonal] += 1.0
+        return made
+
+    def driven(self, s: Complex, number: int) -> Complex:
+        """The right-hand side (k, n) under an input of amplitude one."""
+        return np.asarray(self._level[:, number] + np.multiply.outer(s, self._rate[:, number]))
+
+    def count(self, radius: float) -> int:
+        """How many roots have |s| below a radius, each as often as it is one.
+
+        Law: the integral of trace(M^-1 M') ds / (2 pi i) around them, by the midpoint rule, which converges the
+        faster the farther the nearest root is from the circle. Conjugate points add up to the real part.
+
+        Raises:
+            SimulationError: it does not become a whole number.
+        """
+        before = np.inf
+        for points in POINTS:
+            s = radius * np.exp(1j * np.pi * (np.arange(points) + 0.5) / points)
+            found = float(self._turning(s).mean())
+            if abs(found - before) < WHOLE and abs(found - round(found)) < WHOLE:
+                return round(found)
+            before = found
+        raise SimulationError(
+            f"The modes up to {radius / (2 * np.pi):g} Hz cannot be counted: one is too near. Ask for another f_max."
+        )
+
+    def _joined(self, speeds: Complex, torques: Complex) -> Complex:
+        """What V and W (k, q, 2, 2) do to the rows of the network and of the ends, (k, n, n), the rest zero."""
+        count, shafts = speeds.shape[:2]
+        ends = np.zeros((2, count, 2 * shafts, 2 * shafts), dtype=complex)
+        for k in range(shafts):
+            here = slice(2 * k, 2 * k + 2)
+            ends[0, :, here, here] = speeds[:, k]
+            ends[1, :, here, here] = torques[:, k] - self._lines.impedance[k] * speeds[:, k]
+        speed, arriving = ends * self._scale
+        made = np.zeros((count, self.unknowns, self.unknowns), dtype=complex)
+        made[:, : self._states, self._states :] = -self._arriving @ arriving
+        made[:, self._states :, self._states :] = self._rows * speed - self._through @ arriving
+        return made
+
+    def _turning(self, s: Complex) -> Array:
+        """Real part (k,) of s trace(M^-1 M')."""
+        chunk = max(1, ENTRIES // self.unknowns**2)
+        pieces = [s[first : first + chunk] for first in range(0, len(s), chunk)]
+        traces = [np.trace(np.linalg.solve(self.matrix(z), self.slope(z)), axis1=1, axis2=2) for z in pieces]
+        return np.asarray((s * np.concatenate(traces)).real)
+
+    def roots(self, starts: Complex) -> tuple[Complex, Complex]:
+        """Roots (g,) next to starts (g,) that lie close together, and their vectors (n, g) in the variables given.
+
+        Law: two-sided inverse iteration of g vectors at once, with a Rayleigh quotient in the space that they span:
+        M(s) and M'(s) between them make a small linear problem for the distances of all g roots from s. What is on the
+        imaginary axis stays there (nothing is lost or supplied), and on the real axis.
+
+        Raises:
+            SimulationError: they were not found.
+        """
+        axis = next((unit for unit in (1.0, 1j) if not (starts / unit).imag.any()), None)
+        centre, before = complex(starts.mean()), np.inf
+        random = np.random.default_rng(0)
+        right, left = (random.normal(size=(self.unknowns, len(starts))) + 0j for _ in range(2))
+        for _ in range(ITERATIONS):
+            s = np.array([centre])
+            matrix, slope = self.matrix(s)[0], self.slope(s)[0]
+            right = _basis(matrix, slope @ right)
+            left = _basis(matrix.conj().T, slope.conj().T @ left)
+            reduced = np.linalg.solve(left.conj().T @ slope @ right, left.conj().T @ matrix @ right)
+            distances, shapes = np.linalg.eig(-reduced)
+            if axis is not None:
+                distances = (distances / axis).real * axis
+            step = complex(distances.mean())
+            centre += step
+            if abs(step) <= CONVERGED * abs(centre) or before <= abs(step) <= SETTLED * abs(centre):
+                return centre + distances - step, right @ shapes
+            before = abs(step)
+        raise SimulationError(f"No mode was found next to the rate {starts[0]:.6g} 1/s.")
+
+
+def _basis(matrix: Complex, vectors: Complex) -> Complex:
+    """An orthonormal basis of matrix^-1 vectors; a singular value of zero is taken for a rounding error."""
+    try:
+        solved = np.linalg.solve(matrix, vectors)
+    except np.linalg.LinAlgError:
+        left, sizes, right = np.linalg.svd(matrix)
+        floored = np.maximum(sizes, np.finfo(float).eps * sizes[0])[:, None]
+        solved = right.conj().T @ (left.conj().T @ vectors / floored)
+    return np.asarray(np.linalg.qr(solved)[0])

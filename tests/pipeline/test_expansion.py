@@ -1,0 +1,66 @@
+"""Shafts written out part by part."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import shaftwork as sw
+
+
+def train(model: object, **shaft: float) -> sw.Network:
+    net = sw.Network("train")
+    net.add(sw.KlossMotor("motor", tau_k=30.0, s_k=0.2, n_sync=1500), "m")
+    net.add(sw.Inertia("Je", J=0.025), "m")
+    net.add(sw.Shaft("line", length=1.0, diameter=0.02, **shaft, model=model), "m", "x")
+    net.add(sw.Gear("gear", ratio=2.0), "x", "y")
+    net.add(sw.Shaft("second", length=0.6, diameter=0.03, **shaft, model=model), "y", "l")
+    net.add(sw.Inertia("Jm", J=0.3), "l")
+    return net
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    m=st.integers(1, 7),
+    ends=st.sampled_from(["half", "full"]),
+    damping=st.sampled_from([0.0, 0.02]),
+    friction=st.sampled_from([0.0, 0.3]),
+)
+def test_the_chain_of_parts_equals_the_array(m: int, ends: str, damping: float, friction: float) -> None:
+    """The same equations in another order of additions; 1e-9 is what a run at 1e-12 makes of the rounding."""
+    net = train(sw.Lumped(m, ends=ends), damping=damping, friction=friction)
+    array, chain = net.compile(), net.compile(expand=True)
+    assert len(array.states) == len(chain.states)
+    one, other = (model.simulate(0.02, engine="scipy", rtol=1e-12, t_eval=21) for model in (array, chain))
+    for name in ("Je.omega", "Jm.omega", "motor.tau", "gear.tau_a"):
+        np.testing.assert_allclose(one[name], other[name], atol=1e-9 * np.abs(one[name]).max())
+    for k in range(1, m):
+        inside = one["line.omega"][:, k]
+        np.testing.assert_allclose(inside, other[f"line {k}.omega"], atol=1e-9 * np.abs(inside).max())
+
+
+def test_every_row_of_the_chain_is_printed() -> None:
+    equations = train(sw.Lumped(4)).equations(expand=True)
+    assert sum("line J" in row.name for row in equations.states) == 4  # its first end turns with Je
+    assert [part.name for part in train(sw.Lumped(2)).expanded().parts][1:7] == [
+        "Je",
+        "line J m",
+        "line J 1",
+        "line J x",
+        "line c m",
+        "line c 1",
+    ]
+
+
+def test_one_spring_is_a_spring() -> None:
+    (spring,) = (part for part in train(sw.OneSpring()).expanded().parts if part.name.startswith("line"))
+    assert isinstance(spring, sw.Spring)
+    assert spring.c == pytest.approx(79.3e9 * np.pi * 0.02**4 / 32, rel=1e-14)
+
+
+@pytest.mark.parametrize("model", [sw.Spectral(4), sw.CentralDifference(8), sw.Wave(), sw.Rigid()])
+def test_what_is_no_chain_of_springs_is_named(model: object) -> None:
+    with pytest.raises(sw.ParameterError, match=r"Shaft 'line': model=.* is no chain of springs.*Lumped\(m\) can"):
+        train(model).expanded()
