@@ -143,6 +143,8 @@ def _run(options: argparse.Namespace) -> None:
 
 
 def _compare(options: argparse.Namespace) -> None:
+    for library in ("OPENBLAS", "MKL", "OMP"):  # threads that wait for each other would count as CPU time
+        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     from shaftwork.components.shafts import Shaft
     from shaftwork.core.errors import ParameterError
     from shaftwork.studies import work_precision

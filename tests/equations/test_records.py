@@ -130,7 +130,7 @@ def test_only_derived_quantities_that_occur_are_defined() -> None:
     }
     assert names == {
         "OneSpring()": ["line.area_moment", "line.line_stiffness"],
-        "Wave(places=5)": ["line.area_moment", "line.impedance"],
+        "Wave(places=5)": ["line.area_moment", "line.impedance", "line.delay"],
     }
     assert not equations_of(crane()).definitions
 

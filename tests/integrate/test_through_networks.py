@@ -87,7 +87,7 @@ def test_a_cubic_torque_against_a_cubic_spring_starts_from_rest(engine: str) -> 
     assert sol["J.omega"][-1] == pytest.approx(reference["J.omega"][-1], rel=1e-6)
 
 
-ROUGH = [1 - sympy.sqrt(sw.omega), 1 - sympy.Abs(sw.omega) ** 1.7, sympy.sqrt(sw.t), sw.t**17]
+ROUGH = [1 - sympy.sqrt(sw.omega), 1 - sympy.Abs(sw.omega) ** 1.7, sympy.sqrt(sw.t)]
 
 
 @pytest.mark.parametrize("tau", ROUGH, ids=str)
@@ -131,9 +131,10 @@ def test_sundials_says_once_why_it_failed(capfd: pytest.CaptureFixture[str]) -> 
     assert capfd.readouterr() == ("", "")
 
 
-def test_the_exact_engine_says_that_an_input_is_no_straight_line() -> None:
-    with pytest.raises(sw.ParameterError, match="straight lines in time"):
-        body(sympy.sin(sw.t)).simulate(1.0, engine="exact")
+def test_the_exact_engine_says_that_an_input_is_too_rough() -> None:
+    """A root has no slope at zero, so no polynomials resolve it."""
+    with pytest.raises(sw.ParameterError, match="polynomials resolve the input"):
+        body(sympy.sqrt(sw.t)).simulate(1.0, engine="exact")
 
 
 def test_a_law_that_jumps_in_the_speed_is_not_linear() -> None:

@@ -53,14 +53,25 @@ class BoundArrays:
 
     def values(self, t: Any, x: Array) -> tuple[Array, Array]:
         """Outputs y and inputs u at states x, (n,) or (n, k) with t (k,)."""
-        inputs, part = self.program.inputs, self.part
         if self.loops is not None:
             return self._values_with_loops(self.loops, t, x)
-        y = part.C @ x[: inputs.states]
+        inputs = self.program.inputs
+        y = self._outputs(t, x)
+        return y, inputs.values(t, y, x, self.p)
+
+    def _outputs(self, t: Any, x: Array) -> Array:
+        """Outputs y where there are no loops."""
+        inputs, part = self.program.inputs, self.part
+        y: Array = part.C @ x[: inputs.states]
         if part.D.nnz:  # only inputs of time alone reach the outputs: else there is a loop
             first = inputs.values(t, np.zeros((inputs.outputs, *x.shape[1:])), x, self.p)
             y = y + part.D @ _times(inputs.of_time, first)
-        return y, inputs.values(t, y, x, self.p)
+        return y
+
+    def switches(self, t: Array, x: Array) -> Array:
+        """What jumps or bends a law where its sign changes, (k, m), at times (k,) and states (k, n)."""
+        y = self._outputs(t, x.T) if self.loops is None else self.values(t, x.T)[0]
+        return self.program.inputs.switches(t, y, x.T, self.p).T
 
     def _values_with_loops(self, loops: LoopSolver, t: Any, x: Array) -> tuple[Array, Array]:
         if x.ndim == 1:

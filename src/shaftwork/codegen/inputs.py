@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from sympy import Expr, I, Integer, nan
 from shaftwork.codegen.code import vectorised
 from shaftwork.codegen.elements import Array, Index, TemplateGroup, groups_of
 from shaftwork.components.branches import ACROSS, INTEGRAL
+from shaftwork.components.laws import switches
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import jumps, slope
 from shaftwork.network.templates import Kind
@@ -31,6 +33,21 @@ class _Group:
     integrals: Index
     value: Function
     slopes: tuple[Function | None, Function | None, Function | None]
+
+    @cached_property
+    def moving(self) -> tuple[tuple[Expr, tuple[float, ...]], ...]:
+        """What makes the law jump or bend because of the motion, each once, and at which levels."""
+        law = self.made_of.template.law
+        if self.made_of.template.kind is not Kind.LAW or not law.has(ACROSS, INTEGRAL):
+            return ()
+        found = ((argument, tuple(levels)) for argument, levels in switches(law) if argument.has(ACROSS, INTEGRAL))
+        return tuple(dict.fromkeys(found))
+
+    @cached_property
+    def switches(self) -> tuple[tuple[Function, Array], ...]:
+        """`moving` as functions, and the levels."""
+        symbols = (TIME, ACROSS, INTEGRAL, *self.made_of.template.symbols)
+        return tuple((vectorised(symbols, argument), np.array(levels)) for argument, levels in self.moving)
 
 
 class Inputs:
@@ -109,22 +126,45 @@ class Inputs:
         integrals = [(g.inputs, g.integrals) for g in self._groups if g.outputs.size and g.integrals.size]
         return (*_joined(pairs), *_joined(integrals))
 
+    @property
+    def switching(self) -> bool:
+        """Whether a law jumps or bends because of the motion."""
+        return any(group.moving for group in self._groups)
+
+    def switches(self, t: Array, y: Array, x: Array, p: Array) -> Array:
+        """What jumps or bends a law where its sign changes, (m, k), at times (k,), outputs (outputs, k), states (n, k).
+
+        One row for each switch, level and branch; a level of a table is a kink like any other.
+        """
+        rows: list[Array] = []
+        with np.errstate(all="ignore"):
+            for group in self._groups:
+                if not group.moving:
+                    continue
+                read, free = _read(group, y, x, p), np.zeros((group.inputs.size, t.size))
+                for function, levels in group.switches:
+                    value = function(t, *read) + free
+                    rows.append((value - levels[:, None, None]).reshape(-1, t.size))
+        return np.concatenate(rows)
+
     def _evaluate(self, pick: Callable[[_Group], Function | None], t: Any, y: Array, x: Array, p: Array) -> Array:
         result = np.zeros((self.size, *np.shape(x)[1:]))
         t = np.float64(t)  # of Python's floats the cube root of -1 is complex, and 1 / 0 an exception
         with np.errstate(all="ignore"):  # a law that has no value is NaN here; the engines say when and where
             for group in self._groups:
                 function = pick(group)
-                if function is None:
-                    continue
-                across = y[group.outputs] if group.outputs.size else 0.0
-                known = group.integrals.size and group.integrals[-1] < len(x)  # not the waves, where none are given
-                integral = x[group.integrals] if known else 0.0
-                parameters = p[group.made_of.places]
-                if result.ndim > 1:
-                    parameters = parameters[..., None]
-                result[group.inputs] = function(t, across, integral, *parameters)
+                if function is not None:
+                    result[group.inputs] = function(t, *_read(group, y, x, p))
         return result
+
+
+def _read(group: _Group, y: Array, x: Array, p: Array) -> tuple[Any, ...]:
+    """What the laws of a group read: across variables, integrals, parameters."""
+    across = y[group.outputs] if group.outputs.size else 0.0
+    known = group.integrals.size and group.integrals[-1] < len(x)  # not the waves, where none are given
+    integral = x[group.integrals] if known else 0.0
+    parameters = p[group.made_of.places]
+    return (across, integral, *(parameters if x.ndim == 1 else parameters[..., None]))
 
 
 def _joined(pairs: Sequence[tuple[Index, Index]]) -> tuple[Index, Index]:

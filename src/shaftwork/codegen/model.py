@@ -12,7 +12,9 @@ import numpy as np
 from shaftwork.codegen.arrays import ArrayProgram, BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.scalar import ScalarProgram
+from shaftwork.components.laws import pieces_degree
 from shaftwork.core.errors import ParameterError
+from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.rows import BlockTooLargeError, Rows, explicit_rows
 
@@ -64,6 +66,14 @@ class CompiledModel:
             return explicit_rows(self.form)
         except BlockTooLargeError:
             return None
+
+    @cached_property
+    def degree(self) -> int | None:
+        """The largest degree in time of the laws of time between their breakpoints; None where one is no polynomial."""
+        kinds = (Kind.LAW, Kind.THROUGH_SOURCE, Kind.ACROSS_SOURCE)
+        laws = [b.template.law for b in self.form.graph.branches if b.template.kind in kinds]
+        found = [pieces_degree(law) for law in laws]
+        return None if None in found else max((degree for degree in found if degree is not None), default=0)
 
     @cached_property
     def scalar(self) -> ScalarProgram | None:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from collections.abc import Callable, Sequence
+from functools import cached_property, lru_cache
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from sympy import Expr
 
 from shaftwork.codegen.arrays import BoundArrays
+from shaftwork.codegen.code import scalar
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.recovery import History
 from shaftwork.components.base import Profile
 from shaftwork.network.graph import GraphPart
+from shaftwork.network.templates import BranchTemplate
 
 
 class Dense(Protocol):
@@ -69,14 +71,15 @@ class WaveSystem:
         made = []
         for branch in self._form.waves[::2]:
             template, places = graph.branches[branch].template, graph.part_of(branch).parameters
-            values = {symbol: float(p[places[symbol.name]]) for symbol in template.symbols}
-            made.append([_value(expression, values) for expression in template.line or ()])
+            made.append(_line(template)(*(float(p[places[symbol.name]]) for symbol in template.symbols)))
         impedances, delays = np.array(made).T
         return impedances, delays
 
 
-def _value(expression: Expr, values: dict[Any, float]) -> float:
-    return float(expression.evalf(25, subs=values))
+@lru_cache(maxsize=256)
+def _line(template: BranchTemplate) -> Callable[..., Sequence[float]]:
+    """From the values of its symbols to a line's impedance and delay."""
+    return scalar(list(template.symbols), list(template.line or ()))
 
 
 def along_lines(bound: BoundArrays, part: GraphPart, profile: Profile, t: Array, dense: Dense) -> Array:

@@ -17,6 +17,7 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.integrate.banded_matrix import ShiftedMatrix
 from shaftwork.integrate.banded_method import ShiftedCollocation, shifted_collocation
 from shaftwork.integrate.banded_stages import LinearStages, NewtonStages, Stages, StepStart, shifted
+from shaftwork.integrate.crossings import Crossings
 from shaftwork.integrate.pieces import Pace, Piece, both_sides, check_finite, failure, pieces, start_of_piece
 from shaftwork.integrate.problem import Array, Problem, Trajectory
 
@@ -171,10 +172,8 @@ class _Run:
     def march(self, number: int, piece: Piece) -> None:
         """Step through one piece."""
         before = self.ends[-1] if self.ends else np.asarray(self.problem.x0, dtype=float)
-        start = self._open(piece, start_of_piece(self.problem, piece, before))
-        # At first no state moves by more than its tolerance, over the peak: that step stands, and soon grows.
-        speed = self.method.peak * float((np.abs(start.rate) / start.scale).max())
-        step = 1 / speed if speed > 0 else piece.end - piece.start
+        start, step = self._open(piece, piece.start, start_of_piece(self.problem, piece, before))
+        crossings = Crossings(self.problem, piece)
         while start.t < piece.end:
             self._check(start, step)
             length, end = _fitted(start.t, step, piece.end)
@@ -184,11 +183,18 @@ class _Run:
             if arc is None or factor < SAFETY:
                 step, self.rejected = factor * length, self.rejected + 1
                 continue
+            cut = crossings.cut(start.t, start.x, end, arc.end, arc.at)
+            if cut is not None and cut < end:
+                step, self.rejected = cut - start.t, self.rejected + 1
+                continue
             if factor > WORTH:
                 step = max(step, factor * length)
             self.steps.append(_Step(number, start.t, length, start.x, start.rate if self.stages.noisy else None))
             self.outputs.fill(start.t, end, arc)
-            self._finish(end, arc.end)
+            self._finish(end, arc.end, rests=crossings.rests)
+            if cut is not None and end < piece.end:
+                start, step = self._open(piece, end, arc.end)
+                continue
             rate = arc.rate if self.stages.noisy or end == piece.end else self.stages.rate(end, arc.end)
             start = StepStart(end, arc.end, rate, scale)
         self.ends.append(start.x)
@@ -207,10 +213,14 @@ class _Run:
             return None
         return None if modes is None else _Arc(self, start, length, modes)
 
-    def _open(self, piece: Piece, x: Array) -> StepStart:
-        self.outputs.start(piece.start, x)
+    def _open(self, piece: Piece, t: float, x: Array) -> tuple[StepStart, float]:
+        """Start anew: from where, and the length of the first step in s."""
+        self.outputs.start(t, x)
         self.stages.open(piece)
-        return StepStart(piece.start, x, self.stages.rate(piece.start, x), self.scale(x))
+        start = StepStart(t, x, self.stages.rate(t, x), self.scale(x))
+        # At first no state moves by more than its tolerance, over the peak: that step stands, and soon grows.
+        speed = self.method.peak * float((np.abs(start.rate) / start.scale).max())
+        return start, 1 / speed if speed > 0 else piece.end - t
 
     def _factor(self, arc: _Arc, scale: Array) -> float:
         """The factor by which the next step may be longer; below `SAFETY` this one was too long."""
@@ -227,9 +237,9 @@ class _Run:
             reason = self.stages.reason("the step became too small")
             raise failure(self.problem, "banded", start.t, start.x, reason)
 
-    def _finish(self, t: float, x: Array) -> None:
+    def _finish(self, t: float, x: Array, *, rests: bool) -> None:
         check_finite(self.problem, "banded", t, x)
-        if (objection := self._pace.objection(t)) is not None:
+        if (objection := self._pace.objection(t, rests=rests)) is not None:
             raise failure(self.problem, "banded", t, x, objection)
 
 

@@ -86,6 +86,11 @@ def choose(problem: Problem) -> tuple[str, str]:
             return "exact", "The system is linear with inputs of straight pieces, so it is propagated exactly."
         if _is_chain(problem):
             return "banded", f"The system is a long linear chain: exact propagation would take about {seconds:.2g} s."
+    if problem.driven is not None:
+        from shaftwork.integrate.exact import drivable
+
+        if drivable(problem):
+            return "exact", "The system is linear with smooth inputs, so its modes are propagated without a step error."
     compiled = ENGINES["heyoka"].installed and problem.program is not None
     stiff = _stiff(problem, compiled=compiled)
     if stiff is not None:

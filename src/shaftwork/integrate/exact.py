@@ -14,6 +14,7 @@ from scipy.linalg import expm
 from scipy.sparse.linalg import expm_multiply
 
 from shaftwork.core.errors import ParameterError
+from shaftwork.integrate.driven import driven, polynomials
 from shaftwork.integrate.modal import Modes, find_modes
 from shaftwork.integrate.pieces import Piece, both_sides, failure, pieces, start_of_piece
 from shaftwork.integrate.problem import Array, LinearInputs, Problem, Trajectory
@@ -25,31 +26,41 @@ OWN_INTERVALS = 500
 DENSE_RATE, SPARSE_CALL, SPARSE_RATE = 1e10, 1e-5, 5e8
 # Products with A that the truncated Taylor series of `expm_multiply` takes for a unit of (norm of A) * time.
 TAYLOR_PRODUCTS = 6.0
+# States up to which inputs that are no straight lines are followed mode by mode.
+LARGEST_DRIVEN = 600
 # A forcing may differ from a straight line by this part of its size before it is refused.
 STRAIGHT = 1e-7
 
 
 def solve(problem: Problem) -> Trajectory:
-    """Propagate x' = A x + u(t), u a straight line in each piece, from output to output without a step error.
+    """Propagate x' = A x + u(t), from output to output without a step error.
 
-    Law: a small A with well-conditioned modes is solved mode by mode. Otherwise, with z = (x, s, 1) and z' = M z, where
-    M holds A and the two coefficients of u, z(t + h) = exp(M h) z(t). A may be singular, defective or stiff.
+    Law: a small A with well-conditioned modes is solved mode by mode, with u a straight line in each piece, or any
+    smooth function, which becomes polynomials that leave out 1e-13 of it. Otherwise u must be a straight line; with
+    z = (x, s, 1) and z' = M z, where M holds A and the two coefficients of u, z(t + h) = exp(M h) z(t). A may then be
+    singular, defective or stiff.
 
     Raises:
-        ParameterError: the system is not linear, or its forcing is no straight line.
+        ParameterError: the system is not linear, or its forcing is neither straight nor driven mode by mode.
         SimulationError: the motion is unbounded.
 
     Source: Van Loan, Computing integrals involving the matrix exponential, 1978; Al-Mohy and Higham, Computing the
     action of the matrix exponential, 2011.
     """
-    if problem.linear is None:
+    linear = problem.linear or problem.driven
+    if linear is None:
         raise ParameterError(
-            "The exact engine needs a linear system whose inputs are straight lines in time between their breakpoints, "
-            "and here a law is not linear in speed and angle, or an input such as sin(t) is no straight line. "
+            "The exact engine needs a linear system, and here a law is not linear in speed and angle. "
             "Take the engine 'auto'."
         )
-    system = _system(problem.linear)
-    dense_form = prefers_dense(problem, problem.linear)
+    if problem.linear is None and not drivable(problem):
+        raise ParameterError(
+            "The exact engine takes an input that is no straight line between breakpoints only where the system is "
+            f"small (up to {LARGEST_DRIVEN} states), its modes are well conditioned and polynomials resolve the input; "
+            "take the engine 'auto'."
+        )
+    system = _system(linear)
+    dense_form = problem.linear is None or prefers_dense(problem, linear)
     x = np.asarray(problem.x0, dtype=float)
     spans: list[_Span] = []
     for piece in pieces(problem):
@@ -67,6 +78,27 @@ def solve(problem: Problem) -> Trajectory:
         t = np.asarray(problem.t_eval, dtype=float)
         states = dense(t)
     return Trajectory(t, states, dense, {"steps": dense.steps.size - 1})
+
+
+def drivable(problem: Problem) -> bool:
+    """Whether inputs that are no straight lines can be followed mode by mode."""
+    if problem.driven is None or problem.x0.size > LARGEST_DRIVEN or _system(problem.driven).modes is None:
+        return False
+    return all(_inputs(problem.driven, piece) is not None for piece in pieces(problem))
+
+
+def _inputs(linear: LinearInputs, piece: Piece) -> Array | None:
+    """Values of the inputs of a piece that resolve them, in scaled coordinates; those of the last pieces are kept."""
+    key = f"inputs from {piece.low!r} to {piece.high!r}"
+    if key not in linear.found:
+        scale = _system(linear).scale[:, None]
+        low, high = piece.low, piece.high
+        found = polynomials(
+            lambda elapsed: linear.forcing(np.clip(piece.start + elapsed, low, high)) / scale, piece.end - piece.start
+        )
+        linear.found[key] = found
+    kept: Array | None = linear.found[key]
+    return kept
 
 
 def prefers_dense(problem: Problem, linear: LinearInputs) -> bool:
@@ -198,6 +230,8 @@ class _ExactDense:
 
 def _span(problem: Problem, system: _System, piece: Piece, x: Array, *, dense_form: bool) -> _Span:
     times = _nodes(problem, piece)
+    if problem.linear is None:
+        return _driven_span(problem, system, piece, x, times)
     level, slope = _straight_line(problem, system.forcing, piece)
     modes = system.modes if dense_form else None
     if modes is not None:
@@ -218,6 +252,19 @@ def _span(problem: Problem, system: _System, piece: Piece, x: Array, *, dense_fo
         block = propagator.march(states[first], times[first] - piece.start, step, count)
         states[first + 1 : first + 1 + count] = block
     return _Span(times, states[-1], lambda asked: propagator.between(times, states, asked))
+
+
+def _driven_span(problem: Problem, system: _System, piece: Piece, x: Array, times: Array) -> _Span:
+    values = None if problem.driven is None else _inputs(problem.driven, piece)
+    assert values is not None and system.modes is not None  # noqa: PT018, S101 (`drivable` has said so)
+    motion = driven(system.modes, values, x / system.scale, piece.end - piece.start)
+
+    def at(asked: Array) -> Array:
+        states = motion(asked - piece.start) * system.scale
+        states[asked == piece.start] = x
+        return states
+
+    return _Span(times, at(np.array([piece.end]))[0], at)
 
 
 def _nodes(problem: Problem, piece: Piece) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +15,8 @@ Complex = NDArray[np.complex128]
 
 # The modes may multiply rounding errors by this much; a defective matrix is far beyond.
 LARGEST_CONDITION = 1e4
-SERIES_TERMS = 20
+# Up to this size of their argument the phi functions are summed as series of so many terms.
+NEAR, SERIES_TERMS = 2.0, 32
 # In the scale of energy a lossless matrix is skew up to this part of its entries: each state on the way there rounds.
 SKEW = 1e-12
 
@@ -44,7 +46,7 @@ class Modes:
         t = elapsed[:, None]
         motion = np.exp(z) * (self.inverse @ start)
         if level.any() or slope.any():
-            once, twice = _integrals(z)
+            once, twice = phi(z, 2)
             motion += t * once * (self.inverse @ level) + t**2 * twice * (self.inverse @ slope)
         return np.ascontiguousarray((motion @ self.vectors.T).real)
 
@@ -110,16 +112,23 @@ def _lossless_modes(matrix: Array, scale: Array, speeds: NDArray[np.bool_]) -> M
     return Modes(values, vectors.astype(complex), (rows / scale).astype(complex))
 
 
-def _integrals(z: Complex) -> tuple[Complex, Complex]:
-    """phi1 = (e^z - 1) / z and phi2 = (e^z - 1 - z) / z^2, by their series where the differences would cancel."""
-    small = np.abs(z) < 1.0
-    safe = np.where(small, 1.0, z)
-    once = np.expm1(safe) / safe
-    twice = (once - 1.0) / safe
+def phi(z: Complex, count: int) -> Complex:
+    """phi_1 ... phi_count, (count, ...): phi_k = (phi_{k-1} - 1 / (k-1)!) / z, phi_0 = e^z.
+
+    Near zero, where these differences would cancel, the last one is summed as a series and the others follow from it.
+    """
+    small = np.abs(z) < NEAR
+    safe = np.where(small, NEAR, z)
+    found = np.empty((count, *z.shape), dtype=complex)
+    found[0] = np.expm1(safe) / safe
+    for k in range(1, count):
+        found[k] = (found[k - 1] - 1 / math.factorial(k)) / safe
     near = z[small]
     series = np.ones_like(near)
-    for term in range(SERIES_TERMS, 2, -1):
+    for term in range(SERIES_TERMS, count, -1):
         series = 1.0 + series * near / term
-    twice[small] = series / 2.0
-    once[small] = 1.0 + near * twice[small]
-    return once.astype(complex), twice.astype(complex)
+    series /= math.factorial(count)
+    for k in range(count, 0, -1):
+        found[k - 1][small] = series
+        series = 1 / math.factorial(k - 1) + near * series
+    return found

@@ -14,6 +14,8 @@ from shaftwork.integrate.problem import Array, Problem, Timed
 
 # A run has stalled when so many steps together advance by less than so many times this part of the whole time.
 STALL_STEPS, STALL_SPAN = 2000, 1e-10
+# Where the motion rests at a switch of a law, this part is enough: ten million such steps would make a run.
+STUCK_SPAN = 1e-7
 
 
 @dataclass(frozen=True)
@@ -169,17 +171,22 @@ class Pace:
     """
 
     def __init__(self, problem: Timed) -> None:
-        self._least = STALL_STEPS * STALL_SPAN * (problem.t_end - problem.t0)
+        self._span = STALL_STEPS * (problem.t_end - problem.t0)
         self._time, self._steps = problem.t0, 0
 
-    def objection(self, t: float) -> str | None:
-        """After each step to a time t in s: the reason to give up, or None."""
+    def objection(self, t: float, *, rests: bool = False) -> str | None:
+        """After each step to a time t in s: the reason to give up, or None.
+
+        Args:
+            t: end of the step, s.
+            rests: whether the motion rests at a switch of a law.
+        """
         self._steps += 1
         if self._steps < STALL_STEPS:
             return None
         advance = t - self._time
         self._time, self._steps = t, 0
-        if advance >= self._least:
+        if advance >= self._span * (STUCK_SPAN if rests else STALL_SPAN):
             return None
         return (
             f"the last {STALL_STEPS} steps advanced by {advance:.2g} s only, as where the laws on both sides of a jump "

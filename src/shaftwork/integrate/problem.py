@@ -17,16 +17,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class LinearInputs:
-    """A linear system x' = A x + u(t) whose input is, between breakpoints, a polynomial in t of degree at most 1.
+    """A linear system x' = A x + u(t) whose input is smooth between its breakpoints.
 
     Args:
         A: (n, n) scipy.sparse.csr_array, 1/s times the units of the states.
-        forcing: u(t), shape (n,); evaluated strictly inside a piece it is that piece's own polynomial.
+        forcing: u(t), shape (n,), or (n, k) at times (k,); evaluated strictly inside a piece it is that piece's own.
         found: what an engine has found out about A, for the next run with the same parameters.
     """
 
     A: Any
-    forcing: Callable[[float], Array]
+    forcing: Callable[[Any], Array]
     found: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
 
@@ -47,9 +47,14 @@ class Problem:
             and starts anew; inside a piece it never evaluates `rhs` at or past the piece's end.
         jump: state after a breakpoint from (breakpoint, state before it), or None where the state is continuous.
         sides: from t0, a breakpoint or t_end to the times in s at which inputs are read just before and just after it.
+        switches: what makes the right-hand side jump or bend where its sign changes with the motion, from times (k,)
+            and states (k, n) to (k, m), or None where nothing does. An engine ends a step at such a change
+            (`Crossings`), or finds it by its own means.
         t_eval: strictly increasing output times in [t0, t_end], or None for the engine's own steps. At a breakpoint the
             state after the jump is the output.
-        linear: the same system in linear form when it is one, else None.
+        linear: the same system in linear form, where it is one and its input is, between breakpoints, a polynomial of
+            degree at most 1 in t; else None.
+        driven: the same system in linear form, where it is one and its input is another smooth function; else None.
         symbolic: the same system as a heyoka program with its parameters (`codegen.heyoka.BoundProgram`), a function
             that makes this where an engine asks for it, or None where there is none.
         max_steps: an engine gives up, with a reason, after this many steps.
@@ -66,8 +71,10 @@ class Problem:
     breakpoints: tuple[float, ...] = ()
     jump: Callable[[float, Array], Array] | None = None
     sides: Callable[[float], tuple[float, float]] = around
+    switches: Callable[[Array, Array], Array] | None = None
     t_eval: Array | None = None
     linear: LinearInputs | None = None
+    driven: LinearInputs | None = None
     symbolic: Any = None
     max_steps: int = 10_000_000
 
@@ -86,7 +93,7 @@ class DaeProblem:
         x0: (n,) start values; the algebraic ones are a first guess.
         derivative0: (n,) first guess of dx/dt at the start.
         algebraic: indices of the unknowns whose derivative does not appear.
-        t0, t_end, names, atol, rtol, breakpoints, jump, sides, t_eval, max_steps: as in `Problem`.
+        t0, t_end, names, atol, rtol, breakpoints, jump, sides, switches, t_eval, max_steps: as in `Problem`.
     """
 
     residual: Callable[[float, Array, Array], Array]
@@ -101,6 +108,7 @@ class DaeProblem:
     breakpoints: tuple[float, ...] = ()
     jump: Callable[[float, Array], Array] | None = None
     sides: Callable[[float], tuple[float, float]] = around
+    switches: Callable[[Array, Array], Array] | None = None
     t_eval: Array | None = None
     max_steps: int = 10_000_000
 

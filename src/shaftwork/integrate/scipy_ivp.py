@@ -12,6 +12,7 @@ from scipy.integrate import BDF, DOP853, LSODA, OdeSolution, Radau
 
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.cancellation import cancellation
+from shaftwork.integrate.crossings import Crossings
 from shaftwork.integrate.pieces import (
     GuardedFunctions,
     Pace,
@@ -112,12 +113,13 @@ def _sums(runs: list[_Run]) -> dict[str, int]:
 def _piece(
     problem: Problem, piece: Piece, x: Array, method: Method, max_steps: int, pace: Pace, longest: float
 ) -> _Run:
-    guard = GuardedFunctions(problem, piece)
+    guard, crossings = GuardedFunctions(problem, piece), Crossings(problem, piece)
     times, states = [piece.start], [x]
     interpolants: list[Any] = []
+    retired = np.zeros(2, dtype=int)
     try:
         solver = _solver(problem, piece, x, method, guard, longest)
-        while solver.status == "running":
+        while times[-1] < piece.end:
             if len(interpolants) >= max_steps:
                 raise failure(problem, "scipy", solver.t, solver.y, f"{problem.max_steps} steps were not enough")
             reason = _step(solver, method)
@@ -128,18 +130,32 @@ def _piece(
                 raise failure(problem, "scipy", solver.t, solver.y, guard.reason(f"{method}: the state is not finite"))
             if solver.t <= times[-1]:  # LSODA goes on with steps below the spacing of numbers
                 raise failure(problem, "scipy", solver.t, solver.y, f"{method}: the step became too small")
-            if (objection := pace.objection(solver.t)) is not None:
+            if (objection := pace.objection(solver.t, rests=crossings.rests)) is not None:
                 raise failure(problem, "scipy", solver.t, solver.y, f"{method}: {objection}")
-            interpolants.append(solver.dense_output())
-            times.append(solver.t)
-            states.append(solver.y)
+            dense = solver.dense_output()
+            cut = crossings.cut(times[-1], states[-1], solver.t, solver.y, _rows(dense))
+            if cut is None or cut == solver.t:
+                interpolants.append(dense)
+                times.append(solver.t)
+                states.append(solver.y)
+            if cut is not None or solver.status == "finished":
+                retired += solver.nfev, solver.njev
+            if times[-1] < piece.end and (cut is not None or solver.status == "finished"):
+                end = piece.end if cut is None or cut == solver.t else cut
+                solver = _solver(problem, replace(piece, start=times[-1], end=end), states[-1], method, guard, longest)
     except SimulationError:
         raise
     except (ValueError, RuntimeError) as error:  # a factorisation that met a NaN, or a singular one
         raise failure(problem, "scipy", times[-1], states[-1], guard.reason(f"{method}: {error}")) from error
     solution = OdeSolution(times, interpolants)
-    counts = {"steps": len(interpolants), "rhs": solver.nfev, "jacobians": int(solver.njev)}
-    return _Run(np.array(times), np.array(states), lambda at: np.asarray(solution(at)).T, counts)
+    calls, jacobians = retired.tolist()
+    counts = {"steps": len(interpolants), "rhs": calls, "jacobians": jacobians}
+    return _Run(np.array(times), np.array(states), _rows(solution), counts)
+
+
+def _rows(dense: Callable[[Array], Array]) -> Callable[[Array], Array]:
+    """Dense output with a row for each time, where scipy's has a column."""
+    return lambda times: np.asarray(dense(times)).T
 
 
 def _solver(problem: Problem, piece: Piece, x: Array, method: Method, guard: GuardedFunctions, longest: float) -> Any:

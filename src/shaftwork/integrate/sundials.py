@@ -16,6 +16,7 @@ from scipy import sparse
 from scipy.interpolate import BarycentricInterpolator
 
 from shaftwork.core.errors import MissingExtraError
+from shaftwork.integrate.crossings import Crossings
 from shaftwork.integrate.pieces import (
     GuardedFunctions,
     Pace,
@@ -53,6 +54,10 @@ class _Opened:
     start: Array
     explain: Callable[[str], str] = str
     outgrown: Callable[[], bool] = lambda: False
+
+    def inside(self, times: Array) -> Array:
+        """States (k, n) at times (k,) inside the last step."""
+        return np.array([self.solver.step(time).y.copy() for time in times]).reshape(times.size, self.start.size)
 
 
 Opener = Callable[[Piece, Array], _Opened]
@@ -222,34 +227,44 @@ def _march(
     found: list[tuple[Array, list[_Step]]] = []
     left, pace = problem.max_steps, Pace(problem)
     for piece in pieces(problem):
-        opened = open_solver(piece, start_of_piece(problem, piece, x))
-        solver, x = opened.solver, opened.start
+        opened, crossings = open_solver(piece, start_of_piece(problem, piece, x)), Crossings(problem, piece)
+        x, t = opened.start, piece.start
         found.append((x, []))
-        t = piece.start
         while t < piece.end:
             if left <= 0:
                 raise failure(problem, "sundials", t, x, f"{problem.max_steps} steps were not enough")
-            # SUNDIALS prints what its result says as well.
-            with np.errstate(all="ignore"), redirect_stdout(None):
-                result = solver.step(piece.end, method="onestep", tstop=piece.end)
-            if not result.success:
-                raise failure(problem, "sundials", t, x, opened.explain(str(result.message)))
-            end, x = float(result.t), result.y.copy()
-            check_finite(problem, "sundials", end, x)
-            if end <= t:
-                raise failure(problem, "sundials", t, x, opened.explain("the step became too small"))
-            if (objection := pace.objection(end)) is not None:
+            end, state = _step(problem, piece, opened, t, x)
+            # Its formulas meet a law at the ends of steps alone, so that a step may be cut off at a switch.
+            cut = crossings.cut(t, x, end, state, opened.inside, again=False)
+            whole, end = end, end if cut is None else cut
+            x = state if end == whole else opened.inside(np.array([end]))[0]
+            if (objection := pace.objection(end, rests=crossings.rests)) is not None:
                 raise failure(problem, "sundials", end, x, objection)
             asked = ask(t, end)
-            inside = np.array([solver.step(time).y.copy() if time < end else x for time in asked])
-            if asked.size and asked[0] < end:
-                solver.step(end)  # after an interpolation SUNDIALS gives the end of the step once more
-            found[-1][1].append(_Step(t, end, x, inside.reshape(asked.size, x.size)))
+            within = asked[asked < end]
+            states = np.vstack([opened.inside(within), np.repeat(x[None, :], asked.size - within.size, axis=0)])
+            found[-1][1].append(_Step(t, end, x, states))
             t, left = end, left - 1
-            if t < piece.end and opened.outgrown():
+            if t < piece.end and (cut is not None or opened.outgrown()):
                 opened = open_solver(replace(piece, start=t), x)
-                solver = opened.solver
+                x = opened.start
+            elif within.size or problem.switches is not None:
+                opened.solver.step(end)  # after an interpolation SUNDIALS gives the end of the step once more
     return found
+
+
+def _step(problem: Problem | DaeProblem, piece: Piece, opened: _Opened, t: float, x: Array) -> tuple[float, Array]:
+    """End in s and state (n,) there of the next step from a time and state."""
+    # SUNDIALS prints what its result says as well.
+    with np.errstate(all="ignore"), redirect_stdout(None):
+        result = opened.solver.step(piece.end, method="onestep", tstop=piece.end)
+    if not result.success:
+        raise failure(problem, "sundials", t, x, opened.explain(str(result.message)))
+    end, state = float(result.t), result.y.copy()
+    check_finite(problem, "sundials", end, state)
+    if end <= t:
+        raise failure(problem, "sundials", t, x, opened.explain("the step became too small"))
+    return end, state
 
 
 def _trajectory(problem: Problem | DaeProblem, opener: Callable[[], Opener], degree: int) -> Trajectory:

@@ -17,7 +17,6 @@ from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.operating import initial_state, steady_state
 from shaftwork.codegen.switching import Switching
-from shaftwork.components.laws import pieces_degree
 from shaftwork.core.errors import CompileError, ParameterError, SimulationError
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import LinearInputs, Problem, Trajectory
@@ -243,8 +242,7 @@ class Model(CompiledModel):
                 f"'{self.name}' has a travelling wave at a massless node with a nonlinear law. Give the node an "
                 "inertia, or take model=Spectral(16)."
             )
-        steady = all(pieces_degree(law) == 0 for _, law in self._laws_of_time())
-        return solve_waves(prepared.bound, problem, start, engine, linear=self.linear, steady=steady)
+        return solve_waves(prepared.bound, problem, start, engine, linear=self.linear, steady=self.degree == 0)
 
     def _engine(self, prepared: _Prepared, problem: Problem, engine: str) -> tuple[str, str]:
         if self.form.waves:
@@ -284,8 +282,12 @@ class Model(CompiledModel):
             breakpoints=tuple(time for time in instants.times if span[0] < time < span[1]),
             jump=(lambda t, x: prepared.bound.impulse(x, *instants.sides(t))) if self.form.has_impulses else None,
             sides=instants.sides,
+            switches=(lambda t, x: prepared.bound.switches(t, x))  # noqa: PLW0108 (which makes the matrices)
+            if self.arrays.inputs.switching
+            else None,
             t_eval=output_times(t_eval, *span),
-            linear=prepared.linear,
+            linear=None if self.degree is None else prepared.linear,
+            driven=prepared.linear if self.degree is None else None,
             symbolic=prepared.symbolic,
             max_steps=max_steps,
         )
@@ -318,11 +320,6 @@ class Model(CompiledModel):
         except CompileError:
             return None
 
-    def _laws_of_time(self) -> list[tuple[int, Any]]:
-        branches = self.form.graph.branches
-        kinds = (Kind.LAW, Kind.THROUGH_SOURCE, Kind.ACROSS_SOURCE)
-        return [(b.index, b.template.law) for b in branches if b.template.kind in kinds]
-
     @cached_property
     def switching(self) -> Switching:
         """What switches because of the time alone."""
@@ -350,11 +347,13 @@ class Model(CompiledModel):
         return self._rebuild(twin(self.netlist))
 
     def _linear_inputs(self, p: Array) -> LinearInputs | None:
-        """The linear form, where the network is linear and its inputs are straight lines between breakpoints."""
-        if self.form.waves or not self.linear or any(pieces_degree(law) is None for _, law in self._laws_of_time()):
+        """The linear form, where the network is linear."""
+        if self.form.waves or not self.linear:
             return None
-        rest, bound = np.zeros(len(self.states)), self.bind(p)
-        return LinearInputs(bound.jacobian(0.0, rest).tocsr(), lambda t: bound.rhs(t, rest))
+        n, bound = len(self.states), self.bind(p)
+        return LinearInputs(
+            bound.jacobian(0.0, np.zeros(n)).tocsr(), lambda t: bound.rhs(t, np.zeros((n, *np.shape(t))))
+        )
 
     def _nominal(self, coefficients: Array) -> Array:
         """The size of each state at a speed of one.

@@ -30,7 +30,7 @@ def work_precision_figure(study: WorkPrecision) -> Figure:
     families: dict[str, list[Trial]] = {}
     for trial in study.trials:
         if np.isfinite(trial.error):
-            families.setdefault(_family(trial), []).append(trial)
+            families.setdefault(trial.family, []).append(trial)
     for (family, members), marker in zip(families.items(), MARKERS * len(families), strict=False):
         errors = [max(trial.error, FLOOR) for trial in members]
         costs = [1e3 * trial.cpu for trial in members]
@@ -48,13 +48,6 @@ def work_precision_figure(study: WorkPrecision) -> Figure:
     axes[1].legend(frameon=False, fontsize=8)
     figure.suptitle(f"{study.name}: which model of '{study.shaft}' reaches which accuracy at which cost")
     return figure
-
-
-def _family(trial: Trial) -> str:
-    """The model without its size."""
-    name, _, arguments = trial.model.rstrip(")").partition("(")
-    _, comma, choices = arguments.partition(",")
-    return f"{name}{comma}{choices}"
 
 
 def _size(trial: Trial) -> str:

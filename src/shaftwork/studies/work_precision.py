@@ -37,6 +37,8 @@ LADDER: tuple[ShaftModel, ...] = (
 """The models and sizes that are compared where none are named."""
 POINTS, CALLS = 401, 5
 """Output times, and warm calls of which the median counts."""
+SLOW = 3.0
+"""Where a run has taken longer, in s, larger models of its kind are left out."""
 MOST_STATES = 500
 """Up to this many states natural frequencies are computed."""
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6)
@@ -58,7 +60,8 @@ class Trial:
         errors: largest error of each quantity over its largest value, by name; of frequencies, relative to each.
         extra_modes: oscillating modes, up to halfway between the highest frequency that is judged and the next, less
             those of the exact shaft: spurious ones, or missing ones where negative; None where unknown.
-        why: why it failed; empty where it did not.
+        why: why it failed or was not tried; empty where it was.
+        asked: name of the engine that was asked for.
     """
 
     model: str
@@ -69,6 +72,14 @@ class Trial:
     errors: dict[str, float]
     extra_modes: int | None = None
     why: str = ""
+    asked: str = "auto"
+
+    @property
+    def family(self) -> str:
+        """The model without its size."""
+        name, _, arguments = self.model.rstrip(")").partition("(")
+        _, comma, choices = arguments.partition(",")
+        return f"{name}{comma}{choices}"
 
     @property
     def error(self) -> float:
@@ -155,11 +166,11 @@ def work_precision(
     engines: Iterable[str] = ("auto",),
     points: int = POINTS,
 ) -> WorkPrecision:
-    """Solve a network with each model of one of its shafts, by each engine, and measure error and CPU time.
+    """Solve a network with each model of its shafts, by each engine, and measure error and CPU time.
 
     Args:
         net: the network.
-        shaft: name of the shaft whose model changes.
+        shaft: name of the shaft at which errors are measured; all shafts get the same model.
         t_end: end of the motion, s.
         models: models, or their texts.
         engines: engines by name.
@@ -175,12 +186,21 @@ def work_precision(
     # the fronts of waves that start at zero pass at multiples of the delay; these times are none
     t = end * (np.arange(1, points + 1) - 0.5) / points
     known = truth(net, shaft, end, t)
-    trials = [
-        _trial(net, shaft, ShaftModel.read(model) if isinstance(model, str) else model, engine, end, t, known)
-        for model in models
-        for engine in engines
-    ]
+    trials: list[Trial] = []
+    for model in (ShaftModel.read(model) if isinstance(model, str) else model for model in models):
+        for engine in engines:
+            slow = _slower(trials, _text(model), engine)
+            trials.append(slow or _trial(net, shaft, model, engine, end, t, known))
     return WorkPrecision(net.name, shaft, tuple(trials), (known.source, known.error))
+
+
+def _slower(trials: Sequence[Trial], model: str, engine: str) -> Trial | None:
+    """The row of a model that is not tried, because a smaller one of its kind has taken too long already."""
+    asked = Trial(model, engine, 0, 0.0, np.inf, {})
+    for trial in trials:
+        if trial.family == asked.family and trial.asked == engine and trial.cpu > SLOW:
+            return dataclasses.replace(asked, why=f"not tried, since {trial.model} took {trial.cpu:.0f} s")
+    return None
 
 
 def _trial(net: Network, shaft: str, model: ShaftModel, engine: str, t_end: float, t: Array, known: Truth) -> Trial:
@@ -191,7 +211,8 @@ def _trial(net: Network, shaft: str, model: ShaftModel, engine: str, t_end: floa
 
     began = time.process_time()
     try:
-        compiled = with_model(net, shaft, model).compile()
+        varied = with_model(net, "", model)
+        compiled = varied.compile()
         solution = call(compiled)
         first = time.process_time() - began
         times = []
@@ -205,13 +226,13 @@ def _trial(net: Network, shaft: str, model: ShaftModel, engine: str, t_end: floa
         return Trial(_text(model), engine, 0, 0.0, np.inf, {}, why=str(error).splitlines()[0])
     found = quantities(solution, shaft)
     errors = {name: float(np.abs(found[name] - known.values[name]).max()) / _size(known, name) for name in QUANTITIES}
-    exact, present = known.frequencies, _frequencies(compiled)
+    exact, present = known.frequencies, _frequencies(varied, compiled, known.frequencies)
     extra = None
     if present is not None and len(exact) > MODES:
         errors |= {f"f_{k + 2}": float(np.abs(present / f - 1).min()) for k, f in enumerate(exact[:MODES])}
         extra = int((present < exact[MODES - 1 : MODES + 1].mean()).sum()) - MODES
     cpu = median(times)
-    return Trial(_text(model), solution.engine, len(compiled.states), first - cpu, cpu, errors, extra)
+    return Trial(_text(model), solution.engine, len(compiled.states), first - cpu, cpu, errors, extra, asked=engine)
 
 
 def _size(known: Truth, name: str) -> float:
@@ -221,10 +242,13 @@ def _size(known: Truth, name: str) -> float:
     return float(max(np.abs(value).max() for value in family)) or 1.0
 
 
-def _frequencies(compiled: Model) -> Array | None:
+def _frequencies(net: Network, compiled: Model, judged: Array) -> Array | None:
     """Natural frequencies in Hz of a network that has some and is small enough, the rigid motion left out."""
-    if compiled.form.waves or len(compiled.states) > MOST_STATES or not compiled.linear:
+    if len(compiled.states) > MOST_STATES or not compiled.linear:
         return None
+    if compiled.form.waves:
+        modes = net.modes(f_max=float(judged[-1])) if judged.size else None
+        return None if modes is None else modes.frequencies[modes.frequencies > 0]
     rates = np.linalg.eigvals(compiled.jacobian(0.0, np.zeros(len(compiled.states))).toarray())
     found = rates.imag[rates.imag > 1e-6 * np.abs(rates).max()] / (2 * np.pi)
     return found if found.size else None

@@ -1,0 +1,106 @@
+"""Linear systems under smooth inputs, mode by mode: the inputs become polynomials, the motion under these is exact."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from shaftwork.integrate.modal import Complex, Modes, phi
+from shaftwork.integrate.problem import Array
+
+# Degree of a panel's polynomials, the part of an input that they may leave out, and that which rounding may take.
+DEGREE, LEFT_OUT, ROUNDED = 8, 1e-13, 1e-10
+# Inputs of more values, states by nodes, are left to engines that step.
+MOST_VALUES = 10_000_000
+_NODES = (1 - np.cos(np.pi * np.arange(DEGREE + 1) / DEGREE)) / 2
+# Values at the nodes of [0, 1] to the coefficients of the powers.
+_POWERS = np.linalg.inv(np.vander(_NODES, increasing=True))
+_CHEBYSHEV = np.linalg.inv(chebyshev.chebvander(2 * _NODES - 1, DEGREE))
+_FACTORIALS = np.cumprod([1.0, *range(1, DEGREE + 1)])
+# Values at a time in one evaluation of the motion.
+BLOCK = 200_000
+
+
+@dataclass(frozen=True)
+class Driven:
+    """The motion of a linear system in its modes over a span of time.
+
+    Args:
+        modes: of the system.
+        length: of each panel, s.
+        starts: (panels, modes) the modes at the start of each.
+        inputs: (panels, modes, degree + 1) coefficients of the powers of the share of a panel.
+    """
+
+    modes: Modes
+    length: float
+    starts: Complex
+    inputs: Complex
+
+    def __call__(self, elapsed: Array) -> Array:
+        """States (k, n) at times (k,) in s after the start."""
+        rows = max(1, BLOCK // self.starts.shape[1])
+        blocks = [self._at(elapsed[first : first + rows]) for first in range(0, len(elapsed), rows)]
+        return np.concatenate([(block @ self.modes.vectors.T).real for block in blocks])
+
+    def _at(self, elapsed: Array) -> Complex:
+        panel = np.clip((elapsed / self.length).astype(int), 0, len(self.starts) - 1)
+        inside = elapsed - panel * self.length
+        return _moved(self.modes.values, self.length, inside, self.starts[panel], self.inputs[panel])
+
+
+def _moved(rates: Complex, length: float, inside: Array, start: Complex, inputs: Complex) -> Complex:
+    """The modes (k, m) some times (k,) after their starts (k, m), under inputs (k, m, degree + 1).
+
+    Law: e^z w + t sum_j (t / length)^j j! phi_{j+1}(z) c_j with z = lambda t.
+    """
+    z = np.multiply.outer(inside, rates)
+    weights = phi(z, DEGREE + 1) * _FACTORIALS[:, None, None]
+    shares = (inside / length) ** np.arange(DEGREE + 1)[:, None]
+    return np.asarray(np.exp(z) * start + inside[:, None] * np.einsum("jkm,jk,kmj->km", weights, shares, inputs))
+
+
+def polynomials(forcing: Callable[[Array], Array], length: float) -> Array | None:
+    """Values (n, panels, degree + 1) of inputs at the nodes of panels that resolve them, or None where none do.
+
+    Law: panels are halved until the last Chebyshev coefficients of all inputs are below `LEFT_OUT` of the largest
+    value, or do not fall any more because they are the rounding of the time in the input.
+
+    Args:
+        forcing: inputs (n, k) at times (k,) in s after the start, smooth.
+        length: of the span, s.
+    """
+    panels, before, most = 1, np.inf, MOST_VALUES / (DEGREE + 1) / len(forcing(np.zeros(1)))
+    while panels <= most:
+        times = length / panels * (np.arange(panels)[:, None] + _NODES)
+        values = forcing(times.ravel()).reshape(-1, panels, DEGREE + 1)
+        last = np.abs(values @ _CHEBYSHEV.T)[..., -2:].max(axis=(1, 2))
+        largest = np.maximum(np.abs(values).max(axis=(1, 2)), np.finfo(float).tiny)
+        rough = float((last / largest).max(initial=0.0))
+        if rough <= LEFT_OUT or before / 4 < rough <= ROUNDED:
+            return values
+        panels, before = 2 * panels, rough
+    return None
+
+
+def driven(modes: Modes, values: Array, start: Array, length: float) -> Driven:
+    """The motion from a start state under inputs.
+
+    Args:
+        modes: of the system.
+        values: of the inputs, from `polynomials`.
+        start: (n,) state.
+        length: of the span, s.
+    """
+    step = length / values.shape[1]
+    inputs = np.einsum("mn,npj->pmj", modes.inverse, values @ _POWERS.T, optimize=True)
+    starts = np.zeros(inputs.shape[:2], dtype=complex)
+    gained = _moved(modes.values, step, np.full(len(starts), step), starts, inputs)
+    decay = np.exp(modes.values * step)
+    starts[0] = modes.inverse @ start
+    for panel in range(1, len(starts)):
+        starts[panel] = decay * starts[panel - 1] + gained[panel - 1]
+    return Driven(modes, step, starts, inputs)
