@@ -18,12 +18,15 @@ if TYPE_CHECKING:
     from shaftwork.pipeline.network import Network
     from shaftwork.results.solution import Solution
     from shaftwork.scenes.catalog import Scene
+    from shaftwork.studies.work_precision import Trial
 
 DONE, FAILED, WRONG_INPUT = 0, 1, 2
 BAR = 40
 """Characters of the progress bar."""
 FALLBACK_END = 10.0
 """End time of a model file when none is given, s."""
+COMPARED = 1.0
+"""Models are compared over at most so much motion when no end is given, s: errors show early."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -97,7 +100,9 @@ def _parser() -> argparse.ArgumentParser:
     latex.add_argument("--document", action="store_true", help="a whole document that pdflatex compiles")
     compare = command("compare", _compare, "lumped against distributed shafts: error against run time")
     compare.add_argument("--shaft", metavar="NAME", help="which shaft (default: the first)")
-    compare.add_argument("--t-end", metavar="S", type=float, help="end of the motion in s")
+    compare.add_argument(
+        "--t-end", metavar="S", type=float, help=f"end of the motion in s (default: the scene's, at most {COMPARED:g})"
+    )
     compare.add_argument("--out", metavar="DIR", type=Path, help="folder for picture and CSV")
     command("check", _check, "structure, states, time constants, stiffness, and the engine that auto would take")
     return parser
@@ -157,13 +162,22 @@ def _compare(options: argparse.Namespace) -> None:
         )
     if options.out:
         _make_folder(options.out)
-    t_end = options.t_end if options.t_end is not None else scene.t_end if scene else FALLBACK_END
-    study = work_precision(net, options.shaft or shafts[0], t_end=t_end)
+    t_end = options.t_end if options.t_end is not None else min(scene.t_end if scene else COMPARED, COMPARED)
+    shaft = options.shaft or shafts[0]
+    print(
+        f"comparing over {t_end:g} s of motion (set by --t-end), after the exact solution:", file=sys.stderr, flush=True
+    )
+    study = work_precision(net, shaft, t_end=t_end, report=_done)
     print(f"{study}\n\n{study.advice}")
     if options.out:
         study.to_csv(options.out / "work-precision.csv")
         study.plot().savefig(options.out / "work-precision.png", dpi=150)
         print(f"\nwritten: {options.out / 'work-precision.csv'}, {options.out / 'work-precision.png'}")
+
+
+def _done(trial: Trial) -> None:
+    what = trial.why or f"{1e3 * trial.cpu:.3g} ms, end torques to {trial.error:.1g}"
+    print(f"{trial.model} on {trial.engine}: {what}", file=sys.stderr, flush=True)
 
 
 def _make_folder(folder: Path) -> None:

@@ -258,6 +258,30 @@ def test_auto_takes_the_smallest_spectral_model_that_is_right_up_to_its_frequenc
     assert part.resolved.n == 1 or error(part.resolved.n - 1) > tolerance / 10  # the clamped shaft decides too
 
 
+def test_auto_chooses_again_for_the_parameters_of_a_run() -> None:
+    """A shaft of ten times the length has the model that a new network takes; another inertia asks for no new one."""
+
+    def built(**values: float) -> sw.Network:
+        net = sw.Network("train")
+        net.add(sw.TorqueSource("motor", tau=10.0), "m")
+        net.add(sw.Inertia("Je", J=0.025), "m")
+        net.add(sw.Shaft("line", **STEEL | values, model=sw.Auto(f_max=2000.0)), "m", "l")
+        net.add(sw.Inertia("Jm", J=0.11), "l")
+        return net
+
+    model = built(length=1.0).compile()
+    given = {"line.length": 10.0, "line.density": 7800.0, "Je.J": 0.03}
+    changed = model.simulate(0.02, parameters=given, t_eval=41)
+    fresh = built(length=10.0, density=7800.0).simulate(0.02, parameters={"Je.J": 0.03}, t_eval=41)
+    assert changed.states == fresh.states
+    assert len(changed.states) > len(model.states)
+    np.testing.assert_allclose(changed["line.tau_b"], fresh["line.tau_b"], rtol=1e-12, atol=1e-12)
+    for parameter, value in (("Je.J", 0.05), ("line.length", 1.001), ("line.diameter", 0.03)):
+        assert not model._changes_structure({parameter: value})
+    with pytest.raises(sw.ParameterError, match="half waves along the shaft"):
+        model.simulate(0.02, parameters={"line.length": 1000.0})
+
+
 def test_a_bore_must_be_smaller_than_the_shaft() -> None:
     with pytest.raises(sw.ParameterError, match=r"inner_diameter = 0\.02 must be smaller than the diameter 0\.02"):
         sw.Shaft("line", **STEEL, inner_diameter=0.02)

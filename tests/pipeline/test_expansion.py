@@ -60,7 +60,19 @@ def test_one_spring_is_a_spring() -> None:
     assert spring.c == pytest.approx(79.3e9 * np.pi * 0.02**4 / 32, rel=1e-14)
 
 
-@pytest.mark.parametrize("model", [sw.Spectral(4), sw.CentralDifference(8), sw.Wave(), sw.Rigid()])
+def test_a_rigid_shaft_stays_as_it_is() -> None:
+    net = train(sw.Rigid())
+    assert net.expanded().parts == net.parts
+
+
+def test_the_parts_of_a_chain_have_short_letters() -> None:
+    text = train(sw.Lumped(3), damping=0.02, friction=0.3).equations(expand=True).latex(form="kirchhoff")
+    for letter in ("J", "c", "d", r"\omega"):
+        assert rf"{letter}_{{\mathrm{{line}},1}}" in text
+    assert r"d_{\mathrm{bearing},\mathrm{line},1}" in text
+
+
+@pytest.mark.parametrize("model", [sw.Spectral(4), sw.CentralDifference(8), sw.Wave()])
 def test_what_is_no_chain_of_springs_is_named(model: object) -> None:
     with pytest.raises(sw.ParameterError, match=r"Shaft 'line': model=.* is no chain of springs.*Lumped\(m\) can"):
         train(model).expanded()

@@ -18,6 +18,7 @@ from shaftwork.shafts.exact_response import frequency_response
 from shaftwork.shafts.line import Line, Section
 
 STEEL = {"density": 7900.0, "shear_modulus": 77.5e9}
+SECTION = Section.of_geometry(1.0, 0.02, **STEEL)
 LOSSY = {"damping": 2e-3, "friction": 0.05}
 ROUNDING = 1e-11
 """Of rates and amplitudes; a mesh of 24 to 40 elements is converged to it, and the condition of some is 1e4."""
@@ -273,11 +274,45 @@ def test_modes_that_crowd_are_named_with_the_frequency_up_to_which_all_are_known
 def test_what_the_meshes_lose_is_no_result(monkeypatch: pytest.MonkeyPatch) -> None:
     """The count of the exact modes knows no mesh: with one mode of the mesh left out nothing is returned."""
     net = _train(sw.Wave())
-    monkeypatch.setattr(
-        exact_modes, "_refined", lambda problem, starts, real=exact_modes._refined: real(problem, starts[1:])
-    )
+    monkeypatch.setattr(exact_modes, "_together", lambda starts, real=exact_modes._together: real(starts[:-1]))
     with pytest.raises(sw.SimulationError, match="could not be settled"):
         net.modes(f_max=4000.0)
+
+
+def _open_ended(d: float, J: float = 0.0, side: float = 0.0) -> sw.Network:
+    """A shaft that ends in a damper; at its start nothing, an inertia, or another shaft too."""
+    net = sw.Network("open ended")
+    net.add(sw.TorqueSource("motor", tau=0.0), "m")
+    net.add(sw.Shaft("line", length=1.0, diameter=0.02, **STEEL, model=sw.Wave()), "m", "l")
+    net.add(sw.Damper("end", d=d), "l")
+    if J:
+        net.add(sw.Inertia("Je", J=J), "m")
+    if side:
+        net.add(sw.Shaft("side", length=0.7, diameter=0.02, **STEEL, model=sw.Wave()), "m", "s")
+        net.add(sw.Inertia("Js", J=side), "s")
+    return net
+
+
+def test_at_a_matched_end_everything_leaves_and_no_mode_is_made_up() -> None:
+    """Behind an inertia J the shaft is a damper Z: the one mode is -Z / J. A side branch keeps its own."""
+    impedance = SECTION.impedance
+    for asked in ({"count": 3}, {}, {"f_max": 9000.0}):
+        for J, rates in ((0.0, []), (0.025, [-impedance / 0.025])):
+            with pytest.warns(sw.NetworkWarning, match=r"takes all that arrives.*f_max = 4698 Hz"):
+                modes = _open_ended(impedance, J).modes(**asked)
+            np.testing.assert_allclose(modes.rates, rates, rtol=1e-11)
+    assert len(_open_ended(impedance).modes(f_max=3000.0)) == 0
+    both = _open_ended(impedance, 0.025, 0.1).modes(f_max=3000.0)
+    inertia = _train(sw.Wave(), (0.025, 0.1), length=0.7)
+    inertia.add(sw.Damper("open", d=impedance), "m")
+    _assert_equal_rates(both, inertia.modes(f_max=3000.0), 1e-9)
+
+
+def test_an_end_that_throws_back_a_little_has_the_modes_of_its_echo() -> None:
+    """With the share r thrown back exp(-2 s T) = r has the roots s = (ln r + 2 pi i k) / 2 T."""
+    delay = float(np.sqrt(7900 / 77.5e9))
+    modes = _open_ended(SECTION.impedance * (1 - 0.2) / (1 + 0.2)).modes(count=4)
+    np.testing.assert_allclose(modes.rates, (np.log(0.2) + 2j * np.pi * np.arange(4)) / (2 * delay), rtol=1e-11)
 
 
 def test_an_undamped_resonance_that_is_hit_is_infinite() -> None:

@@ -108,3 +108,18 @@ def test_the_ship_line_is_solved_alike_by_waves_and_by_polynomials() -> None:
     for name in ("propeller.omega", "flywheel.omega"):
         assert np.abs(waves[name] - smooth[name]).max() < 1e-6 * np.abs(smooth[name]).max()
     assert np.abs(waves["shaft2.tau_a"] - smooth["shaft2.tau_a"]).max() < 2e-3 * np.abs(smooth["shaft2.tau_a"]).max()
+
+
+def test_frequencies_are_judged_with_the_damping_at_the_ends() -> None:
+    net = sw.scenes.shaft_step()
+    net.add(sw.Damper("brake", d=200.0), "load end")
+    study = work_precision(net, "line", t_end=0.005, models=["Wave(3)", "Spectral(8)"], points=11)
+    for trial in study.trials:
+        assert max(trial.errors["f_2"], trial.errors["f_3"]) < 1e-9
+        assert trial.setup > 0
+
+
+@pytest.mark.parametrize("wrong", [{"engines": "scipy"}, {"engines": ("foo",)}, {"points": 0}, {"models": "Wave()"}])
+def test_a_wrong_argument_is_one_clear_error(wrong: dict[str, object]) -> None:
+    with pytest.raises(sw.ParameterError, match=r"must be|There is no engine"):
+        work_precision(sw.scenes.shaft_step(), "line", t_end=0.1, **wrong)  # type: ignore[arg-type]

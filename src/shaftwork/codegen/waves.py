@@ -94,20 +94,26 @@ def along_lines(bound: BoundArrays, part: GraphPart, profile: Profile, t: Array,
         first = labels[f"{label}_a" if f"{label}_a" in labels else f"{label}_middle"]
         second = labels[f"{label}_b" if f"{label}_b" in labels else f"{label}_middle"]
         impedance, delay = lines[first]
-        f = _leaving(bound, first, impedance, t - share * delay, dense)
-        g = _leaving(bound, second, impedance, t - (1 - share) * delay, dense)
+        f = _leaving(bound, (first, second), impedance, delay, t - share * delay, dense)
+        g = _leaving(bound, (second, first), impedance, delay, t - (1 - share) * delay, dense)
         made[:, place] = (f - g) / 2 if profile.kind == "through" else (f + g) / (2 * impedance)
     return made
 
 
-def _leaving(bound: BoundArrays, end: int, impedance: float, times: Array, dense: Dense) -> Array:
-    """The wave that leaves an end at some times: 2 Z v + h, and Z v of the steady turning before the start."""
-    begun = times >= dense.steps[0]
-    inside = np.where(begun, times, dense.steps[0])
+def _leaving(
+    bound: BoundArrays, ends: tuple[int, int], impedance: float, delay: float, times: Array, dense: Dense
+) -> Array:
+    """The wave that leaves the first of a line's ends at some times: 2 Z v + h.
+
+    Before the start it is a straight line in time, and arrives at the second end within the first delay.
+    """
+    start = dense.steps[0]
+    inside = np.maximum(times, start)
     order = np.argsort(inside, kind="stable")
     history = History(bound, inside[order], dense(inside[order]))
     values = np.empty(len(times))
-    values[order] = 2 * impedance * history.across[end] + history.through[end]
-    first = dense.steps[:1]
-    arriving = History(bound, first, dense(first)).through[end][0]  # what left the other end before the start
-    return np.where(begun, values, -arriving)
+    values[order] = 2 * impedance * history.across[ends[0]] + history.through[ends[0]]
+    marks = start + np.array([0.25, 0.5]) * min(delay, dense.steps[-1] - start)
+    early, late = -History(bound, marks, dense(marks)).through[ends[1]]
+    before = early + (late - early) / (marks[1] - marks[0]) * (times + delay - marks[0])
+    return np.where(times >= start, values, before)

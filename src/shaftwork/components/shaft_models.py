@@ -200,7 +200,8 @@ class Wave(ShaftModel):
 
     What leaves one end arrives at the other a delay L sqrt(density / shear_modulus) later. Bearing friction is light:
     it is lumped, half of it in the middle and a quarter at each end, as is usual for lines with losses, which is right
-    for motions slower than the delay. Such a network is solved by the engine "wave" alone.
+    for motions slower than the delay and for d' L well below the impedance; from a tenth of it on, a run warns. Such a
+    network is solved by the engine "wave" alone.
 
     Args:
         places: number of places, the ends among them, at which speed and torque are read along the shaft.
@@ -247,13 +248,20 @@ class Auto(ShaftModel):
             ParameterError: the shaft is too long for one polynomial.
         """
         waves = 2 * self.f_max * delay  # half waves along the shaft at the highest frequency
-        for n in range(1, MOST_SPECTRAL + 1):
-            if n > waves and _frequency_error(Spectral(n), waves) <= self.tolerance:
-                return Spectral(n)
+        degree = _smallest_degree(waves, self.tolerance)
+        if degree is not None:
+            return Spectral(degree)
         raise ParameterError(
             f"{self!r} asks for {waves:.0f} half waves along the shaft, more than one polynomial holds. "
             f"Divide the shaft into several in a row, or lower f_max."
         )
+
+
+@lru_cache(maxsize=256)
+def _smallest_degree(half_waves: float, tolerance: float) -> int | None:
+    """Of the spectral models that are right up to a number of half waves; None where none is."""
+    degrees = range(int(half_waves) + 1, MOST_SPECTRAL + 1)
+    return next((n for n in degrees if _frequency_error(Spectral(n), half_waves) <= tolerance), None)
 
 
 def _frequency_error(model: ShaftModel, half_waves: float) -> float:

@@ -185,9 +185,16 @@ class Assembly:
             return sides(stiffness.base * rate, (across,))
         return sides(rate, (stiffness * across,))
 
-    def law_of_history(self, branch: int, other: int) -> Sides:
-        """What arrives at an end of a line: what left the other end a delay ago."""
-        across = self.quantities.across(self.ends(other))
+    @cached_property
+    def opposite(self) -> dict[int, int]:
+        """For each wave that arrives at an end of a line the one that arrives at the other end."""
+        ends = self.form.waves
+        return {end: ends[place ^ 1] for place, end in enumerate(ends)}
+
+    def law_of_history(self, branch: int, across: Expr | None = None) -> Sides:
+        """What arrives at an end of a line: what left the other end, with `across` at it, a delay ago."""
+        other = self.opposite[branch]
+        across = self.quantities.across(self.ends(other)) if across is None else across
         law = self.quantities.printed(branch).xreplace({ACROSS: across, HISTORY: self.quantities.history(other)})
         return sides(self.quantities.history(branch), (law,))
 

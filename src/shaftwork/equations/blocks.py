@@ -10,7 +10,7 @@ from functools import cached_property
 from itertools import zip_longest
 from typing import TYPE_CHECKING
 
-from sympy import Add, Expr, Integer, Symbol, preorder_traversal
+from sympy import Add, Expr, Float, Integer, Symbol, preorder_traversal
 
 from shaftwork.core.domains import ELECTRICAL, ROTATION, TRANSLATION
 from shaftwork.equations.assembly import Group, Sides, sides, tidy
@@ -19,11 +19,12 @@ from shaftwork.equations.printing import LINE_WIDTH, Line, Writer, with_rates
 from shaftwork.equations.quantities import Flow, rate_of
 from shaftwork.equations.second_order import SecondOrder
 from shaftwork.equations.spelling import in_text
+from shaftwork.equations.sums import MEANING, WEIGHTS, Sums, sums_of
 from shaftwork.equations.widths import printed_width
 from shaftwork.network.templates import Kind
 
 if TYPE_CHECKING:  # the records print themselves through this module
-    from shaftwork.equations.records import Eliminated, Equations, Row
+    from shaftwork.equations.records import Eliminated, Equations, Row, StateEquation
 
 AUXILIARY = (r"\sigma", r"\zeta", r"\xi", r"\chi")
 """Letters for sums that occur more than once in a law, such as a slip."""
@@ -60,17 +61,42 @@ class Blocks:
         equations = self.equations
         domains = dict.fromkeys(equations.form.graph.domains)
         balanced = " and ".join(", ".join(BALANCES[domain] for domain in domains).rsplit(", ", 1))
-        yield Block(f"Balance of {balanced} at the nodes", tuple(self._lines(equations.nodes)))
-        yield Block("Speeds around the loops", tuple(self._lines(equations.loops)))
-        yield Block("Ideal couplings", tuple(self._lines(equations.couplings)))
+        nodes = [row for number, row in enumerate(equations.nodes) if number not in self._inside]
+        balances = (summed.balance() for summed in self._sums)
+        yield Block(f"Balance of {balanced} at the nodes", (*self._lines(nodes), *balances))
+        loops = [row for row in equations.loops if equations.assembly.ends(row.link)[0] not in self._twists]
+        twists = (line for summed in self._sums for line in summed.loops())
+        yield Block("Speeds around the loops", (*self._lines(loops), *twists))
+        around = {_to_rounding(row.expression) for row in equations.loops}  # only asked for membership
+        said = [(_to_rounding(row.expression), _to_rounding(-row.expression)) for row in equations.couplings]
+        couplings = [row for row, both in zip(equations.couplings, said, strict=True) if around.isdisjoint(both)]
+        yield Block("Ideal couplings", tuple(self._lines(couplings)))
         yield Block("Laws of the parts", tuple(self._laws()))
 
     def derived(self) -> Block:
         """The definitions of the letters that stand for several parameters; nothing where numbers are printed."""
         definitions = {} if self.values else self.equations.definitions
+        weights = (WEIGHTS,) if self._sums else ()
         return Block(
-            "Derived quantities", tuple(self.writer.line(sides(symbol, (law,))) for symbol, law in definitions.items())
+            "Derived quantities",
+            (*(self.writer.line(sides(symbol, (law,))) for symbol, law in definitions.items()), *weights),
+            MEANING if weights else "",
         )
+
+    @cached_property
+    def _sums(self) -> tuple[Sums, ...]:
+        return sums_of(self.equations.assembly.quantities, self.writer)
+
+    @cached_property
+    def _inside(self) -> frozenset[int]:
+        return frozenset(node for summed in self._sums for node in summed.inside)
+
+    @cached_property
+    def _twists(self) -> frozenset[int]:
+        return frozenset(node for summed in self._sums for node in summed.twists)
+
+    def _is_summed(self, row: StateEquation) -> bool:
+        return self.equations.assembly.ends(row.branches[0])[0] in self._inside | self._twists
 
     def state(self, *, laws: bool = True) -> Iterator[Block]:
         """Rates of the states, what stands in them, and what was eliminated.
@@ -78,11 +104,12 @@ class Blocks:
         Args:
             laws: print the laws that stand in the rates; not needed below Kirchhoff's equations, which contain them.
         """
-        rows = self.equations.states
+        rows = [row for row in self.equations.states if not self._is_summed(row)]
         shown = [row.sides if row.explicit and len(row.groups) <= 1 else row.coupled for row in rows]
         coupled = any(made is not row.sides for made, row in zip(shown, rows, strict=True))
         remark = "Rates that stand together on a left side are coupled by inertias or springs." if coupled else ""
-        yield Block("State equations", tuple(map(self.writer.line, shown)), remark)
+        summed = (line for made in self._sums for line in made.states())
+        yield Block("State equations", (*map(self.writer.line, shown), *summed), remark)
         algebraic = [row for row in self.equations.eliminated if row.kind == "algebraic"]
         standing = self._laws_in_states() if laws else ()
         yield Block("where", (*standing, *self._lines(algebraic)))
@@ -95,11 +122,15 @@ class Blocks:
         size = len(form.coordinates)
         lines = tuple(self._matrices(form)) if size <= LARGEST_MATRIX else ()
         if not lines or max(map(_matrix_width, lines)) > LINE_WIDTH:
-            lines = tuple(self._motion(form, row) for row in range(size))
+            lines = tuple(self._motions(form))
         yield Block("Equations of motion", lines)
         flows = self.equations.assembly.quantities.flows
         known = [flow for flow in flows if self.equations.assembly.quantities.through(flow) in form.laws]
-        laws = (line for flow in known for line in self._law(flow, form.across))
+        laws = [line for flow in known for line in self._law(flow, form.across)]
+        assembly = self.equations.assembly
+        for end, other in assembly.opposite.items():
+            across = assembly.quantities.across(assembly.ends(other)).xreplace(form.across)
+            laws.append(self.writer.line(assembly.law_of_history(end, across)))
         yield Block("where", tuple(laws), r"Angles are counted from the untwisted position.")
 
     def _matrices(self, form: SecondOrder) -> Iterator[Line]:
@@ -118,6 +149,16 @@ class Blocks:
     def _matrix(self, rows: Iterable[Iterable[Expr]]) -> str:
         inner = r" \\ ".join(" & ".join(self.writer.latex(tidy(entry)) for entry in row) for row in rows)
         return rf"\begin{{bmatrix}} {inner} \end{{bmatrix}}"
+
+    def _motions(self, form: SecondOrder) -> Iterator[Line]:
+        """Row by row; shafts whose ends are coordinates have one row for all inside."""
+        nodes = self.equations.form.graph.nodes
+        free = frozenset(form.nodes)
+        summed = [made for made in self._sums if {nodes[made.part.nodes[end]] for end in ("a", "b")} <= free]
+        inside = {nodes[node] for made in summed for node in made.inside}
+        yield from (self._motion(form, row) for row, node in enumerate(form.nodes) if node not in inside)
+        for made in summed:
+            yield from made.motion()
 
     def _motion(self, form: SecondOrder, row: int) -> Line:
         left = self.writer.pieces((Group(Integer(1), tuple(map(tidy, form.terms(row)))),))
@@ -170,6 +211,8 @@ class Blocks:
             sign = -1 if across.could_extract_minus_sign() else 1
             known = sign * Add(*assembly.around(flow.branches[0]))
             yield from self._law(flow, {} if across == 0 else {sign * across: known})
+        for end, other in assembly.opposite.items():
+            yield self.writer.line(assembly.law_of_history(end, Add(*assembly.around(other))))
 
     def _law(self, flow: Flow, known: Mapping[Expr, Expr]) -> Iterator[Line]:
         """A flow's law, and the letters in it; nothing where the law is a parameter alone."""
@@ -202,6 +245,11 @@ class Blocks:
             free = iter(letter + subscript for letter in AUXILIARY if letter + subscript not in taken)
             names.update({symbol.name: next(free) for symbol, _ in shared})
         return names
+
+
+def _to_rounding(expression: Expr) -> Expr:
+    """An expression to compare with others that were added up in another order."""
+    return expression.xreplace({number: Float(number, 12) for number in expression.atoms(Float)})
 
 
 def _shared_sums(terms: tuple[Expr, ...], owner: str) -> tuple[tuple[tuple[Symbol, Expr], ...], tuple[Expr, ...]]:

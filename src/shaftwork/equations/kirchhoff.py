@@ -95,10 +95,8 @@ class _Writer:
                     yield LawEquation(*self.origin((branch,)), partial(self.assembly.law_of_store, branch))
                 elif self.assembly.kind(branch) is Kind.ACROSS_SOURCE:
                     yield LawEquation(*self.origin((branch,)), partial(self.assembly.law_of_source, branch))
-        ends = self.form.waves
-        for first, second in zip(ends[::2], ends[1::2], strict=True):
-            for end, other in ((first, second), (second, first)):
-                yield LawEquation(*self.origin((end, other)), partial(self.assembly.law_of_history, end, other))
+        for end, other in self.assembly.opposite.items():
+            yield LawEquation(*self.origin((end, other)), partial(self.assembly.law_of_history, end))
 
     def couplings(self) -> Iterator[CouplingEquation]:
         for branch in self.graph.branches:
@@ -143,11 +141,11 @@ class _Writer:
         yield from self._reactions()
 
     def _dependent_speeds(self) -> Iterator[Eliminated]:
-        """Speeds of nodes that follow from others through couplings."""
-        owners = self.assembly.quantities.owners
+        """Speeds of nodes that follow from others through couplings; those inside a part are in its own equations."""
+        owners, inner = self.assembly.quantities.owners, self.assembly.quantities.inner
         for number, row in enumerate(self.form.tree.potentials):
             owner = owners.get(number)
-            if row is None or owner in self._tree_stores or not self._tied(row):
+            if row is None or number in inner or owner in self._tree_stores or not self._tied(row):
                 continue
             make = partial(self._follows, number)
             yield Eliminated(*self._origin_of_speed(number, row), make, *self._why_speed(number, row), "speed")

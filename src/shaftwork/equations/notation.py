@@ -77,7 +77,8 @@ class Named:
     def subscript(self, style: int) -> str:
         """The subscript: as short as it may be (0), the whole name (1), the name and a number (2, 3, ...)."""
         if self.chosen is not None and style == 0:
-            return chosen_subscript(str(self.chosen))  # `symbol=1` is a fair choice, and printing never fails
+            stem, index = split_index(str(self.chosen))  # `symbol=1` is a fair choice, and printing never fails
+            return f"{chosen_subscript(stem)}{_index(index)}"
         stem, index = split_index(self.name)
         comma = "" if style and stem.endswith("_") else ","
         if style == 0:
@@ -172,11 +173,7 @@ def _upright(text: str) -> str:
 def _quantity_letters(form: StateForm, quantities: Quantities) -> Iterator[tuple[int, Letter]]:
     """The quantities that are named after a part, with the number of the part."""
     graph = quantities.graph
-    for node, branch in quantities.owners.items():
-        domain, part = graph.domains[node], graph.branches[branch].part
-        label = graph.branches[branch].template.label
-        yield part, _letter(quantities.node(node), domain.across, label)
-        yield part, _letter(quantities.angle(node), domain.integral, label.removeprefix(f"{domain.across.name}_"))
+    yield from _node_letters(quantities)
     for ends, pair in quantities.pairs.items():
         quantity = quantities.domain(ends).across
         sign = "" if quantity is ELECTRICAL.across else r"\Delta "
@@ -197,8 +194,10 @@ def _quantity_letters(form: StateForm, quantities: Quantities) -> Iterator[tuple
             domain = quantities.domain((made.plus, made.minus))
             yield made.part, _letter(quantities.integral(made.index), domain.integral)
         if made.template.is_history:
-            mark = made.template.label.partition("_")[2]
-            yield made.part, Letter(quantities.history(made.index).name, "h", mark, "N*m", "wave that arrives at")
+            line, _, end = made.template.label.partition("_")
+            meaning = f"torque wave that arrives at {end}"
+            symbol = quantities.history(made.index)
+            yield made.part, Letter(symbol.name, "h", _mark(end), "N*m", meaning, number=split_index(line)[1])
         if made.terms:
             quantity = quantities.multiplier_quantity(made.index)
             label = quantities.multiplier_label(made.index)
@@ -209,13 +208,32 @@ def _quantity_letters(form: StateForm, quantities: Quantities) -> Iterator[tuple
             yield part, Letter(state.name, state.latex, "", state.unit, WORDS[state.name.rsplit(".", 1)[1]])
 
 
+def _node_letters(quantities: Quantities) -> Iterator[tuple[int, Letter]]:
+    """Speed and angle of the nodes that a store or source owns, and of those inside a part."""
+    graph = quantities.graph
+    for node, branch in quantities.owners.items():
+        domain, part = graph.domains[node], graph.branches[branch].part
+        label = graph.branches[branch].template.label
+        yield part, _letter(quantities.node(node), domain.across, label)
+        yield part, _letter(quantities.angle(node), domain.integral, label.removeprefix(f"{domain.across.name}_"))
+    for node, (part, port) in quantities.inner.items():
+        domain, (stem, digits) = graph.domains[node], split_index(port)
+        for symbol, quantity in ((quantities.node(node), domain.across), (quantities.angle(node), domain.integral)):
+            letter = _letter(symbol, quantity, f"{stem}_{digits}")
+            yield part, replace(letter, meaning=f"{letter.meaning} of {stem}" if stem else letter.meaning)
+
+
 def _letter(symbol: Symbol, quantity: Quantity, label: str = "") -> Letter:
     """The letter of a quantity; the label of its branch is the mark, "tau_c" of a torque is c, "tau_c_3" is c and 3."""
     stem = label.removeprefix(f"{quantity.name}_")
     number = stem if stem.isdecimal() else running_number(stem)
     mark = stem[: len(stem) - len(number)].rstrip("_")
-    mark = escaped(mark) if len(mark) == 1 else f"\\mathrm{{{escaped(mark)}}}" if mark else ""
-    return Letter(symbol.name, quantity.latex, mark, quantity.unit, WORDS[quantity.name], number=number)
+    return Letter(symbol.name, quantity.latex, _mark(mark), quantity.unit, WORDS[quantity.name], number=number)
+
+
+def _mark(text: str) -> str:
+    """A word as a subscript: one letter in italics, more upright."""
+    return escaped(text) if len(text) == 1 else f"\\mathrm{{{escaped(text)}}}" if text else ""
 
 
 def _distinct(letters: Iterable[Letter]) -> tuple[Letter, ...]:
@@ -235,7 +253,7 @@ def _distinct(letters: Iterable[Letter]) -> tuple[Letter, ...]:
 def _nodes(quantities: Quantities) -> Iterator[tuple[str, Named]]:
     """Nodes whose speed is named after no part."""
     for number, name in enumerate(quantities.graph.nodes):
-        if number not in quantities.owners:
+        if number not in quantities.owners and number not in quantities.inner:
             domain = quantities.graph.domains[number]
             letters = (
                 _letter(quantities.node(number), domain.across),

@@ -9,12 +9,14 @@ from sympy import Expr, Float, Heaviside, Integer, Piecewise, Pow, Symbol
 from sympy.printing.latex import LatexPrinter
 
 from shaftwork.components.laws import t as TIME
-from shaftwork.equations.assembly import Group, Sides
+from shaftwork.equations.assembly import Group, Sides, rising_first
 from shaftwork.equations.quantities import rate_of
 from shaftwork.equations.widths import printed_width
 
 LINE_WIDTH = 76
 """Characters of ordinary width that fit on a printed line beside its left side."""
+WIDEST_PIECE = 60
+"""A product with a sum that is wider may be broken inside the sum: some room is left for left sides."""
 DIGITS = 6
 """Significant digits of numbers in equations."""
 OPENS, CLOSES = "\ue002", "\ue003"
@@ -130,17 +132,32 @@ class Writer:
         """The pieces of a group, each with its sign."""
         factor, terms = group
         if len(terms) < 2 or factor == 1:
-            return [self._signed(factor * term) for term in terms]
+            return [piece for term in terms for piece in self._parted(factor * term)]
         if self._valued(factor) == 1:
-            return [self._signed(term) for term in terms]
+            return [piece for term in terms for piece in self._parted(term)]
         sizes = [abs(term.as_coeff_Mul()[0]) for term in terms]
         if sizes.count(sizes[0]) == len(sizes):  # a half of every term is a half before the bracket
             factor, terms = factor * sizes[0], tuple(term / sizes[0] for term in terms)
-        inside = [self._signed(term) for term in terms]
+        inside = [piece for term in terms for piece in self._parted(term)]
         inside[0] = inside[0].removeprefix("+ ")
         inside[0] = rf"{self._signed(factor)} {OPENS} {inside[0]}"
         inside[-1] = f"{inside[-1]} {CLOSES}"
         return inside
+
+    def _parted(self, term: Expr) -> list[str]:
+        """A term with its sign; one that is too wide as the pieces of the sum that it is a multiple of."""
+        text = self._signed(term)
+        sums = [factor for factor in term.args if factor.is_Add] if term.is_Mul else []
+        if printed_width(text) <= WIDEST_PIECE or len(sums) != 1:
+            return [text]
+        summed = sorted(sums[0].args, key=self._first)
+        pieces = [self._signed(part) for part in rising_first(summed)]
+        pieces[0] = rf"{self._signed(term / sums[0])} \, \bigl( {pieces[0].removeprefix('+ ')}"
+        return [*pieces[:-1], rf"{pieces[-1]} \bigr)"]
+
+    def _first(self, term: Expr) -> str:
+        """Sorts terms by the first of their symbols."""
+        return min((self._ordered[symbol].name for symbol in term.free_symbols & self._ordered.keys()), default="")
 
     def _rank(self, term: Expr) -> str:
         """Sorts the terms of a left side by the rates that they contain."""

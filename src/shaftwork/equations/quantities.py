@@ -182,6 +182,16 @@ class Quantities:
         return found
 
     @cached_property
+    def inner(self) -> dict[int, tuple[int, str]]:
+        """For a node inside a part whose across variable is its own: the place of the part, and the port's name."""
+        return {
+            part.nodes[port.name]: (place, port.name)
+            for place, part in enumerate(self.graph.parts)
+            for port in part.component.inner_ports()
+            if part.nodes[port.name] not in self.owners
+        }
+
+    @cached_property
     def _defining(self) -> tuple[GraphBranch, ...]:
         kinds = (Kind.ACROSS_SOURCE, Kind.ACROSS_STORE)
         return tuple(branch for kind in kinds for branch in self.graph.branches if branch.template.kind is kind)
@@ -242,6 +252,8 @@ class Quantities:
         alike = len(set(numbers)) < len(numbers)  # springs and dampers in different places: the numbers do not do
         for ((plus, minus), branches), label, brief in zip(together.items(), labels, numbers, strict=True):
             made = label.removeprefix(f"{self.domain((plus, minus)).through.name}_") if alike else brief
+            if alike and len(branches) > 1:  # the label is that of the store, which is only a part of it
+                made = f"total_{brief}"
             yield Flow(number, tuple(branches), plus, minus, self._sign(part, branches), made)
 
     def _sign(self, part: GraphPart, branches: list[int]) -> int:

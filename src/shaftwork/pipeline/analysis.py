@@ -46,10 +46,11 @@ def linearized(
     Raises:
         ParameterError: the point is none.
         SignalError: there is no such quantity.
-        SimulationError: a law has no finite slope at the point.
+        SimulationError: a law has no finite slope at the point, or a shaft is a wave.
     """
     named = input_names(model, inputs)
-    time, x = operating_point(model, p, at, t, settled)
+    point = None if model.form.waves else at  # a wave is refused below, whatever the names of the point
+    time, x = operating_point(model, p, point, t, settled)
     slopes = Linearization(model, p, x, time, named)
     return linear_model(model.form.graph.name, slopes, None if outputs is None else _listed(outputs), x, time)
 

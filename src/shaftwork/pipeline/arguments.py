@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
 
 from shaftwork.codegen.elements import Array
+from shaftwork.components.shaft_models import Auto
+from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
 from shaftwork.network.netlist import Netlist
 
 OUTPUTS, MOST_OUTPUTS = 1001, 10_000_000
 """Output times when the user gives none, and the most that can be asked for."""
+DELAYING = ("length", "density", "shear_modulus")
+"""What the delay of a shaft depends on, and with it the choice of its model."""
 OutputTimes = int | Sequence[float] | Array | Literal["steps"] | None
 
 
@@ -112,3 +116,22 @@ def checked_parameter(netlist: Netlist, name: str, value: Any) -> float:
     if hasattr(part, "__post_init__"):  # what the part says of values that do not go together
         dataclasses.replace(part, **{parameter: float(number)})  # type: ignore[arg-type]
     return float(number)
+
+
+def meshes_anew(netlist: Netlist, values: Mapping[str, float]) -> bool:
+    """Whether `Auto` chooses another model of a shaft for new values in SI.
+
+    Raises:
+        ParameterError: a shaft has become too long for one polynomial.
+    """
+    changed: dict[str, dict[str, Any]] = {}
+    for name, value in values.items():
+        owner, _, parameter = name.rpartition(".")
+        if parameter in DELAYING:
+            changed.setdefault(owner, {})[parameter] = value
+    shafts = (placed.part for placed in netlist.placed if placed.part.name in changed)
+    return any(
+        dataclasses.replace(shaft, **changed[shaft.name]).resolved != shaft.resolved
+        for shaft in shafts
+        if isinstance(shaft, Shaft) and isinstance(shaft.model, Auto)
+    )

@@ -8,6 +8,7 @@ from sympy import Expr
 
 from shaftwork.components.base import Component
 from shaftwork.components.rotation import Damper, Inertia, Spring
+from shaftwork.components.shaft_models import Rigid
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import ParameterError
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
@@ -16,7 +17,7 @@ from shaftwork.network.templates import Kind
 
 
 def expanded(netlist: Netlist, graph: CircuitGraph) -> Netlist:
-    """The network with an inertia, a spring or a damper for everything inside its shafts.
+    """The network with an inertia, a spring or a damper for everything inside its shafts; rigid ones are as they were.
 
     Args:
         netlist: of the network.
@@ -27,12 +28,14 @@ def expanded(netlist: Netlist, graph: CircuitGraph) -> Netlist:
     """
     made: list[Placed] = []
     for item, part in zip(netlist.placed, graph.parts, strict=True):
-        made += _chain(item, part, graph) if isinstance(item.part, Shaft) else [item]
+        made += _chain(item, part, graph)
     return Netlist(netlist.name, tuple(made))
 
 
 def _chain(item: Placed, part: GraphPart, graph: CircuitGraph) -> list[Placed]:
-    """The parts of a shaft, from its first end to its second."""
+    """The parts of a shaft, from its first end to its second; any other part as it is."""
+    if not isinstance(item.part, Shaft) or isinstance(item.part.resolved, Rigid):
+        return [item]
     name, branches = item.part.name, [graph.branches[k] for k in part.branches]
     if any(branch.terms or branch.template.line is not None for branch in branches):
         raise ParameterError(
@@ -48,20 +51,22 @@ def _chain(item: Placed, part: GraphPart, graph: CircuitGraph) -> list[Placed]:
     return [
         Placed(made, (names[plus],) if isinstance(made, Inertia) else (names[plus], names[minus]))
         for (plus, minus), laws in joined.items()
-        for made in _parts(name, names[plus], names[minus], laws)
+        for made in _parts(item.part, names[plus], names[minus], laws)
     ]
 
 
-def _parts(shaft: str, plus: str, minus: str, laws: Mapping[Kind, float]) -> Iterator[Component]:
+def _parts(whole: Shaft, plus: str, minus: str, laws: Mapping[Kind, float]) -> Iterator[Component]:
+    shaft = whole.name
     here = plus.removeprefix(f"{shaft} ")
+    symbol = f"{shaft if whole.symbol is None else whole.symbol},{here}"
     stiffness, damping = laws.get(Kind.THROUGH_STORE), laws.get(Kind.CONDUCTANCE)
     if (inertia := laws.get(Kind.ACROSS_STORE)) is not None:
-        yield Inertia(f"{shaft} J {here}", J=inertia)
+        yield Inertia(f"{shaft} J {here}", symbol=symbol, J=inertia)
     if stiffness is not None:
-        yield Spring(f"{shaft} c {here}", c=stiffness, d=damping or 0.0)
+        yield Spring(f"{shaft} c {here}", symbol=symbol, c=stiffness, d=damping or 0.0)
     elif damping is not None:
         to = "" if minus == REFERENCE else f" {minus.removeprefix(f'{shaft} ')}"
-        yield Damper(f"{shaft} d {here}{to}", d=damping)
+        yield Damper(f"{shaft} d {here}{to}", symbol=f"bearing,{symbol}" if minus == REFERENCE else symbol, d=damping)
 
 
 def _coefficients(branches: list[GraphBranch], graph: CircuitGraph) -> dict[int, float]:

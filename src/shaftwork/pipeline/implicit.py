@@ -77,6 +77,7 @@ def solve_loops(bound: BoundArrays, problem: Problem) -> tuple[Trajectory, str, 
 
     from shaftwork.integrate.sundials import solve_dae
 
+    look = problem.switches
     size = float(np.abs(start).max()) or 1.0
     found = solve_dae(
         DaeProblem(
@@ -92,6 +93,7 @@ def solve_loops(bound: BoundArrays, problem: Problem) -> tuple[Trajectory, str, 
             breakpoints=problem.breakpoints,
             jump=jump,
             sides=problem.sides,
+            switches=None if look is None else lambda t, z: look(t, z[:, :states]),
             t_eval=problem.t_eval,
             max_steps=problem.max_steps,
         )

@@ -26,6 +26,7 @@ from shaftwork.pipeline.arguments import (
     OutputTimes,
     absolute_tolerances,
     checked_parameter,
+    meshes_anew,
     output_times,
     relative_tolerance,
     time_span,
@@ -374,11 +375,11 @@ class Model(CompiledModel):
         return np.concatenate([np.ones(len(inertias)), torques, np.ones(len(form.integrals))])
 
     def _changes_structure(self, values: Mapping[str, float]) -> bool:
-        """Whether other equations hold for new values: something becomes zero or stops being it, ratios meet."""
+        """Whether other equations hold for new values: a value becomes zero or ceases to, ratios meet, `Auto`."""
         if not values:
             return False
         decisive = frozenset((*self.form.graph.zeros, *self.form.tree.frozen))
-        if any(name in decisive or value == 0 for name, value in values.items()):
+        if any(name in decisive or value == 0 for name, value in values.items()) or meshes_anew(self.netlist, values):
             return True
         return self.arrays.assembly.loops.degenerates(self.vector(values))
 

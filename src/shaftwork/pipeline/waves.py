@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -17,7 +18,7 @@ from shaftwork.codegen.waves import WaveSystem
 from shaftwork.components.base import Component
 from shaftwork.components.shaft_models import Lumped, Wave
 from shaftwork.components.shafts import Shaft
-from shaftwork.core.errors import ParameterError
+from shaftwork.core.errors import AccuracyWarning, NetworkWarning, ParameterError
 from shaftwork.core.times import just_after
 from shaftwork.integrate.lossless.engine import solve
 from shaftwork.integrate.lossless.lines import DelayProblem, DelayTrajectory
@@ -27,6 +28,12 @@ from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
 
 WHY = "Shafts are travelling waves, so states and delays are solved together."
+LIGHT = 0.1
+"""Lumped bearing friction is light up to this fraction of the impedance: the torques are right to about 0.5 %."""
+MANY_PANELS = 2e5
+"""A march of so many panels takes minutes."""
+CALLER = 6
+"""Frames from a warning to who called `simulate`."""
 
 
 @dataclass(frozen=True)
@@ -91,8 +98,15 @@ def start_of_waves(
 
     Raises:
         SignalError: there is no such quantity.
-        ParameterError: values are not finite or contradict each other.
+        ParameterError: values are not finite or contradict each other, or the ends of a wave are given two torques.
     """
+    for name in dict.fromkeys(form.graph.part_of(end).name for end in form.waves):
+        first, last = (given.get(f"{name}.{end}") for end in ("tau_a", "tau_b"))
+        if first is not None and last is not None and first != last:
+            raise ParameterError(
+                f"The wave '{name}' cannot start with tau_a = {first} and tau_b = {last}: it starts with one torque "
+                "all along. Give one of them, or take model=Spectral(16)."
+            )
     x = initial_state(twin, given, t0)
     motion = np.vstack([initial_state(twin, {}, t0), x])
     times = np.full(2, just_after(t0))
@@ -127,6 +141,10 @@ def solve_waves(
     Raises:
         ParameterError: another engine was asked for.
         SimulationError: the engine failed.
+
+    Warns:
+        AccuracyWarning: bearing friction is too heavy to be lumped.
+        NetworkWarning: a line is so short, and beside it something so nonlinear, that the run hardly ends.
     """
     if engine not in ("auto", "wave"):
         raise ParameterError(
@@ -135,6 +153,9 @@ def solve_waves(
         )
     system = WaveSystem(bound)
     impedances, delays = system.lines
+    _warn_of_friction(bound, impedances)
+    if not linear:
+        _warn_of_short_lines(bound, delays, problem.t_end - problem.t0)
     found = solve(
         DelayProblem(
             rhs=system.rhs,
@@ -161,3 +182,33 @@ def solve_waves(
     )
     x = np.hstack([found.x, found.h])
     return Trajectory(found.t, x, _StatesAndWaves(found, impedances), found.statistics), "wave", WHY
+
+
+def _warn_of_friction(bound: BoundArrays, impedances: Array) -> None:
+    form = bound.program.form
+    parts = [form.graph.part_of(end) for end in form.waves[::2]]
+    for part, impedance in {part.name: (part, Z) for part, Z in zip(parts, impedances, strict=True)}.values():
+        value = {name: float(bound.p[place]) for name, place in part.parameters.items()}
+        share = value.get("friction", 0.0) * value["length"] / float(impedance)
+        if share > LIGHT:
+            warnings.warn(
+                f"Shaft '{part.name}': its bearing friction d' L is {share:.2g} of its wave impedance, and Wave() "
+                f"lumps it at the ends and the middle, which is right far below one only: torques along it are off by "
+                f"{'more than ten' if share > 5 else 'some'} per cent. Take model=Spectral(16), which spreads it out.",
+                AccuracyWarning,
+                stacklevel=CALLER,
+            )
+
+
+def _warn_of_short_lines(bound: BoundArrays, delays: Array, span: float) -> None:
+    shortest = int(delays.argmin())
+    panels = span / float(delays[shortest])
+    if panels > MANY_PANELS:
+        name = bound.program.form.graph.part_of(bound.program.form.waves[2 * shortest]).name
+        warnings.warn(
+            f"A wave crosses shaft '{name}' in {delays[shortest]:.2g} s, and beside nonlinear laws no panel is longer: "
+            f"the run takes at least {panels:.2g} panels. Take model=OneSpring() or Spectral(2) for a shaft so short, "
+            "or a shorter run.",
+            NetworkWarning,
+            stacklevel=CALLER,
+        )

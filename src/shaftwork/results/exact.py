@@ -186,6 +186,9 @@ class ExactModel:
         Raises:
             ParameterError: count or f_max is out of its range, or modes without number crowd below it.
             SimulationError: it cannot be settled that all modes were found.
+
+        Warns:
+            NetworkWarning: an end takes all that arrives at it, so that there are fewer modes.
         """
         return find_exact_modes(self.title, self.slopes, self.starts, count, f_max)
 

@@ -2,18 +2,20 @@
 
 The mesh says about where the rates are and how many lie together. Each is then a root of the exact problem to rounding,
 and the argument principle counts the roots of that problem, which knows no mesh: where both numbers agree none is lost,
-doubled or spurious.
+doubled or spurious. At an end that takes all that arrives, nothing comes back: there the mesh has modes and the shaft
+has none, and what the mesh leads to is taken as far as it is what has been counted.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shaftwork.core.errors import ParameterError, SimulationError
+from shaftwork.core.errors import NetworkWarning, ParameterError, SimulationError
 from shaftwork.results.exact_problem import ExactProblem
 from shaftwork.results.modes import Modes, checked_count, largest_rate, modes_of
 from shaftwork.results.observer import Array
@@ -35,6 +37,10 @@ ROOM = 1.001
 APART = 0.5
 """Roots stay apart by at least this fraction of the distance of their starts."""
 ATTEMPTS = 3
+FADED, SINGULAR = 40.0, 1e13
+"""At the rate -FADED / T what fades grows to beyond rounding: the matrix then has this condition where none echoes."""
+AUDIBLE = 3.0
+"""Half waves up to which the count tells an end that takes all from one that throws back some rounding."""
 
 Starts = Callable[[float, int], Modes]
 """The modes of the network with meshes that are right for |rate| up to a radius, the finer the later the attempt."""
@@ -55,13 +61,16 @@ def find_exact_modes(
     Raises:
         ParameterError: count or f_max is out of its range, or modes without number crowd below it.
         SimulationError: it cannot be settled that all modes were found.
+
+    Warns:
+        NetworkWarning: an end takes all that arrives, so that there are fewer modes.
     """
-    asked, limit = checked_count(count), BELOW * slopes.lines.crowding
+    asked, limit = checked_count(count), min(BELOW * slopes.lines.crowding, _echo_limit(slopes))
     if f_max is not None:
         radius = largest_rate(f_max)
         if radius > limit:
-            raise _crowded(slopes, f"f_max = {f_max:g} Hz")
-        return _lowest(_settled(title, slopes, starts, radius), asked)
+            _stop(slopes, limit, f"f_max = {f_max:g} Hz")
+        return _lowest(_settled(title, slopes, starts, min(radius, limit)), asked)
     enough = MODES if asked is None else asked
     radius = min(np.pi * enough / float(slopes.lines.delay.sum()), limit)
     while slopes.lines.half_waves(radius).sum() > 1.01 * enough:  # a mode for each half wave, roughly
@@ -71,11 +80,20 @@ def find_exact_modes(
         radius = min(radius, ROOM * float(sizes[enough]))
     while True:
         found = _settled(title, slopes, starts, radius)
-        if len(found) >= enough or (asked is None and radius == limit):
+        if len(found) < enough and radius == limit and (asked is not None or np.isinf(slopes.lines.crowding)):
+            _stop(slopes, limit, f"count = {enough}")
+        if len(found) >= enough or radius == limit:
             return _lowest(found, enough)
-        if radius == limit:
-            raise _crowded(slopes, f"count = {enough}")
         radius = min(2 * radius, limit)
+
+
+def _echo_limit(slopes: ExactSlopes) -> float:
+    """The rate up to which modes can be named where an end takes all that arrives; infinite where none does."""
+    lines = slopes.lines
+    s = np.array([-FADED / float(lines.delay.min())], dtype=complex)
+    if np.isfinite(lines.crowding) or np.linalg.cond(_problem(slopes)[0].matrix(s)[0]) < SINGULAR:
+        return np.inf
+    return AUDIBLE * np.pi / float(lines.delay.max())
 
 
 def _lowest(modes: Modes, count: int | None) -> Modes:
@@ -83,10 +101,20 @@ def _lowest(modes: Modes, count: int | None) -> Modes:
     return modes_of(modes.title, modes.slopes, modes.rates[kept], modes.vectors[:, kept])
 
 
-def _crowded(slopes: ExactSlopes, asked: str) -> ParameterError:
+def _stop(slopes: ExactSlopes, limit: float, asked: str) -> None:
+    """Say why modes are named up to a limit alone; where they crowd there, by an error."""
+    if np.isinf(slopes.lines.crowding):
+        warnings.warn(
+            f"{asked}: an end of a shaft takes all that arrives at it (a damper of the impedance of the shaft), and "
+            f"what does not come back makes no mode. Modes are named up to f_max = {limit / (2 * np.pi):.4g} Hz, "
+            f"beyond which rounding alone would make some; for amplitudes take frequency_response.",
+            NetworkWarning,
+            stacklevel=5,
+        )
+        return
     shaft = slopes.lines.names[int(slopes.lines.damping.argmax())]
     most = 0.99 * BELOW * slopes.lines.crowding / (2 * np.pi)  # also with the digits that are shown
-    return ParameterError(
+    raise ParameterError(
         f"{asked}: the internal damping of shaft '{shaft}' makes modes without number whose rates crowd at "
         f"-C'/D' = {-slopes.lines.crowding:.4g} 1/s. All modes can be named up to f_max = {most:.4g} Hz."
     )
@@ -99,13 +127,13 @@ def _settled(title: str, slopes: ExactSlopes, starts: Starts, radius: float) -> 
         outer = _gap(np.abs(mesh.rates), radius)
         inside = np.flatnonzero(np.abs(mesh.rates) < outer)
         problem, kept, following = _problem(slopes)
-        try:
-            rates, found = _refined(problem, mesh.rates[inside][mesh.rates[inside] != 0])
-        except SimulationError:
-            continue
-        standing = inside[mesh.rates[inside] == 0]
-        complete = problem.count(outer) == len(standing) + np.where(rates.imag > 0, 2, 1).sum()
-        if not complete:
+        standing, starts_inside = inside[mesh.rates[inside] == 0], mesh.rates[inside][mesh.rates[inside] != 0]
+        moving = problem.count(outer) - len(standing)
+        refined = _refined(problem, starts_inside)
+        if refined is None or _number(refined[0]) != moving:
+            refined = _reached(problem, starts_inside if moving else starts_inside[:0], outer)
+        rates, found = refined
+        if _number(rates) != moving:
             continue
         weights = slopes.weights[:, None]
         vectors = np.zeros((len(weights), len(rates)), dtype=complex)
@@ -118,8 +146,14 @@ def _settled(title: str, slopes: ExactSlopes, starts: Starts, radius: float) -> 
         return modes_of(title, slopes, rates[below], vectors[:, below])
     raise SimulationError(
         f"The modes of '{title}' up to {radius / (2 * np.pi):.6g} Hz could not be settled: those found from a mesh "
-        f"differ in number from the exact ones. Ask for another f_max, or take model=Spectral(32) and exact=False."
+        f"differ in number from the exact ones. Ask for another f_max or count. Where an end takes nearly all that "
+        f"arrives (a damper of about the shaft's impedance), modes of a mesh mean nothing: take frequency_response."
     )
+
+
+def _number(rates: Complex) -> int:
+    """How many roots there are, with the conjugate ones."""
+    return int(np.where(rates.imag > 0, 2, 1).sum())
 
 
 def _gap(sizes: Array, radius: float) -> float:
@@ -138,25 +172,44 @@ def _problem(slopes: ExactSlopes) -> tuple[ExactProblem, NDArray[np.intp], NDArr
     return ExactProblem(slopes.open, slopes.lines, slopes.weights, kept), kept, following
 
 
-def _refined(problem: ExactProblem, starts: Complex) -> tuple[Complex, Complex]:
-    """The roots next to the starts and their vectors.
+def _reached(problem: ExactProblem, starts: Complex, radius: float) -> tuple[Complex, Complex]:
+    """The different roots within a radius that any starts lead to, and their vectors: the mesh may have more modes."""
+    rates, vectors = np.zeros(0, dtype=complex), np.zeros((problem.unknowns, 0), dtype=complex)
+    for group in _together(starts):
+        try:
+            roots, shapes = problem.roots(starts[group])
+        except SimulationError:
+            continue
+        new = [k for k, root in enumerate(roots) if 0 < abs(root) < radius and root.imag >= 0]
+        new = [k for k in new if (np.abs(rates - roots[k]) > TOGETHER * abs(roots[k])).all()]
+        rates, vectors = np.append(rates, roots[new]), np.hstack([vectors, shapes[:, new]])
+    return rates, vectors
 
-    Raises:
-        SimulationError: two starts have led to one root, or one to none.
-    """
+
+def _together(starts: Complex) -> list[list[int]]:
+    """Groups of starts that lie close together."""
     groups: list[list[int]] = []
     for k in np.lexsort((starts.real, starts.imag)).tolist():
         near = groups and abs(starts[groups[-1][0]] - starts[k]) <= TOGETHER * abs(starts[k])
         groups[-1].append(k) if near else groups.append([k])
+    return groups
+
+
+def _refined(problem: ExactProblem, starts: Complex) -> tuple[Complex, Complex] | None:
+    """The roots next to the starts and their vectors; None where two starts led to one root, or one to none."""
+    groups = _together(starts)
     order = np.array([k for group in groups for k in group], dtype=np.intp)
     if not groups:
         return starts, np.zeros((problem.unknowns, 0), dtype=complex)
-    found = [problem.roots(starts[group]) for group in groups]
+    try:
+        found = [problem.roots(starts[group]) for group in groups]
+    except SimulationError:
+        return None
     rates = np.concatenate([root for root, _ in found])
     label = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
     before, after = (np.abs(each[:, None] - each[None, :]) for each in (starts[order], rates))
     if ((after < APART * before) & (label[:, None] != label)).any():
-        raise SimulationError("Two modes of the mesh are one mode of the shafts.")
+        return None
     return rates, np.hstack([vectors for _, vectors in found])
 
 

@@ -36,10 +36,11 @@ def work_precision_figure(study: WorkPrecision) -> Figure:
         costs = [1e3 * trial.cpu for trial in members]
         sizes = [float(max(trial.states, 1)) for trial in members]
         for axis, values in zip(axes, (costs, sizes), strict=True):
-            axis.loglog(values, errors, marker=marker, markersize=6, linewidth=1.3, label=family)
-            for trial, value, error in zip(members, values, errors, strict=True):
-                if size := _size(trial):
-                    axis.annotate(size, (value, error), (4, 4), textcoords="offset points", fontsize=7, alpha=0.75)
+            (line,) = axis.loglog(values, errors, marker=marker, markersize=6, linewidth=1.3, label=family)
+            ends = {0: (-4, 4, "right"), len(members) - 1: (4, -9, "left")} if len(members) > 1 else {}
+            for k, (x, y, side) in ends.items():
+                style = {"fontsize": 7, "color": line.get_color(), "ha": side}
+                axis.annotate(_size(members[k]), (values[k], errors[k]), (x, y), textcoords="offset points", **style)
     for axis, label in zip(axes, ("CPU time of a warm call in ms", "number of states"), strict=True):
         axis.set_xlabel(label)
         axis.grid(which="both", alpha=0.2)
@@ -51,5 +52,4 @@ def work_precision_figure(study: WorkPrecision) -> Figure:
 
 
 def _size(trial: Trial) -> str:
-    digits = trial.model.partition("=")[2]
-    return digits.split(",")[0].rstrip(")") if trial.model.startswith(("Lumped", "Central", "Spectral")) else ""
+    return trial.model.partition("=")[2].split(",")[0].rstrip(")")

@@ -18,6 +18,7 @@ from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationErro
 from shaftwork.integrate.choice import ENGINES, available
 from shaftwork.pipeline.model import NOMINAL, Model
 from shaftwork.results.observer import Array
+from shaftwork.studies.arguments import engine_names, several, shaft_models
 from shaftwork.studies.stability_cases import CASES, TORQUE, Case
 from shaftwork.studies.stability_truth import QUANTITIES, Motion, exact, predicted
 
@@ -156,12 +157,10 @@ def stability(
     Raises:
         ParameterError: there is no such case, model or engine.
     """
-    asked = tuple(engines) or ("auto", *(name for name in ENGINES if available(name)), "wave")
-    if unknown := [name for name in asked if name not in (*ENGINES, "auto", "wave")]:
-        raise ParameterError(f"There is no engine {unknown[0]!r}. Take some of: auto, {', '.join(ENGINES)}, wave.")
-    read = tuple(ShaftModel.read(model) if isinstance(model, str) else model for model in models)
+    asked = engine_names(engines) or ("auto", *(name for name in ENGINES if available(name)), "wave")
+    read = shaft_models(models)
     cells: list[Cell] = []
-    for case in [_named(case) if isinstance(case, str) else case for case in cases]:
+    for case in [_named(case) if isinstance(case, str) else case for case in several("cases", cases)]:
         truth = exact(case)
         for model in read or case.models:
             cells += _row(case, model, [name for name in asked if name in (case.engines or asked)], truth)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import sympy
@@ -15,6 +15,8 @@ from shaftwork.components.rotation import Damper, Gear, Ground, Inertia, Spring
 from shaftwork.components.shaft_models import CentralDifference, Lumped, OneSpring, Rigid, ShaftModel, Spectral, Wave
 from shaftwork.components.shafts import Shaft
 from shaftwork.components.sources import TorqueSource
+from shaftwork.core.errors import ParameterError
+from shaftwork.core.parameters import in_si
 from shaftwork.pipeline.network import Network
 from shaftwork.results.observer import Array
 from shaftwork.shafts.line import Section
@@ -53,6 +55,9 @@ class Case:
         engines: that are compared, of those asked for; empty for all.
         periods: the outputs are in the last of so many periods of two delays; 0 for all over the motion.
         steps: bound on the steps of a run.
+
+    Raises:
+        ParameterError: there is no such form, or a size is not above 0.
     """
 
     name: str
@@ -72,6 +77,14 @@ class Case:
     engines: tuple[str, ...] = ()
     periods: int = 0
     steps: int = 3000
+
+    def __post_init__(self) -> None:
+        if self.form not in get_args(Form):
+            raise ParameterError(
+                f"Case {self.name!r}: form = {self.form!r} must be one of: {', '.join(get_args(Form))}."
+            )
+        for name in ("rise", "delays", "ratio", "length", "diameter"):
+            in_si(name, getattr(self, name), above=0)
 
     @property
     def section(self) -> Section:

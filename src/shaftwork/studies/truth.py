@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,24 +14,30 @@ from shaftwork.components.base import Component
 from shaftwork.components.laws import NUMERICAL, as_expression, breakpoints
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.rotation import Damper, Inertia
-from shaftwork.components.shaft_models import ShaftModel, Spectral, Wave
+from shaftwork.components.shaft_models import OneSpring, Rigid, ShaftModel, Spectral, Wave
 from shaftwork.components.shafts import Shaft
 from shaftwork.components.sources import TorqueSource
-from shaftwork.core.errors import ParameterError
+from shaftwork.core.errors import ParameterError, ShaftworkError
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
 from shaftwork.pipeline.network import Network
+from shaftwork.results.modes import Modes
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
-from shaftwork.shafts.exact_modes import natural_frequencies
 from shaftwork.shafts.exact_motion import Torque, motion
 from shaftwork.shafts.line import Line, Section
 
 QUANTITIES = ("tau_a", "tau_b", "tau_mid", "omega_a", "omega_b")
 """What is compared: torque at both ends and in the middle, speed of both ends."""
+COARSE = Spectral(8)
+"""The model of a network whose shafts are then taken without one."""
 FINE, FINER = 48, 64
 """Degrees of two spectral models whose difference says how well the finer one stands for the truth."""
 TIGHT = 1e-11
 """Tolerance of runs that stand for the truth."""
+NONLINEAR, LOOSER = (16, 24), 1e-8
+"""The same for a nonlinear network that no wave solves: its modes are stepped through one by one."""
+JUDGED = 4
+"""Elastic natural frequencies that the truth names."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +46,8 @@ class Truth:
 
     Args:
         values: (k,) of each of `QUANTITIES` at the times asked for.
-        frequencies: lowest natural frequencies of the train in Hz, rigid motion left out; empty where unknown.
+        frequencies: lowest natural frequencies |rate| / 2 pi of the network at rest in Hz, of modes that swing; empty
+            where unknown.
         source: where it comes from, a few words.
         error: estimate of its own error, relative to the largest torque.
     """
@@ -51,11 +59,14 @@ class Truth:
 
 
 def with_model(net: Network, shaft: str, model: ShaftModel) -> Network:
-    """The same network with another model of one shaft, or of all where `shaft` is empty."""
+    """The same network with another model of its shafts.
+
+    Other shafts than the named one that are rigid or one spring stay so: that is a wish, no approximation.
+    """
     made = Network(net.name)
     for placed in net.netlist().placed:
         part = placed.part
-        if isinstance(part, Shaft) and shaft in ("", part.name):
+        if isinstance(part, Shaft) and (part.name == shaft or not isinstance(part.resolved, Rigid | OneSpring)):
             part = dataclasses.replace(part, model=model)
         made.add(part, *placed.nodes)
     return made
@@ -65,36 +76,63 @@ def truth(net: Network, shaft: str, t_end: float, t: Array) -> Truth:
     """The exact motion of a shaft.
 
     A train of inertias, lossless shafts, bearings and torques of time is solved by characteristics; another network
-    without internal damping by travelling waves; one with damping by a spectral model of high degree.
+    without losses along its shafts by travelling waves; any other by a spectral model of high degree. Frequencies are
+    those of exact shafts, damping included.
+
+    Raises:
+        ShaftworkError: the network cannot be solved.
     """
-    shafts = [part for part in net.parts if isinstance(part, Shaft)]
-    try:
-        return _by_characteristics(net.netlist(), shaft, t_end, t)
-    except ParameterError:
-        pass
-    if not any(part.damping or part.friction for part in shafts):
-        found = _read(with_model(net, "", Wave(3)), shaft, t_end, t)
-        return Truth(found, np.empty(0), "travelling waves", TIGHT)
-    fine, finer = (_read(with_model(net, "", Spectral(n)), shaft, t_end, t) for n in (FINE, FINER))
+    exact = _exact_frequencies(with_model(net, shaft, COARSE))
+    if not any(part.damping or part.friction for part in net.parts if isinstance(part, Shaft)):
+        waves = with_model(net, shaft, Wave(3))
+        with suppress(ParameterError):  # it is no train
+            values, error = _by_characteristics(waves.netlist(), shaft, t_end, t)
+            return Truth(values, exact, "characteristics", error)
+        with suppress(ShaftworkError):  # such as a clearance at an end of a shaft where no inertia is
+            return Truth(_read(waves, shaft, t_end, t), exact, "travelling waves", TIGHT)
+    linear = with_model(net, shaft, COARSE).compile().linear
+    degrees, rtol = ((FINE, FINER), TIGHT) if linear else (NONLINEAR, LOOSER)
+    fine, finer = (_read(with_model(net, shaft, Spectral(n)), shaft, t_end, t, rtol) for n in degrees)
     gap = max(np.abs(fine[name] - finer[name]).max() / np.abs(finer[name]).max() for name in ("tau_a", "tau_b"))
-    return Truth(finer, np.empty(0), f"Spectral({FINER})", float(gap))
+    return Truth(finer, exact, f"Spectral({degrees[1]})", float(gap))
 
 
-def quantities(solution: Solution, shaft: str) -> dict[str, Array]:
-    """The compared quantities of a solution; the torque in the middle between the two places next to it."""
+def quantities(solution: Solution, net: Network, shaft: str) -> dict[str, Array]:
+    """The compared quantities of a solution.
+
+    The torque in the middle is what the model says: the value of its polynomial, or between the two nearest places.
+    """
     places, torques = solution.places[f"{shaft}.tau"], solution[f"{shaft}.tau"]
+    model = next(part.resolved for part in net.parts if isinstance(part, Shaft) and part.name == shaft)
     middle = places[-1] / 2
-    after = int(np.clip(np.searchsorted(places, middle), 1, len(places) - 1))
-    share = (middle - places[after - 1]) / (places[after] - places[after - 1])
+    if isinstance(model, Spectral):
+        read = np.arange(1, len(places) - 1)  # the ends belong to what is there, not to the polynomial
+    else:
+        read = np.argsort(np.abs(places - middle), kind="stable")[:2]
+    apart = places[read][:, None] - places[read] + np.eye(len(read))
+    lagrange = np.prod((middle - places[read] - np.diag(middle - places[read] - 1)) / apart, axis=1)
     made = {name: solution[f"{shaft}.{name}"] for name in QUANTITIES if name != "tau_mid"}
-    return made | {"tau_mid": (1 - share) * torques[:, after - 1] + share * torques[:, after]}
+    return made | {"tau_mid": torques[:, read] @ lagrange}
 
 
-def _read(net: Network, shaft: str, t_end: float, t: Array) -> dict[str, Array]:
-    return quantities(net.simulate(t_end, t_eval=t, rtol=TIGHT), shaft)
+def frequencies(modes: Modes) -> Array:
+    """The natural frequencies |rate| / 2 pi in Hz of the modes that swing."""
+    return modes.frequencies[modes.frequencies > 0]
 
 
-def _by_characteristics(netlist: Netlist, shaft: str, t_end: float, t: Array) -> Truth:
+def _exact_frequencies(net: Network) -> Array:
+    try:
+        found = frequencies(net.modes(exact=True))
+    except ShaftworkError:
+        return np.empty(0)
+    return found[:JUDGED] if len(found) >= JUDGED else np.empty(0)
+
+
+def _read(net: Network, shaft: str, t_end: float, t: Array, rtol: float = TIGHT) -> dict[str, Array]:
+    return quantities(net.simulate(t_end, t_eval=t, rtol=rtol), net, shaft)
+
+
+def _by_characteristics(netlist: Netlist, shaft: str, t_end: float, t: Array) -> tuple[dict[str, Array], float]:
     order, shafts = _train(netlist)
     sections = [_section(placed.part) for placed in shafts]
     line = Line(
@@ -116,8 +154,7 @@ def _by_characteristics(netlist: Netlist, shaft: str, t_end: float, t: Array) ->
         zip(("tau_a", "tau_b", "omega_a", "omega_b"), (*(sign * tau for tau in torques), *speeds), strict=True)
     )
     values["tau_mid"] = sign * found.torque(middle, t)
-    frequencies = natural_frequencies(line.without_losses(), 5)
-    return Truth(values, frequencies[frequencies > 0][:4], "characteristics", found.error)
+    return values, found.error
 
 
 def _train(netlist: Netlist) -> tuple[list[str], list[Placed]]:
@@ -144,8 +181,8 @@ def _train(netlist: Netlist) -> tuple[list[str], list[Placed]]:
 
 
 def _section(part: Component) -> Section:
-    if not isinstance(part, Shaft) or part.damping or part.friction:
-        raise ParameterError("Characteristics know no losses along the shaft.")
+    if not isinstance(part, Shaft) or not isinstance(part.model, Wave) or part.damping or part.friction:
+        raise ParameterError("Characteristics know neither losses along a shaft nor one that is rigid or one spring.")
     return Section.of_geometry(
         part.length, part.diameter, part.inner_diameter, density=part.density, shear_modulus=part.shear_modulus
     )

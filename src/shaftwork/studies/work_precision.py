@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import itertools
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -15,32 +16,37 @@ import numpy as np
 
 from shaftwork.components.shaft_models import CentralDifference, Lumped, OneSpring, ShaftModel, Spectral, Wave
 from shaftwork.components.shafts import Shaft
-from shaftwork.core.errors import ParameterError, ShaftworkError
+from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError
 from shaftwork.core.parameters import in_si
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.network import Network
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
-from shaftwork.studies.truth import QUANTITIES, Truth, quantities, truth, with_model
+from shaftwork.studies.arguments import engine_names, shaft_models
+from shaftwork.studies.truth import QUANTITIES, Truth, frequencies, quantities, truth, with_model
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LADDER: tuple[ShaftModel, ...] = (
-    OneSpring(),
-    *(Lumped(m) for m in (5, 10, 20, 40, 80, 160)),
-    *(CentralDifference(m) for m in (10, 20, 40, 80)),
-    *(CentralDifference(m, order=4) for m in (10, 20, 40)),
-    *(Spectral(n) for n in (2, 4, 8, 16, 32, 48)),
     Wave(3),
+    OneSpring(),
+    *(Spectral(n) for n in (2, 4, 8, 16, 32, 48)),
+    *(Lumped(m) for m in (5, 10, 20, 40, 80, 160)),
+    *(CentralDifference(m, order=4) for m in (10, 20, 40)),
+    *(CentralDifference(m) for m in (10, 20, 40, 80)),
 )
 """The models and sizes that are compared where none are named."""
 POINTS, CALLS = 401, 5
 """Output times, and warm calls of which the median counts."""
 SLOW = 3.0
-"""Where a run has taken longer, in s, larger models of its kind are left out."""
-MOST_STATES = 500
-"""Up to this many states natural frequencies are computed."""
+"""Where set-up and run have taken longer, in s, larger models of its kind are left out."""
+LONGEST = 5.0
+"""A run is given up after so long, s."""
+BUDGET = 45.0
+"""Where so long has passed, in s, the rest is left out."""
+LOWEST = 20
+"""Modes of a model that are computed, those of smallest rate; as many as the exact ones up to f_5 and their doubles."""
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6)
 """Errors for which the cheapest model is named."""
 MODES = 3
@@ -55,7 +61,7 @@ class Trial:
         model: as text, such as "Lumped(m=20)".
         engine: name of the engine that ran.
         states: number of states.
-        setup: CPU time from the network to the first result, less a warm call, s.
+        setup: CPU time from the network to the first result, less a warm call, s; of a trial that failed, all of it.
         cpu: CPU time of a warm call with reading both end torques, s; the median of several.
         errors: largest error of each quantity over its largest value, by name; of frequencies, relative to each.
         extra_modes: oscillating modes, up to halfway between the highest frequency that is judged and the next, less
@@ -80,6 +86,18 @@ class Trial:
         name, _, arguments = self.model.rstrip(")").partition("(")
         _, comma, choices = arguments.partition(",")
         return f"{name}{comma}{choices}"
+
+    @property
+    def spent(self) -> float:
+        """CPU time of set-up and one call, s; of a trial that failed, until then."""
+        return self.setup + (self.cpu if self.errors else 0.0)
+
+    @property
+    def costs(self) -> tuple[str, str, str]:
+        """States, set-up and CPU time in ms as they are printed."""
+        if not self.errors:
+            return "-", "-", "-"
+        return f"{self.states}", f"{1e3 * self.setup:.0f}", f"{1e3 * self.cpu:.2f}"
 
     @property
     def error(self) -> float:
@@ -126,7 +144,7 @@ class WorkPrecision:
     def __str__(self) -> str:
         header = ["model", "engine", "states", "set-up ms", "CPU ms", *self.columns, "extra modes"]
         rows = [
-            [trial.model, trial.engine, str(trial.states), f"{1e3 * trial.setup:.0f}", f"{1e3 * trial.cpu:.2f}"]
+            [trial.model, trial.engine, *trial.costs]
             + [f"{trial.errors[name]:.1e}" if name in trial.errors else "-" for name in self.columns]
             + ["-" if trial.extra_modes is None else f"{trial.extra_modes}"]
             + ([trial.why] if trial.why else [])
@@ -165,74 +183,108 @@ def work_precision(
     models: Sequence[ShaftModel | str] = LADDER,
     engines: Iterable[str] = ("auto",),
     points: int = POINTS,
+    budget: float = BUDGET,
+    report: Callable[[Trial], None] | None = None,
 ) -> WorkPrecision:
     """Solve a network with each model of its shafts, by each engine, and measure error and CPU time.
 
+    CPU time is that of the calling thread: other threads of the linear algebra, which mostly wait for work at these
+    sizes, are not counted. Times are the surest where there is one thread: set OPENBLAS_NUM_THREADS=1 (MKL_, OMP_)
+    before numpy is imported, as `shaftwork compare` does.
+
     Args:
         net: the network.
-        shaft: name of the shaft at which errors are measured; all shafts get the same model.
+        shaft: name of the shaft at which errors are measured. All shafts get the same model; but others that are rigid
+            or one spring stay so, in the truth as well.
         t_end: end of the motion, s.
         models: models, or their texts.
         engines: engines by name.
         points: number of output times.
+        budget: no trial is begun later than this after the start, s of the clock. A run is given up after `LONGEST` s
+            unless its engine is compiled, and larger models of a kind that took `SLOW` s are left out.
+        report: is told of each trial when it is done.
 
     Raises:
-        ParameterError: there is no such shaft.
+        ParameterError: there is no such shaft, model or engine, or a number is out of its range.
+        ShaftworkError: the network cannot be solved with shafts as they are, so there is no truth.
     """
     shafts = [part.name for part in net.parts if isinstance(part, Shaft)]
     if shaft not in shafts:
         raise ParameterError(f"'{net.name}' has no shaft {shaft!r}. It has: {', '.join(shafts) or 'none'}.")
-    end = in_si("t_end", t_end, "s", above=0)
+    end, allowed = in_si("t_end", t_end, "s", above=0), in_si("budget", budget, "s", above=0)
+    if isinstance(points, bool) or not isinstance(points, int) or points < 1:
+        raise ParameterError(f"points = {points!r} must be a number of output times, 1 or more.")
+    pairs = list(itertools.product(shaft_models(models), engine_names(engines)))
+    began = time.monotonic()
     # the fronts of waves that start at zero pass at multiples of the delay; these times are none
     t = end * (np.arange(1, points + 1) - 0.5) / points
     known = truth(net, shaft, end, t)
     trials: list[Trial] = []
-    for model in (ShaftModel.read(model) if isinstance(model, str) else model for model in models):
-        for engine in engines:
-            slow = _slower(trials, _text(model), engine)
-            trials.append(slow or _trial(net, shaft, model, engine, end, t, known))
+    for model, engine in pairs:
+        asked = Trial(_text(model), engine, 0, 0.0, np.inf, {}, asked=engine)
+        why = _not_tried(asked, trials)
+        if time.monotonic() - began > allowed:
+            why = f"not tried, since the budget of {allowed:g} s is spent"
+        made = dataclasses.replace(asked, why=why) if why else _trial(net, shaft, model, asked, end, t, known)
+        trials.append(made)
+        if report is not None:
+            report(made)
     return WorkPrecision(net.name, shaft, tuple(trials), (known.source, known.error))
 
 
-def _slower(trials: Sequence[Trial], model: str, engine: str) -> Trial | None:
-    """The row of a model that is not tried, because a smaller one of its kind has taken too long already."""
-    asked = Trial(model, engine, 0, 0.0, np.inf, {})
+def _not_tried(asked: Trial, trials: Sequence[Trial]) -> str:
+    """Why a model is left out: a smaller one of its kind has taken too long already. Empty where it is not."""
     for trial in trials:
-        if trial.family == asked.family and trial.asked == engine and trial.cpu > SLOW:
-            return dataclasses.replace(asked, why=f"not tried, since {trial.model} took {trial.cpu:.0f} s")
-    return None
+        if trial.family == asked.family and trial.asked == asked.asked and trial.spent > SLOW:
+            return f"not tried, since {trial.model} took {trial.spent:.0f} s"
+    return ""
 
 
-def _trial(net: Network, shaft: str, model: ShaftModel, engine: str, t_end: float, t: Array, known: Truth) -> Trial:
-    def call(compiled: Model) -> Solution:
-        solution = compiled.simulate(t_end, t_eval=t, engine=engine)  # type: ignore[arg-type]
-        solution[f"{shaft}.tau_a"], solution[f"{shaft}.tau_b"]
-        return solution
-
-    began = time.process_time()
+def _trial(net: Network, shaft: str, model: ShaftModel, asked: Trial, t_end: float, t: Array, known: Truth) -> Trial:
+    began = time.thread_time()
     try:
-        varied = with_model(net, "", model)
+        varied = with_model(net, shaft, model)
         compiled = varied.compile()
-        solution = call(compiled)
-        first = time.process_time() - began
-        times = []
-        for _ in range(CALLS):
-            began = time.process_time()
-            call(compiled)
-            times.append(time.process_time() - began)
-            if sum(times) > 1.0:
-                break
+        built = time.thread_time() - began
+        if compiled.form.waves:
+            _bearable(compiled, shaft, asked.engine, t_end)
+        solution, first = _timed(compiled, shaft, asked.engine, t_end, t)
+        times = [first] if built + first > SLOW else []
+        while not times or (len(times) < CALLS and sum(times) < 1.0):
+            times.append(_timed(compiled, shaft, asked.engine, t_end, t)[1])
     except ShaftworkError as error:
-        return Trial(_text(model), engine, 0, 0.0, np.inf, {}, why=str(error).splitlines()[0])
-    found = quantities(solution, shaft)
+        why = str(error).splitlines()[0]
+        return dataclasses.replace(asked, setup=time.thread_time() - began, why=why)
+    found, cpu = quantities(solution, varied, shaft), median(times)
     errors = {name: float(np.abs(found[name] - known.values[name]).max()) / _size(known, name) for name in QUANTITIES}
-    exact, present = known.frequencies, _frequencies(varied, compiled, known.frequencies)
     extra = None
-    if present is not None and len(exact) > MODES:
-        errors |= {f"f_{k + 2}": float(np.abs(present / f - 1).min()) for k, f in enumerate(exact[:MODES])}
-        extra = int((present < exact[MODES - 1 : MODES + 1].mean()).sum()) - MODES
-    cpu = median(times)
-    return Trial(_text(model), solution.engine, len(compiled.states), first - cpu, cpu, errors, extra, asked=engine)
+    if known.frequencies.size and (present := _frequencies(varied, compiled, known.frequencies)).size:
+        judged, limit = known.frequencies[:MODES], float(known.frequencies[MODES - 1 : MODES + 1].mean())
+        errors |= {f"f_{k + 2}": float(np.abs(present / f - 1).min()) for k, f in enumerate(judged)}
+        extra = int((present < limit).sum()) - MODES
+    setup = built + max(first - cpu, 0.0)
+    return Trial(asked.model, solution.engine, len(compiled.states), setup, cpu, errors, extra, asked=asked.asked)
+
+
+def _bearable(compiled: Model, shaft: str, engine: str, t_end: float) -> None:
+    """Refuse a run of waves, which nothing interrupts, where the first part of it says that it takes too long."""
+    for part in (t_end / 16, t_end / 8, t_end / 4, t_end / 2):
+        _, cpu = _timed(compiled, shaft, engine, part, np.array([part]))
+        if cpu > LONGEST / 2:
+            raise SimulationError(f"given up: {part:.3g} s of {t_end:g} s took {cpu:.0f} s")
+
+
+def _timed(compiled: Model, shaft: str, engine: str, t_end: float, t: Array) -> tuple[Solution, float]:
+    """A run in which both end torques are read, and its CPU time in s."""
+    began, deadline = time.thread_time(), time.monotonic() + LONGEST
+
+    def watch(reached: float) -> None:
+        if time.monotonic() > deadline:
+            raise SimulationError(f"given up after {LONGEST:g} s at t = {reached:.3g} s of {t_end:g} s")
+
+    solution = compiled.simulate(t_end, t_eval=t, engine=engine, progress=watch)  # type: ignore[arg-type]
+    solution[f"{shaft}.tau_a"], solution[f"{shaft}.tau_b"]
+    return solution, time.thread_time() - began
 
 
 def _size(known: Truth, name: str) -> float:
@@ -242,16 +294,14 @@ def _size(known: Truth, name: str) -> float:
     return float(max(np.abs(value).max() for value in family)) or 1.0
 
 
-def _frequencies(net: Network, compiled: Model, judged: Array) -> Array | None:
-    """Natural frequencies in Hz of a network that has some and is small enough, the rigid motion left out."""
-    if len(compiled.states) > MOST_STATES or not compiled.linear:
-        return None
-    if compiled.form.waves:
-        modes = net.modes(f_max=float(judged[-1])) if judged.size else None
-        return None if modes is None else modes.frequencies[modes.frequencies > 0]
-    rates = np.linalg.eigvals(compiled.jacobian(0.0, np.zeros(len(compiled.states))).toarray())
-    found = rates.imag[rates.imag > 1e-6 * np.abs(rates).max()] / (2 * np.pi)
-    return found if found.size else None
+def _frequencies(net: Network, compiled: Model, judged: Array) -> Array:
+    """The lowest natural frequencies in Hz of a network at rest; empty where they are not found."""
+    try:
+        if compiled.form.waves:
+            return frequencies(net.modes(f_max=float(judged[-1])))
+        return frequencies(compiled.linearize(None).modes(count=LOWEST))
+    except ShaftworkError:
+        return np.empty(0)
 
 
 def _text(model: ShaftModel) -> str:
