@@ -90,12 +90,13 @@ def test_the_ends_of_the_range_are_right_with_every_engine(engine: str, ratio: f
     assert np.abs(run["spring.tau"] - expected).max() < BOUND[engine] * np.abs(expected).max()
 
 
-@pytest.mark.parametrize("engine", [name for name in INSTALLED if name != "exact"])
-@pytest.mark.parametrize("ratio", [0.1, 100.0, 1e6])
+# An explicit method would take ten million steps at the last ratio.
+RATIOS = {name: (0.1, 100.0) if name in EXPLICIT else (0.1, 100.0, 1e6) for name in INSTALLED if name != "exact"}
+
+
+@pytest.mark.parametrize(("engine", "ratio"), [(name, ratio) for name, ratios in RATIOS.items() for ratio in ratios])
 def test_a_nonlinear_load_behind_a_strong_damper_is_as_right(engine: str, ratio: float) -> None:
     """Against Radau in the mean speed, the twist and the torque of the damper as a state: there nothing cancels."""
-    if engine in EXPLICIT and ratio > 1e3:
-        pytest.skip("an explicit method would take ten million steps")
     net, t_end = two_inertias(ratio, 1.0, load=0.05)
     run = net.simulate(t_end, engine=engine, t_eval=101)  # type: ignore[arg-type]
     damping = float(2 * ratio * STIFFNESS / np.sqrt(STIFFNESS * 20))

@@ -18,7 +18,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from shaftwork import Model, Network, NetworkWarning
+from shaftwork import AccuracyWarning, Model, Network, NetworkWarning
 from shaftwork.components import REGISTRY
 from tests.reference.mna import GROUND, Piece
 from tests.strategies import Network as Pieces
@@ -66,6 +66,7 @@ def compiled(net: Network | Iterable[Piece]) -> Model:
     """The model; a circuit beside the train is worth a warning to a user, but is meant here."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NetworkWarning)
+        warnings.simplefilter("ignore", AccuracyWarning)
         return (net if isinstance(net, Network) else network_of(net)).compile()
 
 

@@ -112,6 +112,7 @@ def _survives(pieces: Network) -> sw.ShaftworkError | None:
     """
     with processor_time_limit(30.0), warnings.catch_warnings():
         warnings.simplefilter("ignore", sw.NetworkWarning)
+        warnings.simplefilter("ignore", sw.AccuracyWarning)  # it says what is wrong, which is all that is asked
         try:
             net = network_of(pieces)
         except sw.ShaftworkError as error:
