@@ -358,7 +358,6 @@ def test_conditions_of_time_and_state_may_be_joined(engine: str) -> None:
     """1 N m up to 0.5 s, then 2 N m as long as it is slower than 1 rad/s, which it is up to 0.75 s, then nothing."""
     slow, late = sw.omega < 1, sw.t > 0.5
     law = sympy.Piecewise((2, slow & late), (0, late | (sw.omega > 2)), (1, True))
-    # an engine without events steps over the change at 1 rad/s with its tolerance for the state
     sol = body(law).simulate(1.0, engine=engine)
     assert sol["J.omega"][[500, -1]] == pytest.approx([0.5, 1.0], abs=1e-4)
 

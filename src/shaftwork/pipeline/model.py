@@ -121,8 +121,8 @@ class Model(CompiledModel):
             parameters: values that differ from the network's, "part.parameter" to value in SI; nothing is recompiled
                 unless a value changes the structure (a damping that was exactly zero).
             max_steps: give up after this many steps.
-            progress: called again and again with the time that the engine has reached, s; not by the compiled engine
-                and the exact one, which are done before anyone looks.
+            progress: called again and again with the time that the engine has reached, s; not by the
+                compiled engine, the exact one and that of waves.
 
         Raises:
             ParameterError: an argument is out of its range.
