@@ -19,6 +19,9 @@ ACROSS = Symbol("across", real=True)
 INTEGRAL = Symbol("integral", real=True)
 """The integral of the across variable of the branch in whose law it stands (an angle, a position)."""
 
+THROUGH = Symbol("through", real=True)
+"""The through variable of a part, what its first node gives to it; guards of modes read it, laws do not."""
+
 HISTORY = Symbol("history", real=True)
 """What has come from the other end of the line in whose law it stands."""
 
@@ -30,6 +33,21 @@ class Delayed(Function):  # type: ignore[misc]
 
     def _latex(self, printer: Any) -> str:
         return rf"\left[ {printer.doprint(self.args[0])} \right]_{{t - {printer.doprint(self.args[1])}}}"
+
+
+def across_of(port: str) -> Symbol:
+    """In a law or guard: the across variable of a port or inner node of the same part, against the reference."""
+    return Symbol(f"across of {port}", real=True)
+
+
+def through_of(label: str) -> Symbol:
+    """In a law or guard: the through variable of the branch of this label of the same part."""
+    return Symbol(f"through of {label}", real=True)
+
+
+def integral_of(label: str) -> Symbol:
+    """In a law or guard: the integral of the across variable of the branch of this label of the same part."""
+    return Symbol(f"integral of {label}", real=True)
 
 
 End = str | None
