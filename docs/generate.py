@@ -37,7 +37,18 @@ BLOCK = re.compile(r"^```(?P<language>\w+)\n(?P<body>.*?)^```$", re.MULTILINE | 
 MADE_PART = re.compile(r"(?P<start><!-- made: (?P<name>[\w ]+) -->\n).*?(?P<end><!-- end -->)", re.DOTALL)
 OUTPUT = ("text", "toml", "latex")
 """Languages of the blocks that hold what the block before them printed."""
-FAMILIES = ("rotation", "contacts", "shafts", "translation", "sources", "loads", "machines", "electrical")
+FAMILIES = (
+    "rotation",
+    "contacts",
+    "shafts",
+    "translation",
+    "sources",
+    "loads",
+    "machines",
+    "motors",
+    "drives",
+    "electrical",
+)
 """The modules of components in the order in which they are shown."""
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 NOISE, TOLERANCE = 1e-9, 0.02
@@ -153,7 +164,7 @@ def _cells(item: Parameter | None) -> tuple[str, ...]:
     if item is None:
         return ("", "", "", "", "")
     written = repr if item.record else "{:g}".format
-    default = "required" if item.required else written(item.default)
+    default = "required" if item.required else "none" if item.default is None else written(item.default)
     meaning = f"{item.meaning} (law)" if item.law else item.meaning
     unit = item.unit.replace("*", "·").replace("^2", "²").replace("^3", "³")  # stars would be Markdown's
     return (f"`{item.name}`", unit, item.bounds, default, meaning)
@@ -174,8 +185,8 @@ def component_pages() -> str:
 
 def _described(cls: type[Component]) -> str:
     domains = ", ".join(_port(port) for port in cls.ports)
-    dummy = cls("part", **{item.name: 1.0 for item in cls.declared.values() if item.required})
-    quantities = ", ".join(f"`{name}`" for name in dummy.signals())
+    empty = cls.__new__(cls)  # without values, which may have to suit each other; the quantities are those of the class
+    quantities = ", ".join(f"`{name}`" for name in empty.signals())
     text = f"{inspect.cleandoc(cls.__doc__ or '')}\n\nPorts: {domains}. Quantities: {quantities}.\n"
     if not cls.declared:
         return text

@@ -21,10 +21,14 @@ if TYPE_CHECKING:
         ThroughStore,
     )
     from shaftwork.components.contacts import *
+    from shaftwork.components.drives import *
     from shaftwork.components.electrical import *
+    from shaftwork.components.friction import *
     from shaftwork.components.laws import Ramp, Step, Table, omega, phi, psi, s, t, u, v
     from shaftwork.components.loads import *
     from shaftwork.components.machines import *
+    from shaftwork.components.motor_catalogue import motors
+    from shaftwork.components.motors import *
     from shaftwork.components.rotation import *
     from shaftwork.components.shaft_models import Auto, CentralDifference, Lumped, OneSpring, Rigid, Spectral, Wave
     from shaftwork.components.shafts import *
@@ -69,6 +73,7 @@ _HOME = {
         "Spectral",
         "Wave",
     ),
+    "shaftwork.components.motor_catalogue": ("motors",),
     "shaftwork.components.laws": ("Ramp", "Step", "Table", "omega", "phi", "psi", "s", "t", "u", "v"),
     "shaftwork.core.errors": (
         "AccuracyWarning",

@@ -23,10 +23,14 @@ from shaftwork.network.templates import Kind, make_template
 OWN = [name for name, kind in REGISTRY.items() if kind.__module__.startswith("shaftwork.")]
 
 
+TOGETHER = {"CageMotor": {"tau_a": 3.0, "tau_s": 2.0, "tau_k": 4.0, "n_k": 1.0}, "DriveEnvelope": {"s_k": 0.2}}
+"""Values where those of a part must suit each other."""
+
+
 def _made(name: str, **changes: Any) -> sw.Component:
     kind = REGISTRY[name]
     values = {key: 1.5 for key, declared in kind.declared.items() if declared.required and declared.at_most != 1}
-    return kind("part", **{**values, **changes})
+    return kind("part", **{**values, **TOGETHER.get(name, {}), **changes})
 
 
 @pytest.mark.parametrize("name", OWN)

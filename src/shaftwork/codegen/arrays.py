@@ -27,8 +27,7 @@ class ArrayProgram:
         self.form = form
         self.assembly = MatrixAssembly(form, form.outputs)
         order = self.assembly.inputs.tolist()
-        self.inputs = Inputs(form, order, form.outputs)
-        self.reading = self.inputs.reading()
+        self.inputs = Inputs(form, order)
         self.loop_places = np.array([order.index(branch) for branch in form.loop_laws], dtype=np.intp)
         self.loop_in_tree = np.array([branch in form.tree.tree[Kind.LAW] for branch in form.loop_laws], dtype=bool)
 
@@ -48,6 +47,7 @@ class BoundArrays:
     def __init__(self, program: ArrayProgram, p: Array, part: LinearPart) -> None:
         self.program, self.p, self.part = program, p, part
         self._has_slopes = bool(part.B1.nnz)
+        self._controls = np.flatnonzero(program.inputs.controlled)
         loops = program.loop_places
         self.loops = LoopSolver(program.inputs, part, loops, program.loop_in_tree, self.p) if loops.size else None
 
@@ -63,9 +63,11 @@ class BoundArrays:
         """Outputs y where there are no loops."""
         inputs, part = self.program.inputs, self.part
         y: Array = part.C @ x[: inputs.states]
-        if part.D.nnz:  # only inputs of time alone reach the outputs: else there is a loop
+        if part.D.nnz:  # only inputs of time alone and controlled sources reach the outputs: else there is a loop
             first = inputs.values(t, np.zeros((inputs.outputs, *x.shape[1:])), x, self.p)
-            y = y + part.D @ _times(inputs.of_time, first)
+            y = y + part.D @ _where(inputs.of_time, first)
+            if self._controls.size:
+                y = y + part.D @ _where(inputs.controlled, inputs.values(t, y, x, self.p))
         return y
 
     def switches(self, t: Array, x: Array) -> Array:
@@ -90,7 +92,7 @@ class BoundArrays:
         rate: Array = self.part.A @ x[: self.part.A.shape[0]] + self.part.B @ u
         if self._has_slopes:
             slopes = self.program.inputs.time_slopes(t, y, x, self.p)
-            rate = rate + self.part.B1 @ _times(self.program.inputs.of_time, slopes)
+            rate = rate + self.part.B1 @ _where(self.program.inputs.of_time, slopes)
         return rate
 
     def jacobian(self, t: float, x: Array) -> Any:
@@ -99,12 +101,10 @@ class BoundArrays:
             return self.loops.jacobian(t, x)
         inputs, part = self.program.inputs, self.part
         y, _ = self.values(t, x)
-        by_output, outputs, by_integral, states = self.program.reading
-        across = inputs.across_slopes(t, y, x, self.p)[by_output]
-        integral = inputs.integral_slopes(t, y, x, self.p)[by_integral]
-        size = (inputs.size, inputs.states)
-        slope = sparse.csr_array((across, (by_output, outputs)), shape=(inputs.size, inputs.outputs)) @ part.C
-        slope = slope + sparse.csr_array((integral, (by_integral, states)), shape=size)
+        by_y, by_x = inputs.slopes(t, y, x, self.p)
+        slope = by_y @ part.C + by_x
+        if self._controls.size:
+            slope = slope + by_y @ (part.D[:, self._controls] @ slope[self._controls])
         return sparse.csc_array(part.A + part.B @ slope)
 
     def moving_sources(self, t: float) -> tuple[str, ...]:
@@ -131,6 +131,6 @@ class BoundArrays:
         return np.asarray(x + self.part.B1 @ (step * inputs.of_time))
 
 
-def _times(mask: Any, values: Array) -> Array:
+def _where(mask: Any, values: Array) -> Array:
     """Values (m,) or (m, k) where the mask (m,) holds, else zero."""
-    return np.asarray((mask * values.T).T)
+    return np.where(mask if values.ndim == 1 else mask[:, None], values, 0.0)

@@ -81,3 +81,12 @@ def vectorised(symbols: Sequence[Symbol], expression: Expr) -> Callable[..., Any
     printer, modules = _Vectorised(SETTINGS), [NUMERICAL, "numpy"]
     function: Callable[..., Any] = lambdify(list(symbols), expression, modules=modules, printer=printer, cse=True)
     return function
+
+
+def vectorised_list(symbols: Sequence[Symbol], expressions: Sequence[Expr]) -> Callable[..., Any]:
+    """Several expressions as one function of arrays or floats; what they share is computed once."""
+    plain = {symbol: Symbol(f"v{k}", real=True) for k, symbol in enumerate(symbols)}
+    renamed = [expression.xreplace(plain) for expression in expressions]
+    printer, modules = _Vectorised(SETTINGS), [NUMERICAL, "numpy"]
+    function: Callable[..., Any] = lambdify(list(plain.values()), renamed, modules=modules, printer=printer, cse=True)
+    return function

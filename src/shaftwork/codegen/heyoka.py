@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,6 +11,8 @@ import numpy as np
 import sympy
 from numpy.typing import NDArray
 
+from shaftwork.codegen.heyoka_held import HeldParameters
+from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.errors import MissingExtraError
 
 Array = NDArray[np.float64]
@@ -18,6 +21,8 @@ Array = NDArray[np.float64]
 LARGEST_UNROLLED = 100
 # e^-24 is 4e-11: what a series misses beyond is below the tolerance, and what follows it sees.
 NEAR = 24.0
+# For so long in s an event that has just been met is not met again.
+COOLDOWN = 1e-9
 
 
 @dataclass(frozen=True)
@@ -33,9 +38,14 @@ class HeyokaProgram:
         switches: heyoka expressions whose sign the rows depend on.
         conditions: the same as text, for messages.
         timed: which of them depend on the time alone; their signs are known before a run, piece by piece.
-        parameter_count: number of parameters of the model, without the signs.
+        parameter_count: number of parameters of the model and of held functions, without the signs.
         fading: heyoka expressions u of functions that are constant to the last bit where e^-|u| is nothing beside 1; a
             step ends where u comes near, because a series from afar does not show that they change there.
+        guards: heyoka expressions at whose change of sign a run ends; behind the signs of the switches there is a
+            parameter for each: 1 where its rise through zero ends the run, -1 where its fall does, 0 where neither; and
+            behind these another for each, how far beyond zero it has to go.
+        held: functions that are constant between switches; they are the last of the parameters.
+        stepping: which of the switches depend on them.
     """
 
     variables: tuple[Any, ...]
@@ -45,8 +55,16 @@ class HeyokaProgram:
     timed: NDArray[np.bool_]
     parameter_count: int
     fading: tuple[Any, ...] = ()
+    guards: tuple[Any, ...] = ()
+    held: HeldParameters | None = None
+    stepping: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
     _compiled: dict[float, Any] = field(default_factory=dict, repr=False, compare=False)
     _switch_values: list[Any] = field(default_factory=list, repr=False, compare=False)
+
+    def guard_met(self, outcome: Any) -> int | None:
+        """The guard that an outcome of heyoka means, or None where it means something else."""
+        number = -int(outcome) - 1 - len(self.switches) - len(self.fading)
+        return number if 0 <= number < len(self.guards) else None
 
     def integrator(self, tolerance: float) -> Any:
         """The `heyoka.taylor_adaptive` for a relative tolerance; one compilation for each tolerance."""
@@ -82,20 +100,44 @@ class HeyokaProgram:
 
     def bind(self, parameters: Array) -> BoundProgram:
         """The program with its parameter vector (p,): what `integrate.problem.Problem.symbolic` takes."""
-        return BoundProgram(self, np.array(parameters, dtype=float))
+        return BoundProgram(self, np.append(parameters, np.zeros(self.parameter_count - len(parameters))))
+
+    def step(self, number: int, integrator: Any) -> None:
+        """Go on to the next whole number, or back to the last, where the motion has come to the end of one.
+
+        What depends on it may be on its other side there, and is not seen to pass through zero.
+
+        Args:
+            number: of the switch of the held function.
+            integrator: where the motion has come.
+        """
+        assert self.held is not None  # noqa: S101 (it has such a switch)
+        at = integrator.time, integrator.state
+        self.held.step(number, *at, integrator.pars)
+        parameters, signs = np.split(integrator.pars, [self.parameter_count])
+        signs = signs[: len(self.switches)]
+        signs[number] = 1.0
+        own = [*self.held.by_switch]
+        kept = np.where(self.stepping, 0.0, signs)
+        kept[own] = signs[own]
+        signs[:] = self.switch_signs(*at, parameters, kept)
 
     def _compile(self, tolerance: float) -> Any:
         import heyoka
 
         heyoka.set_logger_level_error()  # a failed run says so itself
         options: dict[str, Any] = {}
-        if self.switches or self.fading:
+        if self.switches or self.fading or self.guards:
             options["t_events"] = [
                 *(
-                    _crossing(heyoka.par[index], switch, index)
-                    for index, switch in enumerate(self.switches, self.parameter_count)
+                    _crossing(heyoka.par[self.parameter_count + number], switch, self._passed(number))
+                    for number, switch in enumerate(self.switches)
                 ),
                 *(heyoka.t_event(value**2 - NEAR**2, callback=_go_on) for value in self.fading),
+                *(
+                    _end(heyoka.par[index], heyoka.par[index + len(self.guards)], guard)
+                    for index, guard in enumerate(self.guards, self.parameter_count + len(self.switches))
+                ),
             ]
         return heyoka.taylor_adaptive(
             list(zip(self.variables, self.rows, strict=True)),
@@ -105,10 +147,24 @@ class HeyokaProgram:
             **options,
         )
 
+    def _passed(self, number: int) -> Callable[[Any, int], bool]:
+        """What happens where a switch leaves its side: it has the other, or a whole number gives way to the next."""
+        index = self.parameter_count + number
+
+        def turn(integrator: Any, _direction: int) -> bool:
+            integrator.pars[index] = -integrator.pars[index]
+            return True
+
+        def step(integrator: Any, _direction: int) -> bool:
+            self.step(number, integrator)
+            return True
+
+        return step if self.held is not None and number in self.held.by_switch else turn
+
 
 @dataclass(frozen=True)
 class BoundProgram:
-    """A program and the values (p,) of its parameters."""
+    """A program and the values (p,) of its parameters; those of held functions are zero."""
 
     program: HeyokaProgram
     parameters: Array
@@ -119,6 +175,7 @@ def build(
     time: sympy.Symbol,
     parameters: tuple[sympy.Symbol, ...],
     rows: tuple[sympy.Expr, ...],
+    guards: tuple[sympy.Expr, ...] = (),
 ) -> HeyokaProgram:
     """Translate right-hand sides to heyoka.
 
@@ -127,6 +184,7 @@ def build(
         time: the symbol of time, s.
         parameters: parameter symbols, in order.
         rows: the derivative of each state.
+        guards: what may end a run where its sign changes.
 
     Raises:
         MissingExtraError: heyoka is not installed.
@@ -136,17 +194,28 @@ def build(
         raise MissingExtraError("heyoka", "fast", "The compiled Taylor engine")
     from shaftwork.codegen.heyoka_expressions import Translator
 
-    translator = Translator(states, time, parameters)
+    rows, guards = _in_pieces(rows), _in_pieces(guards)
+    held = len(set[sympy.Expr]().union(*(row.atoms(sympy.floor, HeldNoise) for row in (*rows, *guards))))
+    translator = Translator(states, time, parameters, held)
     translated = tuple(translator.expression(row) for row in rows)
+    watched = tuple(translator.expression(guard) for guard in guards)
     return HeyokaProgram(
         translator.variables,
         translated,
         tuple(translator.switches),
         tuple(translator.conditions),
         np.array(translator.timed, dtype=bool),
-        len(parameters),
+        len(parameters) + held,
         tuple(translator.fading.values()),
+        watched,
+        HeldParameters(translator.held, translator.variables, len(parameters)) if held else None,
+        np.array(translator.stepping, dtype=bool),
     )
+
+
+def _in_pieces(rows: tuple[sympy.Expr, ...]) -> tuple[sympy.Expr, ...]:
+    """Rows with smooth noise written in what is held between whole numbers."""
+    return tuple(row.xreplace({node: node.pieces for node in row.atoms(SmoothNoise)}) for row in rows)
 
 
 def _go_on(_integrator: Any, _direction: int) -> bool:
@@ -154,15 +223,20 @@ def _go_on(_integrator: Any, _direction: int) -> bool:
     return True
 
 
-def _crossing(sign: Any, switch: Any, index: int) -> Any:
-    """The event that a switch leaves the side that its sign, par[index], says."""
+def _end(side: Any, offset: Any, guard: Any) -> Any:
+    """The event that a guard rises through an offset on its side, at which a run ends."""
     import heyoka
 
-    def turn(integrator: Any, _direction: int) -> bool:
-        integrator.pars[index] = -integrator.pars[index]
-        return True
+    met = heyoka.select(side, side * guard - offset, heyoka.expression(-1.0))
+    # heyoka's own cooldown grows with the tolerance, and hides what follows soon
+    return heyoka.t_event(met, direction=heyoka.event_direction.positive, cooldown=COOLDOWN)
+
+
+def _crossing(sign: Any, switch: Any, passed: Callable[[Any, int], bool]) -> Any:
+    """The event that a switch leaves the side that its sign says."""
+    import heyoka
 
     # Only a fall through zero triggers, so a switch that starts at zero or touches it does not stop the run; one that
     # rests at zero has sign 0 and no event, which would trigger for ever.
     side = heyoka.select(sign, sign * switch, heyoka.expression(1.0))
-    return heyoka.t_event(side, direction=heyoka.event_direction.negative, callback=turn)
+    return heyoka.t_event(side, direction=heyoka.event_direction.negative, callback=passed)

@@ -13,7 +13,10 @@ import sympy
 from sympy.functions.elementary.piecewise import ExprCondPair
 from sympy.logic.boolalg import ITE, And, BooleanFalse, BooleanTrue, Not, Or, Xor
 
+from shaftwork.codegen.heyoka_held import Held
+from shaftwork.components import noise
 from shaftwork.components.laws import Interpolation, InterpolationSlope
+from shaftwork.components.noise import HeldNoise
 from shaftwork.components.slopes import wraps
 from shaftwork.core.errors import CompileError
 
@@ -55,16 +58,21 @@ class Translator:
         states: state symbols; they become the heyoka variables `variables`.
         time: symbol of time.
         parameters: parameter symbols; they become heyoka.par[0], heyoka.par[1], ...
+        held: number of different floors and held noises in all that is to be translated; they follow the parameters.
     """
 
-    def __init__(self, states: Sequence[sympy.Symbol], time: sympy.Symbol, parameters: Sequence[sympy.Symbol]) -> None:
+    def __init__(
+        self, states: Sequence[sympy.Symbol], time: sympy.Symbol, parameters: Sequence[sympy.Symbol], held: int = 0
+    ) -> None:
         self.variables = tuple(heyoka.expression(f"x{index}") for index in range(len(states)))
         self.switches: list[Any] = []
         self.conditions: list[str] = []
         self.timed: list[bool] = []
+        self.stepping: list[bool] = []
+        self.held: list[Held] = []
         self._states = frozenset(states)
         self.fading: dict[sympy.Expr, Any] = {}
-        self._first_sign = len(parameters)
+        self._first_held, self._first_sign = len(parameters), len(parameters) + held
         self._moving = frozenset((*states, time))
         self._done: dict[sympy.Basic, Any] = dict(zip(states, self.variables, strict=True))
         self._done.update((symbol, heyoka.par[index]) for index, symbol in enumerate(parameters))
@@ -144,11 +152,29 @@ class Translator:
                 sign = heyoka.select(heyoka.gt(value, zero), one, heyoka.select(heyoka.lt(value, zero), -one, zero))
             else:
                 sign = heyoka.par[self._first_sign + len(self.switches)]
-                self.switches.append(value)
-                self.conditions.append(f"{switch} > 0")
-                self.timed.append(self._states.isdisjoint(switch.free_symbols))
+                self._add_switch(value, f"{switch} > 0", switch)
             self._signs[switch] = sign
         return self._signs[switch]
+
+    def _add_switch(self, value: Any, condition: str, switch: sympy.Expr) -> None:
+        self.switches.append(value)
+        self.conditions.append(condition)
+        self.timed.append(self._states.isdisjoint(switch.free_symbols))
+        self.stepping.append(switch.has(*HELD))
+
+    def constant(self, node: sympy.Expr) -> Any:
+        """A function that is constant between switches; a parameter that an event changes where it steps."""
+        if any(argument.has(*SIDED) for argument in node.args) and not self._moving.isdisjoint(node.free_symbols):
+            raise CompileError(f"A Taylor series cannot follow {node}, which has a kink inside. Use engine='scipy'.")
+        arguments = tuple(self.arguments(node))
+        place = heyoka.par[self._first_held + len(self.held)]
+        timed = self._states.isdisjoint(node.free_symbols)
+        switch = None
+        if isinstance(node, sympy.floor) and not timed and not self._moving.isdisjoint(_between_steps(node.args[0])):
+            switch = len(self.switches)
+            self._add_switch((arguments[0] - place) * (place + 1.0 - arguments[0]), f"{node} = n", node.args[0])
+        self.held.append(Held(arguments, HELD[node.func], timed, switch))
+        return place
 
     def heaviside(self, node: sympy.Heaviside) -> Any:
         """The unit step of an argument."""
@@ -213,6 +239,12 @@ class Translator:
         return choose(0, len(xs))
 
 
+def _between_steps(expression: sympy.Expr) -> set[sympy.Symbol]:
+    """The symbols that an expression depends on while nothing in it steps."""
+    held: dict[sympy.Expr, sympy.Expr] = dict.fromkeys(expression.atoms(*HELD), sympy.S.Zero)
+    return set(expression.xreplace(held).free_symbols)
+
+
 def _whole_power(base: Any, exponent: int) -> Any:
     """A positive whole power by repeated squaring."""
     if exponent == 1:
@@ -226,6 +258,11 @@ def _slopes(node: Any) -> tuple[float, ...]:
     return tuple((high - low) / (right - left) for (left, low), (right, high) in points)
 
 
+SIDED = (sympy.sign, sympy.Abs, sympy.Heaviside, sympy.Max, sympy.Min, sympy.Piecewise, Interpolation)
+"""Functions that have a switch for each side."""
+HELD: dict[Any, Callable[..., float]] = {sympy.floor: lambda x: float(math.floor(x)), HeldNoise: noise.held}
+"""Functions that are constant between switches."""
+
 SHAPES: dict[Any, Callable[[Translator, Any], Any]] = {
     sympy.Add: lambda translator, node: heyoka.sum(translator.arguments(node)),
     sympy.Mul: Translator.product,
@@ -237,6 +274,8 @@ SHAPES: dict[Any, Callable[[Translator, Any], Any]] = {
     sympy.Min: Translator.extreme,
     sympy.Piecewise: Translator.piecewise,
     ITE: Translator.choice,
+    sympy.floor: Translator.constant,
+    HeldNoise: Translator.constant,
     Interpolation: Translator.interpolation,
     InterpolationSlope: Translator.interpolation_slope,
     Not: Translator.negation,

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from sympy import Expr, I, Integer, nan
+from scipy import sparse
+from sympy import Expr, I, Integer, Symbol, nan
 
 from shaftwork.codegen.code import vectorised
 from shaftwork.codegen.elements import Array, Index, TemplateGroup, groups_of
@@ -17,7 +17,8 @@ from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.laws import switches
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import jumps, slope
-from shaftwork.network.templates import Kind
+from shaftwork.network.controlled import Reading, readings_of
+from shaftwork.network.templates import BranchTemplate, Kind
 from shaftwork.reduction.form import StateForm
 
 Function = Callable[..., Any]
@@ -25,28 +26,33 @@ Function = Callable[..., Any]
 
 @dataclass(frozen=True, eq=False)
 class _Group:
-    """The inputs of one template: where they stand in u, their across variables in y, their integrals in x."""
+    """The inputs of one template: where they stand in u, their across variables in y, their integrals in x.
+
+    What they read of other branches, (reads, k), stands in y too. The slopes are by time, across, integral and reads.
+    """
 
     made_of: TemplateGroup
     inputs: Index
     outputs: Index
     integrals: Index
+    reads: Index
     value: Function
-    slopes: tuple[Function | None, Function | None, Function | None]
+    slopes: tuple[Function | None, ...]
 
     @cached_property
     def moving(self) -> tuple[tuple[Expr, tuple[float, ...]], ...]:
         """What makes the law jump or bend because of the motion, each once, and at which levels."""
-        law = self.made_of.template.law
-        if self.made_of.template.kind is not Kind.LAW or not law.has(ACROSS, INTEGRAL):
+        template = self.made_of.template
+        moves = (ACROSS, INTEGRAL, *template.reads)
+        if not (template.kind is Kind.LAW or template.reads) or not template.law.has(*moves):
             return ()
-        found = ((argument, tuple(levels)) for argument, levels in switches(law) if argument.has(ACROSS, INTEGRAL))
+        found = ((argument, tuple(levels)) for argument, levels in switches(template.law) if argument.has(*moves))
         return tuple(dict.fromkeys(found))
 
     @cached_property
     def switches(self) -> tuple[tuple[Function, Array], ...]:
         """`moving` as functions, and the levels."""
-        symbols = (TIME, ACROSS, INTEGRAL, *self.made_of.template.symbols)
+        symbols = _arguments(self.made_of.template)
         return tuple((vectorised(symbols, argument), np.array(levels)) for argument, levels in self.moving)
 
 
@@ -56,43 +62,48 @@ class Inputs:
     Args:
         form: the state form.
         order: branch numbers of the inputs in the order of u.
-        outputs: branch numbers of y.
     """
 
-    def __init__(self, form: StateForm, order: Sequence[int], outputs: Sequence[int]) -> None:
+    def __init__(self, form: StateForm, order: Sequence[int]) -> None:
         self.size = len(order)
-        self.outputs = len(outputs)
+        self.outputs = len(form.outputs) + len(form.readings)
         self.states = len(form.states)
         place = {int(branch): k for k, branch in enumerate(order)}
-        output = {int(branch): k for k, branch in enumerate(outputs)}
+        rows: tuple[int | Reading, ...] = (*form.outputs, *form.readings)
+        output = {row: k for k, row in enumerate(rows)}
         first = self.states - len(form.integrals)
         integral = {branch: first + k for k, branch in enumerate(form.integrals)}
         integral |= {branch: self.states + k for k, branch in enumerate(form.waves)}
+        self._graph = form.graph
         self._groups = tuple(self._group(made, place, output, integral) for made in groups_of(form.graph, order))
         self.of_time = np.ones(self.size, dtype=bool)
+        self.controlled = np.zeros(self.size, dtype=bool)
         for group in self._groups:
             if group.made_of.template.kind is Kind.LAW:
                 self.of_time[group.inputs] = False
+            elif group.made_of.template.reads:
+                self.of_time[group.inputs], self.controlled[group.inputs] = False, True
 
-    @staticmethod
-    def _group(made: TemplateGroup, place: Any, output: Any, integral: Any) -> _Group:
+    def _group(self, made: TemplateGroup, place: Any, output: Any, integral: Any) -> _Group:
         is_wave = made.template.is_history
         law = INTEGRAL if is_wave else made.template.law  # both are read from x
-        symbols = (TIME, ACROSS, INTEGRAL, *made.template.symbols)
+        symbols, reads = _arguments(made.template), made.template.reads
         members = [int(branch) for branch in made.branches]
+        found = [[output[readings_of(self._graph, branch)[symbol]] for branch in members] for symbol in reads]
 
         def function(expression: Expr) -> Function | None:
             real = nan if expression.has(I) else expression  # the slope of (-2)^omega has log(-2)
             return None if real == 0 else vectorised(symbols, real)
 
-        reads = made.template.kind is Kind.LAW
+        moves = made.template.kind is Kind.LAW
         return _Group(
             made,
             np.array([place[branch] for branch in members], dtype=np.intp),
-            np.array([output[branch] for branch in members] if reads else [], dtype=np.intp),
+            np.array([output[branch] for branch in members] if moves else [], dtype=np.intp),
             np.array([integral[branch] for branch in members] if law.has(INTEGRAL) else [], dtype=np.intp),
+            np.array(found, dtype=np.intp).reshape(len(reads), len(members)),
             function(law) or vectorised(symbols, Integer(0)),
-            (function(slope(law, TIME)), function(slope(law, ACROSS)), function(slope(law, INTEGRAL))),
+            tuple(function(slope(law, symbol)) for symbol in (TIME, ACROSS, INTEGRAL, *reads)),
         )
 
     def values(self, t: Any, y: Array, x: Array, p: Array) -> Array:
@@ -103,28 +114,33 @@ class Inputs:
         """The partial derivative of u by time."""
         return self._evaluate(lambda group: group.slopes[0], t, y, x, p)
 
-    def across_slopes(self, t: Any, y: Array, x: Array, p: Array) -> Array:
-        """The partial derivative of each input by its own across variable."""
-        return self._evaluate(lambda group: group.slopes[1], t, y, x, p)
-
-    def integral_slopes(self, t: Any, y: Array, x: Array, p: Array) -> Array:
-        """The partial derivative of each input by its own integral."""
-        return self._evaluate(lambda group: group.slopes[2], t, y, x, p)
+    def slopes(self, t: Any, y: Array, x: Array, p: Array) -> tuple[Any, Any]:
+        """The partial derivatives of u by y (m, outputs) and by the integrals among the states (m, n), sparse."""
+        by_y: list[tuple[Array, Index, Index]] = []
+        by_x: list[tuple[Array, Index, Index]] = []
+        t = np.float64(t)
+        with np.errstate(all="ignore"):
+            for group in self._groups:
+                if not (group.outputs.size or group.reads.size):
+                    continue
+                read, free = _read(group, y, x, p), np.zeros(group.inputs.size)
+                _, across, integral, *others = (None if f is None else f(t, *read) + free for f in group.slopes)
+                if across is not None:
+                    by_y.append((across, group.inputs, group.outputs))
+                if integral is not None:
+                    by_x.append((integral, group.inputs, group.integrals))
+                pairs = zip(others, group.reads, strict=True)
+                by_y += [(found, group.inputs, places) for found, places in pairs if found is not None]
+        return _matrix(by_y, (self.size, self.outputs)), _matrix(by_x, (self.size, self.states))
 
     @property
     def linear(self) -> bool:
-        """Whether every input is linear in the across variable and integral that it reads, with constant slope."""
-        laws = [made.made_of.template.law for made in self._groups]
-        slopes = (slope(law, read) for law in laws for read in (ACROSS, INTEGRAL))
-        if any(found.has(ACROSS, INTEGRAL, TIME) for found in slopes):
-            return False
-        return not any(jumps(law, ACROSS, INTEGRAL) for law in laws)
-
-    def reading(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
-        """Which input reads which output, and which input reads which integral: (inputs, outputs), (inputs, states)."""
-        pairs = [(g.inputs, g.outputs) for g in self._groups if g.outputs.size]
-        integrals = [(g.inputs, g.integrals) for g in self._groups if g.outputs.size and g.integrals.size]
-        return (*_joined(pairs), *_joined(integrals))
+        """Whether every input is linear in all that it reads, with constant slopes."""
+        for template in (made.made_of.template for made in self._groups):
+            reads = (ACROSS, INTEGRAL, *template.reads)
+            if any(slope(template.law, read).has(*reads, TIME) for read in reads) or jumps(template.law, *reads):
+                return False
+        return True
 
     @property
     def switching(self) -> bool:
@@ -159,17 +175,23 @@ class Inputs:
 
 
 def _read(group: _Group, y: Array, x: Array, p: Array) -> tuple[Any, ...]:
-    """What the laws of a group read: across variables, integrals, parameters."""
+    """What the laws of a group read: across variables, integrals, what is of other branches, parameters."""
     across = y[group.outputs] if group.outputs.size else 0.0
     known = group.integrals.size and group.integrals[-1] < len(x)  # not the waves, where none are given
     integral = x[group.integrals] if known else 0.0
     parameters = p[group.made_of.places]
-    return (across, integral, *(parameters if x.ndim == 1 else parameters[..., None]))
+    others = (y[places] for places in group.reads)
+    return (across, integral, *others, *(parameters if x.ndim == 1 else parameters[..., None]))
 
 
-def _joined(pairs: Sequence[tuple[Index, Index]]) -> tuple[Index, Index]:
-    none = np.array([], dtype=np.intp)
-    if not pairs:
-        return none, none
-    first, second = zip(*pairs, strict=True)
-    return np.concatenate(first), np.concatenate(second)
+def _arguments(template: BranchTemplate) -> tuple[Symbol, ...]:
+    """What the functions of a law take, in the order of `_read`."""
+    return (TIME, ACROSS, INTEGRAL, *template.reads, *template.symbols)
+
+
+def _matrix(entries: Sequence[tuple[Array, Index, Index]], shape: tuple[int, int]) -> Any:
+    """A scipy.sparse.csr_array of (values, rows, columns)."""
+    if not entries:
+        return sparse.csr_array(shape)
+    values, rows, columns = (np.concatenate(made) for made in zip(*entries, strict=True))
+    return sparse.csr_array((values, (rows, columns)), shape=shape)

@@ -14,7 +14,6 @@ from shaftwork.codegen.elements import Array
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.slopes import jumps
 from shaftwork.core.errors import SimulationError
-from shaftwork.network.templates import Kind
 
 NEARBY = 1e-9
 """A law is looked at so far to both sides of the point, as a fraction of it, to see whether it jumps there."""
@@ -40,17 +39,12 @@ def input_slopes(bound: BoundArrays, t: float, x: Array, enter: Any) -> tuple[An
     inputs = program.inputs
     y, _ = bound.values(t, x)
     _refuse_jumps(bound, t, y, x)
-    by_output, outputs, by_integral, states = program.reading
-    across = inputs.across_slopes(t, y, x, bound.p)[by_output]
-    integral = inputs.integral_slopes(t, y, x, bound.p)[by_integral]
-    bad = [*by_output[~np.isfinite(across)], *by_integral[~np.isfinite(integral)]]
-    if bad:
+    reads, integral = inputs.slopes(t, y, x, bound.p)
+    if bad := [row for made in (reads, integral) for row in made.tocoo().row[~np.isfinite(made.tocoo().data)]]:
         raise SimulationError(f"{_laws_of(bound, bad)} no finite slope at this point. {_elsewhere(t)}")
-    reads = sparse.csr_array((across, (by_output, outputs)), shape=(inputs.size, inputs.outputs))
-    slopes = reads @ part.C + sparse.csr_array((integral, (by_integral, states)), shape=(inputs.size, inputs.states))
-    through = sparse.csr_array(reads @ part.D)
-    if bound.loops is None:  # a law reads sources alone through D, and those read nothing
-        passed = sparse.eye_array(inputs.size, format="csr") + through
+    slopes, through = reads @ part.C + integral, sparse.csr_array(reads @ part.D)
+    if bound.loops is None:  # through D a law reads sources alone, and of those the controlled ones others
+        passed = sparse.eye_array(inputs.size, format="csr") + through + through @ through
         return sparse.csr_array(passed @ slopes), sparse.csr_array(passed @ enter)
     return _through_loops(bound, slopes, through, enter)
 
@@ -75,17 +69,13 @@ def _refuse_jumps(bound: BoundArrays, t: float, y: Array, x: Array) -> None:
     """Raise where a law that switches with its speed or angle does so at the point itself."""
     inputs, graph, p = bound.program.inputs, bound.program.form.graph, bound.p
     templates = [graph.branches[int(k)].template for k in bound.program.assembly.inputs]
-    switching = np.array(
-        [made.kind is Kind.LAW and jumps(made.law, ACROSS, INTEGRAL) for made in templates], dtype=bool
-    )
+    switching = np.array([jumps(made.law, ACROSS, INTEGRAL, *made.reads) for made in templates], dtype=bool)
     if not switching.any():
         return
     step_y, step_x = (NEARBY * np.maximum(np.abs(given), 1.0) for given in (y, x))
     above, below = (inputs.values(t, y + side * step_y, x + side * step_x, p) for side in (1.0, -1.0))
-    by_output, outputs, by_integral, states = bound.program.reading
-    expected = np.zeros(inputs.size)
-    expected[by_output] += 2 * (inputs.across_slopes(t, y, x, p)[by_output] * step_y[outputs])
-    expected[by_integral] += 2 * (inputs.integral_slopes(t, y, x, p)[by_integral] * step_x[states])
+    by_y, by_x = inputs.slopes(t, y, x, p)
+    expected = 2 * (by_y @ step_y + by_x @ step_x[: inputs.states])
     gap = np.abs(above - below - expected)
     if (bad := np.flatnonzero(switching & (gap > JUMP * np.maximum(np.abs(above), np.abs(below))))).size:
         raise SimulationError(f"{_laws_of(bound, bad)} a jump at this point and so no slope. {_elsewhere(t)}")

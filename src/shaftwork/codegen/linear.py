@@ -55,7 +55,7 @@ def _inputs_of(graph: CircuitGraph, number: int) -> dict[str, _Place]:
     prescribed = {
         graph.branches[k].template.ends: k
         for k in part.branches
-        if graph.branches[k].template.kind is Kind.ACROSS_SOURCE
+        if graph.branches[k].template.kind is Kind.ACROSS_SOURCE and not graph.branches[k].template.reads
     }
     own = signals_of(graph, part)
     if prescribed:

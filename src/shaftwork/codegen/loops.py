@@ -39,7 +39,7 @@ class LoopSolver:
     def __init__(self, inputs: Inputs, part: LinearPart, places: Index, in_tree: NDArray[np.bool_], p: Array) -> None:
         self._inputs, self._part, self._p = inputs, part, p
         self.places, self._tree = places, in_tree
-        self._by_output, self._outputs, self._by_integral, self._integrals = inputs.reading()
+        self._controls = np.flatnonzero(inputs.controlled)
         self._D = part.D.toarray()
         self._P, self._Q = part.tree_law_x.toarray(), part.tree_law_u.toarray()
         self._last = np.zeros(len(places))
@@ -73,9 +73,11 @@ class LoopSolver:
     def inputs_at(self, t: float, x: Array, a: Array) -> tuple[Array, Array, Array]:
         """Outputs y, inputs u and law values g for given unknowns."""
         inputs, part = self._inputs, self._part
-        known = inputs.values(t, np.zeros(inputs.outputs), x, self._p) * inputs.of_time
+        known = np.where(inputs.of_time, inputs.values(t, np.zeros(inputs.outputs), x, self._p), 0.0)
         known[self.places] = a
         y = part.C @ x[: inputs.states] + self._D @ known
+        if self._controls.size:  # they read nothing that depends on others of their kind
+            y = y + self._D[:, self._controls] @ inputs.values(t, y, x, self._p)[self._controls]
         g = inputs.values(t, y, x, self._p)
         u = g.copy()
         u[self.places] = a
@@ -96,11 +98,10 @@ class LoopSolver:
         """The residual by a (loops, loops), and all inputs u by the states through the loops (m, n)."""
         inputs = self._inputs
         y, _, _ = self.inputs_at(t, x, a)
-        reads = np.zeros((inputs.size, inputs.outputs))
-        reads[self._by_output, self._outputs] = inputs.across_slopes(t, y, x, self._p)[self._by_output]
-        by_state = reads @ self._part.C.toarray()
-        by_state[self._by_integral, self._integrals] += inputs.integral_slopes(t, y, x, self._p)[self._by_integral]
-        by_loop = reads @ self._D[:, self.places]
+        by_y, by_x = (made.toarray() for made in inputs.slopes(t, y, x, self._p))
+        through = by_y @ self._D[:, self._controls]
+        by_state, by_loop = by_y @ self._part.C.toarray() + by_x, by_y @ self._D[:, self.places]
+        by_state, by_loop = (made + through @ made[self._controls] for made in (by_state, by_loop))
         u_state, u_loop = by_state.copy(), by_loop.copy()
         u_state[self.places], u_loop[self.places] = 0.0, np.eye(len(self.places))
         r_loop, r_state = np.eye(len(self.places)) - by_loop[self.places], -by_state[self.places]

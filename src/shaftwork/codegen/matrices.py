@@ -3,7 +3,8 @@
     x' = A x + B u + B1 u',    y = C x + D u,    u = (w, e)
 
 with w the through variables of the nonlinear laws and sources, e the prescribed across variables, y the across
-variables that the laws and the integrals read. The equations are those of `reduction.form`.
+variables that the laws and the integrals read, and after them what controlled sources read. The equations are those of
+`reduction.form`.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from shaftwork.codegen.elements import Coefficients, loop_matrix
+from shaftwork.codegen.elements import Coefficients, loop_matrix, potential_matrix
 from shaftwork.core.errors import CompileError
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
@@ -68,6 +69,7 @@ class MatrixAssembly:
         self.outputs = np.array(outputs, dtype=np.intp)
         self.coefficients = Coefficients(form.graph)
         self.loops = loop_matrix(form)
+        self.potentials = potential_matrix(form) if form.readings else None
         self.inputs = np.array([*form.laws, *form.across_inputs], dtype=np.intp)
 
     def __call__(self, p: Array) -> LinearPart:
@@ -105,6 +107,8 @@ class MatrixAssembly:
         t_u = -(blocks.F("T", "R") @ r_u + blocks.F("T", "W") @ blocks.input("W"))
         C, D = blocks.output_rows(self.outputs, g_x, g_u)
         z_x, z_u = blocks.integral_rows(self.outputs, C, D)
+        if self.potentials is not None:
+            C, D = blocks.with_readings(C, D, self.potentials(p), g_x, g_u)
         return LinearPart(
             A=sparse.vstack([c_x, l_x, z_x], format="csr"),
             B=sparse.vstack([c_u, l_u, z_u], format="csr"),
@@ -177,7 +181,7 @@ class _Blocks:
         self._groups = {name: np.array(members, dtype=np.intp) for name, members in groups.items()}
         self._loops = loops
         self._cache: dict[tuple[str, str], Any] = {}
-        self._integrals = form.integrals
+        self._integrals, self._readings = form.integrals, form.readings
         self._states, self._inputs = len(form.states), inputs
 
     def __getattr__(self, name: str) -> NDArray[np.intp]:
@@ -213,10 +217,31 @@ class _Blocks:
         """C and D: the across variables of the output branches, each a link or a tree branch."""
         links = self._loops[:, outputs].T
         own = _selection(outputs, self._loops.shape[0])
-        rows = sparse.csr_array(links + own)  # a tree branch has no loop: its own column stands for it
+        return self._of_tree(links + own, g_x, g_u)  # a tree branch has no loop: its own column stands for it
+
+    def _of_tree(self, rows: Any, g_x: Any, g_u: Any) -> tuple[Any, Any]:
+        """Sums of across variables of tree branches, from states and inputs."""
+        rows = sparse.csr_array(rows)
         x = rows[:, self.C] @ self.pick("C") + rows[:, self.G] @ g_x
         u = rows[:, self.E] @ self.input("E") + rows[:, self.G] @ g_u
         return sparse.csr_array(x), sparse.csr_array(u)
+
+    def with_readings(self, C: Any, D: Any, potentials: Any, g_x: Any, g_u: Any) -> tuple[Any, Any]:
+        """C and D with the rows of what controlled sources read below them."""
+        nodes, stores, integrals = (
+            np.array([reading.of for reading in self._readings if reading.kind == kind], dtype=np.intp)
+            for kind in ("across", "through", "integral")
+        )
+        across_x, across_u = self._of_tree(potentials[nodes], g_x, g_u)
+        carried = sparse.csr_array(_selection(stores, self._loops.shape[0]) - self._loops[stores])  # -F where in a tree
+        through_x, through_u = carried[:, self.L] @ self.pick("L"), carried[:, self.W] @ self.input("W")
+        place = {branch: len(self.C) + len(self.L) + k for k, branch in enumerate(self._integrals)}
+        own = _selection(np.array([place[int(branch)] for branch in integrals], dtype=np.intp), self._states)
+        none = sparse.csr_array((len(integrals), self._inputs))
+        return (
+            sparse.vstack([C, across_x, through_x, own], format="csr"),
+            sparse.vstack([D, across_u, through_u, none], format="csr"),
+        )
 
     def integral_rows(self, outputs: NDArray[np.intp], C: Any, D: Any) -> tuple[Any, Any]:
         """The rows z' = y of the integrals."""

@@ -16,6 +16,7 @@ from shaftwork.components.base import Profile, Signal
 from shaftwork.core.domains import ROTATION
 from shaftwork.core.errors import SignalError
 from shaftwork.network.graph import CircuitGraph, GraphPart
+from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
 
 LARGEST_HISTORY = 2_000_000
@@ -141,11 +142,15 @@ class ModelObserver:
         return self._read(t, x, lambda history: history.profile(part, profile))
 
     def stored(self, t: Array, x: Array, dense: Dense) -> dict[str, Array]:
-        """Stored energy by part."""
+        """Stored energy by part; of sources those that have stores of their own, such as windings."""
         history = History(self._bind(), self._instants.one_sided(t), x)
-        parts = self._graph.parts
-        stored = {part.name: history.stored(part) for part in parts if part.component.role != "source"}
+        parts = (part for part in self._graph.parts if part.component.role != "source" or self._stores(part))
+        stored = {part.name: history.stored(part) for part in parts}
         return stored | {name: stored[name] + held for name, held in self._in_waves(t, dense).items()}
+
+    def _stores(self, part: GraphPart) -> bool:
+        kinds = (self._graph.branches[k].template.kind for k in part.branches)
+        return any(kind in (Kind.ACROSS_STORE, Kind.THROUGH_STORE) for kind in kinds)
 
     def powers(self, t: Array, x: Array) -> tuple[dict[str, Array], dict[str, Array]]:
         """Lost power and supplied power by part."""

@@ -117,9 +117,9 @@ class History:
             case "through":
                 return signal.sign * self._through_port(part, str(signal.ends[0]))
             case "store":
-                return np.asarray(self.through[self._store(part)])
+                return np.asarray(signal.sign * self.through[self._store(part, signal.label)])
             case "twist":
-                store = self._store(part)
+                store = self._store(part, signal.label)
                 return np.asarray(self.through[store] / self.bound.part.coefficients[store])
 
     def profile(self, part: GraphPart, profile: Profile) -> Array:
@@ -137,9 +137,10 @@ class History:
                     columns[:, place] += factor * self.through[labels[name]]
         return columns
 
-    def _store(self, part: GraphPart) -> int:
-        branches = self.form.graph.branches
-        return next(k for k in part.branches if branches[k].template.kind is Kind.THROUGH_STORE)
+    def _store(self, part: GraphPart, label: str) -> int:
+        templates = ((k, self.form.graph.branches[k].template) for k in part.branches)
+        stores = ((k, made) for k, made in templates if made.kind is Kind.THROUGH_STORE)
+        return next(k for k, made in stores if label in ("", made.label))
 
     def _through_port(self, part: GraphPart, port: str) -> Array:
         """What the node at a port gives to the part: the sum over the branches that begin or end there."""

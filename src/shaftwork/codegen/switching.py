@@ -14,7 +14,7 @@ from sympy import Expr, Symbol
 from shaftwork.codegen.code import scalar, vectorised
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.timeline import CLEARANCE, NOTHING, Timeline, timeline
-from shaftwork.components.laws import line, switches
+from shaftwork.components.laws import line, switches, whole_line
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ParameterError
 from shaftwork.network.graph import GraphPart
@@ -50,6 +50,7 @@ class _Switch:
         places: of its parameters in the parameter vector.
         line: from their values to slope and offset, or None where the argument is not linear in time.
         value: from times (k,) and their values to the argument (k,).
+        whole: the line passes a level at every whole number, and these are not in `levels`.
     """
 
     part: str
@@ -58,6 +59,7 @@ class _Switch:
     places: tuple[int, ...]
     line: Callable[..., Sequence[float]] | None
     value: Callable[..., Any]
+    whole: bool = False
 
 
 class Switching:
@@ -73,14 +75,18 @@ class Switching:
         self._found: dict[tuple[bytes, float, float], Timeline] = {}
 
     def known(self, p: Array) -> tuple[float, ...]:
-        """Times in s of switches that are linear in time, increasing: they are known without a run."""
-        times = {time for switch in self._switches if switch.line is not None for time, _ in _on_a_line(switch, p)}
+        """Times in s of switches that are linear in time, increasing: they are known without a run.
+
+        Those that never end, sample after sample, are left out.
+        """
+        single = (switch for switch in self._switches if switch.line is not None and not switch.whole)
+        times = {time for switch in single for time, _ in _on_a_line(switch, switch.levels, p)}
         return tuple(sorted(times))
 
     def timeline(self, p: Array, t0: float, t_end: float) -> Timeline:
         """The instants of a run from t0 to t_end in s with a parameter vector.
 
-        Law: a switch that is linear in time is solved for it. Any other is sampled at times that are spread without a
+        Law: a switch that is linear in time, or the sine of something linear, is solved for it. Any other is sampled at times that are spread without a
         pattern, until four times as many show no more changes of side; where it only comes near its level it is
         followed to its nearest approach. Each change is then bisected to the last digit.
 
@@ -93,7 +99,11 @@ class Switching:
         if key not in self._found:
             found: list[tuple[float, float]] = []
             for switch in self._switches:
-                found += _on_a_line(switch, p) if switch.line is not None else _searched(switch, p, t0, t_end)
+                if switch.line is None:
+                    found += _searched(switch, p, t0, t_end)
+                else:
+                    levels = _whole_numbers(switch, p, t0, t_end) if switch.whole else switch.levels
+                    found += _on_a_line(switch, levels, p)
             while len(self._found) >= KEPT:
                 del self._found[next(iter(self._found))]
             self._found[key] = timeline(found, t0, t_end)
@@ -124,7 +134,8 @@ def _switches(form: StateForm) -> Iterator[_Switch]:
 def _made(
     part: GraphPart, argument: Expr, levels: Sequence[float], symbols: tuple[Symbol, ...], places: tuple[int, ...]
 ) -> _Switch:
-    straight = line(argument)
+    whole = whole_line(argument) if tuple(levels) == (0.0,) else None
+    straight = whole or line(argument)
     return _Switch(
         part.name,
         argument,
@@ -132,18 +143,42 @@ def _made(
         places,
         None if straight is None else scalar(list(symbols), list(straight)),
         vectorised((TIME, *symbols), argument),
+        whole is not None,
     )
 
 
-def _on_a_line(switch: _Switch, p: Array) -> list[tuple[float, float]]:
-    """Times in s at which a switch that is linear in time passes its levels, and the reach of their rounding."""
+def _straight(switch: _Switch, p: Array) -> tuple[float, float]:
+    """Slope and offset of a switch that is linear in time."""
     assert switch.line is not None  # noqa: S101 (the caller asks only then)
-    slope, offset = (float(number) for number in switch.line(*(float(p[place]) for place in switch.places)))
+    slope, offset = switch.line(*(float(p[place]) for place in switch.places))
+    return float(slope), float(offset)
+
+
+def _whole_numbers(switch: _Switch, p: Array, t0: float, t_end: float) -> Array:
+    """The whole numbers that a line passes in a run."""
+    slope, offset = _straight(switch, p)
+    low, high = sorted((slope * t0 + offset, slope * t_end + offset))
+    if not high - low < MOST_SAMPLES // RESOLVED:
+        raise _too_often(switch, t0, t_end)
+    return np.arange(math.floor(low), math.ceil(high) + 1, dtype=float)
+
+
+def _too_often(switch: _Switch, t0: float, t_end: float) -> ParameterError:
+    return ParameterError(
+        f"'{switch.part}': a law that changes with the sign of {switch.argument} switches too often between "
+        f"t = {t0:g} s and {t_end:g} s to be followed: more than {MOST_SAMPLES // RESOLVED} times, or without end. "
+        "Take a shorter run, or a smooth law."
+    )
+
+
+def _on_a_line(switch: _Switch, levels: Array, p: Array) -> list[tuple[float, float]]:
+    """Times in s at which a switch that is linear in time passes levels, and the reach of their rounding."""
+    slope, offset = _straight(switch, p)
     if slope == 0:
         return []
     with np.errstate(all="ignore"):
-        times = (switch.levels - offset) / slope + 0.0
-        reach = ROUNDINGS * np.finfo(float).eps * (np.abs(switch.levels) + abs(offset)) / abs(slope)
+        times = (levels - offset) / slope + 0.0
+        reach = ROUNDINGS * np.finfo(float).eps * (np.abs(levels) + abs(offset)) / abs(slope)
     return [(time, far) for time, far in zip(times.tolist(), reach.tolist(), strict=True) if math.isfinite(time)]
 
 
@@ -162,11 +197,7 @@ def _searched(switch: _Switch, p: Array, t0: float, t_end: float) -> list[tuple[
 
     t = _sampled(sides, t0, t_end)
     if t is None:
-        raise ParameterError(
-            f"'{switch.part}': a law that changes with the sign of {switch.argument} switches too often between "
-            f"t = {t0:g} s and {t_end:g} s to be followed: more than {MOST_SAMPLES // RESOLVED} times, or without end. "
-            "Take a shorter run, or a smooth law."
-        )
+        raise _too_often(switch, t0, t_end)
     if switch.levels.size == 1:
         t = np.sort(np.append(t, _nearest(lambda at: np.abs(argument(at) - switch.levels[0]), t)))
     return _changes(sides, t)

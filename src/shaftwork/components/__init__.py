@@ -2,7 +2,20 @@
 
 from __future__ import annotations
 
-from shaftwork.components import contacts, electrical, loads, machines, rotation, shafts, sources, translation
+from shaftwork.components import (
+    bucket_wheel,
+    contacts,
+    drives,
+    electrical,
+    friction,
+    loads,
+    machines,
+    motors,
+    rotation,
+    shafts,
+    sources,
+    translation,
+)
 from shaftwork.components.base import REGISTRY, Component, Port, Signal, component
 from shaftwork.components.laws import Table
 
@@ -12,11 +25,15 @@ __all__ = [
     "Port",
     "Signal",
     "Table",
+    "bucket_wheel",
     "component",
     "contacts",
+    "drives",
     "electrical",
+    "friction",
     "loads",
     "machines",
+    "motors",
     "rotation",
     "shafts",
     "sources",

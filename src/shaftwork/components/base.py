@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Literal, Self, TypeVar, dataclass_transform, g
 from sympy import Expr
 
 from shaftwork.components.branches import Branch, End
+from shaftwork.components.modes import Modes
 from shaftwork.core.domains import ELECTRICAL, ROTATION, Domain
 from shaftwork.core.errors import ParameterError, ShaftworkError
 from shaftwork.core.parameters import Parameter, parameter
@@ -37,12 +38,14 @@ class Signal:
             across of the part's through store), "store" (the through variable of the store alone).
         ends: the port, or the pair of ports, that it belongs to.
         sign: 1 or -1.
+        label: of the through store, where the part has several.
     """
 
     kind: Literal["through", "across", "twist", "store"]
     ends: tuple[End, End]
     domain: Domain | None
     sign: int = 1
+    label: str = ""
 
 
 @dataclass(frozen=True)
@@ -115,6 +118,10 @@ class Component:
     def branches(self, p: Any) -> Iterator[Branch]:
         """Yield the branches; `p.name` is the symbol of parameter `name` (0 where its value is exactly zero)."""
         raise NotImplementedError
+
+    def modes(self, p: Any) -> Iterator[Modes]:  # noqa: ARG002
+        """Yield the elements of the part that change their mode, each with its modes; by default there are none."""
+        yield from ()
 
     def derived(self, p: Any) -> Iterator[Derived]:  # noqa: ARG002
         """Yield the quantities by whose letters the laws are printed; each is `p.name` from then on. By default none.

@@ -50,6 +50,18 @@ def integral_of(label: str) -> Symbol:
     return Symbol(f"integral of {label}", real=True)
 
 
+def named_in(symbol: Symbol) -> tuple[str, str]:
+    """What `across_of`, `through_of` or `integral_of` stands for: its kind and the name given to it; else ("", "")."""
+    kind, of, name = symbol.name.partition(" of ")
+    return (kind, name) if of else ("", "")
+
+
+def readings_in(law: Expr) -> tuple[Symbol, ...]:
+    """The symbols of a law that stand for other branches and ports of its part, in the order of their names."""
+    found = (symbol for symbol in law.free_symbols if named_in(symbol)[0])
+    return tuple(sorted(found, key=lambda symbol: str(symbol.name)))
+
+
 End = str | None
 """A port or an inner node of the component; None is the reference of the domain (speed zero)."""
 
@@ -74,7 +86,10 @@ class ThroughStore:
 
 @dataclass(frozen=True)
 class ThroughLaw:
-    """Through = f(across, integral of across, t): damper, friction, motor curve, load, resistor, source of torque."""
+    """Through = f(across, integral of across, t): damper, friction, motor curve, load, resistor, source of torque.
+
+    It may read other ports and branches of its part besides, and is then a controlled source.
+    """
 
     through: Expr
     ends: tuple[End, End] | None = None
@@ -83,7 +98,10 @@ class ThroughLaw:
 
 @dataclass(frozen=True)
 class AcrossLaw:
-    """Across = f(t): prescribed speed, voltage source."""
+    """Across = f(t): prescribed speed, voltage source; a controlled one where it reads other branches of its part.
+
+    What it reads then must follow from states and from sources that depend on time alone.
+    """
 
     across: Expr
     ends: tuple[End, End] | None = None

@@ -13,6 +13,8 @@ import sympy
 from numpy.typing import NDArray
 from sympy.core.relational import Relational
 
+from shaftwork.components import noise
+from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.errors import ParameterError
 
 t = sympy.Symbol("t", real=True)
@@ -187,8 +189,8 @@ class InterpolationSlope(_TableFunction):
         return _latex_call("slope", self, printer, exp)
 
 
-NUMERICAL = {"Interpolation": interpolate, "InterpolationSlope": interpolation_slope}
-"""Names and numerical functions of the table functions, for a code printer other than `sympy.lambdify`."""
+NUMERICAL = {"Interpolation": interpolate, "InterpolationSlope": interpolation_slope, **noise.NUMERICAL}
+"""Names and numerical functions of tables and noise, for a code printer other than `sympy.lambdify`."""
 
 
 def as_expression(law: Any) -> sympy.Expr:
@@ -254,7 +256,7 @@ def breakpoints(expression: sympy.Basic, values: Mapping[sympy.Symbol, float] | 
 
     Found are comparisons, Heaviside, sign, Abs, Max, Min and tables of arguments that are linear in `t`. A switch that
     depends on a state has no time that is known beforehand and is left out, as is one that depends on a nonlinear
-    function of time: that is searched for in the span of a run (`codegen.switching`), and `pieces_degree` is None. A
+    function of time, or that is one of endlessly many: those are found in the span of a run (`codegen.switching`). A
     listed time need not be a kink (equal slopes on both sides).
 
     Args:
@@ -291,6 +293,8 @@ def _degree(expression: sympy.Expr) -> float:
     """Degree in t between breakpoints; infinite where the expression is no polynomial there."""
     if t not in expression.free_symbols:
         return 0
+    if isinstance(expression, sympy.floor):
+        return 0 if line(expression.args[0]) is not None else math.inf
     if any(line(argument) is None for argument, _ in _switches(expression)):
         return math.inf
     match expression:
@@ -308,6 +312,8 @@ def _degree(expression: sympy.Expr) -> float:
             return max(_degree(value) for value, _ in expression.args) if located else math.inf
         case sympy.Heaviside() | sympy.sign() | InterpolationSlope():
             return 0
+        case HeldNoise():
+            return 0 if _degree(expression.args[0]) == 0 else math.inf
         case sympy.Abs() | Interpolation():
             return 1
     return math.inf
@@ -330,6 +336,9 @@ def _switches(node: sympy.Basic) -> Iterable[tuple[sympy.Expr, Sequence[float]]]
             return [(sympy.sin(node.args[0]), (0.0,))]
         case _TableFunction():
             return [(node.argument, node.xs)]
+        case sympy.floor() | SmoothNoise():
+            # a sine changes sign at every whole number, and no list of levels would have an end
+            return [(sympy.sin(sympy.pi * node.args[0]), (0.0,))]
     return []
 
 
@@ -339,6 +348,12 @@ def line(expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr] | None:
     if polynomial is None or polynomial.degree() > 1:
         return None
     return polynomial.coeff_monomial(t), polynomial.coeff_monomial(1)
+
+
+def whole_line(argument: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr] | None:
+    """Slope and offset of a line in t that is a whole number where an argument is zero, else None: x of sin(pi x)."""
+    _, factor = argument.as_coeff_Mul()
+    return line(factor.args[0] / sympy.pi) if isinstance(factor, sympy.sin) else None
 
 
 def _latex_call(name: str, node: _TableFunction, printer: Any, exponent: str | None) -> str:

@@ -3,32 +3,59 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from enum import Enum
 from typing import Any, ClassVar
 
-from sympy import tanh
+from sympy import Abs, Expr, Float, Max, cos, pi, sin, tanh
 
-from shaftwork.components.base import Component, Port, Role, component
+from shaftwork.components.base import Component, Derived, Port, Role, component
 from shaftwork.components.branches import ACROSS, Branch, ThroughLaw
-from shaftwork.core.parameters import parameter
+from shaftwork.components.friction import rubbing, rubs
+from shaftwork.components.laws import t
+from shaftwork.components.modes import Modes
+from shaftwork.components.noise import HeldNoise, SmoothNoise
+from shaftwork.core.errors import ParameterError
+from shaftwork.core.parameters import in_si, parameter
+
+GRAVITY = Float("9.81")
+"""m/s^2, as Marinkovic 2012, (8)."""
+
+
+def against_motion(size: Any, p: Any) -> ThroughLaw:
+    """A torque of a given size against the motion of the part's node, rounded below the speed `p.omega_s`."""
+    return ThroughLaw(size * tanh(ACROSS / p.omega_s))
+
+
+def rounding() -> Any:
+    """Declares `omega_s` of a part that has a torque `against_motion`."""
+    return parameter("rad/s", "speed below which it is rounded", at_least=1e-6, default=0.01, latex=r"\omega_s")
 
 
 @component
 class CoulombLoad(Component):
-    """A travel resistance of constant size, always against the motion, rounded near standstill.
+    """A travel resistance of constant size, always against the motion, with true stick.
 
-    Law: torque on the node -tau tanh(omega / omega_s). Source: Marinkovic 2012, (7), (8).
+    Law: torque on the node -sign(omega) tau while it slips, whatever holds up to tau in size while it is stuck; with
+    omega_s, -tau tanh(omega / omega_s) instead, without sticking. Source: Marinkovic 2012, (7), (8), (16).
     """
 
     tau: float = parameter("N*m", "size of the resistance", at_least=0, latex=r"\tau_0")
     omega_s: float = parameter(
-        "rad/s", "speed below which it is rounded", at_least=1e-6, default=0.01, latex=r"\omega_s"
+        "rad/s", "speed below which it is rounded; zero for true stick", at_least=0, default=0.0, latex=r"\omega_s"
     )
 
     role: ClassVar[Role] = "loss"
     ports: ClassVar = (Port("a"),)
 
+    def modes(self, p: Any) -> Iterator[Modes]:
+        if p.omega_s == 0:
+            yield rubbing(p.tau)
+
     def branches(self, p: Any) -> Iterator[Branch]:
-        yield ThroughLaw(p.tau * tanh(ACROSS / p.omega_s))
+        if p.omega_s == 0:
+            yield from rubs(p.tau, p, None)
+        else:
+            yield ThroughLaw(p.tau * tanh(ACROSS / p.omega_s))
 
 
 @component
@@ -42,3 +69,203 @@ class ViscousLoad(Component):
 
     def branches(self, p: Any) -> Iterator[Branch]:
         yield ThroughLaw(p.d * ACROSS)
+
+
+@component
+class CraneTravel(Component):
+    """The travel resistance of a crane at the shaft of its wheels, always against the motion.
+
+    Law: torque on the node -tau_w tanh(omega / omega_s), tau_w = mass g (w + kappa) diameter / 2 with g = 9.81 m/s^2.
+    The mass itself is no part of it: give the node an Inertia of mass diameter^2 / 4, or a Wheel with a Mass.
+    Source: Marinkovic 2012, (7), (8); with its 4.0 t and 0.25 m, 22.4 N m are w + kappa = 0.004567.
+    """
+
+    mass: float = parameter("kg", "of crane and load together", at_least=0, latex=r"m_\Sigma")
+    diameter: float = parameter("m", "of the wheels on the rail", above=0, latex="D")
+    w: float = parameter("1", "specific resistance of friction, see `wheel_friction`", at_least=0)
+    kappa: float = parameter("1", "resistance of wheels that run askew", at_least=0, default=0.0, latex=r"\kappa")
+    omega_s: float = rounding()
+
+    role: ClassVar[Role] = "loss"
+    ports: ClassVar = (Port("a"),)
+
+    def derived(self, p: Any) -> Iterator[Derived]:
+        size = p.mass * GRAVITY * (p.w + p.kappa) * p.diameter / 2
+        yield Derived("tau_w", size, "N*m", "travel resistance", r"\tau_w")
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        yield against_motion(p.tau_w, p)
+
+    @staticmethod
+    def wheel_friction(diameter: float, lever_arm: float, bearing_friction: float, bearing_diameter: float) -> float:
+        """The specific resistance w of wheels in bearings.
+
+        Law: w = (2 lever_arm + bearing_friction bearing_diameter) / diameter.
+
+        Args:
+            diameter: of the wheels, m.
+            lever_arm: of the rolling friction, m; about 0.0005 for steel on steel.
+            bearing_friction: coefficient of friction of the bearings; about 0.002 for roller bearings.
+            bearing_diameter: on which they rub, m.
+
+        Raises:
+            ParameterError: one is negative, or the diameter is zero.
+        """
+        wheel = in_si("diameter", diameter, "m", above=0)
+        arm = in_si("lever_arm", lever_arm, "m", at_least=0)
+        bearing = in_si("bearing_diameter", bearing_diameter, "m", at_least=0)
+        return (2 * arm + in_si("bearing_friction", bearing_friction, at_least=0) * bearing) / wheel
+
+
+@component
+class Hoist(Component):
+    """A load that hangs on the rope of a drum, behind a gear: it pulls downwards whichever way it moves.
+
+    Law: torque on the node -tau_h (1/efficiency + efficiency) / 2 - tau_h (1/efficiency - efficiency) / 2
+    tanh(omega / omega_s), tau_h = mass g radius / ratio: tau_h / efficiency while it is hoisted, efficiency tau_h while
+    it is lowered. A positive speed hoists. The efficiency holds for the weight; that of accelerating the load is left
+    out, and its mass is no part of it: give the node an Inertia of mass (radius / ratio)^2.
+    """
+
+    mass: float = parameter("kg", "of the load and its tackle", at_least=0, latex="m")
+    radius: float = parameter("m", "of the drum", above=0, latex="r")
+    ratio: float = parameter("1", "node speed over drum speed", above=0, default=1.0, latex="i")
+    efficiency: float = parameter("1", "from the node to the load", above=0, at_most=1, default=1.0, latex=r"\eta")
+    omega_s: float = rounding()
+
+    role: ClassVar[Role] = "loss"
+    ports: ClassVar = (Port("a"),)
+
+    def derived(self, p: Any) -> Iterator[Derived]:
+        yield Derived("tau_h", p.mass * GRAVITY * p.radius / p.ratio, "N*m", "weight at the shaft", r"\tau_h")
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        yield ThroughLaw(p.tau_h * (1 / p.efficiency + p.efficiency) / 2)
+        yield against_motion(p.tau_h * (1 / p.efficiency - p.efficiency) / 2, p)
+
+
+def _rising(p: Any) -> Expr:
+    """A torque that rises with the square of the speed up to the nominal point, above a static share."""
+    speed = ACROSS / (2 * pi * p.n_n / 60)
+    return (1 - p.static) * p.tau_n * speed * Abs(speed)
+
+
+@component
+class Fan(Component):
+    """A fan: a torque that rises with the square of the speed, and the friction of its bearings.
+
+    Law: torque on the node -tau_n ((1 - static) w |w| + static tanh(omega / omega_s)), w = omega / (2 pi n_n / 60).
+    """
+
+    tau_n: float = parameter("N*m", "torque at the nominal speed", at_least=0, latex=r"\tau_n")
+    n_n: float = parameter("1/min", "nominal speed", above=0)
+    static: float = parameter("1", "share of friction in it", at_least=0, at_most=1, default=0.0, latex=r"\sigma")
+    omega_s: float = rounding()
+
+    role: ClassVar[Role] = "loss"
+    ports: ClassVar = (Port("a"),)
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        yield ThroughLaw(_rising(p))
+        yield against_motion(p.static * p.tau_n, p)
+
+
+@component
+class Pump(Component):
+    """A pump that lifts a liquid behind a check valve: a static share for the height, the rest with the square of speed.
+
+    Law: torque on the node -tau_n ((1 - static) w |w| + static tanh(omega / omega_s)), w = omega / (2 pi n_n / 60). The
+    valve holds the liquid, so that nothing drives the pump backwards from rest.
+    """
+
+    tau_n: float = parameter("N*m", "torque at the nominal speed", at_least=0, latex=r"\tau_n")
+    n_n: float = parameter("1/min", "nominal speed", above=0)
+    static: float = parameter("1", "share of the height in it", at_least=0, at_most=1, default=0.5, latex=r"\sigma")
+    omega_s: float = rounding()
+
+    role: ClassVar[Role] = "loss"
+    ports: ClassVar = (Port("a"),)
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        yield ThroughLaw(_rising(p))
+        yield against_motion(p.static * p.tau_n, p)
+
+
+@component
+class Conveyor(Component):
+    """A belt that carries a mass up or along: its weight, friction against the motion, and drag that rises with speed.
+
+    Law: torque on the node -radius (mass g sin(incline) + friction mass g cos(incline) tanh(omega / omega_s)
+    + d radius omega). A positive speed carries upwards where the incline is positive. The mass itself is no part of it:
+    give the node an Inertia of mass radius^2.
+    """
+
+    mass: float = parameter("kg", "on the belt and of the belt", at_least=0, latex="m")
+    radius: float = parameter("m", "of the drum", above=0, latex="r")
+    friction: float = parameter("1", "coefficient of friction of the idlers", at_least=0, latex=r"\mu")
+    incline: float = parameter("rad", "of the belt", at_least=-1.57, at_most=1.57, default=0.0, latex=r"\delta")
+    d: float = parameter("N*s/m", "drag per belt speed", at_least=0, default=0.0)
+    omega_s: float = rounding()
+
+    role: ClassVar[Role] = "loss"
+    ports: ClassVar = (Port("a"),)
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        weight = p.mass * GRAVITY * p.radius
+        yield ThroughLaw(weight * sin(p.incline))
+        yield against_motion(p.friction * weight * cos(p.incline), p)
+        yield ThroughLaw(p.d * p.radius**2 * ACROSS)
+
+
+class NoiseKind(Enum):
+    """How a random load varies in time."""
+
+    HELD = "held"
+    BAND_LIMITED = "band-limited"
+
+    def __repr__(self) -> str:
+        return self.value
+
+    @classmethod
+    def read(cls, text: Any) -> NoiseKind:
+        """A kind from its text.
+
+        Raises:
+            ParameterError: there is none.
+        """
+        try:
+            return cls(text)
+        except ValueError:
+            raise ParameterError(f"{text!r} is no kind of noise. The kinds are: held, band-limited.") from None
+
+
+@component
+class RandomLoad(Component):
+    """A resistance of random size, normally distributed, always against the motion.
+
+    Law: torque on the node -max(0, mean + std nu(t / interval)) tanh(omega / omega_s), with nu a standard normal noise:
+    held for each interval (`HeldNoise`), or smooth and band-limited, its power halved at 0.22 / interval
+    (`SmoothNoise`). Where the normal distribution falls below zero there is no resistance: nothing drives.
+    The same seed gives the same load, as a function of time. Source: Marinkovic 2012, section 3, figure 11.
+    """
+
+    mean: float = parameter("N*m", "mean of the resistance", at_least=0, latex=r"\bar\tau")
+    std: float = parameter("N*m", "standard deviation", at_least=0, latex=r"\sigma")
+    interval: float = parameter("s", "time from one random number to the next", above=0, latex="T")
+    seed: float = parameter("1", "any number; other numbers, other noise", default=1.0, latex="z")
+    kind: NoiseKind | str = parameter("1", "held or band-limited", default=NoiseKind.HELD, record=NoiseKind)
+    omega_s: float = rounding()
+
+    role: ClassVar[Role] = "loss"
+    ports: ClassVar = (Port("a"),)
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        yield against_motion(self._size(p), p)
+
+    @staticmethod
+    def _size(p: Any) -> Expr:
+        if p.std == 0:
+            return p.mean
+        if p.kind is NoiseKind.HELD:
+            return p.mean + p.std * HeldNoise(t / p.interval, p.seed, -p.mean / p.std)
+        return Max(0, p.mean + p.std * SmoothNoise(t / p.interval, p.seed))

@@ -9,6 +9,8 @@ from sympy import Integer, pi
 
 from shaftwork.components.base import Component, Port, Role, Signal, component
 from shaftwork.components.branches import ACROSS, Branch, IdealCoupling, ThroughLaw, ThroughStore
+from shaftwork.components.switching import off_time, on_time, refuse_no_time_on, while_on
+from shaftwork.components.torque_curves import kloss
 from shaftwork.core.domains import ELECTRICAL, ROTATION
 from shaftwork.core.parameters import parameter
 
@@ -27,13 +29,18 @@ class KlossMotor(Component):
     n_sync: float = parameter("1/min", "synchronous speed", above=0, latex=r"n_{sync}")
     ratio: float = parameter("1", "motor speed over node speed", nonzero=True, default=1.0, latex="i")
     efficiency: float = parameter("1", "efficiency of the gear", above=0, at_most=1, default=1.0, latex=r"\eta")
+    t_on: float | None = on_time()
+    t_off: float | None = off_time()
 
     role: ClassVar[Role] = "source"
     ports: ClassVar = (Port("a"),)
 
+    def __post_init__(self) -> None:
+        refuse_no_time_on(self)
+
     def branches(self, p: Any) -> Iterator[Branch]:
         slip = 1 - p.ratio * ACROSS / (2 * pi * p.n_sync / 60)
-        yield ThroughLaw(-p.ratio * p.efficiency * 2 * p.tau_k * slip * p.s_k / (slip**2 + p.s_k**2))
+        yield ThroughLaw(-while_on(p.ratio * p.efficiency * kloss(p.tau_k, slip, p.s_k), p))
 
 
 @component

@@ -44,15 +44,15 @@ def wraps(node: Basic) -> bool:
 def slope(expression: Expr, symbol: Symbol) -> Expr:
     """Partial derivative of a law where it is smooth.
 
-    Law: d sign(x) / dx = d Heaviside(x) / dx = 0, d |x| / dx = sign(x); sympy's `diff` has DiracDelta for the first
-    and, where it does not know x as real, derivatives of its real part for the last. A jump has no slope: in time it is
+    Law: d sign(x) / dx = d Heaviside(x) / dx = d floor(x) / dx = 0, d |x| / dx = sign(x); sympy's `diff` has DiracDelta
+    for the first and, where it does not know x as real, derivatives of its real part for the last. A jump has no slope: in time it is
     a breakpoint, in a state the law jumps there and the derivative says nothing about it.
 
     Args:
         expression: a law.
         symbol: what to differentiate by.
     """
-    kinks = expression.atoms(sign, Heaviside, Abs)
+    kinks = expression.atoms(sign, Heaviside, Abs, floor)
     if not kinks:
         return expression.diff(symbol)
     held = {node: Dummy(real=True) for node in kinks}

@@ -80,6 +80,8 @@ class Parameter:
 
     def magnitude(self, value: Any) -> tuple[Any, str | None]:
         """The value in SI as a float (also a law's expression, or the record), and the objection to it, or None."""
+        if value is None and self.default is None:
+            return None, None
         if self.record is not None:
             return self._from_text(value)
         if hasattr(value, "dimensionality") and hasattr(value, "to"):

@@ -211,6 +211,10 @@ class Blocks:
             sign = -1 if across.could_extract_minus_sign() else 1
             known = sign * Add(*assembly.around(flow.branches[0]))
             yield from self._law(flow, {} if across == 0 else {sign * across: known})
+        for source in self.equations.form.across_sources:
+            prescribed = assembly.law_of_source(source)
+            if prescribed.groups[0].terms != (prescribed.left,):
+                yield self.writer.line(prescribed)
         for end, other in assembly.opposite.items():
             yield self.writer.line(assembly.law_of_history(end, Add(*assembly.around(other))))
 

@@ -17,7 +17,7 @@ from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import CompileError
-from shaftwork.equations.quantities import Quantities, rate_of
+from shaftwork.equations.quantities import Quantities, rate_of, refuse_controlled
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch
 from shaftwork.network.templates import Kind
 
@@ -55,13 +55,14 @@ def lagrangian(graph: CircuitGraph) -> Lagrangian:
     """Lagrange's equations of a network of rotating and translating parts.
 
     Raises:
-        CompileError: the network has electrical nodes.
+        CompileError: the network has electrical nodes, or a law reads others.
     """
     if ELECTRICAL in graph.domains:
         raise CompileError(
             f"Lagrange's equations are for mechanical networks, but '{graph.name}' has electrical nodes. "
             "Take form='state'."
         )
+    refuse_controlled(graph)
     return _Energies(graph).made()
 
 

@@ -232,8 +232,8 @@ def _letter(symbol: Symbol, quantity: Quantity, label: str = "") -> Letter:
 
 
 def _mark(text: str) -> str:
-    """A word as a subscript: one letter in italics, more upright."""
-    return escaped(text) if len(text) == 1 else f"\\mathrm{{{escaped(text)}}}" if text else ""
+    """Words as a subscript: one letter in italics, Greek ones as such, others upright."""
+    return ",".join(word if len(word) == 1 else _upright(word) for word in text.split("_") if word)
 
 
 def _distinct(letters: Iterable[Letter]) -> tuple[Letter, ...]:

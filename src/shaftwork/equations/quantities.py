@@ -14,6 +14,8 @@ from functools import cached_property
 from sympy import Expr, Integer, Symbol
 
 from shaftwork.core.domains import ELECTRICAL, Domain, Quantity
+from shaftwork.core.errors import CompileError
+from shaftwork.network.controlled import readings_of
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import branch_name
@@ -30,6 +32,18 @@ def running_number(label: str) -> str:
 def rate_of(symbol: Symbol) -> Symbol:
     """The symbol of a quantity's time derivative."""
     return Symbol(f"der({symbol.name})", real=True)
+
+
+def refuse_controlled(graph: CircuitGraph) -> None:
+    """Refuse laws that read others of their part, where positions are all that there is.
+
+    Raises:
+        CompileError: there is one.
+    """
+    for branch in graph.branches:
+        if branch.template.reads:
+            part = graph.parts[branch.part].name
+            raise CompileError(f"A law of '{part}' reads other quantities than its own speed. Take form='state'.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,8 +112,15 @@ class Quantities:
 
     def printed(self, branch: int) -> Expr:
         """The same; of a wave that arrives, what left the other end."""
+        read = {"across": self.node, "through": self.store, "integral": self.integral}
+        others = readings_of(self.graph, branch).items()
+        return self._own(branch).xreplace({symbol: read[made.kind](made.of) for symbol, made in others})
+
+    def _own(self, branch: int) -> Expr:
+        """A law in parameters and derived quantities of the network, but not in what it reads of others."""
         made = self.graph.branches[branch]
-        return made.template.printed.xreplace(self._of_network[made.part])
+        law: Expr = made.template.printed.xreplace(self._of_network[made.part])
+        return law
 
     @cached_property
     def _of_network(self) -> tuple[dict[Symbol, Symbol], ...]:
@@ -225,7 +246,7 @@ class Quantities:
 
     def _defined(self, branch: GraphBranch) -> Symbol:
         """The symbol of the across variable that a store or a source defines."""
-        law = self.law(branch.index)
+        law = self._own(branch.index)
         if branch.template.kind is Kind.ACROSS_SOURCE and law.is_Symbol and law.name in self.graph.parameters:
             return law
         quantity = self.domain((branch.plus, branch.minus)).across

@@ -16,7 +16,7 @@ from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import CompileError
-from shaftwork.equations.quantities import Quantities, rate_of
+from shaftwork.equations.quantities import Quantities, rate_of, refuse_controlled
 from shaftwork.network.graph import GROUND, CircuitGraph
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.gains import Number, add, divide, simplified
@@ -78,7 +78,7 @@ def second_order(graph: CircuitGraph) -> SecondOrder:
     """The second-order form of a network of rotating and translating parts.
 
     Raises:
-        CompileError: the network has electrical nodes; their equations are of first order.
+        CompileError: the network has electrical nodes; their equations are of first order. Or a law reads others.
     """
     electrical = [name for name, domain in zip(graph.nodes, graph.domains, strict=True) if domain is ELECTRICAL]
     if electrical:
@@ -86,6 +86,7 @@ def second_order(graph: CircuitGraph) -> SecondOrder:
             f"The second-order form is for mechanical networks, but '{graph.name}' has the electrical nodes "
             f"{', '.join(electrical[:6])}{', ...' if len(electrical) > 6 else ''}. Take form='state'."
         )
+    refuse_controlled(graph)
     return _Writer(graph).made()
 
 

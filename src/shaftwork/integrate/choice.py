@@ -133,7 +133,7 @@ def solve(
     name, reason = choose(problem) if engine == "auto" else (engine, f"The engine {engine!r} was asked for.")
     if name != "heyoka" or not (fallback or engine == "auto"):
         trajectory = load(name)(problem)
-        if name not in EXPLICIT and (lost := rounding(problem, trajectory.t, trajectory.x)) is not None:
+        if name not in EXPLICIT and trajectory.t.size and (lost := rounding(problem, trajectory.t, trajectory.x)) is not None:
             warnings.warn(lost, AccuracyWarning, stacklevel=4)
         return trajectory, name, why or reason
     run = load(name)

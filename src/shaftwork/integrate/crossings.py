@@ -69,7 +69,7 @@ class Crossings:
         """
         if self._problem.switches is None:
             return None
-        look = _Look(self._values, np.array([start, end]), np.vstack([x, y]), dense)
+        look = Look(self._values, np.array([start, end]), np.vstack([x, y]), dense)
         look.add(start + FIRST * (end - start))
         if look.is_far():
             return None
@@ -106,7 +106,7 @@ class Crossings:
         moved = self._scale(x) * (0.5 + places) * np.where(places * 16 % 2 < 1, 1.0, -1.0)
         return np.asarray(np.abs(self._values(np.array([t]), (x + moved)[None, :])[0] - values))
 
-    def _longest(self, look: _Look, row: int) -> float:
+    def _longest(self, look: Look, row: int) -> float:
         """The time in s in which no state moves by more than its tolerance, near a row of a look."""
         rows = slice(max(row - 2, 0), row + 2)
         rates = np.abs(np.diff(look.states[rows], axis=0) / np.diff(look.times[rows])[:, None]).max(axis=0)
@@ -127,13 +127,28 @@ class Crossings:
         return self._rests < RESTING
 
 
-class _Look:
-    """A step at some of its times (k,), increasing: its states (k, n) and switches (k, m)."""
+class Look:
+    """A step at some of its times (k,), increasing: its states (k, n) and switches (k, m).
 
-    def __init__(self, switches: Callable[[Array, Array], Array], times: Array, states: Array, dense: Dense) -> None:
+    Args:
+        switches: from times and states to the switches.
+        times: the first of the times.
+        states: the states there.
+        dense: dense output of the step.
+        sides: (m,) on which the switches start, by default those that they have at the first time.
+    """
+
+    def __init__(
+        self,
+        switches: Callable[[Array, Array], Array],
+        times: Array,
+        states: Array,
+        dense: Dense,
+        sides: Array | None = None,
+    ) -> None:
         self._switches, self._dense = switches, dense
         self.times, self.states, self.values = times, states, switches(times, states)
-        self._sides = np.sign(self.values[0])
+        self._sides = np.sign(self.values[0]) if sides is None else sides
 
     def add(self, times: Array) -> None:
         """Look at more times (k,)."""
@@ -142,6 +157,10 @@ class _Look:
         self.times = np.concatenate([self.times, times])[order]
         self.states = np.concatenate([self.states, states])[order]
         self.values = np.concatenate([self.values, self._switches(times, states)])[order]
+
+    def at(self, t: float) -> Array:
+        """The switches (m,) at a time in s."""
+        return np.asarray(self._switches(np.array([t]), self._dense(np.array([t])))[0])
 
     def is_far(self) -> bool:
         """Whether all switches are far from zero for what they move."""
@@ -200,7 +219,7 @@ class _Look:
 
         def value(t: float) -> float:
             if t not in known:
-                known[t] = float(self._switches(np.array([t]), self._dense(np.array([t])))[0, column])
+                known[t] = float(self.at(t)[column])
             return known[t]
 
         tolerance = max(near, float(np.spacing(self.times[-1])))

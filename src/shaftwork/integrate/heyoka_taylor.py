@@ -22,9 +22,15 @@ LOOSEST_TOLERANCE, TIGHTEST_TOLERANCE = 1e-10, 1e-15
 # not is followed by one of a quarter of its length.
 FIRST_DEFECT, FIRST_TRIALS, SHORTER = 1e-8, 30, 0.25
 
-# From (integrator, step callback, step limit, longest step) to (outcome name, steps taken); called again after an
+# From (integrator, step callback, step limit, longest step) to (outcome, its name, steps taken); called again after an
 # interruption.
-Advance = Callable[[Any, Watch | None, int, float], tuple[str, int]]
+Advance = Callable[[Any, Watch | None, int, float], tuple[Any, str, int]]
+# What heyoka's outcomes are called here where a guard ended the run.
+GUARD = "guard"
+# What is as good as zero, and is not.
+NOTHING = 1e-200
+# heyoka's outcomes proper are below this number; those above are events that have ended a run.
+FIRST_OUTCOME = -(2**32)
 
 
 class SeriesError(SimulationError):
@@ -54,7 +60,7 @@ def solve(problem: Problem) -> Trajectory:
         return _on_grid(problem, np.asarray(problem.t_eval, dtype=float))
     dense = _Replay(problem)
     t, x = both_sides(problem, *dense.step_ends)
-    return Trajectory(t, x, dense, {"steps": dense.steps.size - 1})
+    return Trajectory(t, x, dense, {"steps": dense.steps.size - 1}, dense.met, (float(t[-1]), x[-1]))
 
 
 class _Run:
@@ -69,6 +75,8 @@ class _Run:
         self.state: Array = np.array(problem.x0, dtype=float)
         self.start = self.state
         self.steps = 0
+        self.met: int | None = None
+        """The guard that ended the run."""
 
     def piece(self, piece: Piece, advance: Advance) -> None:
         """Bring the run to the end of a piece; `advance` records what it passes."""
@@ -77,13 +85,19 @@ class _Run:
         integrator.state[:] = self.start = start_of_piece(self.problem, piece, self.state)
         # heyoka keeps no parameters behind the last one that the rows contain
         used = min(integrator.pars.size, self.parameters.size)
+        if self.program.held is not None:
+            self.program.held.start(piece.start, (piece.low + piece.high) / 2, self.start, self.parameters)
         integrator.pars[:used] = self.parameters[:used]
         integrator.reset_cooldowns() if integrator.with_events else None
+        if self.problem.guards is not None:
+            guards, first = self.problem.guards, self.parameters.size + len(self.program.switches)
+            # where a value is exactly zero at the start of a step, heyoka finds none of its later zeros in that step
+            integrator.pars[first:] = np.concatenate([guards.sides, np.maximum(guards.offsets, NOTHING)])
         watch = self._watch(piece) if self.program.switches else None
         longest = self._first_step(piece)
         while True:
             left = self.problem.max_steps - self.steps
-            outcome, steps = advance(integrator, watch, left if longest == math.inf else 1, longest)
+            raw, outcome, steps = advance(integrator, watch, left if longest == math.inf else 1, longest)
             self.steps += steps
             if outcome == "step_limit" and longest < math.inf and left > 1:
                 longest = math.inf
@@ -92,7 +106,9 @@ class _Run:
                 settle(self.program, integrator, piece.end - piece.start)
                 continue
             break
-        if outcome not in ("time_limit", "success"):
+        if outcome == GUARD:
+            self.met = self.program.guard_met(raw)
+        elif outcome not in ("time_limit", "success"):
             raise self._failure(piece, outcome, watch)
         self.state = integrator.state.copy()
         if not np.isfinite(self.state).all():
@@ -131,7 +147,8 @@ class _Run:
         return bool((defect <= FIRST_DEFECT * (np.abs(state) + elapsed * np.abs(slope)) + self.problem.atol).all())
 
     def _watch(self, piece: Piece) -> Watch:
-        self.integrator.pars[self.parameters.size :] = 0.0
+        first = self.parameters.size
+        self.integrator.pars[first : first + len(self.program.switches)] = 0.0
         settle(self.program, self.integrator, piece.end - piece.start)
         return Watch(self.program, piece.start, self.problem.t_end - self.problem.t0)
 
@@ -172,8 +189,12 @@ def _on_grid(problem: Problem, times: Array) -> Trajectory:
         stop = times.size if piece.end == problem.t_end else int(np.searchsorted(times, piece.end, side="left"))
         recorder = _GridRecorder(states[done:stop], times[done:stop], piece.end)
         run.piece(piece, recorder)
+        if run.met is not None:
+            done += recorder.filled
+            break
         done = stop
-    return Trajectory(times, states, _Replay(problem), {"steps": run.steps})
+    end = None if problem.guards is None else (run.integrator.time, run.state)
+    return Trajectory(times[:done], states[:done], _Replay(problem), {"steps": run.steps}, run.met, end)
 
 
 class _GridRecorder:
@@ -185,7 +206,12 @@ class _GridRecorder:
         self._grid = times if times.size and times[-1] == end else np.append(times, end)
         self._filled = 0
 
-    def __call__(self, integrator: Any, watch: Watch | None, limit: int, longest: float) -> tuple[str, int]:
+    @property
+    def filled(self) -> int:
+        """Rows of output that are filled."""
+        return min(self._filled, len(self._rows))
+
+    def __call__(self, integrator: Any, watch: Watch | None, limit: int, longest: float) -> tuple[Any, str, int]:
         pending, now = self._grid[self._filled :], integrator.time
         extra = int(pending[0] != now)  # heyoka's grid starts at the present time
         outcome, _, _, steps, _, found = integrator.propagate_grid(
@@ -198,7 +224,7 @@ class _GridRecorder:
         kept = found[: len(self._rows) - self._filled]
         self._rows[self._filled : self._filled + len(kept)] = kept
         self._filled += len(found)
-        return _outcome(outcome, watch, arrived=self._filled == self._grid.size), steps
+        return outcome, _outcome(outcome, watch, arrived=self._filled == self._grid.size), steps
 
 
 class _SegmentRecorder:
@@ -208,18 +234,20 @@ class _SegmentRecorder:
         self._end = end
         self.segments: list[Any] = []
 
-    def __call__(self, integrator: Any, watch: Watch | None, limit: int, longest: float) -> tuple[str, int]:
+    def __call__(self, integrator: Any, watch: Watch | None, limit: int, longest: float) -> tuple[Any, str, int]:
         outcome, _, _, steps, segment, _ = integrator.propagate_until(
             self._end, max_steps=max(limit, 1), max_delta_t=longest, callback=watch, c_output=True
         )
         if segment is not None:
             self.segments.append(segment)
-        return _outcome(outcome, watch, arrived=integrator.time == self._end), steps
+        return outcome, _outcome(outcome, watch, arrived=integrator.time == self._end), steps
 
 
 def _outcome(outcome: Any, watch: Watch | None, *, arrived: bool) -> str:
     """Name of heyoka's outcome; a watch that stops the very last step has stopped the run only if it has a reason."""
     failed = watch is not None and watch.reason is not None
+    if int(outcome) > FIRST_OUTCOME and not failed:
+        return GUARD
     return "time_limit" if arrived and not failed else str(outcome.name)
 
 
@@ -230,14 +258,25 @@ class _Replay:
         self._problem = problem
 
     @cached_property
-    def _segments(self) -> tuple[tuple[Any, ...], ...]:
+    def _made(self) -> tuple[tuple[tuple[Any, ...], ...], int | None]:
         run = _Run(self._problem)
         recorders = []
         for piece in pieces(self._problem):
             recorder = _SegmentRecorder(piece.end)
             run.piece(piece, recorder)
             recorders.append(recorder)
-        return tuple(tuple(recorder.segments) for recorder in recorders)
+            if run.met is not None:
+                break
+        return tuple(tuple(recorder.segments) for recorder in recorders), run.met
+
+    @property
+    def _segments(self) -> tuple[tuple[Any, ...], ...]:
+        return self._made[0]
+
+    @property
+    def met(self) -> int | None:
+        """The guard that ended the run."""
+        return self._made[1]
 
     @cached_property
     def _dense(self) -> PiecewiseDense:

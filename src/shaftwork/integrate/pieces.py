@@ -139,6 +139,11 @@ def both_sides(problem: Timed, times: Sequence[Array], states: Sequence[Array]) 
     return t, x
 
 
+def reached(times: Array, end: float) -> Array:
+    """The output times (k,) up to the end of a run in s, which a guard may have cut short."""
+    return np.asarray(times, dtype=float)[: int(np.searchsorted(times, end, side="right"))]
+
+
 def failure(problem: Timed, engine: str, t: float, x: Array, reason: str) -> SimulationError:
     """The error of a failed run: when, in which state, why, and what to try.
 

@@ -31,6 +31,21 @@ class LinearInputs:
 
 
 @dataclass(frozen=True)
+class Guards:
+    """What ends a phase of a motion.
+
+    Args:
+        values: from times (k,) and states (k, n) to (k, m).
+        sides: (m,) 1 where the rise of a value through zero ends the phase, -1 where its fall does, 0 where neither.
+        offsets: (m,) how far it has to go beyond zero: more than rounding moves it, or it would end where it begins.
+    """
+
+    values: Callable[[Array, Array], Array]
+    sides: Array
+    offsets: Array
+
+
+@dataclass(frozen=True)
 class Problem:
     """An initial value problem x' = rhs(t, x) on [t0, t_end], smooth between its breakpoints.
 
@@ -50,6 +65,8 @@ class Problem:
         switches: what makes the right-hand side jump or bend where its sign changes with the motion, from times (k,)
             and states (k, n) to (k, m), or None where nothing does. An engine ends a step at such a change
             (`Crossings`), or finds it by its own means.
+        guards: what ends the run before `t_end`, or None where nothing does. An engine then returns what it has, up to
+            the time at which the first guard is met, located as exactly as its solution allows; see `Trajectory.met`.
         t_eval: strictly increasing output times in [t0, t_end], or None for the engine's own steps. At a breakpoint the
             state after the jump is the output.
         linear: the same system in linear form, where it is one and its input is, between breakpoints, a polynomial of
@@ -72,6 +89,7 @@ class Problem:
     jump: Callable[[float, Array], Array] | None = None
     sides: Callable[[float], tuple[float, float]] = around
     switches: Callable[[Array, Array], Array] | None = None
+    guards: Guards | None = None
     t_eval: Array | None = None
     linear: LinearInputs | None = None
     driven: LinearInputs | None = None
@@ -93,7 +111,7 @@ class DaeProblem:
         x0: (n,) start values; the algebraic ones are a first guess.
         derivative0: (n,) first guess of dx/dt at the start.
         algebraic: indices of the unknowns whose derivative does not appear.
-        t0, t_end, names, atol, rtol, breakpoints, jump, sides, switches, t_eval, max_steps: as in `Problem`.
+        t0, t_end, names, atol, rtol, breakpoints, jump, sides, switches, guards, t_eval, max_steps: as in `Problem`.
     """
 
     residual: Callable[[float, Array, Array], Array]
@@ -109,6 +127,7 @@ class DaeProblem:
     jump: Callable[[float, Array], Array] | None = None
     sides: Callable[[float], tuple[float, float]] = around
     switches: Callable[[Array, Array], Array] | None = None
+    guards: Guards | None = None
     t_eval: Array | None = None
     max_steps: int = 10_000_000
 
@@ -172,12 +191,16 @@ class Trajectory:
         x: (k, n) states.
         dense: the solution at any time; at a breakpoint the state after the jump.
         statistics: counts by name: "steps", "rhs", "jacobians", "switches" as far as the engine knows them.
+        met: the guard that ended the run, or None where it went on to `Problem.t_end`.
+        end: time in s and state (n,) where the run ended; known of a run with guards.
     """
 
     t: Array
     x: Array
     dense: DenseOutput
     statistics: Mapping[str, int] = field(default_factory=dict)
+    met: int | None = None
+    end: tuple[float, Array] | None = None
 
     @property
     def steps(self) -> Array:

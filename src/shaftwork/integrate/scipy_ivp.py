@@ -13,6 +13,7 @@ from scipy.integrate import BDF, DOP853, LSODA, OdeSolution, Radau
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.cancellation import cancellation
 from shaftwork.integrate.crossings import Crossings
+from shaftwork.integrate.guards import GuardWatch
 from shaftwork.integrate.pieces import (
     GuardedFunctions,
     Pace,
@@ -21,6 +22,7 @@ from shaftwork.integrate.pieces import (
     both_sides,
     failure,
     pieces,
+    reached,
     start_of_piece,
 )
 from shaftwork.integrate.problem import Array, Problem, Trajectory
@@ -43,12 +45,13 @@ STABLE = 6.0
 
 @dataclass(frozen=True)
 class _Run:
-    """One piece, solved: step ends (s,), states there (s, n), dense output and counts."""
+    """One piece, solved: step ends (s,), states there (s, n), dense output, counts, and the guard that ended it."""
 
     times: Array
     states: Array
     dense: Callable[[Array], Array]
     counts: dict[str, int]
+    met: int | None = None
 
 
 def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
@@ -82,9 +85,9 @@ def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
     if problem.t_eval is None:
         t, states = both_sides(problem, [run.times for run in runs], [run.states for run in runs])
     else:
-        t = np.asarray(problem.t_eval, dtype=float)
+        t = reached(problem.t_eval, steps[-1])
         states = dense(t)
-    return Trajectory(t, states, dense, _sums(runs))
+    return Trajectory(t, states, dense, _sums(runs), runs[-1].met, (float(steps[-1]), runs[-1].states[-1]))
 
 
 def _march(problem: Problem, method: Method, longest: float = np.inf) -> list[_Run]:
@@ -98,6 +101,8 @@ def _march(problem: Problem, method: Method, longest: float = np.inf) -> list[_R
             run = _piece(problem, piece, start, method, problem.max_steps - taken, pace, longest)
             runs.append(run)
             x = run.states[-1]
+            if run.met is not None:
+                break
     return runs
 
 
@@ -114,6 +119,7 @@ def _piece(
     problem: Problem, piece: Piece, x: Array, method: Method, max_steps: int, pace: Pace, longest: float
 ) -> _Run:
     guard, crossings = GuardedFunctions(problem, piece), Crossings(problem, piece)
+    watch = GuardWatch(problem, piece.low, piece.high)
     times, states = [piece.start], [x]
     interpolants: list[Any] = []
     retired = np.zeros(2, dtype=int)
@@ -133,7 +139,13 @@ def _piece(
             if (objection := pace.objection(solver.t, rests=crossings.rests)) is not None:
                 raise failure(problem, "scipy", solver.t, solver.y, f"{method}: {objection}")
             dense = solver.dense_output()
+            end = watch.cut(times[-1], states[-1], solver.t, solver.y, _rows(dense))
             cut = crossings.cut(times[-1], states[-1], solver.t, solver.y, _rows(dense))
+            if end is not None and (cut is None or end <= cut):
+                interpolants.append(dense)
+                times.append(end)
+                states.append(np.asarray(dense(end)))
+                break
             if cut is None or cut == solver.t:
                 interpolants.append(dense)
                 times.append(solver.t)
@@ -150,7 +162,8 @@ def _piece(
     solution = OdeSolution(times, interpolants)
     calls, jacobians = retired.tolist()
     counts = {"steps": len(interpolants), "rhs": calls, "jacobians": jacobians}
-    return _Run(np.array(times), np.array(states), _rows(solution), counts)
+    met = watch.met if times[-1] < piece.end else None
+    return _Run(np.array(times), np.array(states), _rows(solution), counts, met)
 
 
 def _rows(dense: Callable[[Array], Array]) -> Callable[[Array], Array]:

@@ -17,6 +17,7 @@ from scipy.interpolate import BarycentricInterpolator
 
 from shaftwork.core.errors import MissingExtraError
 from shaftwork.integrate.crossings import Crossings
+from shaftwork.integrate.guards import GuardWatch
 from shaftwork.integrate.pieces import (
     GuardedFunctions,
     Pace,
@@ -221,13 +222,17 @@ class _Step:
 
 def _march(
     problem: Problem | DaeProblem, open_solver: Opener, ask: Callable[[float, float], Array]
-) -> list[tuple[Array, list[_Step]]]:
-    """All steps of each piece, behind the piece's start state; `ask` gives the times wanted in a step."""
+) -> tuple[list[tuple[Array, list[_Step]]], int | None]:
+    """All steps of each piece, behind the piece's start state, and the guard that ended the run.
+
+    `ask` gives the times wanted in a step.
+    """
     x = np.asarray(problem.x0, dtype=float)
     found: list[tuple[Array, list[_Step]]] = []
     left, pace = problem.max_steps, Pace(problem)
     for piece in pieces(problem):
         opened, crossings = open_solver(piece, start_of_piece(problem, piece, x)), Crossings(problem, piece)
+        watch = GuardWatch(problem, piece.low, piece.high)
         x, t = opened.start, piece.start
         found.append((x, []))
         while t < piece.end:
@@ -235,8 +240,10 @@ def _march(
                 raise failure(problem, "sundials", t, x, f"{problem.max_steps} steps were not enough")
             end, state = _step(problem, piece, opened, t, x)
             # Its formulas meet a law at the ends of steps alone, so that a step may be cut off at a switch.
+            stop = watch.cut(t, x, end, state, opened.inside)
             cut = crossings.cut(t, x, end, state, opened.inside, again=False)
-            whole, end = end, end if cut is None else cut
+            stops = stop is not None and (cut is None or stop <= cut)
+            whole, end = end, stop if stop is not None and stops else end if cut is None else cut
             x = state if end == whole else opened.inside(np.array([end]))[0]
             if (objection := pace.objection(end, rests=crossings.rests)) is not None:
                 raise failure(problem, "sundials", end, x, objection)
@@ -245,12 +252,14 @@ def _march(
             states = np.vstack([opened.inside(within), np.repeat(x[None, :], asked.size - within.size, axis=0)])
             found[-1][1].append(_Step(t, end, x, states))
             t, left = end, left - 1
+            if stops and t < piece.end:
+                return found, watch.met
             if t < piece.end and (cut is not None or opened.outgrown()):
                 opened = open_solver(replace(piece, start=t), x)
                 x = opened.start
-            elif within.size or problem.switches is not None:
+            elif within.size or problem.switches is not None or problem.guards is not None:
                 opened.solver.step(end)  # after an interpolation SUNDIALS gives the end of the step once more
-    return found
+    return found, None
 
 
 def _step(problem: Problem | DaeProblem, piece: Piece, opened: _Opened, t: float, x: Array) -> tuple[float, Array]:
@@ -271,7 +280,7 @@ def _trajectory(problem: Problem | DaeProblem, opener: Callable[[], Opener], deg
     dense = _Replay(problem, opener, degree)
     if problem.t_eval is None:
         t, states = both_sides(problem, *dense.step_ends)
-        return Trajectory(t, states, dense, {"steps": dense.steps.size - 1})
+        return Trajectory(t, states, dense, {"steps": dense.steps.size - 1}, dense.met, (float(t[-1]), states[-1]))
     times = np.asarray(problem.t_eval, dtype=float)
     rows: list[Array] = []
     steps = 0
@@ -281,12 +290,16 @@ def _trajectory(problem: Problem | DaeProblem, opener: Callable[[], Opener], deg
         side: Literal["left", "right"] = "left" if end in problem.breakpoints else "right"
         return times[np.searchsorted(times, start, side="right") : np.searchsorted(times, end, side=side)]
 
-    for piece, (start, marched) in zip(pieces(problem), _march(problem, opener(), ask), strict=True):
+    found, met = _march(problem, opener(), ask)
+    for piece, (start, marched) in zip(pieces(problem), found, strict=False):  # a guard may end it early
         if piece.start in times:
             rows.append(start[None, :])
         rows.extend(step.inside for step in marched)
         steps += len(marched)
-    return Trajectory(times, np.concatenate(rows), dense, {"steps": steps})
+    last = found[-1][1][-1]
+    none = np.empty((0, last.state.size))
+    states = np.concatenate([none, *rows])
+    return Trajectory(times[: len(states)], states, dense, {"steps": steps}, met, (last.end, last.state))
 
 
 class _Replay:
@@ -299,8 +312,17 @@ class _Replay:
         self._points = (1 - np.cos(np.pi * np.arange(degree + 1) / degree)) / 2
 
     @cached_property
-    def _found(self) -> list[tuple[Array, list[_Step]]]:
+    def _marched(self) -> tuple[list[tuple[Array, list[_Step]]], int | None]:
         return _march(self._problem, self._opener(), lambda start, end: start + (end - start) * self._points[1:-1])
+
+    @property
+    def _found(self) -> list[tuple[Array, list[_Step]]]:
+        return self._marched[0]
+
+    @property
+    def met(self) -> int | None:
+        """The guard that ended the run."""
+        return self._marched[1]
 
     @cached_property
     def _dense(self) -> PiecewiseDense:
@@ -312,7 +334,7 @@ class _Replay:
                 parts.append(_polynomial(step.start, step.end, self._points, nodes))
                 starts.append(step.start)
                 before = step.state
-        ends = np.array([*starts, self._problem.t_end])
+        ends = np.array([*starts, self._found[-1][1][-1].end])
         return PiecewiseDense(np.array(starts), tuple(parts), ends, self._problem.x0.size)
 
     @property

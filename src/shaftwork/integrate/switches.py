@@ -30,7 +30,8 @@ def settle(program: Any, integrator: Any, horizon: float) -> None:
         integrator: its integrator; time and state are left as they were.
         horizon: length of the piece, or of the rest of it, in s.
     """
-    parameters, signs = np.split(integrator.pars, [program.parameter_count])
+    first = program.parameter_count
+    parameters, signs = integrator.pars[:first], integrator.pars[first : first + len(program.switches)]
     timed = signs * program.timed
     middle = program.switch_signs(integrator.time + horizon / 2, integrator.state, parameters, timed)
     signs[:] = program.switch_signs(integrator.time, integrator.state, parameters, middle * program.timed)
@@ -42,6 +43,9 @@ def settle(program: Any, integrator: Any, horizon: float) -> None:
         if np.array_equal(found, signs):
             return
         signs[:] = found
+        if program.held is not None:  # a whole number, from which the motion starts downwards
+            for number in program.held.by_switch:
+                program.step(number, integrator) if signs[number] < 0 else None
 
 
 def _early_signs(program: Any, integrator: Any, horizon: float) -> Array:
@@ -77,7 +81,7 @@ def keeps_sides(program: Any, integrator: Any, parameters: Array, start: float) 
     """
     if not program.switches:
         return True
-    signs = parameters[program.parameter_count :]
+    signs = parameters[program.parameter_count :][: len(program.switches)]
     times = start + INSIDE * (integrator.time - start)
     states = [np.array(integrator.update_d_output(time)) for time in times]
     values = np.array([program.switch_values(*at, parameters) for at in zip(times, states, strict=True)])
@@ -105,7 +109,7 @@ class Watch:
 
     def __call__(self, integrator: Any) -> bool:
         values = self._program.switch_values(integrator.time, integrator.state, integrator.pars)
-        signs = integrator.pars[self._program.parameter_count :]
+        signs = integrator.pars[self._program.parameter_count :][: len(self._program.switches)]
         np.maximum(self._largest, np.abs(values), out=self._largest)
         # What switches by the time alone has its sign for the piece, and nothing can drive it back.
         wrong = (signs * values < -WRONG_SIDE * self._largest) & ~self._program.timed

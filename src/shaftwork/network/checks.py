@@ -22,6 +22,7 @@ from shaftwork.components.branches import ACROSS, HISTORY, INTEGRAL
 from shaftwork.components.laws import SYMBOLS, Interpolation, InterpolationSlope, Table, t
 from shaftwork.core.domains import Domain
 from shaftwork.core.errors import Problem, ShaftworkError
+from shaftwork.network.controlled import check_readings
 from shaftwork.network.grammar import FUNCTION_NAMES, FUNCTIONS
 from shaftwork.network.graph import GROUND, CircuitGraph, resolve
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
@@ -100,11 +101,11 @@ class _Examination:
 
     def take(self, placed: Placed) -> None:
         """Check one part and keep it if the rest can be examined with it."""
-        renamed = Placed(self._with_name(placed), placed.nodes)
+        renamed = dataclasses.replace(placed, part=self._with_name(placed))
         fits = self._stands(renamed)
         sound = self._with_values(renamed)
         if fits and sound is not None:
-            self.kept.append(Placed(sound, placed.nodes))
+            self.kept.append(dataclasses.replace(placed, part=sound))
 
     def _with_name(self, placed: Placed) -> Component:
         """The part under a name that no other part has."""
@@ -221,7 +222,7 @@ class _Examination:
             _Fault(name, f"is a {type(value).__name__}, not a number or a law", "Give a number, a Table or a formula.")
             for name, value in values.items()
             if not isinstance(value, float) and (not isinstance(value, sympy.Expr) or value.is_Matrix)
-            if part.declared[name].record is None
+            if part.declared[name].record is None and (value is not None or part.declared[name].default is not None)
         )
         if odd:
             return odd
@@ -239,6 +240,7 @@ def _law_faults(part: Component, values: Mapping[str, Any]) -> Iterator[_Fault]:
     sound = {**values, **dict.fromkeys((fault.parameter for fault in faults), 1.0)}
     templates = make_template(part, sound).branches
     _check_ends(part, templates)
+    check_readings(part, templates)
     for template in {(made.kind, made.law, made.terms): made for made in templates}.values():
         if unreadable := _unreadable("", template.law):
             yield unreadable._replace(what=f"a branch law {unreadable.what}")
@@ -290,6 +292,7 @@ def _unreadable(name: str, law: sympy.Expr) -> _Fault | None:
 def _strange_symbols(template: BranchTemplate) -> set[sympy.Symbol]:
     found = template.law.free_symbols.union(*(coefficient.free_symbols for coefficient, _, _ in template.terms))
     found -= {HISTORY} if template.is_history else set()
+    found -= {*template.reads} if template.kind in (Kind.LAW, Kind.ACROSS_SOURCE) else set()
     return set(found - {*template.symbols} - _READS.get(template.kind, frozenset()))
 
 

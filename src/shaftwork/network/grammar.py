@@ -12,6 +12,7 @@ import sympy
 from sympy.core.relational import Relational
 from sympy.logic.boolalg import BooleanAtom, BooleanFunction
 
+from shaftwork.components import noise
 from shaftwork.core.errors import ModelFileError
 
 MAXIMUM_LENGTH = 200_000
@@ -72,6 +73,9 @@ FUNCTIONS: dict[str, Function] = {
     "Heaviside": Function(sympy.Heaviside, 1, 2, _heaviside),
     "Max": Function(sympy.Max, 1, MAXIMUM_EXTREMA, lambda *values: max(values)),
     "Min": Function(sympy.Min, 1, MAXIMUM_EXTREMA, lambda *values: min(values)),
+    "floor": Function(sympy.floor, 1, 1, math.floor),
+    "HeldNoise": Function(noise.HeldNoise, 2, 3, noise.held),
+    "SmoothNoise": Function(noise.SmoothNoise, 2, 2, noise.smooth),
 }
 """The functions of values; Piecewise and Table have forms of their own."""
 

@@ -13,6 +13,7 @@ from sympy import Expr, Symbol
 from shaftwork.components.base import Component, Derived
 from shaftwork.components.branches import End
 from shaftwork.components.laws import Table, as_expression
+from shaftwork.components.modes import Modes
 from shaftwork.core.domains import ROTATION, Domain
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
 from shaftwork.network.templates import BranchTemplate, Kind, Template, make_template
@@ -46,7 +47,7 @@ class GraphBranch:
 class GraphPart:
     """A part with its nodes by port name, the places of its parameters in the parameter vector, and its branches.
 
-    The derived quantities are those in whose letters its laws are printed.
+    The derived quantities are those in whose letters its laws are printed; the modes are of its elements that change.
     """
 
     component: Component
@@ -54,6 +55,7 @@ class GraphPart:
     parameters: Mapping[str, int]
     branches: tuple[int, ...]
     derived: tuple[Derived, ...]
+    modes: tuple[Modes, ...] = ()
 
     @property
     def name(self) -> str:
@@ -159,11 +161,11 @@ class _Table:
             self.domains.append(domain or ROTATION)
         return self.numbers[name]
 
-    def template(self, part: Component, values: Mapping[str, Any]) -> Template:
+    def template(self, placed: Placed, values: Mapping[str, Any]) -> Template:
         pattern = tuple(bool(value) if isinstance(value, float) else value for value in values.values())
-        key = (type(part), pattern)
+        key = (type(placed.part), pattern, placed.choices)
         if key not in self.templates:
-            self.templates[key] = make_template(part, values)
+            self.templates[key] = make_template(placed.part, values, placed.choices)
         return self.templates[key]
 
 
@@ -181,16 +183,18 @@ def build_graph(netlist: Netlist) -> CircuitGraph:
     branches: list[GraphBranch] = []
     for item in resolved:
         part, values = item.placed.part, item.values
-        template = table.template(part, values)
+        template = table.template(item.placed, values)
         places: dict[str, int] = {}
         for name in template.parameters:
             places[name] = len(parameters)
-            parameters[f"{part.name}.{name}"] = values[name]
+            parameters[f"{part.name}.{name}"] = values.get(name, 0.0)  # numbers of modes are no values of the part
         zeros.extend(f"{part.name}.{name}" for name, value in values.items() if isinstance(value, float) and not value)
         nodes = _port_nodes(item.placed, table)
         first = len(branches)
         branches.extend(_place(made, first + k, len(parts), nodes) for k, made in enumerate(template.branches))
-        parts.append(GraphPart(part, nodes, places, tuple(range(first, len(branches))), template.derived))
+        parts.append(
+            GraphPart(part, nodes, places, tuple(range(first, len(branches))), template.derived, template.modes)
+        )
     names = tuple(table.numbers)[1:]
     return CircuitGraph(
         netlist.name, names, tuple(table.domains), tuple(parts), tuple(branches), parameters, tuple(zeros)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from shaftwork.components.base import Component
+from shaftwork.components.modes import Choice
 
 REFERENCE = "ground"
 """The node name that stands for the reference of every domain (speed zero)."""
@@ -14,10 +15,17 @@ REFERENCE = "ground"
 
 @dataclass(frozen=True)
 class Placed:
-    """A component and the nodes at its ports, in the order of the ports."""
+    """A component and the nodes at its ports, in the order of the ports.
+
+    Args:
+        part: the component.
+        nodes: one for each port.
+        choices: of a part with modes, what is chosen for each of its elements; by default its first modes.
+    """
 
     part: Component
     nodes: tuple[str, ...]
+    choices: tuple[Choice, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -36,6 +44,11 @@ class Netlist:
 
         def changed(item: Placed) -> Placed:
             new = by_part.get(item.part.name)
-            return item if new is None else Placed(replace(item.part, **new), item.nodes)
+            return item if new is None else replace(item, part=replace(item.part, **new))
 
         return Netlist(self.name, tuple(changed(item) for item in self.placed))
+
+    def with_choices(self, choices: Mapping[str, tuple[Choice, ...]]) -> Netlist:
+        """The same parts with what is chosen for those that have modes, by name of the part."""
+        placed = (replace(item, choices=choices.get(item.part.name, item.choices)) for item in self.placed)
+        return Netlist(self.name, tuple(placed))

@@ -90,6 +90,8 @@ def _part_text(placed: Placed) -> PartText:
 
 def _is_default(part: Component, name: str) -> bool:
     declared = part.declared[name]
+    if declared.default is None:
+        return getattr(part, name) is None
     kinds = (float,) if declared.record is None else (declared.record,)
     return not declared.required and isinstance(value := getattr(part, name), kinds) and value == declared.default
 

@@ -11,9 +11,10 @@ import reprlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import cached_property
 from typing import Any, get_args
 
-from sympy import Expr, I, Integer, Symbol, nan, oo, zoo
+from sympy import Expr, I, Integer, Symbol, nan, oo, sympify, zoo
 
 from shaftwork.components.base import Component, Derived, symbols_of
 from shaftwork.components.branches import (
@@ -29,10 +30,13 @@ from shaftwork.components.branches import (
     IdealCoupling,
     ThroughLaw,
     ThroughStore,
+    readings_in,
     rigid,
+    through_of,
 )
 from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME
+from shaftwork.components.modes import ALL_IN_ONE, Choice, Modes, has_mode, mode_symbol
 from shaftwork.components.slopes import jumps, slope
 from shaftwork.core.domains import DOMAINS
 from shaftwork.core.errors import ParameterError, ShaftworkError
@@ -80,6 +84,11 @@ class BranchTemplate:
         """Whether the law reads the angle, position or flux linkage of its branch."""
         return bool(self.law.has(INTEGRAL))
 
+    @cached_property
+    def reads(self) -> tuple[Symbol, ...]:
+        """What the law reads of other ports and branches of its part."""
+        return readings_in(self.law)
+
     @property
     def is_history(self) -> bool:
         """Whether it is what has come from the other end of a line."""
@@ -91,11 +100,15 @@ _Resolved = tuple[Kind, Expr]
 
 @dataclass(frozen=True, eq=False)
 class Template:
-    """All branches of a component with a given pattern of zero parameters, and the derived quantities in their laws."""
+    """All branches of a component with a given pattern of zero parameters, and the derived quantities in their laws.
+
+    The modes are those of its elements, in symbols of the component; numbers of modes are the last parameters.
+    """
 
     branches: tuple[BranchTemplate, ...]
     parameters: tuple[str, ...]
     derived: tuple[Derived, ...]
+    modes: tuple[Modes, ...] = ()
 
 
 def substitution(part: Component) -> dict[Any, Any]:
@@ -108,8 +121,14 @@ def substitution(part: Component) -> dict[Any, Any]:
     return names
 
 
-def make_template(part: Component, values: Mapping[str, Any]) -> Template:
-    """The branches of a part whose parameter values are floats or, for laws, expressions."""
+def make_template(part: Component, values: Mapping[str, Any], choices: tuple[Choice, ...] = ()) -> Template:
+    """The branches of a part whose parameter values are floats or, for laws, expressions.
+
+    Args:
+        part: the part.
+        values: of its parameters.
+        choices: what is chosen for each of its elements that have modes; by default the first modes.
+    """
     translate = substitution(part)
     placed: dict[str, Any] = {}
     for name, value in values.items():
@@ -118,13 +137,46 @@ def make_template(part: Component, values: Mapping[str, Any]) -> Template:
         else:
             placed[name] = value.xreplace(translate) if isinstance(value, Expr) else value
     known = {Symbol(name, real=True): name for name, value in values.items() if isinstance(value, float) and value}
-    p = symbols_of(placed)
+    p = symbols_of(placed | {"form": None, "mode": mode_symbol("mode")})
     derived = tuple(_derived(part, p))
+    modes = tuple(part.modes(p))
+    known |= _choose(p, modes, choices)
     resolver = _Resolver(_default_ends(part), tuple(known), _in_parameters(derived))
-    branches = tuple(
-        made for number, branch in enumerate(part.branches(p), 1) for made in resolver.templates(branch, number)
-    )
-    return Template(branches, tuple(known.values()), _occurring(derived, resolver.printed))
+    yielded = _without_absent(tuple(part.branches(p)))
+    branches = tuple(made for number, branch in enumerate(yielded, 1) for made in resolver.templates(branch, number))
+    return Template(branches, tuple(known.values()), _occurring(derived, resolver.printed), modes)
+
+
+def _choose(p: Any, modes: tuple[Modes, ...], choices: tuple[Choice, ...]) -> dict[Symbol, str]:
+    """Put the chosen forms and numbers of modes into `p`; symbol and name of the numbers that stay parameters."""
+    firsts = tuple(Choice(element.options[0].form, element.options[0].value) for element in modes)
+    free: dict[Symbol, str] = {}
+    for element, choice in zip(
+        modes, choices * len(modes) if choices == ALL_IN_ONE else choices or firsts, strict=True
+    ):
+        setattr(p, element.form, choice.form)
+        if choice.value is not None:
+            setattr(p, element.symbol, sympify(choice.value if choice.value % 1 else int(choice.value)))
+        else:
+            setattr(p, element.symbol, mode_symbol(element.symbol))
+            free[mode_symbol(element.symbol)] = element.symbol
+    return free
+
+
+def _without_absent(branches: tuple[Branch, ...]) -> tuple[Branch, ...]:
+    """The branches, with laws that read zero in place of what a store lets through that is left out."""
+    stores = (branch for branch in branches if isinstance(branch, ThroughStore))
+    absent = {through_of(store.label): Integer(0) for store in stores if store.stiffness == 0}
+
+    def known(branch: Branch) -> Branch:
+        match branch:
+            case ThroughLaw(Expr() as law):
+                return dataclasses.replace(branch, through=law.xreplace(absent))
+            case AcrossLaw(Expr() as law):
+                return dataclasses.replace(branch, across=law.xreplace(absent))
+        return branch
+
+    return tuple(map(known, branches)) if absent else branches
 
 
 def _derived(part: Component, p: Any) -> Iterator[Derived]:
@@ -250,7 +302,7 @@ def _is_rigid(branch: Branch, law: Expr) -> bool:
     """Whether an infinite law stands for a rigid joint: an infinite store, or a conductance such as 1/R with R = 0."""
     if isinstance(branch, ThroughLaw):
         found = slope(law, ACROSS)
-        return bool(found.has(oo, zoo)) and not found.has(ACROSS, INTEGRAL, TIME)
+        return bool(found.has(oo, zoo)) and not found.has(ACROSS, INTEGRAL, TIME) and not readings_in(law)
     return isinstance(branch, AcrossStore | ThroughStore)
 
 
@@ -278,10 +330,11 @@ def _linear(kind: Kind, coefficient: Expr) -> Iterator[_Resolved]:
 
 def _through_law(through: Expr) -> Iterator[_Resolved]:
     conductance = slope(through, ACROSS)
-    if conductance.has(ACROSS, INTEGRAL, TIME) or jumps(through, ACROSS):
+    varies = conductance.has(ACROSS, INTEGRAL, TIME) or has_mode(conductance) or readings_in(conductance)
+    if varies or jumps(through, ACROSS):
         yield Kind.LAW, through
         return
     yield from _linear(Kind.CONDUCTANCE, conductance)
     rest = through.subs(ACROSS, 0)
     if rest != 0 and not rest.has(nan):
-        yield Kind.LAW if rest.has(INTEGRAL) else Kind.THROUGH_SOURCE, rest
+        yield Kind.LAW if rest.has(INTEGRAL) or readings_in(rest) else Kind.THROUGH_SOURCE, rest

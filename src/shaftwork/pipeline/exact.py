@@ -90,7 +90,9 @@ class ExactNetwork:
         """The network with shafts replaced. Its warnings are those of the network itself, already given."""
         if not shafts:
             return self._model
-        placed = tuple(Placed(shafts.get(item.part.name, item.part), item.nodes) for item in self._model.netlist.placed)
+        placed = tuple(
+            dataclasses.replace(item, part=shafts.get(item.part.name, item.part)) for item in self._model.netlist.placed
+        )
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", NetworkWarning)
             return self._compiled(Netlist(self._model.name, placed))

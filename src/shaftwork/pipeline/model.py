@@ -5,13 +5,11 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.observer import ModelObserver
@@ -21,7 +19,6 @@ from shaftwork.core.errors import CompileError, ParameterError, SimulationError
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import LinearInputs, Problem, Trajectory
 from shaftwork.network.netlist import Netlist
-from shaftwork.network.templates import Kind
 from shaftwork.pipeline.arguments import (
     OutputTimes,
     absolute_tolerances,
@@ -33,6 +30,8 @@ from shaftwork.pipeline.arguments import (
     watched_by,
 )
 from shaftwork.pipeline.implicit import at_rest, solve_loops
+from shaftwork.pipeline.phases import Demand, Phases, motion
+from shaftwork.pipeline.prepared import Prepared, nominal_tolerances
 from shaftwork.reduction.form import StateForm
 from shaftwork.results.solution import Solution
 
@@ -45,31 +44,8 @@ VARIANTS = 8
 """Models of other structure, and choices of an engine, that are kept for later calls."""
 SIMILAR = 5.0
 """An engine suits parameters that differ by less than this factor too: looking anew would cost more than the run."""
-NOMINAL = 1e-3
-"""Absolute tolerance as a fraction of the relative one, for a speed of 1 rad/s (m/s, V)."""
 EngineName = Literal["auto", "scipy", "scipy-radau", "heyoka", "sundials", "exact", "banded", "wave"]
 Rebuild = Callable[[Netlist], "Model"]
-
-
-@dataclass(frozen=True, eq=False)
-class _Prepared:
-    """Everything that depends on the parameter vector alone, made once for a run of equal calls."""
-
-    p: Array
-    bind: Callable[[Array], BoundArrays]
-    rhs: Callable[[float, Array], Array]
-    symbolic: Callable[[], Any]
-    linear: LinearInputs | None
-    atol: Array
-
-    @cached_property
-    def bound(self) -> BoundArrays:
-        """The matrices, which many a run of compiled code can do without."""
-        return self.bind(self.p)
-
-    def jacobian(self, t: float, x: Array) -> Any:
-        """Of the right-hand side, sparse."""
-        return self.bound.jacobian(t, x)
 
 
 class Model(CompiledModel):
@@ -84,7 +60,7 @@ class Model(CompiledModel):
     def __init__(self, form: StateForm, netlist: Netlist, rebuild: Rebuild) -> None:
         super().__init__(form)
         self.netlist, self._rebuild = netlist, rebuild
-        self._prepared: tuple[bytes, _Prepared] | None = None
+        self._prepared: tuple[bytes, Prepared] | None = None
         self._variants: dict[tuple[tuple[str, float], ...], Model] = {}
         self._choices: list[tuple[tuple[float, float, float], Array, tuple[str, str]]] = []
 
@@ -134,9 +110,20 @@ class Model(CompiledModel):
             options: dict[str, Any] = {"t_start": t_start, "rtol": rtol, "atol": atol, "t_eval": t_eval}
             options |= {"engine": engine, "initial": initial, "max_steps": max_steps, "progress": progress}
             return self._variant(values).simulate(t_end, **options)
-        prepared = self._prepare(self.vector(values) if values else self.defaults)
+        if self._phases is not None:
+            demand = Demand(
+                time_span(t_start, t_end),
+                relative_tolerance(rtol),
+                atol,
+                output_times(t_eval, *time_span(t_start, t_end)),
+                engine,
+                max_steps,
+                progress,
+            )
+            return motion(self._phases, values, initial, demand, self.name)
+        prepared = self.prepare(self.vector(values) if values else self.defaults)
         span = time_span(t_start, t_end)
-        x0, waves = self._start(prepared, initial, span)
+        x0, waves = self.start(prepared, initial, span)
         problem = self._problem(prepared, span, x0, relative_tolerance(rtol), atol, t_eval, max_steps)
         if progress is not None:
             problem = dataclasses.replace(problem, rhs=watched_by(problem.rhs, progress))
@@ -175,7 +162,7 @@ class Model(CompiledModel):
             return self._variant(values).steady_state(t, initial=initial)
         if self.form.waves:
             return self._twin.steady_state(t, initial=initial, parameters=values)
-        prepared = self._prepare(self.vector(values) if values else self.defaults)
+        prepared = self.prepare(self.vector(values) if values else self.defaults)
         when = t if math.isfinite(t) else self.settled(prepared.p)
         start = initial_state(prepared.bound, initial or {}, when)
         if not math.isfinite(t) and (moving := prepared.bound.moving_sources(when)):
@@ -215,12 +202,12 @@ class Model(CompiledModel):
 
     def choose_engine(self, t_end: float, *, t_start: float = 0.0, rtol: float = 1e-8) -> tuple[str, str]:
         """The engine that "auto" takes for a motion, and why."""
-        prepared, span = self._prepare(self.defaults), time_span(t_start, t_end)
-        x0, _ = self._start(prepared, None, span)
+        prepared, span = self.prepare(self.defaults), time_span(t_start, t_end)
+        x0, _ = self.start(prepared, None, span)
         return self._engine(prepared, self._problem(prepared, span, x0, rtol, None, None, 1), "auto")
 
     def _solve(
-        self, prepared: _Prepared, problem: Problem, waves: WaveStart | None, engine: str
+        self, prepared: Prepared, problem: Problem, waves: WaveStart | None, engine: str
     ) -> tuple[Trajectory, str, str]:
         """The run, the engine that made it, and why that one."""
         if self.form.waves:
@@ -234,7 +221,7 @@ class Model(CompiledModel):
         return choice.solve(problem, name, why, fallback=engine == "auto")
 
     def _solve_waves(
-        self, prepared: _Prepared, problem: Problem, start: WaveStart | None, engine: str
+        self, prepared: Prepared, problem: Problem, start: WaveStart | None, engine: str
     ) -> tuple[Trajectory, str, str]:
         from shaftwork.pipeline.waves import solve_waves
 
@@ -245,7 +232,7 @@ class Model(CompiledModel):
             )
         return solve_waves(prepared.bound, problem, start, engine, linear=self.linear, steady=self.degree == 0)
 
-    def _engine(self, prepared: _Prepared, problem: Problem, engine: str) -> tuple[str, str]:
+    def _engine(self, prepared: Prepared, problem: Problem, engine: str) -> tuple[str, str]:
         if self.form.waves:
             from shaftwork.pipeline.waves import WHY
 
@@ -262,7 +249,7 @@ class Model(CompiledModel):
 
     def _problem(
         self,
-        prepared: _Prepared,
+        prepared: Prepared,
         span: tuple[float, float],
         x0: Array,
         rtol: float,
@@ -293,17 +280,18 @@ class Model(CompiledModel):
             max_steps=max_steps,
         )
 
-    def _prepare(self, p: Array) -> _Prepared:
+    def prepare(self, p: Array) -> Prepared:
+        """Everything that depends on a parameter vector alone; the last one is kept."""
         key = p.tobytes()
         if self._prepared is None or self._prepared[0] != key:
             scalar = self.scalar
-            made = _Prepared(
+            made = Prepared(
                 p=p,
                 bind=self.bind,
                 rhs=self.bind(p).rhs if scalar is None else scalar.bind(p),
                 symbolic=cache(lambda: None if self._program is None else self._program.bind(p)),
                 linear=self._linear_inputs(p),
-                atol=NOMINAL * self._nominal(self.arrays.assembly.coefficients(p)),
+                atol=nominal_tolerances(self.form, self.arrays.assembly.coefficients(p)),
             )
             self._prepared = (key, made)
         return self._prepared[1]
@@ -322,12 +310,24 @@ class Model(CompiledModel):
             return None
 
     @cached_property
+    def _phases(self) -> Phases | None:
+        """The phases of a network whose parts change their mode, or None where none does."""
+        if not any(part.modes for part in self.form.graph.parts) or self.form.waves or self._is_phase:
+            return None
+        return Phases(self, self._rebuild)
+
+    @property
+    def _is_phase(self) -> bool:
+        """Whether it is itself the model of a phase."""
+        return any(item.choices for item in self.netlist.placed)
+
+    @cached_property
     def switching(self) -> Switching:
         """What switches because of the time alone."""
         return Switching(self.form)
 
-    def _start(
-        self, prepared: _Prepared, initial: Mapping[str, float] | None, span: tuple[float, float]
+    def start(
+        self, prepared: Prepared, initial: Mapping[str, float] | None, span: tuple[float, float]
     ) -> tuple[Array, WaveStart | None]:
         """The states at the start, and the waves where they are not at rest."""
         if initial is None and not self.form.has_impulses:
@@ -355,24 +355,6 @@ class Model(CompiledModel):
         return LinearInputs(
             bound.jacobian(0.0, np.zeros(n)).tocsr(), lambda t: bound.rhs(t, np.zeros((n, *np.shape(t))))
         )
-
-    def _nominal(self, coefficients: Array) -> Array:
-        """The size of each state at a speed of one.
-
-        A store of torque has its impedance sqrt(stiffness * inertia), or the damping beside it where that is larger: a
-        tolerance below what an overdamped spring carries is lost in the rounding of an implicit step.
-        """
-        form, graph = self.form, self.form.graph
-        damping = np.zeros(len(graph.parts))
-        for branch in graph.branches:
-            if branch.template.kind is Kind.CONDUCTANCE:
-                damping[branch.part] = max(damping[branch.part], coefficients[branch.index])
-        inertias = coefficients[list(form.across_states)]
-        typical = float(np.median(inertias)) if inertias.size else 1.0
-        springs = list(form.through_states)
-        beside = damping[[graph.branches[index].part for index in springs]]
-        torques = np.maximum(np.sqrt(coefficients[springs] * typical), beside)
-        return np.concatenate([np.ones(len(inertias)), torques, np.ones(len(form.integrals))])
 
     def _changes_structure(self, values: Mapping[str, float]) -> bool:
         """Whether other equations hold for new values: a value becomes zero or ceases to, ratios meet, `Auto`."""

@@ -23,7 +23,7 @@ from shaftwork.core.times import just_after
 from shaftwork.integrate.lossless.engine import solve
 from shaftwork.integrate.lossless.lines import DelayProblem, DelayTrajectory
 from shaftwork.integrate.problem import Problem, Trajectory
-from shaftwork.network.netlist import Netlist, Placed
+from shaftwork.network.netlist import Netlist
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
 
@@ -82,7 +82,7 @@ def twin(netlist: Netlist) -> Netlist:
             return part
         return dataclasses.replace(part, model=Lumped(1 if part.friction == 0 else 2))
 
-    return Netlist(netlist.name, tuple(Placed(stiff(item.part), item.nodes) for item in netlist.placed))
+    return Netlist(netlist.name, tuple(dataclasses.replace(item, part=stiff(item.part)) for item in netlist.placed))
 
 
 def start_of_waves(

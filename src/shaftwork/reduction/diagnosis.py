@@ -3,30 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Any
 
 import networkx as nx
-import numpy as np
 import sympy
 
-from shaftwork.components.branches import ACROSS
 from shaftwork.components.laws import InterpolationSlope, breakpoints, t
-from shaftwork.core.domains import Domain
 from shaftwork.core.errors import Problem
 from shaftwork.network.checks import LEFT_OUT, connection_problems, examine
-from shaftwork.network.graph import GROUND, CircuitGraph, build_graph, ends_of
+from shaftwork.network.graph import CircuitGraph, build_graph
 from shaftwork.network.netlist import Netlist
 from shaftwork.network.templates import Kind
-from shaftwork.network.wording import Spelling, at_nodes, listed, title
+from shaftwork.network.wording import at_nodes, listed, title
+from shaftwork.reduction.cancelling import extreme_ratios, numeric_problems
+from shaftwork.reduction.controlled import controlled_problems, reads_itself
 from shaftwork.reduction.form import StateForm, state_form
-from shaftwork.reduction.gains import Gain, value_of
+from shaftwork.reduction.gains import value_of
 from shaftwork.reduction.tree import column_of
-
-SINGULAR = 1e-13
-"""Reciprocal condition below which coupled values cancel; the same as in the assembly of the matrices."""
+from shaftwork.reduction.view import View, words_of
 
 _LACKING = ("floating part", "loose end", "massless node", "algebraic loop", "undetermined speed", "separate train")
 """Kinds that say that something is missing at a node; each is said only where none before it says so already."""
@@ -35,33 +31,6 @@ _OF_VALUES = (
     *("redundant coupling", "fixed ratios", "cancelling values", "extreme ratios"),
 )
 """Kinds that depend on values: not said of parts whose values are replaced."""
-
-
-@dataclass(frozen=True)
-class _Words:
-    """What an engineer calls the quantities and parts of a domain."""
-
-    across: str
-    through: str
-    store: str
-    spring: str
-    loss: str
-    remedy: str
-
-
-_WORDS = {
-    "rotation": _Words("speed", "torque", "inertia", "spring", "damper", "an Inertia, or a Damper to the frame"),
-    "translation": _Words(
-        "speed", "force", "mass", "spring", "damper", "a Mass, or a TranslationalDamper to the frame"
-    ),
-    "electrical": _Words(
-        "voltage", "current", "capacitor", "inductor", "resistor", "a Resistor or a Capacitor to ground"
-    ),
-}
-
-
-def _words(domain: Domain) -> _Words:
-    return _WORDS.get(domain.name, _WORDS["rotation"])
 
 
 def diagnose(netlist: Netlist) -> tuple[CircuitGraph | None, StateForm | None, tuple[Problem, ...]]:
@@ -83,7 +52,7 @@ def diagnose(netlist: Netlist) -> tuple[CircuitGraph | None, StateForm | None, t
         found += [*structural_problems(form), *numeric_problems(form)]
     except ArithmeticError:  # of the ratios: nothing else is computed with before the values are judged
         form = None
-        found.append(_extreme(graph, range(len(graph.branches))))
+        found.append(extreme_ratios(graph, range(len(graph.branches))))
     problems = (*typed, *_causes(typed, found))
     return (None, None, problems) if typed else (graph, form, problems)
 
@@ -104,9 +73,10 @@ def _causes(typed: Sequence[Problem], found: Sequence[Problem]) -> Iterator[Prob
 
 def structural_problems(form: StateForm) -> tuple[Problem, ...]:
     """What the normal tree says: errors, then warnings, then notes, whatever the values are."""
-    view = _View(form)
+    view = _Structure(form)
     return (
         *view.prescribed_twice(),
+        *controlled_problems(view),
         *view.massless(),
         *view.implicit(),
         *view.undetermined(),
@@ -117,49 +87,8 @@ def structural_problems(form: StateForm) -> tuple[Problem, ...]:
     )
 
 
-class _View:
-    """The state form with names for what is in it."""
-
-    def __init__(self, form: StateForm) -> None:
-        self.form, self.graph, self.tree = form, form.graph, form.tree
-        self.spelling = Spelling(form.graph.nodes)
-        wanted = {*form.tree.tree[Kind.THROUGH_SOURCE], *form.tree.tree[Kind.LAW], *form.tree_conductances}
-        self.moved: dict[int, list[int]] = {branch: [] for branch in wanted}
-        for node, row in enumerate(form.tree.potentials if wanted else ()):
-            for branch in wanted.intersection(row or ()):
-                self.moved[branch].append(node)
-        self.cutsets: dict[int, list[int]] = {branch: [] for branch in wanted}
-        for link, loop in form.tree.loops.items() if wanted else ():
-            for branch in wanted.intersection(loop):
-                self.cutsets[branch].append(link)
-
-    def kind(self, branch: int) -> Kind:
-        return self.graph.branches[branch].template.kind
-
-    def parts(self, branches: Iterable[int]) -> tuple[str, ...]:
-        return tuple(dict.fromkeys(self.graph.part_of(branch).name for branch in branches))
-
-    def titles(self, branches: Iterable[int]) -> str:
-        """Parts with their classes, joined as in "A, B and C"."""
-        names = list(dict.fromkeys(title(self.graph.part_of(branch).component) for branch in branches))
-        shown = names if len(names) <= 8 else [*names[:7], f"{len(names) - 7} more"]
-        return " and ".join(filter(None, (", ".join(shown[:-1]), shown[-1])))
-
-    def nodes(self, numbers: Iterable[int]) -> tuple[str, ...]:
-        """Names of the nodes that the user has named; of those inside a part only where there are no others."""
-        names = tuple(dict.fromkeys(self.graph.nodes[node] for node in numbers if node != GROUND))
-        return tuple(name for name in names if "." not in name) or names
-
-    def ends(self, branches: Iterable[int]) -> tuple[str, ...]:
-        """The nodes at the ends of branches."""
-        found = (edge for branch in branches for edge in ends_of(self.graph.branches[branch]))
-        return self.nodes(node for _, plus, minus in found for node in (plus, minus))
-
-    def words(self, branch: int) -> _Words:
-        """The words of the domain in which a branch lies."""
-        ends = ends_of(self.graph.branches[branch])
-        nodes = (node for _, plus, minus in ends for node in (plus, minus) if node != GROUND)
-        return next((_words(self.graph.domains[node]) for node in nodes), _WORDS["rotation"])
+class _Structure(View):
+    """What the state form says, problem by problem."""
 
     def prescribed_twice(self) -> Iterator[Problem]:
         """Sources of speed or voltage that others in their loop contradict."""
@@ -182,7 +111,7 @@ class _View:
 
     def massless(self) -> Iterator[Problem]:
         """Sources of torque or current that nothing answers."""
-        for source in self.tree.tree[Kind.THROUGH_SOURCE]:
+        for source in (*self.tree.tree[Kind.THROUGH_SOURCE], *filter(self.is_controlled, self.tree.tree[Kind.LAW])):
             words, sources = self.words(source), [source, *self.cutsets[source]]
             nodes = self.nodes(self.moved[source]) or self.ends([source])
             message = (
@@ -195,9 +124,11 @@ class _View:
     def implicit(self) -> Iterator[Problem]:
         """Laws whose torque decides, alone or through dampers, the speed that they depend on."""
         for law in sorted((*self.tree.tree[Kind.LAW], *self.tree.links[Kind.LAW])):
+            if law not in self.tree.loops and self.is_controlled(law):
+                continue
             branch, words = self.graph.branches[law], self.words(law)
             losses = [other for other in self.tree.loops.get(law, ()) if self.kind(other) is Kind.CONDUCTANCE]
-            if law in self.tree.loops and not (losses and branch.template.law.has(ACROSS)):
+            if law in self.tree.loops and not (losses and reads_itself(self, law)):
                 continue
             moved = [node for other in losses or [law] for node in self.moved[other]]
             nodes = self.nodes(node for node in moved if node in (branch.plus, branch.minus)) or self.nodes(moved)
@@ -231,7 +162,7 @@ class _View:
     def _undetermined_group(self, members: Sequence[int], at: Sequence[int]) -> Problem:
         parts, nodes = [self.graph.parts[number] for number in at], self.nodes(members)
         domain = self.graph.domains[members[0]]
-        words, names = _words(domain), tuple(part.name for part in parts)
+        words, names = words_of(domain), tuple(part.name for part in parts)
         many = len(nodes) > 1
         if domain.name == "electrical":
             message = f"the circuit at {at_nodes(nodes)} ({listed(names)}) is joined to ground nowhere."
@@ -335,66 +266,3 @@ def _jumps(law: sympy.Expr) -> tuple[float, ...]:
 
     reach = 1e-3 * min(gaps, default=1.0)
     return tuple(time for time in times if step(time, reach / 64) > 0.5 * step(time, reach) > 0)
-
-
-def numeric_problems(form: StateForm) -> tuple[Problem, ...]:
-    """Values that cancel each other or lie outside what a computer can represent, although the structure is sound."""
-    graph, loops = form.graph, form.tree.loops
-    gains = ((link, entry) for link, loop in loops.items() for entry in loop.values() if isinstance(entry, Gain))
-    if wild := sorted({link for link, gain in gains if not (math.isfinite(gain.value) and gain.value)}):
-        return (_extreme(graph, (branch for link in wild for branch in (link, *loops[link]))),)
-    groups = ((form.tree_conductances, form.link_conductances), (form.across_states, form.dependent_across))
-    return tuple(problem for own, beside in groups for problem in _cancelling(form, own, beside))
-
-
-def _extreme(graph: CircuitGraph, branches: Iterable[int]) -> Problem:
-    names = tuple(dict.fromkeys(graph.part_of(branch).name for branch in branches if graph.branches[branch].terms))
-    message = f"the ratios of {listed(names)} multiply to a number that is no longer finite or no longer above zero."
-    return Problem("extreme ratios", message, "Check their units and powers of ten.", names)
-
-
-def _cancelling(form: StateForm, own: Sequence[int], beside: Sequence[int]) -> Iterator[Problem]:
-    """Coupled conductances (or inertias) of which a negative one cancels others, block by block."""
-    values = _coefficients(form.graph, (*own, *beside))
-    if all(value > 0 for value in values.values()):
-        return  # positive values cannot cancel
-    blocks: nx.Graph[int] = nx.Graph()
-    blocks.add_nodes_from(own)
-    members = frozenset(own)
-    blocks.add_edges_from((tree, link) for link in beside for tree in form.tree.loops[link] if tree in members)
-    for found in nx.connected_components(blocks):
-        trees, links = sorted(found & members), sorted(found - members)
-        loops = [[value_of(form.tree.loops[link].get(tree, 0)) for link in links] for tree in trees]
-        F = np.array(loops, dtype=float).reshape(len(trees), len(links))
-        matrix = np.diag([values[tree] for tree in trees]) + F * [values[link] for link in links] @ F.T
-        if min(values[branch] for branch in found) <= 0 and _is_singular(matrix):
-            yield _cancelling_block(_View(form), (*trees, *links))
-
-
-def _coefficients(graph: CircuitGraph, branches: Iterable[int]) -> dict[int, float]:
-    made: dict[tuple[Any, ...], Any] = {}
-    values: dict[int, float] = {}
-    for index in branches:
-        template, part = graph.branches[index].template, graph.part_of(index)
-        if (key := (template.law, template.symbols)) not in made:
-            made[key] = sympy.lambdify(template.symbols, template.law, "math")
-        numbers = (graph.parameters[f"{part.name}.{symbol.name}"] for symbol in template.symbols)
-        values[index] = float(made[key](*numbers))
-    return values
-
-
-def _is_singular(block: Any) -> bool:
-    scale = 1 / np.sqrt(np.abs(np.diag(block)) + np.finfo(float).tiny)
-    scaled = block * scale[:, None] * scale[None, :]
-    return not (np.isfinite(scaled).all() and 1 / np.linalg.cond(scaled) > SINGULAR)
-
-
-def _cancelling_block(view: _View, branches: Sequence[int]) -> Problem:
-    moved = (node for branch in branches for node in view.moved.get(branch, ()))
-    nodes, words = view.nodes(moved) or view.ends(branches), view.words(branches[0])
-    message = (
-        f"the values of {view.titles(branches)} at {at_nodes(nodes)} cancel each other, "
-        f"so that no {words.across} follows from a {words.through} there."
-    )
-    hint = f"Change one of the values, or give a node {words.remedy}."
-    return Problem("cancelling values", message, hint, view.parts(branches), nodes)

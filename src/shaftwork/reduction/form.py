@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from shaftwork.core.domains import Domain
+from shaftwork.network.controlled import Reading, readings_of
 from shaftwork.network.graph import CircuitGraph, GraphBranch
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.tree import NormalTree, normal_tree
@@ -108,8 +109,21 @@ class StateForm:
     def integrals(self) -> tuple[int, ...]:
         """Branches whose integrated across variable is read by a law or asked for: each adds a state."""
         laws = (*self.laws, *self.tree.tree[Kind.LAW])
-        read = (index for index in laws if self.graph.branches[index].template.has_integral)
-        return tuple(dict.fromkeys((*read, *self.angles)))
+        own = (index for index in laws if self.graph.branches[index].template.has_integral)
+        read = (reading.of for reading in self.readings if reading.kind == "integral")
+        return tuple(dict.fromkeys((*own, *read, *self.angles)))
+
+    @cached_property
+    def controlled(self) -> tuple[int, ...]:
+        """Prescribed across variables that follow from other branches of their part, not from the time alone."""
+        return tuple(index for index in self.across_sources if self.graph.branches[index].template.reads)
+
+    @cached_property
+    def readings(self) -> tuple[Reading, ...]:
+        """What laws read besides what is across their own branches, each once: nodes, then branches."""
+        laws = (*self.tree.links[Kind.LAW], *self.tree.tree[Kind.LAW], *self.controlled)
+        found = dict.fromkeys(reading for law in laws for reading in readings_of(self.graph, law).values())
+        return tuple(sorted(found, key=lambda reading: ("across", "through", "integral").index(reading.kind)))
 
     @cached_property
     def waves(self) -> tuple[int, ...]:
@@ -149,6 +163,12 @@ def branch_name(graph: CircuitGraph, branch: GraphBranch) -> str:
     domain = _domain(graph, branch)
     label = branch.template.label or domain.through.name
     return f"{part.name}.{label}"
+
+
+def store_name(graph: CircuitGraph, branch: GraphBranch) -> str:
+    """The name that a store's state has, where it is one: "J1.omega", "shaft.tau_c"."""
+    made = _across_state if branch.template.kind is Kind.ACROSS_STORE else _through_state
+    return made(graph, branch).name
 
 
 def _domain(graph: CircuitGraph, branch: GraphBranch) -> Domain:

@@ -10,11 +10,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import networkx as nx
-from sympy import Add, Expr, Integer, Matrix, Symbol
+from sympy import Add, Dummy, Expr, Integer, Matrix, Symbol
 
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import slope
+from shaftwork.network.controlled import Reading, readings_of
+from shaftwork.network.graph import GROUND
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.gains import exact_of
@@ -70,6 +72,7 @@ class _Solution:
                 self.cutsets.setdefault(tree, []).append((link, gain))
         self.across: dict[int, Expr] = {k: own["across", k] for k in form.across_states}
         self.across.update({k: self.law(k) for k in form.across_sources})
+        self.across.update({k: Dummy(real=True) for k in form.controlled})
         self.through: dict[int, Expr] = {k: own["through", k] for k in form.through_states}
         self.integral = {k: own["integral", k] for k in form.integrals}
 
@@ -92,18 +95,43 @@ class _Solution:
         sources = form.tree.links[Kind.THROUGH_SOURCE]
         self.through.update({k: self.law(k) for k in sources})
         self._solve_conductances(sources)
+        self._put_in_controls()
         for link in form.link_conductances:
             self.across[link] = self.around(link)
             self.through[link] = self.law(link) * self.across[link]
         for link in form.tree.links[Kind.LAW]:
             self.across[link] = self.around(link)
             known = {ACROSS: self.across[link], INTEGRAL: self.integral.get(link, INTEGRAL)}
-            self.through[link] = self.law(link).xreplace(known)
+            self.through[link] = self.law(link).xreplace({**known, **self.read(link)})
         for link in (*sources, *form.through_states, *form.dependent_across):
             self.across[link] = self.around(link)
         rates = (*self._speed_rates(), *self._torque_rates(), *(self.across[k] for k in form.integrals))
         parameters = tuple(Symbol(name, real=True) for name in self.graph.parameters)
         return Rows(self.states, parameters, rates, self.across, self.through)
+
+    def read(self, branch: int) -> dict[Symbol, Expr]:
+        """What the law of a branch reads of other ports and branches of its part."""
+        return {symbol: self.value(made) for symbol, made in readings_of(self.graph, branch).items()}
+
+    def value(self, reading: Reading) -> Expr:
+        """A quantity that a law reads, in states and sources of time."""
+        match reading:
+            case Reading("across", node):
+                row = {} if node == GROUND else self.form.tree.potentials[node] or {}
+                known = [tree for tree in row if tree in self.across]
+                gains = exact_of(row[tree] for tree in known)
+                return Add(*(gain * self.across[tree] for tree, gain in zip(known, gains, strict=True)))
+            case Reading("through", store) if store not in self.through:  # others of its cutset decide
+                links = (*self.form.through_states, *self.form.tree.links[Kind.THROUGH_SOURCE])
+                return -self.out_of(store, links)
+            case Reading("through", store):
+                return self.through[store]
+        return self.integral[reading.of]
+
+    def _put_in_controls(self) -> None:
+        """Controlled sources by what they read; until then a symbol stands for each."""
+        found = {self.across[k]: self.law(k).xreplace(self.read(k)) for k in self.form.controlled}
+        self.across = {k: across.xreplace(found) for k, across in self.across.items()} if found else self.across
 
     def _solve_conductances(self, sources: Sequence[int]) -> None:
         form = self.form

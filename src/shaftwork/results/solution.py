@@ -21,6 +21,23 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+@dataclass(frozen=True)
+class PhaseRow:
+    """A phase of a motion.
+
+    Args:
+        start: s.
+        end: s.
+        name: in words, "gap open, brake locked".
+        modes: of every part that changes its mode.
+    """
+
+    start: float
+    end: float
+    name: str
+    modes: Mapping[str, str]
+
+
 @dataclass(frozen=True, eq=False)
 class Solution:
     """A motion.
@@ -35,7 +52,8 @@ class Solution:
         statistics: counts of the solver: steps, right-hand sides, ...
         dense: states (k, n) at any times (k,) within the run; knows the ends of the integration steps.
         observer: recovers quantities from states.
-        events: (time, part, from, to) of every change of mode.
+        events: (time, part, from, to) of every change of mode, times in s.
+        phases: the spans of time between them.
     """
 
     name: str
@@ -48,6 +66,7 @@ class Solution:
     dense: Dense
     observer: Observer
     events: tuple[tuple[float, str, str, str], ...] = ()
+    phases: tuple[PhaseRow, ...] = ()
 
     @property
     def steps(self) -> Array:

@@ -1,0 +1,152 @@
+"""The quantities of a network whose equations change from phase to phase, along a motion through all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from shaftwork.codegen.arrays import BoundArrays
+from shaftwork.codegen.elements import Array, Index
+from shaftwork.codegen.observer import ModelObserver
+from shaftwork.codegen.stores import Stores
+from shaftwork.codegen.timeline import Timeline
+from shaftwork.codegen.waves import Dense
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """A phase as it is read.
+
+    Args:
+        start: s.
+        key: the same for phases of the same equations with the same parameters.
+        stores: what the equations store.
+        bind: makes the array program.
+        observer: of the equations.
+        instants: at which inputs jump.
+        dense: the motion, in the states of the equations; None where it has none.
+        states: their names.
+    """
+
+    start: float
+    key: Any
+    stores: Stores
+    bind: Callable[[], BoundArrays]
+    observer: ModelObserver
+    instants: Timeline
+    dense: Callable[[Array], Array]
+    states: tuple[str, ...]
+
+
+class Stretches:
+    """All phases of a motion, by time.
+
+    Args:
+        stretches: in their order, none of them empty.
+    """
+
+    def __init__(self, stretches: Sequence[Stretch]) -> None:
+        self.all = tuple(stretches)
+        self.starts = np.array([made.start for made in stretches])
+        self.names = self.all[0].stores.names
+
+    def groups(self, t: Array) -> Iterator[tuple[tuple[Stretch, ...], Index]]:
+        """Phases with equal equations, and the places of the times (k,) in them.
+
+        A time between two phases belongs to the later one; of one that is listed twice in a row the first does not.
+        """
+        index = np.clip(np.searchsorted(self.starts, t, side="right") - 1, 0, None)
+        twice = np.append(t[1:] == t[:-1], False) & (self.starts[index] == t) & (index > 0)
+        index = index - twice
+        keys: dict[Any, list[int]] = {}
+        for number in np.unique(index).tolist():
+            keys.setdefault(self.all[number].key, []).append(number)
+        for numbers in keys.values():
+            places = np.flatnonzero(np.isin(index, numbers))
+            yield tuple(self.all[number] for number in numbers), places
+
+    def dense(self, t: Array) -> Array:
+        """(k, stores) all that is stored at times (k,)."""
+        t = np.atleast_1d(np.asarray(t, dtype=float))
+        made = np.empty((t.size, len(self.names)))
+        index = np.clip(np.searchsorted(self.starts, t, side="right") - 1, 0, None)
+        for number in np.unique(index).tolist():
+            stretch, places = self.all[number], np.flatnonzero(index == number)
+            made[places] = stretch.stores.of(stretch.bind, t[places], stretch.dense(t[places]))
+        return made
+
+
+class PhaseObserver:
+    """Recovers every quantity from all that is stored, in each phase by its own equations.
+
+    Args:
+        stretches: the phases.
+    """
+
+    def __init__(self, stretches: Stretches) -> None:
+        self._stretches = stretches
+
+    @property
+    def _first(self) -> ModelObserver:
+        return self._stretches.all[0].observer
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Every quantity that can be read and its unit."""
+        return self._first.units
+
+    @property
+    def profiles(self) -> Mapping[str, tuple[str, tuple[float, ...]]]:
+        """Every quantity that can be read along a part."""
+        return self._first.profiles
+
+    def signal(self, name: str, t: Array, x: Array, dense: Dense | None = None) -> Array:
+        """(k,) a quantity by its name in `units`."""
+        made = np.empty(len(t))
+        for observer, places, times, states in self._pieces(t, x):
+            made[places] = observer.signal(name, times, states, dense)
+        return made
+
+    def profile(self, name: str, t: Array, x: Array, dense: Dense) -> Array:
+        """(k, places) a quantity along a part by its name in `profiles`."""
+        made = np.empty((len(t), len(self.profiles[name][1])))
+        for observer, places, times, states in self._pieces(t, x):
+            made[places] = observer.profile(name, times, states, dense)
+        return made
+
+    def stored(self, t: Array, x: Array, dense: Dense) -> dict[str, Array]:
+        """Stored energy by part."""
+        return self._by_part(t, x, lambda observer, times, states: observer.stored(times, states, dense))
+
+    def powers(self, t: Array, x: Array) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Lost power and supplied power by part."""
+        lost = self._by_part(t, x, lambda observer, times, states: observer.powers(times, states)[0])
+        return lost, self._by_part(t, x, lambda observer, times, states: observer.powers(times, states)[1])
+
+    def _by_part(
+        self, t: Array, x: Array, read: Callable[[ModelObserver, Array, Array], dict[str, Array]]
+    ) -> dict[str, Array]:
+        made: dict[str, Array] = {}
+        for observer, places, times, states in self._pieces(t, x):
+            for name, values in read(observer, times, states).items():
+                made.setdefault(name, np.zeros(len(t)))[places] = values
+        return made
+
+    def _pieces(self, t: Array, x: Array) -> Iterator[tuple[ModelObserver, Index, Array, Array]]:
+        names = self._stretches.names
+        for stretches, places in self._stretches.groups(t):
+            first = stretches[0]
+            columns = [names.index(state) for state in first.states]
+            yield first.observer, places, self._sided(first.instants, t, places), x[places][:, columns]
+
+    @staticmethod
+    def _sided(instants: Timeline, t: Array, places: Index) -> Array:
+        """The times, and where an instant is listed twice and only its first is here, one before it."""
+        times = t[places].copy()
+        alone = np.append(t[1:] == t[:-1], False)[places] & ~np.isin(places + 1, places)
+        for k in np.flatnonzero(alone).tolist():
+            times[k] = instants.sides(float(times[k]))[0]
+        return times

@@ -1,0 +1,95 @@
+"""All that is stored, in whichever states a set of equations carries it: what goes over when the equations change.
+
+Where two inertias become joined or let go, the states are other ones. What goes over is the speed of every inertia, the
+torque of every spring, every angle. New equations take it up with the least change that they admit, x such that
+
+    (C + F_CK K F_CK') x_C = C v_C + F_CK K (v_K - F_EK' e),
+    (1/L + F_SL' F_SL / S) x_L = i_L / L - F_SL' (i_S + F_SW w) / S,
+
+which is an inelastic impact: it keeps every momentum that nothing outside takes away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cached_property
+
+import numpy as np
+
+from shaftwork.codegen.arrays import BoundArrays
+from shaftwork.codegen.elements import Array
+from shaftwork.codegen.recovery import History
+from shaftwork.network.templates import Kind
+from shaftwork.reduction.form import StateForm, store_name
+
+
+class Stores:
+    """What one set of equations stores, and how its states follow from that.
+
+    Args:
+        form: the state form.
+    """
+
+    def __init__(self, form: StateForm) -> None:
+        self._form = form
+        kinds = (Kind.ACROSS_STORE, Kind.THROUGH_STORE)
+        made = {store_name(form.graph, b): b.index for b in form.graph.branches if b.template.kind in kinds}
+        self._branches = made
+        angles = tuple(state.name for state in form.states if state.kind == "integral")
+        self.names = (*made, *angles)
+        """Every store and angle, named as a state whether it is one or not."""
+        self._states = [state.name for state in form.states]
+
+    @cached_property
+    def _columns(self) -> list[int]:
+        return [self._states.index(name) if name in self._states else -1 for name in self.names]
+
+    def of(self, bind: Callable[[], BoundArrays], t: Array, x: Array) -> Array:
+        """(k, stores) all that is stored, in the order of `names`, at times (k,) and states (k, n).
+
+        The equations are bound only where some store is no state.
+        """
+        if -1 not in self._columns:
+            return x[:, self._columns]
+        history, columns = History(bind(), t, x), []
+        for name, column in zip(self.names, self._columns, strict=True):
+            if column >= 0:
+                columns.append(x[:, column])
+                continue
+            branch = self._branches[name]
+            is_across = self._form.graph.branches[branch].template.kind is Kind.ACROSS_STORE
+            columns.append((history.across if is_across else history.through)[branch])
+        return np.array(columns).T
+
+    def states(self, bound: BoundArrays, t: float, held: Mapping[str, float]) -> Array:
+        """(n,) the states that the equations start with.
+
+        Args:
+            bound: the equations with their parameters.
+            t: time in s at which inputs are read.
+            held: all that was stored, by name.
+        """
+        form, part = self._form, bound.part
+        x = np.array([held[name] for name in self._states])
+        if not (form.dependent_across or form.dependent_through):
+            return x
+        before = np.zeros(len(form.graph.branches))
+        for name, branch in self._branches.items():
+            before[branch] = held[name]
+        inputs = bound.program.inputs
+        u = inputs.values(t, np.zeros(inputs.outputs), x, bound.p)
+        k, laws = part.coefficients, len(form.laws)
+        across, through = list(form.across_states), list(form.through_states)
+        if other := list(form.dependent_across):
+            F = part.loops[across][:, other].toarray()
+            prescribed = part.loops[list(form.across_inputs)][:, other].T @ u[laws:]
+            momentum = k[across] * before[across] + F @ (k[other] * (before[other] - prescribed))
+            x[: len(across)] = np.linalg.solve(np.diag(k[across]) + F * k[other] @ F.T, momentum)
+        if other := list(form.dependent_through):
+            F = part.loops[other][:, through].toarray()
+            driven = part.loops[other][:, list(form.laws)] @ u[:laws]
+            twist = before[through] / k[through] - F.T @ ((before[other] + driven) / k[other])
+            x[len(across) : len(across) + len(through)] = np.linalg.solve(
+                np.diag(1 / k[through]) + F.T / k[other] @ F, twist
+            )
+        return x

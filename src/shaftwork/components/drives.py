@@ -1,0 +1,125 @@
+"""Drives: induction motors at a frequency that changes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, ClassVar
+
+from sympy import Abs, Expr, Integer, Max, Piecewise, pi
+
+from shaftwork.components.base import Component, Derived, Port, Role, component
+from shaftwork.components.branches import ACROSS, Branch, ThroughLaw
+from shaftwork.components.laws import Ramp
+from shaftwork.components.switching import number_of, off_time, on_time, refuse_no_time_on, while_on
+from shaftwork.components.torque_curves import kloss
+from shaftwork.core.errors import ParameterError
+from shaftwork.core.parameters import parameter
+
+
+@component
+class FrequencyDrive(Component):
+    """An induction motor fed with a frequency that follows a law, such as the ramp of a soft start.
+
+    Law: tau = ratio efficiency 2 tau_k flux^2 D D_k / (D^2 + D_k^2), with D = omega_0 f / f_n - ratio omega the speed
+    by which the motor lags behind its field, omega_0 = 2 pi n_sync / 60, D_k = omega_0 s_k (f / f_n)^slip_exponent;
+    flux = 1 while voltage over frequency is constant, f_n / f above f_n, where the voltage can rise no more, and
+    1 + boost (1 - f / f_boost) below f_boost.
+
+    Without `f` the frequency is f_0 until t_on (or 0 s), rises along a straight line during t_ramp, and stays at f_end,
+    by default f_n. A frequency that falls makes the motor brake; one below zero turns it backwards.
+
+    The lag D_k at which the motor pulls out is the same at every frequency (slip_exponent = 0): without stator
+    resistance it is the rotor's resistance over its leakage inductance, so that the pull-out slip is s_k f_n / f. In
+    (3b) Marinkovic prints (n_k / n)^2 for (f_n / f)^2, which is slip_exponent = 1: the slip s_k at every frequency,
+    where f > 0. The boost is chosen, as the source has none: a share of flux at standstill, since Kloss' formula knows
+    no stator resistance for which a voltage would make up. Analogue: a controlled current source. Source: Marinkovic
+    2012, (2), (3a), (3b), (18).
+    """
+
+    tau_k: float = parameter("N*m", "pull-out torque at f_n, at the motor shaft", above=0, latex=r"\tau_k")
+    s_k: float = parameter("1", "slip at the pull-out torque at f_n", above=0)
+    n_sync: float = parameter("1/min", "synchronous speed at f_n", above=0, latex=r"n_{sync}")
+    f: Any = parameter("Hz", "frequency; by default a ramp from f_0 to f_end", law=True, default=None)
+    f_n: float = parameter("Hz", "rated frequency", above=0, default=50.0)
+    f_0: float = parameter("Hz", "frequency at which the ramp starts", at_least=0, default=2.5)
+    f_end: float | None = parameter("Hz", "frequency at which it ends; f_n", above=0, default=None, latex="f_{end}")
+    t_ramp: float = parameter("s", "duration of the ramp", above=0, default=5.0, latex="t_{ramp}")
+    boost: float = parameter("1", "flux at standstill over rated flux, less 1", at_least=0, default=0.0, latex="b")
+    f_boost: float = parameter("Hz", "frequency at which the boost ends", above=0, default=10.0, latex="f_b")
+    slip_exponent: float = parameter("1", "how the lag at pull-out grows with f", at_least=0, default=0.0, latex="m")
+    ratio: float = parameter("1", "motor speed over node speed", nonzero=True, default=1.0, latex="i")
+    efficiency: float = parameter("1", "efficiency of the gear", above=0, at_most=1, default=1.0, latex=r"\eta")
+    t_on: float | None = on_time()
+    t_off: float | None = off_time()
+
+    role: ClassVar[Role] = "source"
+    ports: ClassVar = (Port("a"),)
+
+    def __post_init__(self) -> None:
+        refuse_no_time_on(self)
+
+    def derived(self, p: Any) -> Iterator[Derived]:
+        """Synchronous speed at the rated frequency, and by how much the motor lags behind it where it pulls out."""
+        yield Derived("omega_0", 2 * pi * p.n_sync / 60, "rad/s", "synchronous speed at rated frequency", r"\omega_0")
+        yield Derived("lag_k", p.s_k * p.omega_0, "rad/s", "lag at the pull-out torque", "D_k")
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        f = _ramp(p) if p.f is None else p.f
+        lag = p.omega_0 * f / p.f_n - p.ratio * ACROSS
+        torque = kloss(p.tau_k * _flux(f, p) ** 2, lag, p.lag_k * (f / p.f_n) ** p.slip_exponent)
+        yield ThroughLaw(-while_on(p.ratio * p.efficiency * torque, p))
+
+
+def _ramp(p: Any) -> Expr:
+    """The frequency of a start."""
+    top = p.f_n if p.f_end is None else p.f_end
+    return Ramp(top - p.f_0, p.t_ramp, 0 if p.t_on is None else p.t_on, p.f_0)
+
+
+def _flux(f: Expr, p: Any) -> Expr:
+    """Flux over rated flux; a ramp is above zero, and one that ends at the rated frequency is never weakened."""
+    size = f if p.f is None else Abs(f)
+    weakened = p.f is not None or p.f_end is not None
+    return (1 + p.boost * Max(0, 1 - size / p.f_boost)) * (p.f_n / Max(p.f_n, size) if weakened else 1)
+
+
+@component
+class DriveEnvelope(Component):
+    """The torque that a frequency drive can give at each speed, when it always leads the motor to its pull-out point.
+
+    Law: with the motor's speed n and n_k = n_sync (1 - s_k) it is tau_k for n < n_k, then Kloss' formula; with an
+    overspeed x it is tau_k (n_k / n)^2 from n_k to x n_k, then Kloss' formula at x times the rated frequency, with the
+    pull-out torque tau_k / x^2, the synchronous speed x n_sync and the slip s_k; times ratio and efficiency. These are
+    curves 1 and 2 (x = 2, 100 Hz) of figure 6. Analogue: a voltage-controlled current source. Source: Marinkovic 2012,
+    (2), (3a), (3b), (18).
+    """
+
+    tau_k: float = parameter("N*m", "pull-out torque at the motor shaft", above=0, latex=r"\tau_k")
+    s_k: float = parameter("1", "slip at the pull-out torque", above=0)
+    n_sync: float = parameter("1/min", "synchronous speed at rated frequency", above=0, latex=r"n_{sync}")
+    overspeed: float | None = parameter("1", "highest over rated frequency", above=1, default=None, latex="x")
+    ratio: float = parameter("1", "motor speed over node speed", nonzero=True, default=1.0, latex="i")
+    efficiency: float = parameter("1", "efficiency of the gear", above=0, at_most=1, default=1.0, latex=r"\eta")
+    t_on: float | None = on_time()
+    t_off: float | None = off_time()
+
+    role: ClassVar[Role] = "source"
+    ports: ClassVar = (Port("a"),)
+
+    def __post_init__(self) -> None:
+        refuse_no_time_on(self)
+        if (number_of(self, "s_k") or 0.0) >= 1:
+            raise ParameterError(
+                f"DriveEnvelope '{self.name}': s_k = {self.s_k} must be below 1, or the motor pulls out at standstill. "
+                "Take a FrequencyDrive."
+            )
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        speed, synchronous = p.ratio * ACROSS, 2 * pi * p.n_sync / 60
+        pull_out = synchronous * (1 - p.s_k)
+        most, held = Integer(1), p.tau_k
+        if p.overspeed is not None:
+            most, held = p.overspeed, p.tau_k * (pull_out / Max(pull_out, speed)) ** 2
+        running = kloss(p.tau_k / most**2, 1 - speed / (most * synchronous), p.s_k)
+        torque = Piecewise((held, speed < most * pull_out), (running, True))
+        yield ThroughLaw(-while_on(p.ratio * p.efficiency * torque, p))

@@ -1,0 +1,187 @@
+"""Parts that rub and hold: dry friction, brakes and clutches, and the freewheel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any, ClassVar
+
+from sympy import And, Expr, Min, Not, exp, false, tanh
+
+from shaftwork.components.base import Component, Port, Role, Signal, component
+from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, Branch, End, ThroughLaw, rigid
+from shaftwork.components.laws import t
+from shaftwork.components.modes import ANEW, Leave, Mode, Modes
+from shaftwork.core.domains import ROTATION
+from shaftwork.core.errors import ParameterError
+from shaftwork.core.parameters import parameter
+
+SLIPPING, STUCK = "", "stuck"
+# What holds gives way this much above its limit: then there is a torque that moves it, and no rounding of one.
+GIVES_WAY = 1 + 1e-12
+ROUNDED = 0.01
+"""Speed in rad/s over which friction is rounded where nothing chooses modes, beside shafts of travelling waves."""
+
+
+def rubbing(limit: Any, *, held: str = "stuck", moves: str = "slipping", apart: tuple[Leave, ...] = ()) -> Modes:
+    """Slipping forward and backward, and stuck until the torque through it exceeds a limit.
+
+    Args:
+        limit: the torque up to which it holds, N m.
+        held: what the mode of rest is called.
+        moves: what the modes of motion are called, before "forward" and "backward".
+        apart: what else ends each of these modes, where they lead to one that is called "apart".
+    """
+    most = limit * GIVES_WAY
+    gives_way = (Leave(THROUGH - most, "forward"), Leave(-THROUGH - most, "backward"))
+    return Modes(
+        (
+            Mode("forward", (Leave(-ACROSS, "stuck"), *apart), 1.0, SLIPPING, ACROSS > 0, f"{moves} forward"),
+            Mode("backward", (Leave(ACROSS, "stuck"), *apart), -1.0, SLIPPING, ACROSS < 0, f"{moves} backward"),
+            Mode("stuck", (*gives_way, *apart), 0.0, STUCK, says=held),
+        )
+    )
+
+
+def rubs(size: Any, p: Any, second: End = "b") -> Iterator[Branch]:
+    """The branches of what has the modes of `rubbing`, with a torque of a given size against the motion."""
+    if p.form is None:
+        yield ThroughLaw(size * tanh(ACROSS / ROUNDED))
+    elif p.form == STUCK:
+        yield rigid(("a", second))
+    else:
+        yield ThroughLaw(p.mode * size)
+
+
+@component
+class DryFriction(Component):
+    """Dry friction between two nodes, or between a node and the frame: Coulomb, Stribeck and viscous, with true stick.
+
+    Law: while slipping tau = sign(omega) (tau_c + (tau_s - tau_c) exp(-(omega / omega_s)^2)) + d omega; while stuck
+    omega = 0 exactly, and tau is whatever holds, up to tau_s in size. Modes: slipping forward or backward, stuck.
+    Analogue: a conductance that conducts ideally below a limit of current. Source: Marinkovic 2012, (16), fig. 4.
+    """
+
+    tau_c: float = parameter("N*m", "torque while slipping", at_least=0, latex=r"\tau_c")
+    tau_s: float | None = parameter(
+        "N*m", "torque up to which it holds, by default tau_c", at_least=0, default=None, latex=r"\tau_s"
+    )
+    omega_s: float = parameter(
+        "rad/s", "speed of the fall from tau_s to tau_c", above=0, default=0.1, latex=r"\omega_s"
+    )
+    d: float = parameter("N*m*s/rad", "viscous friction", at_least=0, default=0.0)
+
+    role: ClassVar[Role] = "loss"
+    ports: ClassVar = (Port("a"), Port("b", optional=True))
+
+    def modes(self, p: Any) -> Iterator[Modes]:
+        yield rubbing(p.tau_c if p.tau_s is None else p.tau_s)
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        more = 0 if p.tau_s is None else (p.tau_s - p.tau_c) * exp(-((ACROSS / p.omega_s) ** 2))
+        yield from rubs(p.tau_c + more, p)
+        if p.form != STUCK:
+            yield ThroughLaw(p.d * ACROSS)
+
+
+@component
+class Brake(Component):
+    """A brake between a node and the frame, or between two nodes: it slips against the motion, then holds.
+
+    Law: on from t_on, or from when `on` rises above zero, to t_off. While slipping the torque is sign(omega) tau, with
+    tau constant; rising along a straight line over t_rise; or as tau (1 - exp(-(t - t_on) / t_lag)). While locked
+    omega = 0 exactly, and the torque is whatever holds, up to tau in size. Any other course of tau is a law of time.
+    Modes: released, slipping forward or backward, locked. Source: Marinkovic 2012, (4)-(6).
+    """
+
+    tau: Any = parameter("N*m", "torque, also over time", law=True)
+    t_on: float = parameter("s", "time from which it acts", default=0.0, latex=r"t_{on}")
+    t_off: float | None = parameter("s", "time from which it acts no more", default=None, latex=r"t_{off}")
+    t_rise: float = parameter("s", "time over which the torque rises straight", at_least=0, default=0.0, latex="t_A")
+    t_lag: float = parameter("s", "time constant of a rise that slows down", at_least=0, default=0.0, latex="t_A")
+    on: Any = parameter("1", "acts from when this law is above zero, omega - 10 or phi", law=True, default=None)
+
+    role: ClassVar[Role] = "loss"
+    ports: ClassVar = (Port("a"), Port("b", optional=True))
+    words: ClassVar[tuple[str, str, str]] = ("released", "slipping", "locked")
+
+    def __post_init__(self) -> None:
+        if self.on is not None and (self.t_rise or self.t_lag):
+            raise ParameterError(
+                f"{type(self).__name__} '{self.name}': a rise over t_rise or t_lag starts at t_on, and the time at which "
+                "`on` comes true is not known before. Leave one of them out."
+            )
+        if self.t_rise and self.t_lag:
+            raise ParameterError(f"{type(self).__name__} '{self.name}': give t_rise or t_lag, not both.")
+
+    def _capacity(self, p: Any) -> Expr:
+        if p.t_rise != 0:
+            return p.tau * Min(1, (t - p.t_on) / p.t_rise)
+        return p.tau if p.t_lag == 0 else p.tau * (1 - exp(-(t - p.t_on) / p.t_lag))
+
+    def modes(self, p: Any) -> Iterator[Modes]:
+        released, moves, held = self.words
+        begins = t - p.t_on if p.on is None else p.on if p.t_on == 0 else Min(t - p.t_on, p.on)
+        over = () if p.t_off is None else (Leave(t - p.t_off, "released"),)
+        past = false if p.t_off is None else t >= p.t_off
+        waits = And(begins < 0 if p.on is None else begins <= 0, Not(past))
+        rubs_so = rubbing(self._capacity(p), held=held, moves=moves, apart=over).options
+        yield Modes(
+            (
+                *(replace(mode, starts=And(mode.starts, Not(waits), Not(past))) for mode in rubs_so),
+                Mode("waiting", (Leave(begins, ANEW),), starts=waits, says=released),
+                Mode("released", starts=past, says=released),
+            ),
+            angle="phi",
+        )
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        yield from rubs(self._capacity(p), p)
+        if isinstance(p.on, Expr) and p.on.has(INTEGRAL):
+            yield ThroughLaw(p.mode * (1 - p.mode**2) * INTEGRAL, label="phi")  # no torque: it carries the angle
+
+
+@component
+class Clutch(Brake):
+    """A friction clutch between two nodes: it slips until both turn alike, then holds up to its torque.
+
+    Law: that of a `Brake` on the speed of node a against node b. Modes: open, slipping forward or backward, engaged.
+    """
+
+    ports: ClassVar = (Port("a"), Port("b"))
+    words: ClassVar[tuple[str, str, str]] = ("open", "slipping", "engaged")
+
+
+@component
+class Freewheel(Component):
+    """An overrunning clutch: it holds node a back from turning faster than node b, and lets it turn more slowly.
+
+    Law: omega_a = omega_b and tau >= 0 while locked, with tau the torque that a gives to b; tau = 0 and
+    omega_a <= omega_b while free. A backstop has the frame for one of its nodes. Modes: free, locked.
+    Analogue: an ideal diode.
+    """
+
+    role: ClassVar[Role] = "coupling"
+    ports: ClassVar = (Port("a"), Port("b", optional=True))
+
+    def modes(self, p: Any) -> Iterator[Modes]:  # noqa: ARG002
+        yield conducting("free", "locked")
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        if p.form == STUCK:
+            yield rigid(("a", "b"))
+
+    def signals(self) -> dict[str, Signal]:
+        """Torque that node a gives to node b, speed of a against b."""
+        pair = ("a", "b")
+        return {"tau": Signal("through", pair, ROTATION), "omega_rel": Signal("across", pair, ROTATION)}
+
+
+def conducting(apart: str, joined: str) -> Modes:
+    """Joined rigidly while the first end gives to the second, apart while its across value is the smaller one."""
+    return Modes(
+        (
+            Mode(apart, (Leave(ACROSS, joined),), starts=ACROSS < 0),
+            Mode(joined, (Leave(-THROUGH, apart),), 1.0, STUCK),
+        )
+    )

@@ -1,0 +1,132 @@
+"""Modes: the ways in which a part works, what holds in each, and what ends it.
+
+A gap is open or in contact, a brake slips or holds, a diode conducts or blocks. In each mode the part has laws of its
+own. Two modes of the same *form* have the same branches and differ in one number, which stands in their laws as
+`p.mode`; so they share equations and compiled code. Another form has other branches, a rigid joint for instance, and so
+the network has other equations. A network makes those of a combination of forms when a motion first comes there.
+
+`Component.branches` finds the form as `p.form` and the number as `p.mode`; of an element with a label as
+`p.form_<label>` and `p.mode_<label>`. Where nothing chooses modes, as for shafts of travelling waves, `p.form` is None.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sympy import Expr, Symbol, false, true
+from sympy.logic.boolalg import Boolean
+
+from shaftwork.components.branches import End
+
+
+@dataclass(frozen=True)
+class Leave:
+    """What ends a mode.
+
+    Args:
+        when: the mode ends where this rises above zero. It may contain, beside the part's parameters and the time,
+            ACROSS, THROUGH and INTEGRAL of the element (see `Modes`), `p.mode`, and `across_of`, `through_of` and
+            `integral_of`.
+        to: name of the mode that follows; `ANEW` stands for the one in which a motion would start there.
+        rebound: of an impact, the share of the speed across the element that comes back after it. The element is joined
+            rigidly for an instant, by the form of `to`, and is thrown back unless the speed is below `rest`; then the
+            mode that follows is `to`, otherwise the one before goes on.
+        rest: speed below which there is no rebound, in the unit of the across variable.
+    """
+
+    when: Expr
+    to: str
+    rebound: Expr | None = None
+    rest: Expr | None = None
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One way in which an element works.
+
+    Args:
+        name: of its own among the modes of the element.
+        leaves: what ends it.
+        value: the number that stands in the laws as `p.mode`.
+        form: which branches the part has; modes of equal form share equations.
+        starts: a motion begins in the first mode whose condition holds, in ACROSS, INTEGRAL and the time.
+        says: how phases of a motion and events call it; modes that say the same are told apart inside only.
+    """
+
+    name: str
+    leaves: tuple[Leave, ...] = ()
+    value: float = 0.0
+    form: str = ""
+    starts: Boolean = true
+    says: str = ""
+
+    @property
+    def words(self) -> str:
+        """How phases and events call it."""
+        return self.says or self.name
+
+
+@dataclass(frozen=True)
+class Modes:
+    """The modes of an element, which is a part or a piece of one that changes its mode on its own.
+
+    Args:
+        options: the modes. In the first the element joins nothing rigidly: in it a network is printed and checked, and
+            the state at the start of a motion is read.
+        ends: the ports that ACROSS is of (the first less the second); THROUGH is what the first one gives to the part.
+        angle: label of the branch that INTEGRAL is of, in all forms; by default the only one that reads it.
+        label: of the element, where the part has several.
+    """
+
+    options: tuple[Mode, ...]
+    ends: tuple[End, End] | None = None
+    angle: str = ""
+    label: str = ""
+
+    def __getitem__(self, name: str) -> Mode:
+        """A mode by name."""
+        return next(mode for mode in self.options if mode.name == name)
+
+    @property
+    def symbol(self) -> str:
+        """Name of the number in laws."""
+        return f"mode_{self.label}" if self.label else "mode"
+
+    @property
+    def form(self) -> str:
+        """Name under which `Component.branches` finds the form."""
+        return f"form_{self.label}" if self.label else "form"
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What is chosen for an element when branches are made: a form, and a number or None for a parameter.
+
+    Args:
+        form: of the mode; None where the laws of all modes are wanted in one.
+        value: the number for `p.mode` in laws; None leaves a parameter in its place.
+    """
+
+    form: str | None
+    value: float | None = None
+
+
+ALL_IN_ONE = (Choice(None, 0.0),)
+"""The laws of all modes in one, for every element of a part."""
+
+
+def mode_symbol(name: str) -> Symbol:
+    """The symbol of the number of an element's mode, by its name in `p`."""
+    return Symbol(name, real=True)
+
+
+def has_mode(law: Expr) -> bool:
+    """Whether the number of a mode stands in a law."""
+    return any(symbol.name == "mode" or symbol.name.startswith("mode_") for symbol in law.free_symbols)
+
+
+ANEW = ""
+"""Of a `Leave`: to whichever mode a motion would start in, other than the one that ends."""
+
+NEVER = false
+"""The condition of a mode in which no motion begins."""

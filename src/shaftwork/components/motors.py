@@ -1,0 +1,172 @@
+"""Motors by their torque-speed curve: the torques of a catalogue, or a table."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterator
+from typing import Any, ClassVar
+
+from sympy import Expr, Piecewise, pi
+
+from shaftwork.components.base import Component, Derived, Port, Role, component
+from shaftwork.components.branches import ACROSS, Branch, ThroughLaw
+from shaftwork.components.laws import Interpolation, Table
+from shaftwork.components.switching import number_of, off_time, on_time, refuse_no_time_on, while_on
+from shaftwork.components.torque_curves import bend, kloss, pull_out_slip, pull_up_share
+from shaftwork.core.errors import NetworkWarning, ParameterError
+from shaftwork.core.parameters import parameter
+
+
+@component
+class CageMotor(Component):
+    """A squirrel-cage motor by the torques of its catalogue, seen through a gear of given ratio and efficiency.
+
+    Law: with the motor's speed n, the quartic through (0, tau_a), (n_s, tau_s) with slope 0 and (n_k, tau_k) with slope
+    0 for 0 <= n < n_k, Kloss' 2 tau_k s s_k / (s^2 + s_k^2) with the slip s = 1 - n / n_sync for n >= n_k, tau_a for
+    n < 0; times ratio and efficiency. Without n_k it is the one for which Kloss' curve passes through the rated point
+    (tau_n, n_n), which is not read otherwise; without n_s it is that of `pull_up_share`. Above the synchronous speed
+    the motor is a generator, with -tau_k at the slip -s_k. Turned backwards it gives its locked-rotor torque: chosen,
+    as the quartic says nothing there. Analogue: a voltage-controlled current source. Source: Marinkovic 2012, (1), (2),
+    (18). A `NetworkWarning` tells where the quartic does not fall to tau_s and rise to tau_k.
+    """
+
+    tau_a: float = parameter("N*m", "locked-rotor torque at the motor shaft", above=0, latex=r"\tau_A")
+    tau_s: float = parameter("N*m", "pull-up torque, the smallest on the way up", above=0, latex=r"\tau_S")
+    tau_k: float = parameter("N*m", "pull-out torque", above=0, latex=r"\tau_K")
+    n_sync: float = parameter("1/min", "synchronous speed", above=0, latex=r"n_{sync}")
+    tau_n: float | None = parameter("N*m", "rated torque", above=0, default=None)
+    n_n: float | None = parameter("1/min", "rated speed", above=0, default=None)
+    n_k: float | None = parameter("1/min", "speed at the pull-out torque", above=0, default=None, latex="n_K")
+    n_s: float | None = parameter("1/min", "speed at the pull-up torque", above=0, default=None, latex="n_S")
+    ratio: float = parameter("1", "motor speed over node speed", nonzero=True, default=1.0, latex="i")
+    efficiency: float = parameter("1", "efficiency of the gear", above=0, at_most=1, default=1.0, latex=r"\eta")
+    t_on: float | None = on_time()
+    t_off: float | None = off_time()
+
+    role: ClassVar[Role] = "source"
+    ports: ClassVar = (Port("a"),)
+
+    def __post_init__(self) -> None:
+        refuse_no_time_on(self)
+        _check_curve(self)
+
+    def derived(self, p: Any) -> Iterator[Derived]:
+        """Pull-out slip, the speeds of the two points in rad/s, and what makes a quartic of the cubic between them."""
+        slip = pull_out_slip(p.tau_k, p.tau_n, p.n_n, p.n_sync) if p.n_k is None else 1 - p.n_k / p.n_sync
+        yield Derived("slip_k", slip, "1", "slip at the pull-out torque", "s_K")
+        top = 2 * pi * p.n_sync / 60 * (1 - p.slip_k)
+        yield Derived("omega_k", top, "rad/s", "speed at the pull-out torque", r"\omega_K")
+        yield Derived("share", _share(p), "1", "pull-up speed over pull-out speed", r"\alpha")
+        yield Derived("width", p.omega_k * (1 - p.share), "rad/s", "speed from pull-up to pull-out", "W")
+        rise = p.tau_k - p.tau_s
+        free = -2 * rise * p.share * (1 - p.share)  # what `bend` is with `pull_up_share`, also where tau_a is tau_s
+        curved = free if p.n_s is None else bend(p.tau_a, p.tau_s, p.tau_k, p.share)
+        yield Derived("bend", curved, "N*m", "bends the cubic to the quartic", "B")
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        speed = p.ratio * ACROSS
+        way = (speed - p.omega_k * p.share) / p.width
+        quartic = p.tau_s + (p.tau_k - p.tau_s) * way**2 * (3 - 2 * way) + p.bend * way**2 * (1 - way) ** 2
+        running = kloss(p.tau_k, 1 - speed / (2 * pi * p.n_sync / 60), p.slip_k)
+        torque = Piecewise((p.tau_a, speed < 0), (quartic, speed < p.omega_k), (running, True))
+        yield ThroughLaw(-while_on(p.ratio * p.efficiency * torque, p))
+
+
+@component
+class TableMotor(Component):
+    """A motor by its measured torque over speed, seen through a gear of given ratio and efficiency.
+
+    Law: tau = ratio efficiency curve(n), with n the speed of the motor in 1/min: straight lines between the points of
+    the table, constant beyond them. For wound-rotor motors, motors of any other kind, and parts of a curve where the
+    motor brakes. Analogue: a voltage-controlled current source. Source: Marinkovic 2012, (18).
+    """
+
+    curve: Any = parameter("N*m", "torque over the motor's speed in 1/min: a Table, or one number", law=True)
+    ratio: float = parameter("1", "motor speed over node speed", nonzero=True, default=1.0, latex="i")
+    efficiency: float = parameter("1", "efficiency of the gear", above=0, at_most=1, default=1.0, latex=r"\eta")
+    t_on: float | None = on_time()
+    t_off: float | None = off_time()
+
+    role: ClassVar[Role] = "source"
+    ports: ClassVar = (Port("a"),)
+
+    def __post_init__(self) -> None:
+        refuse_no_time_on(self)
+        if isinstance(self.curve, Expr) and not isinstance(self.curve, Table) and not self.curve.is_number:
+            raise ParameterError(
+                f"TableMotor '{self.name}': curve = {self.curve} is an expression. Give Table(speeds, torques) with "
+                "speeds in 1/min, or take a TorqueSource, whose law reads omega."
+            )
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        speed = 60 * p.ratio * ACROSS / (2 * pi)
+        # a table alone becomes a law of time wherever a law is given; here its argument is the speed
+        torque = p.curve.table(speed) if isinstance(p.curve, Interpolation) else p.curve
+        yield ThroughLaw(-while_on(p.ratio * p.efficiency * torque, p))
+
+
+def _share(p: Any) -> Expr:
+    """Pull-up speed over pull-out speed, as given or chosen."""
+    return pull_up_share(p.tau_a, p.tau_s, p.tau_k) if p.n_s is None else 2 * pi * p.n_s / 60 / p.omega_k
+
+
+def _check_curve(motor: CageMotor) -> None:
+    """Say of the torques and speeds of a cage motor what does not go together.
+
+    Raises:
+        ParameterError: they give no curve.
+    """
+    given = {name: number_of(motor, name) for name in _CURVE}
+    if any(value is None and getattr(motor, name) is not None for name, value in given.items()):
+        return  # the checks of the network name what is no admissible number
+    tau_a, tau_s, tau_k, n_sync, n_n, tau_n, n_k, n_s = (given[name] or 0.0 for name in _CURVE)
+    title = f"CageMotor '{motor.name}'"
+    if not tau_s < tau_k or tau_s > tau_a:
+        raise ParameterError(
+            f"{title}: tau_s = {tau_s:g} N m must be less than tau_k = {tau_k:g} N m and not more than tau_a = "
+            f"{tau_a:g} N m: the pull-up torque is the smallest on the way up."
+        )
+    if not n_k:
+        if not tau_n or not n_n:
+            raise ParameterError(f"{title}: give the rated point tau_n and n_n, or the pull-out speed n_k.")
+        if tau_n >= tau_k or n_n >= n_sync:
+            raise ParameterError(
+                f"{title}: the rated point tau_n = {tau_n:g} N m, n_n = {n_n:g} 1/min must lie below the pull-out "
+                f"torque tau_k = {tau_k:g} N m and the synchronous speed n_sync = {n_sync:g} 1/min."
+            )
+        n_k = n_sync * (1 - float(pull_out_slip(tau_k, tau_n, n_n, n_sync)))
+    if not 0 < n_k < n_sync:
+        raise ParameterError(
+            f"{title}: the pull-out speed n_k = {n_k:g} 1/min must lie between 0 and n_sync = {n_sync:g} 1/min. "
+            "Where it follows from the rated point, give n_k itself."
+        )
+    if n_s >= n_k:
+        raise ParameterError(f"{title}: n_s = {n_s:g} 1/min must be less than the pull-out speed {n_k:g} 1/min.")
+    _warn_of_turns(title, (tau_a, tau_s, tau_k), n_k, n_s)
+
+
+_CURVE = ("tau_a", "tau_s", "tau_k", "n_sync", "n_n", "tau_n", "n_k", "n_s")
+
+
+def _warn_of_turns(title: str, torques: tuple[float, float, float], n_k: float, n_s: float) -> None:
+    """Warn where the quartic turns elsewhere than at the pull-up and the pull-out point.
+
+    With x as in `bend` its slope is 2 x (1 - x) (3 (tau_k - tau_s) + B (1 - 2 x)), so that it turns once more at
+    x = (1 + 3 (tau_k - tau_s) / B) / 2.
+    """
+    free = float(pull_up_share(*torques))
+    share = n_s / n_k if n_s else free
+    if share == 0:
+        return  # a pull-up point at standstill, and a cubic
+    curved = bend(*torques, share)
+    turn = (1 + 3 * (torques[2] - torques[1]) / curved) / 2 if curved else math.inf
+    speed = n_k * (share + turn * (1 - share))
+    if 0 < speed < n_k:
+        other = f"a speed n_s nearer to {free * n_k:.4g} 1/min, or none" if n_s else "n_s"
+        warnings.warn(
+            f"{title}: the quartic through its three torques turns once more at {speed:.4g} 1/min, so that the torque "
+            f"does not fall to tau_s and rise to tau_k as it should. Give {other}.",
+            NetworkWarning,
+            stacklevel=6,
+        )

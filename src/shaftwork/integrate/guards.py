@@ -1,0 +1,80 @@
+"""Guards of a phase: whether a step meets one, and when. The step is then cut off there, for the phase is smooth beyond."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.optimize import brentq
+
+from shaftwork.integrate.crossings import FIRST, LOOKS, Look
+from shaftwork.integrate.problem import Array, DaeProblem, Problem
+
+Dense = Callable[[Array], Array]
+
+# No step is shorter than so many rounding units of the time.
+CLEARANCE = 8
+
+
+class GuardWatch:
+    """Finds the first guard of a problem that a step meets; the last one found is `met`.
+
+    Args:
+        problem: what is being solved.
+        low: the earliest time in s at which inputs are read.
+        high: the latest.
+    """
+
+    def __init__(self, problem: Problem | DaeProblem, low: float, high: float) -> None:
+        guards = problem.guards
+        self._columns = np.zeros(0, dtype=np.intp) if guards is None else np.flatnonzero(guards.sides)
+        self._guards, self._low, self._high = guards, low, high
+        self.met: int | None = None
+
+    def cut(self, start: float, x: Array, end: float, y: Array, dense: Dense) -> float | None:
+        """The time in s at which a step meets its first guard, or None.
+
+        Args:
+            start: of the step, s.
+            x: (n,) state there.
+            end: of the step, s.
+            y: (n,) state there.
+            dense: its dense output, times (k,) to states (k, n).
+        """
+        if not self._columns.size:
+            return None
+        look = Look(self._values, np.array([start, end]), np.vstack([x, y]), dense, -np.ones(self._columns.size))
+        look.add(start + FIRST * (end - start))
+        if look.is_far() and (look.values[0] < 0).all():
+            return None
+        look.add(start + LOOKS * (end - start))
+        look.follow()
+        found = [(self._time(look, column), column) for column in np.flatnonzero((look.values > 0).any(axis=0))]
+        known = [(time, int(self._columns[column])) for time, column in found if time is not None]
+        if not known:
+            return None
+        time, self.met = min(known)
+        return min(max(time, start + CLEARANCE * float(np.spacing(abs(end)))), end)
+
+    def _values(self, times: Array, states: Array) -> Array:
+        values = self._guards.values(np.clip(times, self._low, self._high), states)
+        return np.asarray((values * self._guards.sides - self._guards.offsets)[:, self._columns])
+
+    def _time(self, look: Look, column: int) -> float | None:
+        """When a guard rises through zero; one that is above it from the start, by rounding, has to fall first."""
+        values = look.values[:, column]
+        below = np.flatnonzero(values < 0)
+        if not below.size:
+            return float(look.times[0]) if values[-1] > values[0] else None
+        above = np.flatnonzero(values[below[0] :] > 0)
+        if not above.size:
+            return None
+        row = int(below[0] + above[0])
+        before = int(below[below < row][-1])
+
+        def value(t: float) -> float:
+            return float(look.at(t)[column])
+
+        if value(look.times[before]) * value(look.times[row]) > 0:  # an end that is rounding away from the dense output
+            return float(look.times[row])
+        return float(brentq(value, look.times[before], look.times[row], xtol=float(np.spacing(look.times[-1]))))

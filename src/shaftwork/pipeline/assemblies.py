@@ -1,0 +1,280 @@
+"""The equations of a network in each combination of forms that its parts take, with the guards that hold there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy import sparse
+from sympy import Expr, Integer, Piecewise, Symbol, sympify
+
+from shaftwork.codegen.arrays import BoundArrays
+from shaftwork.codegen.code import vectorised_list
+from shaftwork.codegen.elements import Array
+from shaftwork.codegen.stores import Stores
+from shaftwork.codegen.timeline import Timeline
+from shaftwork.components.branches import ACROSS
+from shaftwork.components.laws import pieces_degree
+from shaftwork.components.laws import t as TIME
+from shaftwork.components.modes import Leave, Mode, Modes
+from shaftwork.core.errors import CompileError, SimulationError
+from shaftwork.integrate.choice import available
+from shaftwork.integrate.problem import Guards, Problem
+from shaftwork.network.graph import GraphPart
+from shaftwork.pipeline.prepared import Prepared
+from shaftwork.reduction.readings import Readings
+from shaftwork.reduction.rows import Rows
+
+if TYPE_CHECKING:
+    from shaftwork.pipeline.model import Model
+
+SAMPLES = 64
+"""Times at which a guard is looked at to know its size."""
+
+ModeNames = tuple[str, ...]
+"""The mode of every element of a network, in their order."""
+
+
+@dataclass(frozen=True, eq=False)
+class Element:
+    """A piece of a part that changes its mode.
+
+    Args:
+        part: of which it is.
+        modes: its modes.
+        number: "part.mode", the parameter in laws.
+    """
+
+    part: GraphPart
+    modes: Modes
+    number: str
+
+    @property
+    def name(self) -> str:
+        """How messages and tables call it."""
+        return f"{self.part.name}.{self.modes.label}" if self.modes.label else self.part.name
+
+
+def elements_of(model: Model) -> tuple[Element, ...]:
+    """Every element of a network, in the order of its parts."""
+    return tuple(
+        Element(part, modes, f"{part.name}.{modes.symbol}") for part in model.form.graph.parts for modes in part.modes
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Watched:
+    """What may end a mode in a set of equations: the guard's place, the side on which it is met, and what follows."""
+
+    guard: int
+    side: float
+    leave: Leave
+
+
+class Assembly:
+    """One set of equations and its guards.
+
+    Args:
+        model: the compiled equations.
+        elements: of the network.
+        forms: of each element.
+    """
+
+    def __init__(self, model: Model, elements: Sequence[Element], forms: tuple[str, ...]) -> None:
+        self.model, self.elements = model, elements
+        self.stores = Stores(model.form)
+        self._places = {name: k for k, name in enumerate(model.parameters)}
+        self._expressions: list[Expr] = []
+        self._watched: dict[tuple[int, str], tuple[Watched, ...]] = {}
+        if model.rows is None:
+            raise SimulationError(
+                f"'{model.name}' has parts that change their mode, and more than 64 states or too closely coupled ones."
+                " Take coarser shafts."
+            )
+        self._readings = readings = Readings(model.form, model.rows)
+        self._parts = {part.name: part for part in model.form.graph.parts}
+        for number, (element, form) in enumerate(zip(elements, forms, strict=True)):
+            part = self._parts[element.part.name]
+            for mode in element.modes.options:
+                if mode.form == form:
+                    self._watched[number, mode.name] = tuple(self._leaves(readings, part, element.modes, mode))
+        self._prepared: dict[bytes, Prepared] = {}
+        self._across: dict[int, Callable[..., Any]] = {}
+        self._guards: dict[bytes, Callable[[Array, Array], Array]] = {}
+
+    def _leaves(self, readings: Readings, part: GraphPart, modes: Modes, mode: Mode) -> Iterator[Watched]:
+        for leave in mode.leaves:
+            when = readings.guard(part, modes, leave.when)
+            for side, made in ((1.0, when), (-1.0, -when)):
+                if made in self._expressions:
+                    yield Watched(self._expressions.index(made), side, leave)
+                    break
+            else:
+                self._expressions.append(when)
+                yield Watched(len(self._expressions) - 1, 1.0, leave)
+
+    def watched(self, modes: ModeNames) -> Iterator[tuple[int, Watched]]:
+        """Element and guard of everything that may end one of the modes."""
+        for number, name in enumerate(modes):
+            for made in self._watched[number, name]:
+                yield number, made
+
+    @cached_property
+    def clocks(self) -> tuple[int, ...]:
+        """Guards that change with time by themselves: a step must be short enough to see it, though no state moves."""
+        every = not self.model.states
+        return tuple(k for k, made in enumerate(self._expressions) if every or _winds(made))
+
+    def vector(self, base: Mapping[str, float], numbers: Mapping[str, float]) -> Array:
+        """The parameter vector with the given values and numbers of modes."""
+        p = self.model.defaults.copy()
+        for values in (base, numbers):
+            for name, value in values.items():
+                if name in self._places:
+                    p[self._places[name]] = value
+        return p
+
+    def prepared(self, p: Array) -> Prepared:
+        """What depends on the parameter vector alone; kept for every combination of modes."""
+        key = p.tobytes()
+        if key not in self._prepared:
+            self._prepared[key] = self.model.prepare(p)
+        return self._prepared[key]
+
+    def bound(self, p: Array) -> BoundArrays:
+        """The equations for a parameter vector."""
+        return self.prepared(p).bound
+
+    def guards(self, p: Array) -> Callable[[Array, Array], Array]:
+        """All guards as a function of times (k,) and states (k, n) to (k, guards)."""
+        key = p.tobytes()
+        if key not in self._guards:
+            function, parameters, size = self._function, tuple(p.tolist()), len(self._expressions)
+
+            def values(times: Array, states: Array) -> Array:
+                made = np.empty((times.size, size))
+                with np.errstate(all="ignore"):
+                    for column, value in enumerate(function(times, *states.T, *parameters)):
+                        made[:, column] = value
+                return made
+
+            self._guards[key] = values
+        return self._guards[key]
+
+    def first_modes(self, t: float, x: Array, p: Array) -> ModeNames:
+        """The mode of each element in which a motion starts, in the equations in which nothing is joined by a mode."""
+        return tuple(self.start_of(number, "", t, x, p) for number in range(len(self.elements)))
+
+    def start_of(self, number: int, besides: str, t: float, x: Array, p: Array) -> str:
+        """The mode of an element in which a motion would start, besides one."""
+        holds = self._starts[number](np.array([t]), *x[:, None], *p.tolist())
+        options = self.elements[number].modes.options
+        return next(m.name for m, found in zip(options, holds, strict=True) if np.all(found) and m.name != besides)
+
+    @cached_property
+    def _starts(self) -> tuple[Callable[..., Any], ...]:
+        rows, made = self._rows, []
+        for element in self.elements:
+            part = self._parts[element.part.name]
+            holds = [self._readings.guard(part, element.modes, mode.starts) for mode in element.modes.options]
+            conditions = [Piecewise((Integer(1), found), (Integer(0), True)) for found in holds]
+            made.append(vectorised_list((TIME, *rows.states, *rows.parameters), conditions))
+        return tuple(made)
+
+    @property
+    def _rows(self) -> Rows:
+        assert self.model.rows is not None  # noqa: S101 (refused at the start)
+        return self.model.rows
+
+    def across(self, number: int, t: float, x: Array, p: Array) -> float:
+        """The speed across an element."""
+        if number not in self._across:
+            element, rows = self.elements[number], self._rows
+            made = self._readings.guard(self._parts[element.part.name], element.modes, ACROSS)
+            self._across[number] = vectorised_list((TIME, *rows.states, *rows.parameters), [made])
+        return float(np.ravel(self._across[number](t, *x.tolist(), *p.tolist())[0])[0])
+
+    def constant(self, number: int, expression: Expr | None, p: Array) -> float:
+        """A number that is made of an element's parameters."""
+        if expression is None:
+            return 0.0
+        element = self.elements[number]
+        made = self._readings.guard(self._parts[element.part.name], element.modes, sympify(expression))
+        return float(made.xreplace({s: p[self._places[s.name]] for s in made.free_symbols}))
+
+    def problem(self, p: Array, modes: ModeNames, x: Array, span: tuple[float, float], times: Timeline) -> Problem:
+        """The motion of a phase, before it is known where it ends; tolerances are for rtol = 1.
+
+        Its states are those of the model and, behind them, the integrals of the guards in `clocks`.
+        """
+        prepared, guards = self.prepared(p), self.guards(p)
+        clocks, size = list(self.clocks), x.size
+        sides = self.sides(modes)
+        watch = Guards(guards if not clocks else lambda t, y: guards(t, y[:, :size]), sides, np.zeros_like(sides))
+        switching = self.model.arrays.inputs.switching
+        rhs, jacobian, switches = prepared.rhs, prepared.jacobian, lambda t, y: prepared.bound.switches(t, y[:, :size])
+        if clocks:
+
+            def rhs(t: float, y: Array) -> Array:
+                wound = guards(np.array([t]), y[None, :size])[0, clocks]
+                return np.concatenate([prepared.rhs(t, y[:size]) if size else np.empty(0), wound])
+
+            def jacobian(t: float, y: Array) -> Any:
+                return sparse.block_diag((prepared.jacobian(t, y[:size]), sparse.csc_array((len(clocks),) * 2)), "csc")
+
+        return Problem(
+            rhs=rhs,
+            jacobian=jacobian if size else None,
+            x0=np.concatenate([x, np.zeros(len(clocks))]),
+            t0=span[0],
+            t_end=span[1],
+            names=(*self.model.states, *(f"guard {k}" for k in clocks)),
+            atol=np.concatenate([prepared.atol, self._sizes(guards, x, span)]),
+            sides=times.sides,
+            switches=switches if switching else None,
+            guards=watch,
+            symbolic=lambda: None if self.program is None else self.program.bind(p),
+        )
+
+    def _sizes(self, guards: Callable[[Array, Array], Array], x: Array, span: tuple[float, float]) -> Array:
+        """The size of each clock over a phase, as far as the time alone tells."""
+        if not self.clocks:
+            return np.empty(0)
+        times = np.linspace(*span, SAMPLES)
+        largest = np.abs(guards(times, np.tile(x, (SAMPLES, 1)))).max(axis=0)[list(self.clocks)]
+        return np.where(largest > 0, largest, 1.0) * (span[1] - span[0])
+
+    @cached_property
+    def _function(self) -> Callable[..., Any]:
+        rows = self._rows
+        return vectorised_list((TIME, *rows.states, *rows.parameters), self._expressions)
+
+    def sides(self, modes: ModeNames) -> Array:
+        """(guards,) the side of each guard that ends one of the modes."""
+        sides = np.zeros(len(self._expressions))
+        for _, made in self.watched(modes):
+            sides[made.guard] = made.side
+        return sides
+
+    @cached_property
+    def program(self) -> Any:
+        """The heyoka program with the guards as its events, or None where there can be none."""
+        rows = self._rows
+        if not (rows.states or self.clocks) or not available("heyoka"):
+            return None
+        from shaftwork.codegen.heyoka import build
+
+        clocks = tuple(Symbol(f"clock {k}", real=True) for k in self.clocks)
+        rates = (*rows.rates, *(self._expressions[k] for k in self.clocks))
+        try:
+            return build((*rows.states, *clocks), TIME, rows.parameters, rates, tuple(self._expressions))
+        except CompileError:
+            return None
+
+
+def _winds(guard: Expr) -> bool:
+    """Whether a guard changes with time other than along straight pieces."""
+    return bool(guard.has(TIME)) and pieces_degree(guard) is None

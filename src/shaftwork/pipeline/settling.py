@@ -1,0 +1,193 @@
+"""Which modes go on at an instant: one changes after another until all are consistent with the motion that follows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shaftwork.codegen.elements import Array
+from shaftwork.core.errors import NetworkError, SimulationError
+from shaftwork.pipeline.assemblies import Assembly, Element, ModeNames, Watched
+
+if TYPE_CHECKING:
+    from shaftwork.pipeline.phases import Phases
+
+# A guard within so many rounding units of zero is on its limit, and only its further course tells its side.
+ROUNDINGS = 64.0
+# How far ahead that course is looked at: parts of the time in which a state moves by its nominal size, and of the run.
+AHEAD, AHEAD_OF_RUN = 1e-3, 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """A change of mode: when in s, of which element, from which mode to which; or a rebound, back to the one before."""
+
+    time: float
+    element: Element
+    before: str
+    after: str
+    rebound: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """Modes, their equations and parameters, and the states."""
+
+    modes: ModeNames
+    assembly: Assembly
+    p: Array
+    x: Array
+
+
+class Settling:
+    """Changes modes at an instant.
+
+    Args:
+        phases: the sets of equations.
+        values: parameters that differ from the network's.
+        span: start and end of the run, s.
+    """
+
+    def __init__(self, phases: Phases, values: Mapping[str, float], span: tuple[float, float]) -> None:
+        self._phases, self._values = phases, dict(values)
+        self._ahead = AHEAD_OF_RUN * (span[1] - span[0])
+        self._vectors: dict[ModeNames, Array] = {}
+
+    def moment(self, modes: ModeNames, assembly: Assembly) -> Moment:
+        """Modes without states."""
+        if modes not in self._vectors:
+            self._vectors[modes] = assembly.vector(self._values, self._phases.numbers(modes))
+        return Moment(modes, assembly, self._vectors[modes], np.empty(0))
+
+    def changed(self, moment: Moment, t: float, modes: ModeNames) -> Moment:
+        """The same instant in other modes: all that is stored goes over.
+
+        Raises:
+            NetworkError: the equations of these modes contradict each other.
+        """
+        assembly = self._phases.assembly(modes)
+        new = self.moment(modes, assembly)
+        if assembly is moment.assembly:
+            return replace(new, x=moment.x)
+        return replace(new, x=assembly.stores.states(assembly.bound(new.p), t, self._held(moment, t)))
+
+    def _held(self, moment: Moment, t: float) -> dict[str, float]:
+        assembly = moment.assembly
+        values = assembly.stores.of(lambda: assembly.bound(moment.p), np.array([t]), moment.x[None, :])[0]
+        return dict(zip(assembly.stores.names, values.tolist(), strict=True))
+
+    def settle(self, t: float, after: float, moment: Moment, met: int | None) -> tuple[Moment, list[Change]]:
+        """The modes that go on, and the changes that lead there.
+
+        Args:
+            t: the instant, s.
+            after: a time just after it, s, at which inputs are read.
+            moment: what was before.
+            met: the guard that ended the phase, or None.
+
+        Raises:
+            SimulationError: no modes are consistent; names the pair that changes for ever.
+        """
+        changes: list[Change] = []
+        seen: dict[ModeNames, None] = {}
+        number, ended = self._first(moment, after, met)
+        while ended is not None:
+            moment, change = self._follow(t, after, moment, number, ended)
+            changes.append(change)
+            if moment.modes in seen and not change.rebound:
+                raise self._endless(t, changes)
+            seen[moment.modes] = None
+            number, ended = self._violated(moment, after)
+        return moment, changes
+
+    def _first(self, moment: Moment, after: float, met: int | None) -> tuple[int, Watched | None]:
+        if met is not None:
+            for number, made in moment.assembly.watched(moment.modes):
+                if made.guard == met:
+                    return number, made
+        return self._violated(moment, after)
+
+    def _violated(self, moment: Moment, t: float) -> tuple[int, Watched | None]:
+        """The guard that is farthest beyond its limit, or on it and about to go beyond."""
+        watched = list(moment.assembly.watched(moment.modes))
+        if not watched:
+            return 0, None
+        columns, sides = [made.guard for _, made in watched], np.array([made.side for _, made in watched])
+        now, band, ahead = self._course(moment, t)[:, columns]
+        now, ahead = now * sides, ahead * sides
+        beyond = np.where(now > band, now, 0.0)
+        if not beyond.any():
+            beyond = np.where((np.abs(now) <= band) & (ahead > 2 * band), ahead, 0.0)
+        if not beyond.any():
+            return 0, None
+        return watched[int(np.argmax(beyond))]
+
+    def band(self, moment: Moment, t: float) -> Array:
+        """(guards,) how far rounding moves each guard: nearer to zero it has no side."""
+        return self._course(moment, t)[1]
+
+    def _course(self, moment: Moment, t: float) -> Array:
+        """(3, guards) the guards now, how far rounding of states and time moves them, and what they are soon after."""
+        assembly, x = moment.assembly, moment.x
+        guards, rhs = assembly.guards(moment.p), assembly.prepared(moment.p).rhs
+        ulp = ROUNDINGS * float(np.spacing(abs(t)))
+        moved = x * (1 + ROUNDINGS * np.finfo(float).eps * np.where(np.arange(x.size) % 2, 1.0, -1.0))
+        rate, other = (rhs(t, x), rhs(t, moved)) if x.size else (x, x)
+        with np.errstate(divide="ignore"):
+            step = min(self._ahead, AHEAD * float(np.min(assembly.prepared(moment.p).atol / np.abs(rate), initial=np.inf)))
+        times = np.array([t, t, t + ulp, t + step, t + step])
+        states = np.vstack([x, moved, x + ulp * rate, x + step * rate, moved + step * other])
+        now, near, later, ahead, beside = guards(times, states)
+        return np.array([now, np.abs(near - now) + np.abs(later - now) + np.abs(beside - ahead), ahead])
+
+    def _follow(self, t: float, after: float, moment: Moment, number: int, ended: Watched) -> tuple[Moment, Change]:
+        """The mode of an element changes, or what hits is thrown back."""
+        element, leave = self._phases.elements[number], ended.leave
+        before = moment.modes[number]
+        to = leave.to or moment.assembly.start_of(number, before, after, moment.x, moment.p)
+        modes = (*moment.modes[:number], to, *moment.modes[number + 1 :])
+        try:
+            new = self.changed(moment, after, modes)
+        except NetworkError:
+            return self._around(t, after, moment, number, to)
+        if leave.rebound is not None and (back := self._rebound(moment, new, number, after, ended)) is not None:
+            return back, Change(t, element, before, to, rebound=True)
+        return new, Change(t, element, before, to)
+
+    def _around(self, t: float, after: float, moment: Moment, number: int, to: str) -> tuple[Moment, Change]:
+        """Past a mode whose equations contradict others: into the other one that it leads to.
+
+        A friction that a prescribed speed turns cannot stick: it passes from slipping one way to slipping the other.
+        """
+        element, before = self._phases.elements[number], moment.modes[number]
+        others = [leave.to for leave in element.modes[to].leaves if leave.to != before]
+        for other in others:
+            modes = (*moment.modes[:number], other, *moment.modes[number + 1 :])
+            return self.changed(moment, after, modes), Change(t, element, before, other)
+        raise SimulationError(f"'{element.name}' can neither stay '{before}' nor become '{to}' at t = {t:.9g} s.")
+
+    def _rebound(self, moment: Moment, joined: Moment, number: int, t: float, ended: Watched) -> Moment | None:
+        """The states after an impact with restitution; None where it is too slow for one.
+
+        Law: v = v_joined + e (v_joined - v_before), which gives e times the speed back and keeps every momentum.
+        """
+        leave = ended.leave
+        assembly, p = moment.assembly, moment.p
+        share = assembly.constant(number, leave.rebound, p)
+        rest = assembly.constant(number, leave.rest, p)
+        if share * abs(assembly.across(number, t, moment.x, p)) <= rest:
+            return None
+        held, plastic = self._held(moment, t), self._held(joined, t)
+        thrown = {name: plastic[name] + share * (plastic[name] - value) for name, value in held.items()}
+        return replace(moment, x=assembly.stores.states(assembly.bound(p), t, thrown))
+
+    def _endless(self, t: float, changes: list[Change]) -> SimulationError:
+        last = changes[-1]
+        others = dict.fromkeys(change.element.name for change in changes)
+        return SimulationError(
+            f"At t = {t:.9g} s no modes of {', '.join(others)} are consistent: '{last.element.name}' changes for ever "
+            f"between '{last.before}' and '{last.after}'. Give the node between them an inertia, or one of them damping."
+        )

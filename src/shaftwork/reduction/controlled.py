@@ -1,0 +1,104 @@
+"""Controlled sources: at which instant what they read is known, and what is wrong where it is not.
+
+A prescribed across variable is known before everything else, so one that reads others may read nothing but states and
+what follows from states and sources of time. A through variable may read whatever does not depend on itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from shaftwork.components.branches import ACROSS
+from shaftwork.core.errors import Problem
+from shaftwork.network.controlled import Reading, readings_of
+from shaftwork.network.graph import GROUND
+from shaftwork.network.templates import Kind
+from shaftwork.network.wording import at_nodes, title
+from shaftwork.reduction.view import View
+
+
+def reads_itself(view: View, law: int) -> bool:
+    """Whether what a law among the links reads depends at the same instant on what it gives."""
+    own = view.tree.loops[law] if view.graph.branches[law].template.law.has(ACROSS) else ()
+    read = (tree for reading in readings_of(view.graph, law).values() for tree in _tree_branches(view, reading))
+    return law in _deciding(view, (*own, *read))
+
+
+def _tree_branches(view: View, reading: Reading) -> tuple[int, ...]:
+    """The tree branches whose across variables make up what is read; of an integral, its rate."""
+    match reading:
+        case Reading("across", of):
+            return () if of == GROUND else tuple(view.tree.potentials[of] or ())
+        case Reading("integral", of):
+            return tuple(view.tree.loops.get(of, (of,)))
+    return ()
+
+
+def _deciding(view: View, trees: Iterable[int]) -> tuple[int, ...]:
+    """Laws and sources that decide the across variables of tree branches together with the states."""
+    found: dict[int, None] = {}
+    left, seen = list(trees), set[int]()
+    while left:
+        tree = left.pop()
+        if tree in seen:
+            continue
+        seen.add(tree)
+        if view.kind(tree) in (Kind.ACROSS_SOURCE, Kind.LAW):
+            found[tree] = None
+        elif view.kind(tree) is Kind.CONDUCTANCE:
+            for link in view.cutsets[tree]:
+                if view.kind(link) is Kind.CONDUCTANCE:
+                    left.extend(view.tree.loops[link])
+                elif view.kind(link) is not Kind.THROUGH_STORE:
+                    found[link] = None
+    return tuple(sorted(found))
+
+
+def controlled_problems(view: View) -> Iterator[Problem]:
+    """Controlled sources that read what is not known, or that jolt a store."""
+    laws = (*view.tree.tree[Kind.LAW], *view.tree.links[Kind.LAW], *view.form.controlled)
+    reading = [law for law in sorted(laws) if view.graph.branches[law].template.reads]
+    for law in reading:
+        for made in readings_of(view.graph, law).values():
+            yield from _unknown(view, law, made)
+    for law in view.form.controlled:
+        yield from _beside_a_store(view, law)
+    if reading and view.form.waves:
+        message = (
+            f"{view.titles(reading)} reads other quantities of its own, and {view.titles(view.form.waves)} is a wave."
+        )
+        hint = "The two do not go together: take another model of the shaft, such as Spectral(16)."
+        yield Problem("controlled source", message, hint, view.parts((*reading, *view.form.waves)))
+
+
+def _unknown(view: View, law: int, reading: Reading) -> Iterator[Problem]:
+    trees, words = _tree_branches(view, reading), view.words(law)
+    name = title(view.graph.part_of(law).component)
+    nodes = view.nodes((reading.of,)) if reading.kind == "across" else view.ends((reading.of,))
+    what = f"{name} reads what is across {at_nodes(nodes)}"
+    parts = view.parts((law,))
+    if series := [tree for tree in trees if view.kind(tree) is Kind.THROUGH_STORE]:
+        kept = view.words(series[0])
+        message = f"{what}, where only {kept.spring}s meet: it follows from how fast their {kept.through} changes."
+        yield Problem(
+            "controlled source", message, f"Let it read a {kept.through}, or put a {kept.loss} there.", parts, nodes
+        )
+    if law in view.form.controlled:
+        moving = [k for k in _deciding(view, trees) if view.kind(k) is Kind.LAW or k in view.form.controlled]
+        if moving:
+            message = f"{what}, and prescribes a {words.across}; but what it reads depends on {view.titles(moving)}."
+            hint = f"Give the node some {view.words(moving[0]).store}, so that what is read there is a state."
+            yield Problem("controlled source", message, hint, view.parts((law, *moving)), nodes)
+
+
+def _beside_a_store(view: View, law: int) -> Iterator[Problem]:
+    """A store whose through variable would be the rate of what a law reads."""
+    stores = [link for link in view.tree.links[Kind.ACROSS_STORE] if law in view.tree.loops[link]]
+    if stores:
+        words = view.words(stores[0])
+        message = (
+            f"{view.titles((law,))} prescribes the {words.across} of {view.titles(stores)} by what it reads, so that "
+            f"the {words.through} would be the rate of that."
+        )
+        hint = f"Put a {words.loss} or {words.spring} between the two."
+        yield Problem("controlled source", message, hint, view.parts((law, *stores)), view.ends(stores))

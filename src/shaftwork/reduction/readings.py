@@ -1,0 +1,145 @@
+"""What the guards of modes read, as expressions in states, parameters and time: any speed, torque and angle of a part.
+
+Reactions are among them, the torque through a stuck brake for instance. That of a tree branch is the sum over its
+cutset, in which an inertia that follows others takes its torque from their rates:
+
+    i_tree = -F i_link,   i_K = K F' dx_C/dt
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+from sympy import Add, Expr, Integer, Symbol
+
+from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, End, across_of, integral_of, through_of
+from shaftwork.components.laws import t as TIME
+from shaftwork.components.modes import Modes
+from shaftwork.components.slopes import slope
+from shaftwork.network.graph import GROUND, GraphBranch, GraphPart
+from shaftwork.network.templates import Kind
+from shaftwork.reduction.form import StateForm
+from shaftwork.reduction.gains import exact_of
+from shaftwork.reduction.rows import Rows
+
+
+class Readings:
+    """Expressions of what parts show, in one set of equations.
+
+    Args:
+        form: the state form.
+        rows: its explicit rows.
+    """
+
+    def __init__(self, form: StateForm, rows: Rows) -> None:
+        self.form, self.graph, self.rows = form, form.graph, rows
+        branches = [state.branch for state in form.states]
+        self._rates = dict(zip(branches, rows.rates, strict=True)) if branches else {}
+        self._through: dict[int, Expr] = {}
+
+    def guard(self, part: GraphPart, element: Modes, expression: Expr) -> Expr:
+        """An expression of a guard, in the symbols of its component, in states, the network's parameters and time."""
+        ports = [port.name for port in part.component.ports]
+        ends = element.ends or (ports[0], ports[1] if len(ports) > 1 else None)
+        known: dict[Symbol, Expr] = {}
+        for symbol in expression.free_symbols - {TIME}:
+            if symbol == ACROSS:
+                known[symbol] = self.across(part, ends[0]) - self.across(part, ends[1])
+            elif symbol == THROUGH:
+                known[symbol] = self.into(part, ends[0])
+            elif symbol == INTEGRAL:
+                known[symbol] = self._integral(part, element.angle)
+            else:
+                known[symbol] = self._named(part, symbol)
+        return expression.xreplace(known)
+
+    def _named(self, part: GraphPart, symbol: Symbol) -> Expr:
+        for port in part.nodes:
+            if symbol == across_of(port):
+                return self.across(part, port)
+        for branch in self._of(part):
+            label = branch.template.label
+            if symbol == through_of(label):
+                return self.through(branch.index)
+            if symbol == integral_of(label):
+                return self._integral(part, label)
+        return self.graph.symbol_of(part, symbol.name)
+
+    def across(self, part: GraphPart, port: End) -> Expr:
+        """The across variable of a port against the reference."""
+        node = GROUND if port is None else part.nodes[port]
+        row = None if node == GROUND else self.form.tree.potentials[node]
+        if row is None:
+            return Integer(0)
+        members = [tree for tree in row if self.graph.branches[tree].template.kind is not Kind.COUPLING]
+        exact = exact_of(row[tree] for tree in members)
+        return Add(*(gain * self._tree_across(tree) for tree, gain in zip(members, exact, strict=True)))
+
+    def _tree_across(self, tree: int) -> Expr:
+        if tree in self.rows.across:
+            return self.rows.across[tree]
+        # a spring in series with others: its speed is the rate of its torque over its stiffness
+        rates = Add(*(gain * self._rate_of_through(link) for link, gain in self._cutsets[tree]))
+        return -rates / self._law(tree)
+
+    def _rate_of_through(self, link: int) -> Expr:
+        if link in self.form.through_states:
+            return self._rates[link]
+        return slope(self.rows.through[link], TIME)
+
+    def into(self, part: GraphPart, port: End) -> Expr:
+        """What the node at a port gives to the part."""
+        total: list[Expr] = []
+        for branch in self._of(part):
+            for coefficient, plus, minus in branch.template.terms or ((Integer(1), *branch.template.ends),):
+                sign = (plus == port) - (minus == port)
+                if sign:
+                    factor = self.graph.in_network_symbols(coefficient, branch)
+                    total.append(sign * factor * self.through(branch.index))
+        return Add(*total)
+
+    def through(self, branch: int) -> Expr:
+        """The through variable of a branch; of a coupling its lambda."""
+        if branch not in self._through:
+            self._through[branch] = self._made(branch)
+        return self._through[branch]
+
+    def _made(self, branch: int) -> Expr:
+        if branch in self.rows.through:
+            return self.rows.through[branch]
+        if branch in self.form.dependent_across:
+            return self._law(branch) * Add(*(gain * self._rate_of_across(tree) for tree, gain in self._loop(branch)))
+        if branch in self.form.tree.loops:  # a redundant joint carries nothing
+            return Integer(0)
+        return -Add(*(gain * self.through(link) for link, gain in self._cutsets.get(branch, ())))
+
+    def _rate_of_across(self, tree: int) -> Expr:
+        if tree in self.form.across_sources:
+            return slope(self.rows.across[tree], TIME)
+        return self._rates.get(tree, Integer(0)) if tree in self.form.across_states else Integer(0)
+
+    def _loop(self, link: int) -> list[tuple[int, Expr]]:
+        row = self.form.tree.loops[link]
+        return list(zip(row, exact_of(row.values()), strict=True))
+
+    @cached_property
+    def _cutsets(self) -> dict[int, list[tuple[int, Expr]]]:
+        entries = [(tree, link, gain) for link, row in self.form.tree.loops.items() for tree, gain in row.items()]
+        found: dict[int, list[tuple[int, Expr]]] = {}
+        for (tree, link, _), gain in zip(entries, exact_of(gain for _, _, gain in entries), strict=True):
+            found.setdefault(tree, []).append((link, gain))
+        return found
+
+    def _integral(self, part: GraphPart, label: str) -> Expr:
+        own = {branch.index: branch for branch in self._of(part)}
+        for state in self.form.states:
+            if state.kind == "integral" and state.branch in own and label in ("", own[state.branch].template.label):
+                return Symbol(state.name, real=True)
+        raise AssertionError(f"{part.name} has no angle")  # its laws read one in every form
+
+    def _of(self, part: GraphPart) -> list[GraphBranch]:
+        return [self.graph.branches[k] for k in part.branches]
+
+    def _law(self, branch: int) -> Expr:
+        made = self.graph.branches[branch]
+        return self.graph.in_network_symbols(made.template.law, made)

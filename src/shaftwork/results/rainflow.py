@@ -1,0 +1,186 @@
+"""Rainflow counting: the cycles of load that a quantity goes through, each with its time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shaftwork.core.errors import MissingExtraError, ParameterError
+from shaftwork.core.parameters import in_si
+from shaftwork.results.observer import Array
+from shaftwork.results.turning import Read, TurningPoints, turning_points
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SMALLEST = 1e-6
+BINS = 24
+SHOWN = 12
+"""Cycles in the printed table."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rainflow:
+    """The load cycles of a quantity, in the order in which they start.
+
+    Law: rainflow counting of ASTM E1049, 5.4.4. A cycle that closes counts 1, one that stays open to the end counts
+    1/2. Analogue: a closed loop in the stress-strain diagram of the material. Source: package `rainflow`.
+
+    Args:
+        title: of the network.
+        name: of the quantity.
+        unit: of the quantity.
+        duration: of the motion, s.
+        turning: the peaks and valleys that were counted.
+        range: (n,) peak minus valley of each cycle.
+        mean: (n,) middle of peak and valley.
+        count: (n,) 1 or 1/2.
+        start: (n,) time of the cycle's first turning point, s.
+        end: (n,) time of its second turning point, s.
+    """
+
+    title: str
+    name: str
+    unit: str
+    duration: float
+    turning: TurningPoints
+    range: Array
+    mean: Array
+    count: Array
+    start: Array
+    end: Array
+
+    @property
+    def amplitude(self) -> Array:
+        """(n,) half the range."""
+        return 0.5 * self.range
+
+    def __len__(self) -> int:
+        return len(self.range)
+
+    def matrix(self, bins: int | tuple[int, int] = BINS) -> tuple[Array, Array, Array]:
+        """Cycles by range and mean: counts (ranges, means), edges of the ranges from 0 on, edges of the means.
+
+        Args:
+            bins: of both, or of ranges and means.
+
+        Raises:
+            ParameterError: no whole numbers above 0.
+        """
+        numbers = bins if isinstance(bins, tuple) else (bins, bins)
+        if len(numbers) != 2 or not all(isinstance(n, int) and n > 0 for n in numbers):
+            raise ParameterError(f"bins = {bins!r} must be a whole number above 0, or two: of ranges and of means.")
+        low, high = (float(self.mean.min()), float(self.mean.max())) if len(self) else (0.0, 0.0)
+        if high <= low:
+            low, high = low - 0.5 * max(1.0, abs(low)), low + 0.5 * max(1.0, abs(low))
+        limits = [(0.0, float(self.range.max(initial=0.0)) or 1.0), (low, high)]
+        counts, ranges, means = np.histogram2d(self.range, self.mean, numbers, limits, weights=self.count)
+        return counts, ranges, means
+
+    def spectrum(self) -> tuple[Array, Array]:
+        """Ranges in descending order, and how many cycles have at least this range."""
+        order = np.argsort(-self.range, kind="stable")
+        return self.range[order], np.cumsum(self.count[order])
+
+    def equivalent(self, slope: float, cycles: float = 1.0) -> float:
+        """The amplitude that, in so many equal cycles, does the damage of all of them.
+
+        Law: (sum count amplitude^m / cycles)^(1/m).
+
+        Args:
+            slope: m of the S-N line.
+            cycles: number of equal cycles.
+
+        Raises:
+            ParameterError: a number that is not above 0.
+        """
+        m, n = in_si("slope", slope, above=0), in_si("cycles", cycles, above=0)
+        largest = float(self.amplitude.max(initial=0.0))
+        if not largest:
+            return 0.0
+        return float(largest * (self.count @ (self.amplitude / largest) ** m / n) ** (1.0 / m))
+
+    def plot(self, bins: int | tuple[int, int] = BINS) -> Figure:
+        """The matrix of ranges and means beside the spectrum (extra `plot`).
+
+        Args:
+            bins: as in `matrix`.
+
+        Raises:
+            MissingExtraError: matplotlib is not installed.
+        """
+        return _picture(self, bins)
+
+    def __str__(self) -> str:
+        cycles = float(self.count.sum())
+        head = f"{self.name} in '{self.title}': {cycles:g} cycles in {self.duration:g} s"
+        if not len(self):
+            return head
+        lines = [f"{'range in ' + self.unit:>14}  {'mean':>12}  {'count':>5}  {'from s':>10}  {'to s':>10}"]
+        for k in np.argsort(-self.range, kind="stable")[:SHOWN].tolist():
+            row = f"{self.range[k]:>14.6g}  {self.mean[k]:>12.6g}  {self.count[k]:>5g}"
+            lines.append(f"{row}  {self.start[k]:>10.6g}  {self.end[k]:>10.6g}")
+        more = len(self) - SHOWN
+        return "\n".join([f"{head}, the largest of them:", *lines, *([f"and {more} smaller"] if more > 0 else [])])
+
+
+def rainflow(read: Read, steps: Array, *, title: str, name: str, unit: str, smallest: float = SMALLEST) -> Rainflow:
+    """Count the cycles of a quantity.
+
+    Args:
+        read: the quantity at ascending times.
+        steps: (s,) times between which it is smooth.
+        title: of the network.
+        name: of the quantity.
+        unit: of the quantity.
+        smallest: cycles up to this fraction of the whole range are left out.
+
+    Raises:
+        MissingExtraError: the package rainflow is not installed.
+        ParameterError: `smallest` is no fraction.
+    """
+    try:
+        from rainflow import extract_cycles
+    except ImportError:
+        raise MissingExtraError("rainflow", "life", "Solution.rainflow()") from None
+    fraction = in_si("smallest", smallest, at_least=0, at_most=1)
+    turning = turning_points(read, steps, smallest=fraction)
+    last = len(turning.t) - 1
+    # the package knows an end by a value that follows: without one a single ramp would be no cycle
+    series = [*turning.values.tolist(), float(turning.values[-1])]
+    found = sorted(extract_cycles(series), key=lambda cycle: cycle[3:])
+    table = np.array([cycle[:3] for cycle in found]).reshape(-1, 3)
+    places = np.minimum(np.array([cycle[3:] for cycle in found], dtype=np.intp).reshape(-1, 2), last)
+    kept = table[:, 0] > fraction * float(np.ptp(turning.values))
+    ranges, means, counts = table[kept].T
+    start, end = turning.t[places[kept]].T
+    return Rainflow(title, name, unit, float(steps[-1] - steps[0]), turning, ranges, means, counts, start, end)
+
+
+def _picture(cycles: Rainflow, bins: int | tuple[int, int]) -> Figure:
+    counts, ranges, means = cycles.matrix(bins)
+    try:
+        from matplotlib.colors import LogNorm
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise MissingExtraError("matplotlib", "plot", "Rainflow.plot()") from None
+    figure = Figure(figsize=(11, 4.5), layout="constrained")
+    left, right = figure.subplots(1, 2, width_ratios=(3, 2))
+    unit = cycles.unit.replace("*", " ")
+    shown = np.ma.masked_equal(counts, 0.0)
+    colours = LogNorm(0.5, max(1.0, float(counts.max())))
+    mesh = left.pcolormesh(means, ranges, shown, norm=colours, cmap="viridis")
+    figure.colorbar(mesh, ax=left, label="cycles")
+    left.set_xlabel(f"mean in {unit}")
+    left.set_ylabel(f"range in {unit}")
+    right.set_title("cycles of at least this range", fontsize="medium")
+    size, number = cycles.spectrum()
+    right.step(number, size, where="pre", linewidth=1.2)
+    right.set_xscale("log")
+    right.set_ylim(bottom=0.0)
+    right.set_xlabel("cycles")
+    right.grid(alpha=0.3)
+    figure.suptitle(f"{cycles.title}: {cycles.name}")
+    return figure
