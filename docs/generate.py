@@ -47,6 +47,7 @@ FAMILIES = (
     "machines",
     "motors",
     "drives",
+    "induction_machine",
     "electrical",
 )
 """The modules of components in the order in which they are shown."""

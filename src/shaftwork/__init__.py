@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from shaftwork.components.drives import *
     from shaftwork.components.electrical import *
     from shaftwork.components.friction import *
+    from shaftwork.components.induction_machine import *
     from shaftwork.components.laws import Ramp, Step, Table, omega, phi, psi, s, t, u, v
     from shaftwork.components.loads import *
     from shaftwork.components.machines import *
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
     from shaftwork.core.parameters import parameter
     from shaftwork.pipeline.model import Model
     from shaftwork.pipeline.network import Network
+    from shaftwork.results.fatigue import SNLine
     from shaftwork.results.solution import Solution
 
 __version__ = "0.1.0"
@@ -90,6 +92,7 @@ _HOME = {
     "shaftwork.core.parameters": ("parameter",),
     "shaftwork.pipeline.model": ("Model",),
     "shaftwork.pipeline.network": ("Network",),
+    "shaftwork.results.fatigue": ("SNLine",),
     "shaftwork.results.solution": ("Solution",),
 }
 _PACKAGES = ("scenes", "studies")

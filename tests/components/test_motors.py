@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
@@ -61,9 +62,9 @@ def pieces(motor: Component) -> list[sympy.Expr]:
     return [pair.expr for pair in (-branch.through).args]
 
 
-@pytest.mark.parametrize("given", [{"n_k": 930.0}, {"n_k": 930.0, "n_s": 140.0}, {"n_s": 300.0}, {}], ids=str)
+@pytest.mark.parametrize("given", [{"n_k": 930.0}, {"n_k": 930.0, "n_s": 260.0}, {"n_s": 300.0}, {}], ids=str)
 def test_a_cage_curve_has_the_values_and_slopes_of_its_points_exactly(given: dict[str, float]) -> None:
-    """In exact arithmetic, differentiated on both sides of the points: an error of rounding would not vanish."""
+    """To 40 digits, differentiated on both sides of the points: no error of rounding could hide one of the formula."""
     motor = sw.CageMotor("m", **{**EXCAVATOR, **given})
     behind, starting, running = pieces(motor)
     tau_a, tau_s, tau_k = (sympy.nsimplify(motor.values[name]) for name in ("tau_a", "tau_s", "tau_k"))
@@ -73,10 +74,11 @@ def test_a_cage_curve_has_the_values_and_slopes_of_its_points_exactly(given: dic
     points = [(starting, 0, tau_a), (starting, n_s, tau_s), (starting, n_k, tau_k), (running, n_k, tau_k)]
     assert behind == tau_a
     for law, n, torque in points:
-        assert sympy.simplify(law.subs(ACROSS, 2 * sympy.pi * n / 60) - torque) == 0
-        if n != 0:
-            assert sympy.simplify(law.diff(ACROSS).subs(ACROSS, 2 * sympy.pi * n / 60)) == 0
-    assert sympy.degree(sympy.expand(starting), ACROSS) == 4
+        value, slope = (sympy.N(made.subs(ACROSS, 2 * sympy.pi * n / 60), 50) for made in (law, law.diff(ACROSS)))
+        assert abs(value - torque) < 1e-40 * torque
+        assert n == 0 or abs(slope) < 1e-40 * torque
+    assert sympy.N(starting.diff(ACROSS, 4)) != 0
+    assert starting.diff(ACROSS, 5).expand() == 0
 
 
 def test_a_compiled_cage_curve_keeps_its_points_to_rounding() -> None:
@@ -118,8 +120,8 @@ def test_a_cage_motor_is_continuous_and_finite_at_every_speed(ratio: float) -> N
     at = lambda *speeds: curve(motor, np.array(speeds) / ratio)  # noqa: E731 (speeds of the motor's own shaft)
     np.testing.assert_allclose(at(-1e6, -1000.0, -1e-9), size * 5310.0, rtol=1e-12)
     for n in (0.0, n_k, 1000.0):
-        # 2e-6 1/min times the largest slope of the curve, some 100 N m / (1/min)
-        assert np.ptp(at(n - 1e-6, n, n + 1e-6)) < 1e-3
+        # 2e-6 1/min times the largest slope of the curve, some 170 N m / (1/min), times the ratio
+        assert np.ptp(at(n - 1e-6, n, n + 1e-6)) < 2e-3
     assert at(2000.0 - n_k)[0] == pytest.approx(-size * 5550.0, rel=1e-12)
     assert np.isfinite(at(1e9)).all()
 
@@ -132,7 +134,7 @@ def test_a_cage_motor_is_continuous_and_finite_at_every_speed(ratio: float) -> N
         ({"tau_n": None}, "give the rated point tau_n and n_n, or the pull-out speed n_k"),
         ({"tau_n": 6000.0}, "the rated point tau_n = 6000 N m"),
         ({"n_n": 1000.0}, "the synchronous speed n_sync = 1000 1/min"),
-        ({"n_n": 700.0}, "the pull-out speed n_k = -314"),
+        ({"n_n": 700.0}, "the pull-out speed n_k = -313"),
         ({"n_k": 1200.0}, "the pull-out speed n_k = 1200 1/min must lie between 0 and n_sync"),
         ({"n_s": 950.0}, "n_s = 950 1/min must be less than the pull-out speed 934"),
         ({"t_on": 2.0, "t_off": 1.0}, "t_off = 1 s is not later than t_on = 2 s"),
@@ -170,19 +172,20 @@ def test_a_kloss_motor_reaches_a_slip_at_the_time_of_the_closed_form() -> None:
     assert sol["J.omega"][-1] == pytest.approx((1 - slip) * synchronous, rel=1e-9)  # 100 rtol
 
 
-MOTORS = {
+MOTORS: dict[str, Callable[..., Component]] = {
     "kloss": lambda **times: sw.KlossMotor("m", **KLOSS, **times),
     "cage": lambda **times: sw.CageMotor("m", **EXCAVATOR, **times),
     "table": lambda **times: sw.TableMotor("m", curve=sw.Table([0.0, 500.0, 1000.0], [5.0, 6.0, 0.0]), **times),
     "drive": lambda **times: sw.FrequencyDrive("m", **KLOSS, t_ramp=0.5, **times),
-    "envelope": lambda **times: sw.DriveEnvelope("m", **KLOSS, overspeed=2.0, **times),
+    "held": lambda **times: sw.PullOutDrive("m", **KLOSS, overspeed=2.0, **times),
 }
+INERTIA = {"cage": 100.0}  # kg m^2; the others are smaller motors
 
 
 @pytest.mark.parametrize("name", MOTORS)
 def test_a_motor_gives_exactly_no_torque_before_t_on_and_from_t_off_on(name: str) -> None:
     times = np.linspace(0.0, 2.0, 41)
-    sol = alone(MOTORS[name](t_on=0.5, t_off=1.5), inertia=0.3).simulate(2.0, t_eval=times)
+    sol = alone(MOTORS[name](t_on=0.5, t_off=1.5), INERTIA.get(name, 0.3)).simulate(2.0, t_eval=times)
     off = (times < 0.5) | (times >= 1.5)
     assert (sol["m.tau"][off] == 0.0).all()
     assert (sol["m.tau"][~off] > 0.0).all()
@@ -192,8 +195,8 @@ def test_a_motor_gives_exactly_no_torque_before_t_on_and_from_t_off_on(name: str
 
 @pytest.mark.parametrize("name", MOTORS)
 def test_switched_on_later_it_starts_in_the_same_way(name: str) -> None:
-    first = alone(MOTORS[name](), inertia=0.3).simulate(1.0, rtol=1e-11, t_eval=5)
-    later = alone(MOTORS[name](t_on=0.7), inertia=0.3).simulate(1.7, rtol=1e-11, t_eval=0.7 + first.t)
+    first = alone(MOTORS[name](), INERTIA.get(name, 0.3)).simulate(1.0, rtol=1e-11, t_eval=5)
+    later = alone(MOTORS[name](t_on=0.7), INERTIA.get(name, 0.3)).simulate(1.7, rtol=1e-11, t_eval=0.7 + first.t)
     np.testing.assert_allclose(later["J.omega"], first["J.omega"], rtol=1e-9)  # 100 rtol
 
 

@@ -193,7 +193,7 @@ VALUES = {
     "CageMotor": {"tau_a": 5.0, "tau_s": 4.0, "tau_k": 6.0, "n_k": 80.0, "n_sync": 100.0, "ratio": 1.5, "t_off": 0.3},
     "TableMotor": {"curve": sw.Table([0.0, 50.0, 100.0], [5.0, 6.0, 0.0]), "ratio": 1.5, "efficiency": 0.9},
     "FrequencyDrive": {"tau_k": 5.0, "s_k": 0.3, "n_sync": 100.0, "t_ramp": 0.3, "f_end": 80.0, "boost": 0.2},
-    "DriveEnvelope": {"tau_k": 5.0, "s_k": 0.3, "n_sync": 60.0, "overspeed": 2.0, "efficiency": 0.9},
+    "PullOutDrive": {"tau_k": 5.0, "s_k": 0.3, "n_sync": 60.0, "overspeed": 2.0, "efficiency": 0.9},
     "CoulombLoad": {"tau": 2.0, "omega_s": 0.3},
     "DCMachine": {"k": 0.4, "R": 1.5, "L": 0.3},
     "SpeedSource": {"omega": sympy.sin(3 * sw.t)},

@@ -15,7 +15,7 @@ from sympy.logic.boolalg import ITE, And, BooleanFalse, BooleanTrue, Not, Or, Xo
 
 from shaftwork.codegen.heyoka_held import Held
 from shaftwork.components import noise
-from shaftwork.components.laws import Interpolation, InterpolationSlope
+from shaftwork.components.laws import Interpolation, InterpolationSlope, between_steps
 from shaftwork.components.noise import HeldNoise
 from shaftwork.components.slopes import wraps
 from shaftwork.core.errors import CompileError
@@ -148,7 +148,7 @@ class Translator:
         if switch not in self._signs:
             value = self.expression(switch)
             zero, one = heyoka.expression(0.0), heyoka.expression(1.0)
-            if self._moving.isdisjoint(switch.free_symbols):
+            if self._moving.isdisjoint(between_steps(switch)):
                 sign = heyoka.select(heyoka.gt(value, zero), one, heyoka.select(heyoka.lt(value, zero), -one, zero))
             else:
                 sign = heyoka.par[self._first_sign + len(self.switches)]
@@ -170,7 +170,7 @@ class Translator:
         place = heyoka.par[self._first_held + len(self.held)]
         timed = self._states.isdisjoint(node.free_symbols)
         switch = None
-        if isinstance(node, sympy.floor) and not timed and not self._moving.isdisjoint(_between_steps(node.args[0])):
+        if isinstance(node, sympy.floor) and not timed and not self._moving.isdisjoint(between_steps(node.args[0])):
             switch = len(self.switches)
             self._add_switch((arguments[0] - place) * (place + 1.0 - arguments[0]), f"{node} = n", node.args[0])
         self.held.append(Held(arguments, HELD[node.func], timed, switch))
@@ -237,12 +237,6 @@ class Translator:
             return heyoka.select(beyond, choose(middle + 1, last), choose(first, middle))
 
         return choose(0, len(xs))
-
-
-def _between_steps(expression: sympy.Expr) -> set[sympy.Symbol]:
-    """The symbols that an expression depends on while nothing in it steps."""
-    held: dict[sympy.Expr, sympy.Expr] = dict.fromkeys(expression.atoms(*HELD), sympy.S.Zero)
-    return set(expression.xreplace(held).free_symbols)
 
 
 def _whole_power(base: Any, exponent: int) -> Any:

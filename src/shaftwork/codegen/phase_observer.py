@@ -83,11 +83,16 @@ class PhaseObserver:
     """Recovers every quantity from all that is stored, in each phase by its own equations.
 
     Args:
-        stretches: the phases.
+        names: of all that is stored.
+        stretches: makes the phases when a quantity is first read.
     """
 
-    def __init__(self, stretches: Stretches) -> None:
-        self._stretches = stretches
+    def __init__(self, names: tuple[str, ...], stretches: Callable[[], Stretches]) -> None:
+        self._names, self._make = names, stretches
+
+    @property
+    def _stretches(self) -> Stretches:
+        return self._make()
 
     @property
     def _first(self) -> ModelObserver:
@@ -136,7 +141,7 @@ class PhaseObserver:
         return made
 
     def _pieces(self, t: Array, x: Array) -> Iterator[tuple[ModelObserver, Index, Array, Array]]:
-        names = self._stretches.names
+        names = self._names
         for stretches, places in self._stretches.groups(t):
             first = stretches[0]
             columns = [names.index(state) for state in first.states]

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -44,6 +45,14 @@ class Stores:
     def _columns(self) -> list[int]:
         return [self._states.index(name) if name in self._states else -1 for name in self.names]
 
+    @cached_property
+    def by_loops(self) -> bool:
+        """Whether all stores follow from the states by loops alone, whatever the laws are."""
+        missing = [self._branches[name] for name, column in zip(self.names, self._columns, strict=True) if column < 0]
+        sources = {*self._form.across_inputs, *self._form.tree_conductances}  # only asked for membership
+        across = set(self._form.dependent_across)
+        return all(k in across and sources.isdisjoint(self._form.tree.loops[k]) for k in missing)
+
     def of(self, bind: Callable[[], BoundArrays], t: Array, x: Array) -> Array:
         """(k, stores) all that is stored, in the order of `names`, at times (k,) and states (k, n).
 
@@ -51,7 +60,20 @@ class Stores:
         """
         if -1 not in self._columns:
             return x[:, self._columns]
-        history, columns = History(bind(), t, x), []
+        return self._by_loops(bind().part.loops, x) if self.by_loops else self._recovered(bind(), t, x)
+
+    def _by_loops(self, loops: Any, x: Array) -> Array:
+        across = list(self._form.across_states)
+        other = [self._branches[name] for name, column in zip(self.names, self._columns, strict=True) if column < 0]
+        follow = x[:, : len(across)] @ loops[across][:, other].toarray()
+        made = np.empty((len(x), len(self.names)))
+        known = np.array(self._columns) >= 0
+        made[:, known] = x[:, [column for column in self._columns if column >= 0]]
+        made[:, ~known] = follow
+        return made
+
+    def _recovered(self, bound: BoundArrays, t: Array, x: Array) -> Array:
+        history, columns = History(bound, t, x), []
         for name, column in zip(self.names, self._columns, strict=True):
             if column >= 0:
                 columns.append(x[:, column])

@@ -140,9 +140,7 @@ class BucketWheelLoad(Component):
 
 def _resistance(number: Expr, p: Any) -> Expr:
     """The specific resistance of a bucket pass."""
-    if p.k_std == 0:
-        return p.k_mean
-    return p.k_mean + p.k_std * HeldNoise(number, p.seed, -p.k_mean / p.k_std)
+    return Max(0, p.k_mean + p.k_std * HeldNoise(number, p.seed))
 
 
 def _profile(angle: Expr, number: int, p: Any) -> Expr:

@@ -84,8 +84,8 @@ def _flux(f: Expr, p: Any) -> Expr:
 
 
 @component
-class DriveEnvelope(Component):
-    """The torque that a frequency drive can give at each speed, when it always leads the motor to its pull-out point.
+class PullOutDrive(Component):
+    """A frequency drive that always leads its motor to the pull-out point, as a curve over speed.
 
     Law: with the motor's speed n and n_k = n_sync (1 - s_k) it is tau_k for n < n_k, then Kloss' formula; with an
     overspeed x it is tau_k (n_k / n)^2 from n_k to x n_k, then Kloss' formula at x times the rated frequency, with the
@@ -110,7 +110,7 @@ class DriveEnvelope(Component):
         refuse_no_time_on(self)
         if (number_of(self, "s_k") or 0.0) >= 1:
             raise ParameterError(
-                f"DriveEnvelope '{self.name}': s_k = {self.s_k} must be below 1, or the motor pulls out at standstill. "
+                f"PullOutDrive '{self.name}': s_k = {self.s_k} must be below 1, or the motor pulls out at standstill. "
                 "Take a FrequencyDrive."
             )
 

@@ -65,7 +65,7 @@ class InductionMachine(Component):
         yield AcrossLaw(switched, (supplied, None), f"u_{axis}")
         yield ThroughLaw(ACROSS / (PHASES * p.R_s), (supplied, stator), f"R_{axis}")
         yield AcrossLaw(PHASES * emf, (moved, None), f"u_r_{axis}")
-        yield ThroughLaw(ACROSS / (PHASES * p.R_r), (moved, rotor), f"Rr_{axis}")
+        yield ThroughLaw(ACROSS / (PHASES * p.R_r), (moved, rotor), f"R_r_{axis}")
         yield ThroughStore(1 / (PHASES * p.L_r_sigma), (rotor, gap), f"i_r_{axis}")
         yield ThroughStore(1 / (PHASES * p.L_s_sigma), (stator, gap), f"i_{axis}")
         yield ThroughStore(1 / (PHASES * p.L_m), (gap, None), f"i_m_{axis}")

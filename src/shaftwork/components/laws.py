@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from sympy.core.relational import Relational
 
 from shaftwork.components import noise
-from shaftwork.components.noise import HeldNoise, SmoothNoise
+from shaftwork.components.branches import ACROSS, INTEGRAL, readings_in
+from shaftwork.components.noise import SmoothNoise
 from shaftwork.core.errors import ParameterError
 
 t = sympy.Symbol("t", real=True)
@@ -275,9 +276,12 @@ def breakpoints(expression: sympy.Basic, values: Mapping[sympy.Symbol, float] | 
 
 
 def switches(expression: sympy.Basic) -> Iterator[tuple[sympy.Expr, Sequence[float]]]:
-    """Every argument in an expression with the levels at which it makes the expression jump or bend."""
+    """Every argument in an expression with the levels at which it makes the expression jump or bend.
+
+    One that is constant but for steps of `floor` passes its levels there alone, and is left out.
+    """
     for node in sympy.preorder_traversal(expression):
-        yield from _switches(node)
+        yield from ((argument, levels) for argument, levels in _switches(node) if not _only_steps(argument))
 
 
 def pieces_degree(expression: sympy.Expr) -> int | None:
@@ -293,8 +297,8 @@ def _degree(expression: sympy.Expr) -> float:
     """Degree in t between breakpoints; infinite where the expression is no polynomial there."""
     if t not in expression.free_symbols:
         return 0
-    if isinstance(expression, sympy.floor):
-        return 0 if line(expression.args[0]) is not None else math.inf
+    if t not in between_steps(expression):
+        return 0 if all(line(step.args[0]) is not None for step in expression.atoms(sympy.floor)) else math.inf
     if any(line(argument) is None for argument, _ in _switches(expression)):
         return math.inf
     match expression:
@@ -312,8 +316,6 @@ def _degree(expression: sympy.Expr) -> float:
             return max(_degree(value) for value, _ in expression.args) if located else math.inf
         case sympy.Heaviside() | sympy.sign() | InterpolationSlope():
             return 0
-        case HeldNoise():
-            return 0 if _degree(expression.args[0]) == 0 else math.inf
         case sympy.Abs() | Interpolation():
             return 1
     return math.inf
@@ -340,6 +342,20 @@ def _switches(node: sympy.Basic) -> Iterable[tuple[sympy.Expr, Sequence[float]]]
             # a sine changes sign at every whole number, and no list of levels would have an end
             return [(sympy.sin(sympy.pi * node.args[0]), (0.0,))]
     return []
+
+
+def between_steps(expression: sympy.Expr) -> set[sympy.Symbol]:
+    """The symbols on which an expression depends while none of its floors steps."""
+    floors: dict[sympy.Expr, sympy.Expr] = {step: sympy.Dummy() for step in expression.atoms(sympy.floor)}
+    return set(expression.xreplace(floors).free_symbols.difference(floors.values()))
+
+
+def _only_steps(argument: sympy.Expr) -> bool:
+    """Whether an argument is constant but for the steps of its floors."""
+    if not argument.has(sympy.floor):
+        return False
+    moving = (*SYMBOLS, ACROSS, INTEGRAL, *readings_in(argument))
+    return between_steps(argument).isdisjoint(moving)
 
 
 def line(expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr] | None:

@@ -264,8 +264,5 @@ class RandomLoad(Component):
 
     @staticmethod
     def _size(p: Any) -> Expr:
-        if p.std == 0:
-            return p.mean
-        if p.kind is NoiseKind.HELD:
-            return p.mean + p.std * HeldNoise(t / p.interval, p.seed, -p.mean / p.std)
-        return Max(0, p.mean + p.std * SmoothNoise(t / p.interval, p.seed))
+        noise = HeldNoise if p.kind is NoiseKind.HELD else SmoothNoise
+        return Max(0, p.mean + p.std * noise(t / p.interval, p.seed))

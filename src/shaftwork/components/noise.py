@@ -50,10 +50,10 @@ def normal(number: int, seed: float) -> float:
     return _STANDARD.inv_cdf(((_mixed(start + number * _GAMMA & _LAST) >> 11) + 0.5) / 2**53)
 
 
-def held(x: Any, seed: Any, least: Any = -math.inf) -> Any:
+def held(x: Any, seed: Any) -> Any:
     """Value of `HeldNoise`, a number or an array of numbers; NaN where x has no whole number below it."""
     if isinstance(x, int | float) and isinstance(seed, int | float):
-        return max(normal(math.floor(x), float(seed)), least) if math.isfinite(x) else math.nan
+        return normal(math.floor(x), float(seed)) if math.isfinite(x) else math.nan
     x, seed = np.broadcast_arrays(np.floor(x), np.asarray(seed, dtype=float))
     values = np.full(x.shape, math.nan)
     for one in np.unique(seed).tolist():
@@ -61,7 +61,7 @@ def held(x: Any, seed: Any, least: Any = -math.inf) -> Any:
         numbers, places = np.unique(x[asked], return_inverse=True)
         found = np.array([normal(int(number), one) for number in numbers.tolist()])
         values[asked] = found[places.reshape(-1)] if found.size else values[asked]
-    return np.maximum(values, least)
+    return values
 
 
 def smooth(x: Any, seed: Any, order: Any = 0) -> Any:
@@ -113,7 +113,7 @@ def _piece(order: int) -> Callable[..., Any]:
 class HeldNoise(sympy.Function):  # type: ignore[misc]
     """Noise that is held from one whole number to the next: the standard normal number that x has reached.
 
-    Law: number floor(x) of the standard normal numbers of a seed; with a third argument at least that.
+    Law: number floor(x) of the standard normal numbers of a seed.
 
     `22.4 + 10 * sw.HeldNoise(sw.t / 0.05, 1)` changes every 0.05 s, with mean 22.4 and standard deviation 10. The
     argument may also be an angle over a pitch. Its derivative is zero.
@@ -121,19 +121,18 @@ class HeldNoise(sympy.Function):  # type: ignore[misc]
     Args:
         x: the argument, an expression.
         seed: any number; other seeds give independent noise.
-        least: values below it are replaced by it.
     """
 
-    nargs = (2, 3)
+    nargs = 2
     # lambdify finds the numerical function of a sympy function under this name
     _imp_ = staticmethod(held)
 
     @classmethod
-    def eval(cls, x: sympy.Expr, seed: sympy.Expr, *least: sympy.Expr) -> sympy.Expr | None:
-        if x.is_number and seed.is_number and all(bound.is_number for bound in least):
-            return sympy.Float(held(float(x), float(seed), *map(float, least)))
+    def eval(cls, x: sympy.Expr, seed: sympy.Expr) -> sympy.Expr | None:
+        if x.is_number and seed.is_number:
+            return sympy.Float(held(float(x), float(seed)))
         # so all that makes a law switch at whole numbers is its floors
-        return None if _is_whole(x) else cls(sympy.floor(x), seed, *least)
+        return None if _is_whole(x) else cls(sympy.floor(x), seed)
 
     def _eval_is_extended_real(self) -> bool:
         return True
@@ -200,7 +199,6 @@ NUMERICAL = {"HeldNoise": held, "SmoothNoise": smooth}
 
 def _latex(letter: str, node: sympy.Function, printer: Any, exponent: str | None) -> str:
     # the public doprint would open a new formula inside the formula
-    x, seed, *least = (printer._print(argument) for argument in node.args)  # noqa: SLF001
-    value = rf"{letter}_{{{seed}}}\left({x}\right)"
-    made = rf"\max\left({value},\, {least[0]}\right)" if least else value
+    x, seed = (printer._print(argument) for argument in node.args)  # noqa: SLF001
+    made = rf"{letter}_{{{seed}}}\left({x}\right)"
     return made if exponent is None else rf"\left({made}\right)^{{{exponent}}}"

@@ -48,6 +48,14 @@ ENGINES: dict[str, EngineEntry] = {
     "sundials": EngineEntry(
         "shaftwork.integrate.sundials:solve", "stiff systems", "sksundae", "scikit-sundae", "stiff"
     ),
+    "sundials-adams": EngineEntry(
+        "shaftwork.integrate.sundials:solve",
+        "smooth motion that is not stiff",
+        "sksundae",
+        "scikit-sundae",
+        "stiff",
+        (("method", "Adams"),),
+    ),
     "scipy": EngineEntry("shaftwork.integrate.scipy_ivp:solve", "everything that is not stiff"),
     "scipy-radau": EngineEntry("shaftwork.integrate.scipy_ivp:solve", "stiff systems", options=(("method", "Radau"),)),
     "banded": EngineEntry("shaftwork.integrate.banded:solve", "long chains, linear or stiff"),
@@ -69,7 +77,7 @@ STABLE, TRANSIENT_STEPS, STEPS_PER_RADIAN = 5.0, 300.0, 20.0
 
 
 # Of these no run is so long that the rounding of speeds spoils torques: the stiffness bounds their steps.
-EXPLICIT = ("heyoka", "scipy")
+EXPLICIT = ("heyoka", "scipy", "sundials-adams")
 
 
 def choose(problem: Problem) -> tuple[str, str]:
@@ -99,6 +107,11 @@ def choose(problem: Problem) -> tuple[str, str]:
         return "heyoka", "The system is not stiff and its equations are compiled, so Taylor series are the fastest."
     reason = "heyoka cannot compile its equations" if ENGINES["heyoka"].installed else "heyoka is not installed"
     return "scipy", f"The system is not stiff and {reason}, so scipy's DOP853 is taken."
+
+
+def is_stiff(problem: Problem) -> bool:
+    """Whether an implicit engine costs less than an explicit one that is not compiled."""
+    return _stiff(problem, compiled=False) is not None
 
 
 def available(name: str) -> bool:
@@ -133,7 +146,11 @@ def solve(
     name, reason = choose(problem) if engine == "auto" else (engine, f"The engine {engine!r} was asked for.")
     if name != "heyoka" or not (fallback or engine == "auto"):
         trajectory = load(name)(problem)
-        if name not in EXPLICIT and trajectory.t.size and (lost := rounding(problem, trajectory.t, trajectory.x)) is not None:
+        if (
+            name not in EXPLICIT
+            and trajectory.t.size
+            and (lost := rounding(problem, trajectory.t, trajectory.x)) is not None
+        ):
             warnings.warn(lost, AccuracyWarning, stacklevel=4)
         return trajectory, name, why or reason
     run = load(name)

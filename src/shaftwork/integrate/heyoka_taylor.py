@@ -77,6 +77,8 @@ class _Run:
         self.steps = 0
         self.met: int | None = None
         """The guard that ended the run."""
+        self.reactions = 0
+        """Guards met before, past which it went on."""
 
     def piece(self, piece: Piece, advance: Advance) -> None:
         """Bring the run to the end of a piece; `advance` records what it passes."""
@@ -90,10 +92,8 @@ class _Run:
         integrator.pars[:used] = self.parameters[:used]
         integrator.reset_cooldowns() if integrator.with_events else None
         if self.problem.guards is not None:
-            guards, first = self.problem.guards, self.parameters.size + len(self.program.switches)
-            # where a value is exactly zero at the start of a step, heyoka finds none of its later zeros in that step
-            integrator.pars[first:] = np.concatenate([guards.sides, np.maximum(guards.offsets, NOTHING)])
-        watch = self._watch(piece) if self.program.switches else None
+            self._guard(self.problem.guards.sides, self.problem.guards.offsets)
+        watch = self._watch(piece)
         longest = self._first_step(piece)
         while True:
             left = self.problem.max_steps - self.steps
@@ -105,6 +105,8 @@ class _Run:
             if outcome == "cb_stop" and watch is not None and watch.reason is None:
                 settle(self.program, integrator, piece.end - piece.start)
                 continue
+            if outcome == GUARD and self._reacts(raw):
+                continue
             break
         if outcome == GUARD:
             self.met = self.program.guard_met(raw)
@@ -113,6 +115,27 @@ class _Run:
         self.state = integrator.state.copy()
         if not np.isfinite(self.state).all():
             raise self._failure(piece, "err_nf_state", watch)
+
+    def _guard(self, sides: Array, offsets: Array) -> None:
+        """Watch the guards from here on."""
+        first = self.program.parameter_count + len(self.program.switches)
+        # where a value is exactly zero at the start of a step, heyoka finds none of its later zeros in that step
+        self.integrator.pars[first:] = np.concatenate([sides, np.maximum(offsets, NOTHING)])
+
+    def _reacts(self, raw: Any) -> bool:
+        """Whether the run goes on past the guard that it has met."""
+        if self.problem.react is None:
+            return False
+        integrator = self.integrator
+        met = self.program.guard_met(raw)
+        reaction = self.problem.react(self.reactions, met, integrator.time, integrator.state.copy())
+        if reaction is None:
+            return False
+        self.reactions += 1
+        integrator.pars[: reaction.p.size] = reaction.p
+        self._guard(reaction.sides, reaction.offsets)
+        integrator.reset_cooldowns()
+        return True
 
     def _first_step(self, piece: Piece) -> float:
         """Longest first step in s, infinite where heyoka's own choice is good.
@@ -146,11 +169,17 @@ class _Run:
             defect = elapsed * np.abs(self.problem.rhs(piece.inside(start + elapsed), state) - slope)
         return bool((defect <= FIRST_DEFECT * (np.abs(state) + elapsed * np.abs(slope)) + self.problem.atol).all())
 
-    def _watch(self, piece: Piece) -> Watch:
-        first = self.parameters.size
-        self.integrator.pars[first : first + len(self.program.switches)] = 0.0
-        settle(self.program, self.integrator, piece.end - piece.start)
-        return Watch(self.program, piece.start, self.problem.t_end - self.problem.t0)
+    def _watch(self, piece: Piece) -> Watch | None:
+        """Set the signs of the switches; what has to look after them, where the motion may change them."""
+        program = self.program
+        if not program.switches:
+            return None
+        first = program.parameter_count
+        self.integrator.pars[first : first + len(program.switches)] = 0.0
+        settle(program, self.integrator, piece.end - piece.start)
+        if program.timed.all():
+            return None
+        return Watch(program, piece.start, self.problem.t_end - self.problem.t0)
 
     def _failure(self, piece: Piece, outcome: str, watch: Watch | None) -> SimulationError:
         time, state = self._last_good(piece, watch)

@@ -46,6 +46,21 @@ class Guards:
 
 
 @dataclass(frozen=True)
+class Reaction:
+    """How a run goes on past a guard in the same equations.
+
+    Args:
+        p: (p,) parameters from there on.
+        sides: of the guards.
+        offsets: of the guards.
+    """
+
+    p: Array
+    sides: Array
+    offsets: Array
+
+
+@dataclass(frozen=True)
 class Problem:
     """An initial value problem x' = rhs(t, x) on [t0, t_end], smooth between its breakpoints.
 
@@ -67,6 +82,8 @@ class Problem:
             (`Crossings`), or finds it by its own means.
         guards: what ends the run before `t_end`, or None where nothing does. An engine then returns what it has, up to
             the time at which the first guard is met, located as exactly as its solution allows; see `Trajectory.met`.
+        react: from the number of guards met so far, the guard, the time in s and the state (n,) to how the run goes on
+            in the same equations with the same state, or None where it must end. Only engines that gain by it ask.
         t_eval: strictly increasing output times in [t0, t_end], or None for the engine's own steps. At a breakpoint the
             state after the jump is the output.
         linear: the same system in linear form, where it is one and its input is, between breakpoints, a polynomial of
@@ -90,6 +107,7 @@ class Problem:
     sides: Callable[[float], tuple[float, float]] = around
     switches: Callable[[Array, Array], Array] | None = None
     guards: Guards | None = None
+    react: Callable[[int, int, float, Array], Reaction | None] | None = None
     t_eval: Array | None = None
     linear: LinearInputs | None = None
     driven: LinearInputs | None = None

@@ -16,7 +16,7 @@ WRONG_SIDE = 1e-9
 EARLY = (1e-4, 1e-2, 1e-1)
 
 # Where in a step the sides of the switches are looked at: at no regular places, which a wave might share.
-INSIDE = np.array([0.07, 0.19, 0.31, 0.42, 0.53, 0.61, 0.74, 0.83, 0.91])
+INSIDE = np.array([0.07, 0.19, 0.31, 0.42, 0.53, 0.61, 0.74, 0.83, 0.91, 1.0])
 
 
 def settle(program: Any, integrator: Any, horizon: float) -> None:
@@ -71,7 +71,8 @@ def keeps_sides(program: Any, integrator: Any, parameters: Array, start: float) 
     """Whether every switch stays on its side up to the end of the last step, which an event would have ended.
 
     heyoka looks for events in the series of the switches. Where that shows nothing in its last two terms, as that of
-    sin(t^2) does, the step is too long for it.
+    sin(t^2) does, the step is too long for it. Nor does it find any in a series that starts with a double zero, as that
+    of an angle from rest does.
 
     Args:
         program: a `codegen.heyoka.HeyokaProgram`.
@@ -79,7 +80,7 @@ def keeps_sides(program: Any, integrator: Any, parameters: Array, start: float) 
         parameters: all parameters before the step, the signs included.
         start: of the step, s.
     """
-    if not program.switches:
+    if program.timed.all():
         return True
     signs = parameters[program.parameter_count :][: len(program.switches)]
     times = start + INSIDE * (integrator.time - start)

@@ -74,7 +74,7 @@ FUNCTIONS: dict[str, Function] = {
     "Max": Function(sympy.Max, 1, MAXIMUM_EXTREMA, lambda *values: max(values)),
     "Min": Function(sympy.Min, 1, MAXIMUM_EXTREMA, lambda *values: min(values)),
     "floor": Function(sympy.floor, 1, 1, math.floor),
-    "HeldNoise": Function(noise.HeldNoise, 2, 3, noise.held),
+    "HeldNoise": Function(noise.HeldNoise, 2, 2, noise.held),
     "SmoothNoise": Function(noise.SmoothNoise, 2, 2, noise.smooth),
 }
 """The functions of values; Piecewise and Table have forms of their own."""

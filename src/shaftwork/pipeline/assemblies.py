@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,7 +13,7 @@ from scipy import sparse
 from sympy import Expr, Integer, Piecewise, Symbol, sympify
 
 from shaftwork.codegen.arrays import BoundArrays
-from shaftwork.codegen.code import vectorised_list
+from shaftwork.codegen.code import scalar, vectorised_list
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.stores import Stores
 from shaftwork.codegen.timeline import Timeline
@@ -36,6 +37,7 @@ SAMPLES = 64
 
 ModeNames = tuple[str, ...]
 """The mode of every element of a network, in their order."""
+Motion = Callable[[float, list[float]], tuple[list[float], list[float]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +105,8 @@ class Assembly:
                     self._watched[number, mode.name] = tuple(self._leaves(readings, part, element.modes, mode))
         self._prepared: dict[bytes, Prepared] = {}
         self._across: dict[int, Callable[..., Any]] = {}
+        self._sides: dict[ModeNames, Array] = {}
+        self._ends: dict[ModeNames, tuple[tuple[int, Watched], ...]] = {}
         self._guards: dict[bytes, Callable[[Array, Array], Array]] = {}
 
     def _leaves(self, readings: Readings, part: GraphPart, modes: Modes, mode: Mode) -> Iterator[Watched]:
@@ -116,11 +120,12 @@ class Assembly:
                 self._expressions.append(when)
                 yield Watched(len(self._expressions) - 1, 1.0, leave)
 
-    def watched(self, modes: ModeNames) -> Iterator[tuple[int, Watched]]:
+    def watched(self, modes: ModeNames) -> tuple[tuple[int, Watched], ...]:
         """Element and guard of everything that may end one of the modes."""
-        for number, name in enumerate(modes):
-            for made in self._watched[number, name]:
-                yield number, made
+        if modes not in self._ends:
+            pairs = ((number, made) for number, name in enumerate(modes) for made in self._watched[number, name])
+            self._ends[modes] = tuple(pairs)
+        return self._ends[modes]
 
     @cached_property
     def clocks(self) -> tuple[int, ...]:
@@ -205,7 +210,9 @@ class Assembly:
         made = self._readings.guard(self._parts[element.part.name], element.modes, sympify(expression))
         return float(made.xreplace({s: p[self._places[s.name]] for s in made.free_symbols}))
 
-    def problem(self, p: Array, modes: ModeNames, x: Array, span: tuple[float, float], times: Timeline) -> Problem:
+    def problem(
+        self, p: Array, modes: ModeNames, x: Array, bands: Sequence[float], span: tuple[float, float], times: Timeline
+    ) -> Problem:
         """The motion of a phase, before it is known where it ends; tolerances are for rtol = 1.
 
         Its states are those of the model and, behind them, the integrals of the guards in `clocks`.
@@ -213,7 +220,7 @@ class Assembly:
         prepared, guards = self.prepared(p), self.guards(p)
         clocks, size = list(self.clocks), x.size
         sides = self.sides(modes)
-        watch = Guards(guards if not clocks else lambda t, y: guards(t, y[:, :size]), sides, np.zeros_like(sides))
+        watch = Guards(guards if not clocks else lambda t, y: guards(t, y[:, :size]), sides, np.array(bands))
         switching = self.model.arrays.inputs.switching
         rhs, jacobian, switches = prepared.rhs, prepared.jacobian, lambda t, y: prepared.bound.switches(t, y[:, :size])
         if clocks:
@@ -254,10 +261,37 @@ class Assembly:
 
     def sides(self, modes: ModeNames) -> Array:
         """(guards,) the side of each guard that ends one of the modes."""
-        sides = np.zeros(len(self._expressions))
-        for _, made in self.watched(modes):
-            sides[made.guard] = made.side
-        return sides
+        if modes not in self._sides:
+            sides = np.zeros(len(self._expressions))
+            for _, made in self.watched(modes):
+                sides[made.guard] = made.side
+            self._sides[modes] = sides
+        return self._sides[modes]
+
+    def motion(self, p: Array) -> Motion:
+        """Rates and guards together, from a time in s and a list of states: in plain floats, for a single instant."""
+        function, values, sizes = self._scalar, p.tolist(), (len(self._rows.states), len(self._expressions))
+
+        def made(t: float, x: list[float]) -> tuple[list[float], list[float]]:
+            try:
+                found = function(t, x, values)
+            except (ArithmeticError, ValueError):
+                return [math.nan] * sizes[0], [math.nan] * sizes[1]
+            return found[: sizes[0]], found[sizes[0] :]
+
+        return made
+
+    @cached_property
+    def _scalar(self) -> Callable[..., list[float]]:
+        rows = self._rows
+        symbols = {symbol: Symbol(f"x{k}", real=True) for k, symbol in enumerate(rows.states)}
+        symbols |= {symbol: Symbol(f"p{k}", real=True) for k, symbol in enumerate(rows.parameters)}
+        made = [expression.xreplace(symbols) for expression in (*rows.rates, *self._expressions)]
+        return scalar([TIME, [symbols[s] for s in rows.states], [symbols[s] for s in rows.parameters]], made)
+
+    def sizes(self, p: Array) -> list[float]:
+        """The nominal size of each state."""
+        return self.prepared(p).atol.tolist()  # type: ignore[no-any-return]
 
     @cached_property
     def program(self) -> Any:

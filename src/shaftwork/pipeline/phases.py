@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from shaftwork.codegen.timeline import Timeline
 from shaftwork.components.modes import Choice
 from shaftwork.core.errors import NetworkError, ParameterError, SimulationError
 from shaftwork.integrate import choice
-from shaftwork.integrate.problem import Problem, Trajectory
+from shaftwork.integrate.problem import Problem, Reaction, Trajectory
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import watched_by
 from shaftwork.pipeline.assemblies import Assembly, ModeNames, elements_of
@@ -32,8 +33,16 @@ if TYPE_CHECKING:
 
 # So many changes of mode, each within this part of the run of the one before, are chatter.
 CHATTER_EVENTS, CHATTER_SPAN = 200, 1e-9
-# Engines that follow guards.
-FOLLOWING = ("heyoka", "scipy", "scipy-radau", "sundials")
+# Engines that follow guards. An error grows with every change of mode, by some hundreds on the way through sixty
+# contacts, so they run with this part of the tolerance that is asked for, and with no looser one than the second number.
+FOLLOWING = {
+    "heyoka": (1.0, 1.0),
+    "scipy": (1 / 30, 1e-7),
+    "scipy-radau": (1 / 30, 1e-7),
+    "sundials": (1 / 300, 1e-8),
+    "sundials-adams": (1 / 100, 1e-8),
+}
+TIGHTEST_RTOL = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,16 +52,27 @@ class Phase:
     Args:
         start: s.
         modes: of every element.
-        assembly: the equations.
-        p: their parameters.
-        trajectory: the motion, in the states of these equations and their clocks.
+        p: parameters of the equations.
     """
 
     start: float
     modes: ModeNames
-    assembly: Assembly
     p: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Span:
+    """One run of an engine: phases in the same equations.
+
+    Args:
+        assembly: the equations.
+        trajectory: the motion, in the states of these equations and their clocks.
+        phases: at least one.
+    """
+
+    assembly: Assembly
     trajectory: Trajectory
+    phases: tuple[Phase, ...]
 
 
 @dataclass(frozen=True)
@@ -124,11 +144,12 @@ class Phases:
                     f"The engine '{asked}' follows no parts that change their mode "
                     f"({', '.join(element.name for element in self.elements)}). Take one of: {', '.join(FOLLOWING)}."
                 )
+            if asked == "sundials" and not choice.is_stiff(problem):
+                return "sundials-adams", "asked for; the motion is not stiff, so Adams' formulas are taken."
             return asked, "asked for"
         if assembly not in self._engines:
             name, why = choice.choose(problem)
-            known = name if name in FOLLOWING else "scipy"
-            self._engines[assembly] = known, why
+            self._engines[assembly] = name, why
         return self._engines[assembly]
 
 
@@ -144,26 +165,20 @@ class Run:
     def __init__(self, phases: Phases, values: Mapping[str, float], demand: Demand) -> None:
         self.phases, self.demand = phases, demand
         self.settling = Settling(phases, values, demand.span)
-        self.found: list[Phase] = []
+        self.spans: list[Span] = []
         self.changes: list[Change] = []
         self.engine, self.why, self.steps = "", "", 0
+        self._soon = 0
         self._timelines: dict[Assembly, Timeline] = {}
 
     def march(self, initial: Mapping[str, float] | None) -> None:
         """Go through all phases from the start values."""
-        start, end = self.demand.span
-        moment = self._start(initial)
-        moment = self._settle(start, moment, None)
-        t = before = start
-        short = 0
+        t, end = self.demand.span
+        moment = self._settle(t, self._start(initial), None)
         while t < end:
-            t, moment, met = self._phase(t, moment)
+            t, moment, met = self._span(t, moment)
             if t < end or met is not None:
                 moment = self._settle(t, moment, met)
-            short = short + 1 if t - before < CHATTER_SPAN * (end - start) and met is not None else 0
-            if short > CHATTER_EVENTS:
-                raise self._chatter(t)
-            before = t
 
     def _start(self, initial: Mapping[str, float] | None) -> Moment:
         """The states and modes at the start, before modes have settled."""
@@ -184,38 +199,56 @@ class Run:
     def _settle(self, t: float, moment: Moment, met: int | None) -> Moment:
         after = self.timeline(moment.assembly, moment.p).sides(t)[1]
         moment, changes = self.settling.settle(t, after, moment, met)
-        self.changes += changes
+        self.note(t, changes)
         return moment
 
-    def _phase(self, t: float, moment: Moment) -> tuple[float, Moment, int | None]:
-        """One phase, or what of it lies before the next instant at which an input jumps."""
+    def note(self, t: float, changes: list[Change]) -> None:
+        """Put down what has changed at a time.
+
+        Raises:
+            SimulationError: changes follow each other without time going on.
+        """
+        if not changes:
+            return
+        span = self.demand.span[1] - self.demand.span[0]
+        soon = bool(self.changes) and t - self.changes[-1].time < CHATTER_SPAN * span
+        self._soon = self._soon + 1 if soon else 0
+        self.changes += changes
+        if self._soon > CHATTER_EVENTS:
+            last = changes[-1]
+            raise SimulationError(
+                f"{type(last.element.part.component).__name__} '{last.element.name}' changes again and again between "
+                f"'{last.before}' and '{last.after}' at t = {t:.9g} s, {CHATTER_EVENTS} times without time going on. "
+                "Give it damping or its neighbours an inertia, or let it rest."
+            )
+
+    def _span(self, t: float, moment: Moment) -> tuple[float, Moment, int | None]:
+        """One run of the engine, up to a change of equations or the next instant at which an input jumps."""
         demand, assembly, times = self.demand, moment.assembly, self.timeline(moment.assembly, moment.p)
-        end = next((time for time in times.times if time > t), demand.span[1])
-        problem = assembly.problem(moment.p, moment.modes, moment.x, (t, min(end, demand.span[1])), times)
+        end = min(next((time for time in times.times if time > t), np.inf), demand.span[1])
+        problem = assembly.problem(moment.p, moment.modes, moment.x, moment.bands, (t, end), times)
         atol = demand.rtol * problem.atol
         if demand.atol is not None:
             atol[: moment.x.size] = demand.atol
+        passing = _Passing(self, moment, t)
         problem = replace(
             problem,
             rtol=demand.rtol,
             atol=atol,
-            t_eval=self._outputs(t, problem.t_end),
+            t_eval=self._outputs(t, end),
             max_steps=demand.max_steps - self.steps,
+            react=passing,
+            rhs=problem.rhs if demand.progress is None else watched_by(problem.rhs, demand.progress),
         )
-        if demand.progress is not None:
-            problem = replace(problem, rhs=watched_by(problem.rhs, demand.progress))
-        assert problem.guards is not None  # noqa: S101 (assemblies make them)
-        band = self.settling.band(moment, times.sides(t)[1])
-        problem = replace(problem, guards=replace(problem.guards, offsets=band))
         trajectory = self._solve(assembly, problem)
         self.steps += trajectory.statistics.get("steps", 0)
-        self.found.append(Phase(t, moment.modes, assembly, moment.p, trajectory))
+        self.spans.append(Span(assembly, trajectory, tuple(passing.phases)))
         assert trajectory.end is not None  # noqa: S101 (engines that follow guards say it)
         t, x = trajectory.end
         x = x[: moment.x.size]
         if trajectory.met is None and assembly.model.form.has_impulses:
             x = assembly.bound(moment.p).impulse(x, *times.sides(t))
-        return t, replace(moment, x=x), trajectory.met
+        return t, replace(passing.moment, x=x), trajectory.met
 
     def _outputs(self, t: float, end: float) -> Array | None:
         """The output times of a phase: an event belongs to the next one."""
@@ -229,18 +262,42 @@ class Run:
             made, _, _ = at_rest(problem)
             return replace(made, end=(problem.t_end, problem.x0))
         name, why = self.phases.engine(assembly, problem, self.demand.engine)
+        share, loosest = FOLLOWING[name]
+        tight = max(min(share * problem.rtol, loosest), min(problem.rtol, TIGHTEST_RTOL))
+        problem = replace(problem, rtol=tight, atol=problem.atol * (tight / problem.rtol))
         trajectory, name, why = choice.solve(problem, name, why, fallback=self.demand.engine == "auto")
         if not self.engine:
             self.engine, self.why = name, why
         return trajectory
 
-    def _chatter(self, t: float) -> SimulationError:
-        last = self.changes[-1]
-        return SimulationError(
-            f"{type(last.element.part.component).__name__} '{last.element.name}' changes again and again between "
-            f"'{last.before}' and '{last.after}' at t = {t:.9g} s, {CHATTER_EVENTS} times without time going on. "
-            "Give it damping or its neighbours an inertia, or let it rest."
-        )
+
+class _Passing:
+    """Lets an engine go on past guards that change a number in its equations only; `Problem.react`.
+
+    Args:
+        run: to which changes are told.
+        moment: at the start of the engine's run.
+        start: s.
+    """
+
+    def __init__(self, run: Run, moment: Moment, start: float) -> None:
+        self._run, self.moment = run, moment
+        self.phases = [Phase(start, moment.modes, moment.p)]
+        self._reactions: list[Reaction] = []
+
+    def __call__(self, number: int, met: int, t: float, x: Array) -> Reaction | None:
+        if number < len(self._reactions):  # the run is made once more, for its dense output
+            return self._reactions[number]
+        before = replace(self.moment, x=x[: self.moment.x.size])
+        moment, changes = self._run.settling.settle(t, t, before, met)
+        if moment.assembly is not before.assembly or any(change.rebound for change in changes):
+            return None
+        self._run.note(t, changes)
+        self.moment = moment
+        self.phases.append(Phase(t, moment.modes, moment.p))
+        reaction = Reaction(moment.p, moment.assembly.sides(moment.modes), np.array(moment.bands))
+        self._reactions.append(reaction)
+        return reaction
 
 
 def motion(
@@ -254,70 +311,75 @@ def motion(
 
 def solution(run: Run, name: str) -> Solution:
     """The motion as a whole, to be read."""
-    stretches = Stretches([_stretch(run, phase) for phase in run.found])
-    names = stretches.names
-    t = np.concatenate([phase.trajectory.t for phase in run.found])
-    x = np.concatenate(
-        [_stored(stretch, phase, names) for stretch, phase in zip(stretches.all, run.found, strict=True)]
-    )
-    events = tuple(_event(change) for change in run.changes if _is_event(change))
+    names = run.spans[0].assembly.stores.names
+    whole = _Whole(run)
     return Solution(
         name=name,
-        t=t,
-        x=x,
+        t=np.concatenate([span.trajectory.t for span in run.spans]),
+        x=np.concatenate([_stored(span, names) for span in run.spans]),
         states=names,
         engine=run.engine,
         why=run.why,
-        statistics={"steps": run.steps, "phases": len(run.found), "assemblies": len(run._timelines)},
-        dense=PhasedDense(stretches, tuple(phase.trajectory for phase in run.found)),
-        observer=PhaseObserver(stretches),
-        events=events,
+        statistics={"steps": run.steps, "changes": len(run.changes)},
+        dense=whole,
+        observer=PhaseObserver(names, whole.stretches),
+        events=tuple(_event(change) for change in run.changes if _is_event(change)),
         phases=_table(run),
     )
 
 
-def _stretch(run: Run, phase: Phase) -> Stretch:
-    assembly, p = phase.assembly, phase.p
-    states = assembly.model.states
-    size, dense = len(states), phase.trajectory.dense
-    instants = run.timeline(assembly, p)
+def _stored(span: Span, names: tuple[str, ...]) -> Array:
+    """(k, stores) all that is stored at the output times of a span."""
+    t, states = span.trajectory.t, span.trajectory.x[:, : len(span.assembly.model.states)]
+    if not t.size:
+        return np.empty((0, len(names)))
+    stores = span.assembly.stores
+    if stores.by_loops:
+        return stores.of(lambda: span.assembly.bound(span.phases[0].p), t, states)
+    starts = np.array([phase.start for phase in span.phases])
+    made = np.empty((t.size, len(names)))
+    index = np.clip(np.searchsorted(starts, t, side="right") - 1, 0, None)
+    for number in np.unique(index).tolist():
+        here = index == number
+        made[here] = stores.of(partial(span.assembly.bound, span.phases[number].p), t[here], states[here])
+    return made
+
+
+class _Whole:
+    """All that is stored at any time of a motion; what it needs is made when it is first asked."""
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+
+    @cache
+    def stretches(self) -> Stretches:
+        """The phases as they are read."""
+        return Stretches([_stretch(self._run, span, phase) for span in self._run.spans for phase in span.phases])
+
+    @property
+    def steps(self) -> Array:
+        """Ends of the integration steps; where an engine began anew the time is listed twice."""
+        return np.concatenate([span.trajectory.steps for span in self._run.spans])
+
+    def __call__(self, times: Array) -> Array:
+        return self.stretches().dense(times)
+
+
+def _stretch(run: Run, span: Span, phase: Phase) -> Stretch:
+    assembly, states = span.assembly, span.assembly.model.states
+    size, dense = len(states), span.trajectory.dense
+    instants = run.timeline(assembly, phase.p)
+    bind = partial(assembly.bound, phase.p)
     return Stretch(
         start=phase.start,
-        key=(id(assembly), p.tobytes()),
+        key=(id(assembly), phase.p.tobytes()),
         stores=assembly.stores,
-        bind=lambda: assembly.bound(p),
-        observer=ModelObserver(assembly.model.form, lambda: assembly.bound(p), instants),
+        bind=bind,
+        observer=ModelObserver(assembly.model.form, bind, instants),
         instants=instants,
         dense=lambda times: dense(times)[:, :size],
         states=states,
     )
-
-
-def _stored(stretch: Stretch, phase: Phase, names: tuple[str, ...]) -> Array:
-    trajectory = phase.trajectory
-    if not trajectory.t.size:
-        return np.empty((0, len(names)))
-    return stretch.stores.of(stretch.bind, trajectory.t, trajectory.x[:, : len(stretch.states)])
-
-
-class PhasedDense:
-    """All that is stored at any time of a motion.
-
-    Args:
-        stretches: its phases.
-        trajectories: of the phases.
-    """
-
-    def __init__(self, stretches: Stretches, trajectories: tuple[Trajectory, ...]) -> None:
-        self._stretches, self._trajectories = stretches, trajectories
-
-    @property
-    def steps(self) -> Array:
-        """Ends of the integration steps; the end of a phase is listed once more as the start of the next."""
-        return np.concatenate([trajectory.steps for trajectory in self._trajectories])
-
-    def __call__(self, times: Array) -> Array:
-        return self._stretches.dense(times)
 
 
 def _is_event(change: Change) -> bool:
@@ -334,13 +396,16 @@ def _event(change: Change) -> tuple[float, str, str, str]:
 def _table(run: Run) -> tuple[PhaseRow, ...]:
     """The phases in words: those that say the same are one."""
     rows: list[PhaseRow] = []
-    ends = [*(phase.start for phase in run.found[1:]), run.demand.span[1]]
-    for phase, end in zip(run.found, ends, strict=True):
-        pairs = zip(run.phases.elements, phase.modes, strict=True)
-        modes = {element.name: element.modes[name].words for element, name in pairs}
-        name = ", ".join(f"{part} {words}" for part, words in modes.items())
-        if rows and rows[-1].name == name:
+    phases = [phase for span in run.spans for phase in span.phases]
+    ends = [*(phase.start for phase in phases[1:]), run.demand.span[1]]
+    words: dict[ModeNames, dict[str, str]] = {}
+    for phase, end in zip(phases, ends, strict=True):
+        if phase.modes not in words:
+            pairs = zip(run.phases.elements, phase.modes, strict=True)
+            words[phase.modes] = {element.name: element.modes[name].words for element, name in pairs}
+        modes = words[phase.modes]
+        if rows and rows[-1].modes == modes:
             rows[-1] = replace(rows[-1], end=end)
         elif end > phase.start:
-            rows.append(PhaseRow(phase.start, end, name, modes))
+            rows.append(PhaseRow(phase.start, end, modes))
     return tuple(rows)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -15,6 +16,7 @@ from shaftwork.pipeline.assemblies import Assembly, Element, ModeNames, Watched
 if TYPE_CHECKING:
     from shaftwork.pipeline.phases import Phases
 
+EPS = float(np.finfo(float).eps)
 # A guard within so many rounding units of zero is on its limit, and only its further course tells its side.
 ROUNDINGS = 64.0
 # How far ahead that course is looked at: parts of the time in which a state moves by its nominal size, and of the run.
@@ -34,12 +36,13 @@ class Change:
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """Modes, their equations and parameters, and the states."""
+    """Modes, their equations and parameters, the states, and how far rounding moves each guard."""
 
     modes: ModeNames
     assembly: Assembly
     p: Array
     x: Array
+    bands: Sequence[float] = ()
 
 
 class Settling:
@@ -93,55 +96,59 @@ class Settling:
         """
         changes: list[Change] = []
         seen: dict[ModeNames, None] = {}
-        number, ended = self._first(moment, after, met)
-        while ended is not None:
-            moment, change = self._follow(t, after, moment, number, ended)
+        if met is None:
+            moment, found = self._violated(moment, after)
+        else:
+            found = next(pair for pair in moment.assembly.watched(moment.modes) if pair[1].guard == met)
+        while found is not None:
+            moment, change = self._follow(t, after, moment, *found)
             changes.append(change)
             if moment.modes in seen and not change.rebound:
                 raise self._endless(t, changes)
             seen[moment.modes] = None
-            number, ended = self._violated(moment, after)
+            moment, found = self._violated(moment, after)
         return moment, changes
 
-    def _first(self, moment: Moment, after: float, met: int | None) -> tuple[int, Watched | None]:
-        if met is not None:
-            for number, made in moment.assembly.watched(moment.modes):
-                if made.guard == met:
-                    return number, made
-        return self._violated(moment, after)
+    def _violated(self, moment: Moment, t: float) -> tuple[Moment, tuple[int, Watched] | None]:
+        """The guard that is farthest beyond its limit, or on it and about to go beyond; the moment with its bands."""
+        now, bands, ahead, unsure = self._course(moment, t)
+        moment = replace(moment, bands=bands)
+        worst, largest = None, 0.0
+        on_limit = []
+        for pair in moment.assembly.watched(moment.modes):
+            k, side = pair[1].guard, pair[1].side
+            value = side * now[k]
+            if value > bands[k]:
+                if value > largest:
+                    worst, largest = pair, value
+            elif value >= -bands[k]:
+                on_limit.append(pair)
+        if worst is None:
+            for pair in on_limit:
+                k, side = pair[1].guard, pair[1].side
+                value = side * ahead[k]
+                if value > max(unsure[k], largest):
+                    worst, largest = pair, value
+        return moment, worst
 
-    def _violated(self, moment: Moment, t: float) -> tuple[int, Watched | None]:
-        """The guard that is farthest beyond its limit, or on it and about to go beyond."""
-        watched = list(moment.assembly.watched(moment.modes))
-        if not watched:
-            return 0, None
-        columns, sides = [made.guard for _, made in watched], np.array([made.side for _, made in watched])
-        now, band, ahead = self._course(moment, t)[:, columns]
-        now, ahead = now * sides, ahead * sides
-        beyond = np.where(now > band, now, 0.0)
-        if not beyond.any():
-            beyond = np.where((np.abs(now) <= band) & (ahead > 2 * band), ahead, 0.0)
-        if not beyond.any():
-            return 0, None
-        return watched[int(np.argmax(beyond))]
-
-    def band(self, moment: Moment, t: float) -> Array:
-        """(guards,) how far rounding moves each guard: nearer to zero it has no side."""
-        return self._course(moment, t)[1]
-
-    def _course(self, moment: Moment, t: float) -> Array:
-        """(3, guards) the guards now, how far rounding of states and time moves them, and what they are soon after."""
-        assembly, x = moment.assembly, moment.x
-        guards, rhs = assembly.guards(moment.p), assembly.prepared(moment.p).rhs
-        ulp = ROUNDINGS * float(np.spacing(abs(t)))
-        moved = x * (1 + ROUNDINGS * np.finfo(float).eps * np.where(np.arange(x.size) % 2, 1.0, -1.0))
-        rate, other = (rhs(t, x), rhs(t, moved)) if x.size else (x, x)
-        with np.errstate(divide="ignore"):
-            step = min(self._ahead, AHEAD * float(np.min(assembly.prepared(moment.p).atol / np.abs(rate), initial=np.inf)))
-        times = np.array([t, t, t + ulp, t + step, t + step])
-        states = np.vstack([x, moved, x + ulp * rate, x + step * rate, moved + step * other])
-        now, near, later, ahead, beside = guards(times, states)
-        return np.array([now, np.abs(near - now) + np.abs(later - now) + np.abs(beside - ahead), ahead])
+    def _course(self, moment: Moment, t: float) -> tuple[list[float], list[float], list[float], list[float]]:
+        """The guards now, how far rounding of states and time moves them; what they are soon after, how surely."""
+        assembly, x = moment.assembly, moment.x.tolist()
+        motion = assembly.motion(moment.p)
+        ulp, tiny = ROUNDINGS * math.ulp(t), ROUNDINGS * EPS
+        rates, now = motion(t, x)
+        step = self._ahead
+        for rate, size in zip(rates, assembly.sizes(moment.p), strict=True):
+            if rate and AHEAD * size < step * abs(rate):
+                step = AHEAD * size / abs(rate)
+        moved = [v * (1 + tiny if k % 2 else 1 - tiny) for k, v in enumerate(x)]
+        others, near = motion(t, moved)
+        later = motion(t + ulp, [v + ulp * rate for v, rate in zip(x, rates, strict=True)])[1]
+        ahead = motion(t + step, [v + step * rate for v, rate in zip(x, rates, strict=True)])[1]
+        beside = motion(t + step, [v + step * rate for v, rate in zip(moved, others, strict=True)])[1]
+        bands = [abs(n - g) + abs(later[k] - g) for k, (n, g) in enumerate(zip(near, now, strict=True))]
+        unsure = [band + abs(b - a) for band, a, b in zip(bands, ahead, beside, strict=True)]
+        return now, bands, ahead, unsure
 
     def _follow(self, t: float, after: float, moment: Moment, number: int, ended: Watched) -> tuple[Moment, Change]:
         """The mode of an element changes, or what hits is thrown back."""

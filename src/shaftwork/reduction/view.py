@@ -56,6 +56,7 @@ class View:
                 self.cutsets[branch].append(link)
 
     def kind(self, branch: int) -> Kind:
+        """What the law of a branch is."""
         return self.graph.branches[branch].template.kind
 
     def is_controlled(self, branch: int) -> bool:
@@ -64,6 +65,7 @@ class View:
         return bool(template.reads) and not template.law.has(ACROSS)
 
     def parts(self, branches: Iterable[int]) -> tuple[str, ...]:
+        """Names of the parts that branches belong to."""
         return tuple(dict.fromkeys(self.graph.part_of(branch).name for branch in branches))
 
     def titles(self, branches: Iterable[int]) -> str:

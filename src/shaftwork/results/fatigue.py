@@ -110,11 +110,6 @@ def damage(cycles: Rainflow, sn: SNLine) -> Damage:
     Args:
         cycles: of a quantity.
         sn: the S-N line, in the unit of this quantity.
-
-    Raises:
-        ParameterError: `sn` is none.
     """
-    if not isinstance(sn, SNLine):
-        raise ParameterError(f"sn = {sn!r} must be an S-N line, such as SNLine(amplitude=300.0, cycles=1e6, slope=5).")
     with np.errstate(divide="ignore"):
         return Damage(cycles, sn, cycles.count / sn.borne(cycles.amplitude, cycles.mean))

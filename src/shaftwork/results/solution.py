@@ -7,13 +7,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
 from shaftwork.core.errors import MissingExtraError, SignalError
 from shaftwork.results.energy import EnergyBalance, energy_balance
+from shaftwork.results.fatigue import Damage, SNLine
+from shaftwork.results.life import damage_of, damages, load_cycles
 from shaftwork.results.observer import Array, Dense, Observer
+from shaftwork.results.rainflow import SMALLEST, Rainflow
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,14 +31,17 @@ class PhaseRow:
     Args:
         start: s.
         end: s.
-        name: in words, "gap open, brake locked".
-        modes: of every part that changes its mode.
+        modes: of every part that changes its mode, in words.
     """
 
     start: float
     end: float
-    name: str
     modes: Mapping[str, str]
+
+    @property
+    def name(self) -> str:
+        """In words, "gap open, brake locked"."""
+        return ", ".join(f"{part} {mode}" for part, mode in self.modes.items())
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,6 +159,48 @@ class Solution:
         from shaftwork.results.plotting import plot_signals
 
         return plot_signals(self, tuple(self._known(name) for name in names or self.states))
+
+    def rainflow(self, name: str, *, place: int | None = None, smallest: float = SMALLEST) -> Rainflow:
+        """The load cycles of a quantity, such as "shaft.tau", over the run (extra `life`).
+
+        Peaks and valleys are those of the motion, from the dense output, not of the output times.
+
+        Args:
+            name: of the quantity.
+            place: index in `places` of a quantity that is read along a part.
+            smallest: cycles up to this fraction of the whole range are left out.
+
+        Raises:
+            MissingExtraError: the package rainflow is not installed.
+            ParameterError: `smallest` is no fraction.
+            SignalError: there is no such quantity or place.
+        """
+        return load_cycles(self, name, place, smallest)
+
+    @overload
+    def damage(self, name: str, *, sn: SNLine, smallest: float = SMALLEST) -> Damage: ...
+
+    @overload
+    def damage(
+        self, name: None = None, *, sn: SNLine | Mapping[str, SNLine], smallest: float = SMALLEST
+    ) -> dict[str, Damage]: ...
+
+    def damage(
+        self, name: str | None = None, *, sn: SNLine | Mapping[str, SNLine], smallest: float = SMALLEST
+    ) -> Damage | dict[str, Damage]:
+        """What the motion takes from the life of a part, at the worst place of a long shaft (extra `life`).
+
+        Args:
+            name: of the quantity; by default the torques of all shafts and springs.
+            sn: the S-N line; without `name` one for all, or one by the name of each quantity.
+            smallest: as in `rainflow`.
+
+        Raises:
+            MissingExtraError: the package rainflow is not installed.
+            ParameterError: `sn` is no S-N line.
+            SignalError: there is no such quantity, or no shaft.
+        """
+        return damages(self, sn, smallest) if name is None else damage_of(self, name, sn, smallest)
 
     def _known(self, name: str) -> str:
         units = self.observer.units

@@ -13,15 +13,13 @@ from shaftwork.results.observer import Array
 Read = Callable[[Array], Array]
 """From ascending times (k,) to the values of a quantity there."""
 
-PANELS = 8
-"""Of one integration step, before they are halved."""
-HALVINGS = 8
+PANELS, SAMPLES = 4, 2000
+"""Of one integration step and of the whole run at least, before the panels are halved: an exact engine needs few steps."""
+HALVINGS = 9
 SETTLED = 0.01
 """The panels are halved until as many turning points are found as before and the way up and down is longer by less."""
-WITHIN = np.linspace(0.0, 1.0, 5)
-ROUNDS = 8
-"""The bracket of a turning point becomes a quarter as wide each time, 1e-5 of a panel in the end; its value is good to
-the square of this."""
+ROUNDS = 4
+"""Of parabolas through three values about an extreme; the bracket of a smooth one gets an eighth as wide each time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +43,8 @@ def turning_points(read: Read, steps: Array, *, smallest: float) -> TurningPoint
         steps: (s,) times between which it is smooth.
         smallest: changes up to this fraction of the whole range are no change; it keeps out the solver's noise.
     """
-    panels, found, way = PANELS, np.empty(0, dtype=np.intp), 0.0
+    panels = max(PANELS, SAMPLES // len(steps))
+    found, way = np.empty(0, dtype=np.intp), 0.0
     for _ in range(HALVINGS):
         t = _sampled(steps, panels)
         values = read(t)
@@ -70,7 +69,7 @@ def _sampled(steps: Array, panels: int) -> Array:
 
 
 def _turns(values: Array, smallest: float) -> NDArray[np.intp]:
-    """Indices of the first value and of all that follow it as peak or valley by more than `smallest`, the end included."""
+    """Indices of the first value and of every peak and valley after it that differ by more than `smallest`."""
     slopes = np.sign(np.diff(values))
     moving = np.flatnonzero(slopes)
     extremes = moving[1:][slopes[moving[1:]] != slopes[moving[:-1]]]
@@ -89,16 +88,34 @@ def _turns(values: Array, smallest: float) -> NDArray[np.intp]:
 
 def _refined(read: Read, t: Array, found: NDArray[np.intp], peaks: Array) -> tuple[Array, Array]:
     """Times and values of the extremes near samples, for peaks 1 and valleys -1; never lower than the sample itself."""
-    rows, middle = np.arange(len(found)), t[found]
-    low, high = t[found - 1], t[found + 1]
+    rows, sign = np.arange(len(found))[:, None], peaks[:, None]
+    beside = 2.0 * np.spacing(t[found])  # the two sides of a step's end are one instant
+    low = np.where(t[found] - t[found - 1] > beside, found - 1, found - 2)
+    high = np.where(t[found + 1] - t[found] > beside, found + 1, found + 2)
+    x = t[np.stack([np.maximum(low, 0), found, np.minimum(high, len(t) - 1)], axis=1)]
+    y = sign * _read_all(read, x)
     for _ in range(ROUNDS):
-        sides = middle - low, high - middle
-        times = np.hstack([low[:, None] + sides[0][:, None] * WITHIN, middle[:, None] + sides[1][:, None] * WITHIN[1:]])
-        values = _read_all(read, times)
-        best = np.argmax(peaks[:, None] * values, axis=1)
-        low, high = times[rows, np.maximum(best - 1, 0)], times[rows, np.minimum(best + 1, times.shape[1] - 1)]
-        middle = times[rows, best]
-    return middle, values[rows, best]
+        new = _closer(x, y)
+        x, y = np.hstack([x, new]), np.hstack([y, sign * _read_all(read, new)])
+        order = np.argsort(x, axis=1, kind="stable")
+        x, y = x[rows, order], y[rows, order]
+        near = np.clip(np.argmax(y, axis=1), 1, x.shape[1] - 2)[:, None] + np.array([-1, 0, 1])
+        x, y = x[rows, near], y[rows, near]
+    best = np.argmax(y, axis=1)[:, None]
+    return x[rows, best][:, 0], peaks * y[rows, best][:, 0]
+
+
+def _closer(x: Array, y: Array) -> Array:
+    """(k, 3) times to look at next: the vertex of the parabola, or the middle of the wider side, and about it."""
+    (left, right), (up, down) = np.diff(x).T, np.diff(y).T
+    bend = right * up - left * down
+    with np.errstate(divide="ignore", invalid="ignore"):
+        vertex = x[:, 1] + 0.5 * (right**2 * up + left**2 * down) / bend
+    inside = (bend > 0.0) & (vertex > x[:, 0]) & (vertex < x[:, 2])
+    wider = np.where(left > right, x[:, 1] - 0.5 * left, x[:, 1] + 0.5 * right)
+    centre = np.where(inside, vertex, wider)[:, None]
+    around = np.maximum(left, right)[:, None] * np.array([-0.125, 0.0, 0.125])
+    return np.asarray(np.clip(centre + around, x[:, :1], x[:, 2:]))
 
 
 def _read_all(read: Read, times: Array) -> Array:
