@@ -44,9 +44,11 @@ FAMILIES = (
     "translation",
     "sources",
     "loads",
+    "bucket_wheel",
     "machines",
     "motors",
     "drives",
+    "controllers",
     "induction_machine",
     "electrical",
 )
@@ -178,8 +180,8 @@ def component_pages() -> str:
     for name, cls in components().items():
         if cls.__module__ != family:
             family = cls.__module__
-            module = sys.modules[family]
-            texts.append(f"## {family.rpartition('.')[2].capitalize()}\n\n{(module.__doc__ or '').splitlines()[0]}\n")
+            module, heading = sys.modules[family], family.rpartition(".")[2].replace("_", " ").capitalize()
+            texts.append(f"## {heading}\n\n{(module.__doc__ or '').splitlines()[0]}\n")
         texts.append(f"### {name}\n\n{_described(cls)}")
     return "\n".join(texts)
 

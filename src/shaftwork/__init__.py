@@ -20,7 +20,9 @@ if TYPE_CHECKING:
         ThroughLaw,
         ThroughStore,
     )
+    from shaftwork.components.bucket_wheel import *
     from shaftwork.components.contacts import *
+    from shaftwork.components.controllers import *
     from shaftwork.components.drives import *
     from shaftwork.components.electrical import *
     from shaftwork.components.friction import *
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
     from shaftwork.components.machines import *
     from shaftwork.components.motor_catalogue import motors
     from shaftwork.components.motors import *
+    from shaftwork.components.noise import HeldNoise, SmoothNoise
     from shaftwork.components.rotation import *
     from shaftwork.components.shaft_models import Auto, CentralDifference, Lumped, OneSpring, Rigid, Spectral, Wave
     from shaftwork.components.shafts import *
@@ -76,6 +79,8 @@ _HOME = {
         "Wave",
     ),
     "shaftwork.components.motor_catalogue": ("motors",),
+    "shaftwork.components.bucket_wheel": ("Soil",),
+    "shaftwork.components.noise": ("HeldNoise", "SmoothNoise"),
     "shaftwork.components.laws": ("Ramp", "Step", "Table", "omega", "phi", "psi", "s", "t", "u", "v"),
     "shaftwork.core.errors": (
         "AccuracyWarning",

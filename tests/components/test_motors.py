@@ -175,6 +175,7 @@ def test_a_kloss_motor_reaches_a_slip_at_the_time_of_the_closed_form() -> None:
 MOTORS: dict[str, Callable[..., Component]] = {
     "kloss": lambda **times: sw.KlossMotor("m", **KLOSS, **times),
     "cage": lambda **times: sw.CageMotor("m", **EXCAVATOR, **times),
+    "wound": lambda **times: sw.WoundRotorMotor("m", **KLOSS, resistance=3.0, **times),
     "table": lambda **times: sw.TableMotor("m", curve=sw.Table([0.0, 500.0, 1000.0], [5.0, 6.0, 0.0]), **times),
     "drive": lambda **times: sw.FrequencyDrive("m", **KLOSS, t_ramp=0.5, **times),
     "held": lambda **times: sw.PullOutDrive("m", **KLOSS, overspeed=2.0, **times),
@@ -217,6 +218,30 @@ def test_a_table_motor_is_a_torque_source_with_its_table() -> None:
     assert curve(sw.TableMotor("m", curve=5.0), [0.0, 900.0]) == pytest.approx([5.0, 5.0])
     with pytest.raises(sw.ParameterError, match="take a TorqueSource"):
         sw.TableMotor("m", curve=5.0 - sw.omega)
+
+
+def test_resistance_in_the_rotor_moves_the_pull_out_point_and_keeps_its_torque() -> None:
+    wound = sw.WoundRotorMotor("m", **KLOSS, resistance=3.0)
+    speeds = np.linspace(-1000.0, 4000.0, 21)
+    np.testing.assert_allclose(
+        curve(wound, speeds), curve(sw.KlossMotor("m", **{**KLOSS, "s_k": 0.9}), speeds), rtol=1e-12
+    )
+    assert curve(wound, 3000.0 * (1 - 0.9)) == pytest.approx(8.0, rel=1e-12)
+
+
+def test_a_start_over_resistors_takes_the_time_of_the_closed_form_of_each_step() -> None:
+    """As for the Kloss motor, from slip to slip: the resistor is taken out when the slip is 0.4."""
+    synchronous, inertia = 3000.0 * PER_MINUTE, 0.02
+
+    def needed(first: float, last: float, s_k: float) -> float:
+        drop = (first**2 - last**2) / (2 * s_k) + s_k * math.log(first / last)
+        return inertia * synchronous / (2 * 8.0) * drop
+
+    switched = needed(1.0, 0.4, 0.9)
+    steps = sw.Step(-2.0, start=switched, before=3.0)
+    model = alone(sw.WoundRotorMotor("m", **KLOSS, resistance=steps), inertia)
+    sol = model.simulate(switched + needed(0.4, 0.05, 0.3), rtol=1e-11, t_eval=2)
+    assert sol["J.omega"][-1] == pytest.approx(0.95 * synchronous, rel=1e-9)  # 100 rtol
 
 
 def test_an_excavator_start_is_the_same_with_every_engine_and_by_hand() -> None:

@@ -194,6 +194,7 @@ VALUES = {
     "TableMotor": {"curve": sw.Table([0.0, 50.0, 100.0], [5.0, 6.0, 0.0]), "ratio": 1.5, "efficiency": 0.9},
     "FrequencyDrive": {"tau_k": 5.0, "s_k": 0.3, "n_sync": 100.0, "t_ramp": 0.3, "f_end": 80.0, "boost": 0.2},
     "PullOutDrive": {"tau_k": 5.0, "s_k": 0.3, "n_sync": 60.0, "overspeed": 2.0, "efficiency": 0.9},
+    "SpeedController": {"omega_ref": 4.0, "k_p": 1.0, "t_i": 3.0, "tau_max": 50.0},
     "CoulombLoad": {"tau": 2.0, "omega_s": 0.3},
     "DCMachine": {"k": 0.4, "R": 1.5, "L": 0.3},
     "SpeedSource": {"omega": sympy.sin(3 * sw.t)},

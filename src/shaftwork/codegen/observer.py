@@ -141,6 +141,11 @@ class ModelObserver:
             return along_lines(self._bind(), part, profile, t, dense)
         return self._read(t, x, lambda history: history.profile(part, profile))
 
+    @property
+    def impacts(self) -> tuple[tuple[float, str], ...]:
+        """Times at which energy is lost at once; only changes of mode do that."""
+        return ()
+
     def stored(self, t: Array, x: Array, dense: Dense) -> dict[str, Array]:
         """Stored energy by part; of sources those that have stores of their own, such as windings."""
         history = History(self._bind(), self._instants.one_sided(t), x)

@@ -85,10 +85,16 @@ class PhaseObserver:
     Args:
         names: of all that is stored.
         stretches: makes the phases when a quantity is first read.
+        impacts: times in s at which energy may be lost at once, and the part that loses it.
     """
 
-    def __init__(self, names: tuple[str, ...], stretches: Callable[[], Stretches]) -> None:
-        self._names, self._make = names, stretches
+    def __init__(
+        self,
+        names: tuple[str, ...],
+        stretches: Callable[[], Stretches],
+        impacts: tuple[tuple[float, str], ...],
+    ) -> None:
+        self._names, self._make, self.impacts = names, stretches, impacts
 
     @property
     def _stretches(self) -> Stretches:

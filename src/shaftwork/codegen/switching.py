@@ -86,9 +86,9 @@ class Switching:
     def timeline(self, p: Array, t0: float, t_end: float) -> Timeline:
         """The instants of a run from t0 to t_end in s with a parameter vector.
 
-        Law: a switch that is linear in time, or the sine of something linear, is solved for it. Any other is sampled at times that are spread without a
-        pattern, until four times as many show no more changes of side; where it only comes near its level it is
-        followed to its nearest approach. Each change is then bisected to the last digit.
+        Law: a switch that is linear in time, or the sine of something linear, is solved for it. Any other is sampled at
+        times that are spread without a pattern, until four times as many show no more changes of side; where it only
+        comes near its level it is followed to its nearest approach. Each change is then bisected to the last digit.
 
         Raises:
             ParameterError: a law switches too often to be followed.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from shaftwork.components import (
     bucket_wheel,
     contacts,
+    controllers,
     drives,
     electrical,
     friction,
@@ -29,6 +30,7 @@ __all__ = [
     "bucket_wheel",
     "component",
     "contacts",
+    "controllers",
     "drives",
     "electrical",
     "friction",

@@ -56,7 +56,7 @@ class Soil:
         except (SyntaxError, ValueError, TypeError, RecursionError, MemoryError):
             pass
         raise ParameterError(
-            f"{reprlib.repr(text)} is no soil. The soils are: {', '.join(SOILS)}; of another write Soil(mean, std) in N/m."
+            f"{reprlib.repr(text)} is no soil. The soils are: {', '.join(SOILS)}; another is Soil(mean, std) in N/m."
         )
 
 
@@ -95,7 +95,7 @@ class BucketWheelLoad(Component):
     pass j begins at the angle phi = 2 pi j / buckets, its own angle psi_j goes on from zero, and f = sin(psi) up to
     pi/2, then (alpha - psi) / (alpha - pi/2), and zero from alpha on. k_j = max(0, k_1 + sigma nu_j) is drawn for each
     pass from the soil's normal distribution. So the torque is a function of the angle and the seed, and continuous.
-    From `t_on` on the wheel digs, to its full depth after `rise`. The soil in the buckets is left out, as in the source.
+    From `t_on` on the wheel digs, to its full depth after `rise`. The soil in the buckets is left out, as there.
     Source: Marinkovic 2012, (9)-(11), algorithm of 6 steps, table 1.
     """
 
@@ -140,7 +140,7 @@ class BucketWheelLoad(Component):
 
 def _resistance(number: Expr, p: Any) -> Expr:
     """The specific resistance of a bucket pass."""
-    return Max(0, p.k_mean + p.k_std * HeldNoise(number, p.seed))
+    return Max(0, p.k_mean + p.k_std * HeldNoise(number, p.seed)) if p.k_std != 0 else p.k_mean
 
 
 def _profile(angle: Expr, number: int, p: Any) -> Expr:

@@ -1,41 +1,121 @@
-"""Parts that touch and let go: gaps and stops."""
+"""Parts that touch and let go: gaps and stops, with flanks that spring or rigid ones."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
-from sympy import Expr, Max, Min, Piecewise
+from sympy import Expr, Integer, Max, Min, Piecewise, true
 
-from shaftwork.components.base import Component, Role, component
-from shaftwork.components.branches import ACROSS, INTEGRAL, Branch, ThroughLaw
+from shaftwork.components.base import Component, Port, Role, Signal, component
+from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, Branch, ThroughLaw, rigid
 from shaftwork.components.modes import NEVER, Leave, Mode, Modes
+from shaftwork.core.domains import ROTATION
+from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter
 
+CLOSED = "closed"
 
-def _elastic(upper: Any, lower: Any, p: Any) -> Modes:
-    """Open between two limits of the twist, in contact beyond, where the flank springs back; it never pulls."""
-    forward, backward = p.c * (INTEGRAL - upper) + p.d * ACROSS, p.c * (INTEGRAL - lower) + p.d * ACROSS
-    above, below = INTEGRAL - upper, lower - INTEGRAL
-    return Modes(
-        (
-            Mode("open", (Leave(above, "forward"), Leave(below, "backward")), starts=(above <= 0) & (below <= 0)),
+
+def _stiffness() -> Any:
+    return parameter("N*m/rad", "torsional stiffness in contact, by default rigid", above=0, default=None)
+
+
+def _damping() -> Any:
+    return parameter("N*m*s/rad", "damping in contact", at_least=0, default=0.0)
+
+
+def _restitution() -> Any:
+    meaning = "of rigid flanks, the share of the speed that comes back"
+    return parameter("1", meaning, at_least=0, at_most=1, default=0.0, latex="e")
+
+
+def _rest() -> Any:
+    meaning = "of rigid flanks, speed below which they stay together"
+    return parameter("rad/s", meaning, above=0, default=1e-6, latex=r"\omega_r")
+
+
+def _refuse_mixed(part: Any) -> None:
+    if part.c is None and part.d:
+        raise ParameterError(f"{type(part).__name__} '{part.name}': a damping d needs a stiffness c beside it.")
+    if part.c is not None and part.restitution:
+        raise ParameterError(
+            f"{type(part).__name__} '{part.name}': restitution is for rigid flanks. Leave out c, or restitution and take d."
+        )
+
+
+def _torques(upper: Any, lower: Any, p: Any) -> tuple[Any, Any]:
+    """Torques of a flank beyond each limit, None where there is no limit."""
+    made = (None if limit is None else p.c * (INTEGRAL - limit) + p.d * ACROSS for limit in (upper, lower))
+    forward, backward = made
+    return forward, backward
+
+
+def _modes(upper: Any, lower: Any, p: Any) -> Modes:
+    """Open between two limits of the twist, either of which may be None, and in contact beyond."""
+    above = None if upper is None else INTEGRAL - upper
+    below = None if lower is None else lower - INTEGRAL
+    return _rigid(above, below, p) if p.c is None else _elastic(above, below, _torques(upper, lower, p))
+
+
+def _elastic(above: Any, below: Any, torques: tuple[Any, Any]) -> Modes:
+    """In contact the flank springs back; it never pulls."""
+    forward, backward = torques
+    begins, modes, inside = [], [], true
+    if above is not None:
+        begins.append(Leave(above, "forward"))
+        inside &= above <= 0
+        modes += [
             Mode("forward", (Leave(-forward, "parted forward"),), 1.0, starts=above > 0, says="in contact"),
-            Mode("backward", (Leave(backward, "parted backward"),), -1.0, starts=below > 0, says="in contact backward"),
             # beyond the limit, but the flank springs back more slowly than the other moves away
             Mode("parted forward", (Leave(forward, "forward"), Leave(-above, "open")), starts=NEVER, says="open"),
+        ]
+    if below is not None:
+        begins.append(Leave(below, "backward"))
+        inside &= below <= 0
+        modes += [
+            Mode("backward", (Leave(backward, "parted backward"),), -1.0, starts=below > 0, says="in contact backward"),
             Mode("parted backward", (Leave(-backward, "backward"), Leave(-below, "open")), starts=NEVER, says="open"),
-        )
-    )
+        ]
+    return Modes((Mode("open", tuple(begins), starts=inside), *modes))
 
 
-def _elastic_law(upper: Any, lower: Any, p: Any) -> Expr:
-    """The law in a mode; where nothing chooses modes, of all of them in one."""
+def _rigid(above: Any, below: Any, p: Any) -> Modes:
+    """At a limit a rebound, and below a small speed a rigid contact; it never pulls."""
+    begins, modes = [], []
+    if above is not None:
+        begins.append(Leave(above, "forward", p.restitution, p.omega_rest))
+        modes.append(Mode("forward", (Leave(-THROUGH, "open"),), 1.0, CLOSED, NEVER, "in contact"))
+    if below is not None:
+        begins.append(Leave(below, "backward", p.restitution, p.omega_rest))
+        modes.append(Mode("backward", (Leave(THROUGH, "open"),), -1.0, CLOSED, NEVER, "in contact backward"))
+    return Modes((Mode("open", tuple(begins)), *modes), angle="phi")
+
+
+def _branches(upper: Any, lower: Any, p: Any, second: str | None = "b") -> Iterator[Branch]:
+    if p.c is not None:
+        yield ThroughLaw(_law(upper, lower, p))
+        return
+    if p.form == CLOSED:
+        yield rigid(("a", second))
+    yield ThroughLaw(p.mode * (1 - p.mode**2) * INTEGRAL, ("a", second), "phi")  # no torque: it carries the twist
+
+
+def _law(upper: Any, lower: Any, p: Any) -> Expr:
+    """The torque in a mode; where nothing chooses modes, in all of them."""
+    forward, backward = _torques(upper, lower, p)
     if p.form is None:
-        forward, backward = p.c * (INTEGRAL - upper) + p.d * ACROSS, p.c * (INTEGRAL - lower) + p.d * ACROSS
-        return Piecewise((Max(0, forward), upper < INTEGRAL), (Min(0, backward), lower > INTEGRAL), (0, True))
-    limit = (upper + lower) / 2 + p.mode * (upper - lower) / 2
+        pieces = [(Max(0, forward), INTEGRAL > upper)] if upper is not None else []
+        pieces += [(Min(0, backward), INTEGRAL < lower)] if lower is not None else []
+        return Piecewise(*pieces, (Integer(0), True))
+    one, other = upper if upper is not None else lower, lower if lower is not None else upper
+    limit = (one + other) / 2 + p.mode * (one - other) / 2
     return p.mode**2 * (p.c * (INTEGRAL - limit) + p.d * ACROSS)
+
+
+def _signals(second: str | None) -> dict[str, Signal]:
+    pair = ("a", second)
+    return {"tau": Signal("through", pair, ROTATION), "omega_rel": Signal("across", pair, ROTATION)}
 
 
 @component
@@ -44,18 +124,65 @@ class Backlash(Component):
 
     Law: tau = max(0, c (phi - gap/2) + d omega) where phi > gap/2, min(0, c (phi + gap/2) + d omega) where
     phi < -gap/2, and 0 between, with phi the twist and omega the speed of node a against node b. A contact never
-    pulls: flanks that part faster than they spring back have let go. Modes: open, in contact, in contact backward.
-    Source: Marinkovic 2012, (12)-(16).
+    pulls: flanks that part faster than they spring back have let go. Without c the flanks are rigid, and the speed
+    omega with which they meet comes back as -restitution omega. Modes: open, in contact, in contact backward.
+    Source: Marinkovic 2012, (12)-(16); restitution: Newton.
     """
 
     gap: float = parameter("rad", "whole free twist", at_least=0, latex=r"\Delta")
-    c: float = parameter("N*m/rad", "torsional stiffness in contact", above=0)
-    d: float = parameter("N*m*s/rad", "damping in contact", at_least=0, default=0.0)
+    c: float | None = _stiffness()
+    d: float = _damping()
+    restitution: float = _restitution()
+    omega_rest: float = _rest()
 
     role: ClassVar[Role] = "loss"
 
+    def __post_init__(self) -> None:
+        _refuse_mixed(self)
+
     def modes(self, p: Any) -> Iterator[Modes]:
-        yield _elastic(p.gap / 2, -p.gap / 2, p)
+        yield _modes(p.gap / 2, -p.gap / 2, p)
 
     def branches(self, p: Any) -> Iterator[Branch]:
-        yield ThroughLaw(_elastic_law(p.gap / 2, -p.gap / 2, p))
+        yield from _branches(p.gap / 2, -p.gap / 2, p)
+
+    def signals(self) -> dict[str, Signal]:
+        """Torque that node a gives to node b, speed of a against b."""
+        return _signals("b")
+
+
+@component
+class HardStop(Component):
+    """A stop at a limit of the twist of node a against node b, or against the frame, counted from the start.
+
+    Law: as of a `Backlash`, with limits of its own, of which one may be left out. Without c the stop is rigid, and the
+    speed omega with which it is hit comes back as -restitution omega; below omega_rest it stays in contact, and never
+    pulls. Modes: open, in contact, in contact backward. Source: Newton's law of impact.
+    """
+
+    upper: float | None = parameter("rad", "upper limit of the twist", default=None, latex=r"\varphi_+")
+    lower: float | None = parameter("rad", "lower limit of the twist", default=None, latex=r"\varphi_-")
+    c: float | None = _stiffness()
+    d: float = _damping()
+    restitution: float = _restitution()
+    omega_rest: float = _rest()
+
+    role: ClassVar[Role] = "loss"
+    ports: ClassVar = (Port("a"), Port("b", optional=True))
+
+    def __post_init__(self) -> None:
+        _refuse_mixed(self)
+        if self.upper is None and self.lower is None:
+            raise ParameterError(f"HardStop '{self.name}': give upper, lower or both, in rad.")
+        if self.upper is not None and self.lower is not None and not self.lower < self.upper:
+            raise ParameterError(f"HardStop '{self.name}': lower = {self.lower} must be below upper = {self.upper}.")
+
+    def modes(self, p: Any) -> Iterator[Modes]:
+        yield _modes(p.upper, p.lower, p)
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        yield from _branches(p.upper, p.lower, p)
+
+    def signals(self) -> dict[str, Signal]:
+        """Torque that node a gives to node b, speed of a against b."""
+        return _signals("b")

@@ -151,7 +151,7 @@ def _rising(p: Any) -> Expr:
 
 
 @component
-class Fan(Component):
+class FanLoad(Component):
     """A fan: a torque that rises with the square of the speed, and the friction of its bearings.
 
     Law: torque on the node -tau_n ((1 - static) w |w| + static tanh(omega / omega_s)), w = omega / (2 pi n_n / 60).
@@ -171,8 +171,8 @@ class Fan(Component):
 
 
 @component
-class Pump(Component):
-    """A pump that lifts a liquid behind a check valve: a static share for the height, the rest with the square of speed.
+class PumpLoad(Component):
+    """A pump that lifts a liquid behind a check valve: a static share for the height, the rest as the square of speed.
 
     Law: torque on the node -tau_n ((1 - static) w |w| + static tanh(omega / omega_s)), w = omega / (2 pi n_n / 60). The
     valve holds the liquid, so that nothing drives the pump backwards from rest.
@@ -265,4 +265,4 @@ class RandomLoad(Component):
     @staticmethod
     def _size(p: Any) -> Expr:
         noise = HeldNoise if p.kind is NoiseKind.HELD else SmoothNoise
-        return Max(0, p.mean + p.std * noise(t / p.interval, p.seed))
+        return Max(0, p.mean + p.std * noise(t / p.interval, p.seed)) if p.std != 0 else p.mean

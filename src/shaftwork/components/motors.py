@@ -74,6 +74,36 @@ class CageMotor(Component):
 
 
 @component
+class WoundRotorMotor(Component):
+    """A slip-ring motor that starts over resistors in its rotor circuit, which are taken out step by step.
+
+    Law: Kloss' tau = ratio efficiency 2 tau_k s S / (s^2 + S^2), with the slip s = 1 - ratio omega / (2 pi n_sync / 60)
+    and S = s_k r, r the resistance of the rotor circuit over that of the rotor alone, a law of time or of speed:
+    resistance moves the pull-out point and keeps the pull-out torque.
+    Analogue: a voltage-controlled current source. Source: Marinkovic 2012, (2), (18).
+    """
+
+    tau_k: float = parameter("N*m", "pull-out torque at the motor shaft", above=0, latex=r"\tau_k")
+    s_k: float = parameter("1", "slip at the pull-out torque with slip rings closed", above=0)
+    n_sync: float = parameter("1/min", "synchronous speed", above=0, latex=r"n_{sync}")
+    resistance: Any = parameter("1", "resistance of the rotor circuit over that of the rotor", law=True, latex="r")
+    ratio: float = parameter("1", "motor speed over node speed", nonzero=True, default=1.0, latex="i")
+    efficiency: float = parameter("1", "efficiency of the gear", above=0, at_most=1, default=1.0, latex=r"\eta")
+    t_on: float | None = on_time()
+    t_off: float | None = off_time()
+
+    role: ClassVar[Role] = "source"
+    ports: ClassVar = (Port("a"),)
+
+    def __post_init__(self) -> None:
+        refuse_no_time_on(self)
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        slip = 1 - p.ratio * ACROSS / (2 * pi * p.n_sync / 60)
+        yield ThroughLaw(-while_on(p.ratio * p.efficiency * kloss(p.tau_k, slip, p.s_k * p.resistance), p))
+
+
+@component
 class TableMotor(Component):
     """A motor by its measured torque over speed, seen through a gear of given ratio and efficiency.
 

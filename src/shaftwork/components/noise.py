@@ -1,6 +1,6 @@
-"""Seeded noise in laws: normal numbers that depend on their place and a seed alone, not on who asks, when, or how often.
+"""Seeded noise in laws: normal numbers that depend on their place and a seed alone, not on who asks, when, how often.
 
-Number k of a seed is the same in every engine, in every order of calls and in every process, for k of any sign and size.
+Number k of a seed is the same in every engine, order of calls and process, for k of any sign and size.
 """
 
 from __future__ import annotations
@@ -71,6 +71,7 @@ def smooth(x: Any, seed: Any, order: Any = 0) -> Any:
             return math.nan
         below: Any = math.floor(x)
     else:
+        x = np.where(np.isfinite(x), x, math.nan)
         below = np.floor(x)
     around = (held(below + k, seed) for k in range(_FIRST, _FIRST + len(_AROUND)))
     return _piece(int(order))(x - below, *around)

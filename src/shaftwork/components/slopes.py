@@ -8,6 +8,8 @@ from sympy import (
     Dummy,
     Expr,
     Heaviside,
+    Max,
+    Min,
     Symbol,
     acos,
     acot,
@@ -37,7 +39,12 @@ TURNING = (sin, cos, tan, cot, sec, csc)
 
 
 def wraps(node: Basic) -> bool:
-    """Whether a function brings an angle back into one turn, with a jump or a kink where the next turn begins."""
+    """Whether a function brings an angle back into one turn, with a jump or a kink where the next turn begins.
+
+    The inverse function of what is clipped on both sides, max(-a, min(a, sin x)), keeps away from the next turn.
+    """
+    if isinstance(node, asin | acos) and isinstance(inner := node.args[0], Max | Min):
+        return not any(isinstance(part, Max | Min) and part.func is not inner.func for part in inner.args)
     return isinstance(node, atan2) or (isinstance(node, atan | asin | acos | acot | asec | acsc) and node.has(*TURNING))
 
 
@@ -45,8 +52,8 @@ def slope(expression: Expr, symbol: Symbol) -> Expr:
     """Partial derivative of a law where it is smooth.
 
     Law: d sign(x) / dx = d Heaviside(x) / dx = d floor(x) / dx = 0, d |x| / dx = sign(x); sympy's `diff` has DiracDelta
-    for the first and, where it does not know x as real, derivatives of its real part for the last. A jump has no slope: in time it is
-    a breakpoint, in a state the law jumps there and the derivative says nothing about it.
+    for the first and, where it does not know x as real, derivatives of its real part for the last. A jump has no slope:
+    in time it is a breakpoint, in a state the law jumps there and the derivative says nothing about it.
 
     Args:
         expression: a law.

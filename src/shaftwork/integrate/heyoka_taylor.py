@@ -60,7 +60,7 @@ def solve(problem: Problem) -> Trajectory:
         return _on_grid(problem, np.asarray(problem.t_eval, dtype=float))
     dense = _Replay(problem)
     t, x = both_sides(problem, *dense.step_ends)
-    return Trajectory(t, x, dense, {"steps": dense.steps.size - 1}, dense.met, (float(t[-1]), x[-1]))
+    return Trajectory(t, x, dense, {"steps": dense.steps.size - 1}, met=dense.met, end=(float(t[-1]), x[-1]))
 
 
 class _Run:
@@ -106,6 +106,8 @@ class _Run:
                 settle(self.program, integrator, piece.end - piece.start)
                 continue
             if outcome == GUARD and self._reacts(raw):
+                if watch is not None:  # a switch may be at zero where the guard was met
+                    settle(self.program, integrator, piece.end - integrator.time)
                 continue
             break
         if outcome == GUARD:
@@ -179,7 +181,9 @@ class _Run:
         settle(program, self.integrator, piece.end - piece.start)
         if program.timed.all():
             return None
-        return Watch(program, piece.start, self.problem.t_end - self.problem.t0)
+        integrator = self.integrator
+        size = np.abs(program.switch_values(integrator.time, integrator.state, integrator.pars))
+        return Watch(program, piece.start, self.problem.t_end - self.problem.t0, size)
 
     def _failure(self, piece: Piece, outcome: str, watch: Watch | None) -> SimulationError:
         time, state = self._last_good(piece, watch)
@@ -223,7 +227,7 @@ def _on_grid(problem: Problem, times: Array) -> Trajectory:
             break
         done = stop
     end = None if problem.guards is None else (run.integrator.time, run.state)
-    return Trajectory(times[:done], states[:done], _Replay(problem), {"steps": run.steps}, run.met, end)
+    return Trajectory(times[:done], states[:done], _Replay(problem), {"steps": run.steps}, met=run.met, end=end)
 
 
 class _GridRecorder:

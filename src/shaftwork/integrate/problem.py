@@ -217,8 +217,8 @@ class Trajectory:
     x: Array
     dense: DenseOutput
     statistics: Mapping[str, int] = field(default_factory=dict)
-    met: int | None = None
-    end: tuple[float, Array] | None = None
+    met: int | None = field(default=None, kw_only=True)
+    end: tuple[float, Array] | None = field(default=None, kw_only=True)
 
     @property
     def steps(self) -> Array:

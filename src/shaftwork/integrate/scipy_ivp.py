@@ -87,7 +87,7 @@ def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
     else:
         t = reached(problem.t_eval, steps[-1])
         states = dense(t)
-    return Trajectory(t, states, dense, _sums(runs), runs[-1].met, (float(steps[-1]), runs[-1].states[-1]))
+    return Trajectory(t, states, dense, _sums(runs), met=runs[-1].met, end=(float(steps[-1]), runs[-1].states[-1]))
 
 
 def _march(problem: Problem, method: Method, longest: float = np.inf) -> list[_Run]:

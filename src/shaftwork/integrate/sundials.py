@@ -280,7 +280,9 @@ def _trajectory(problem: Problem | DaeProblem, opener: Callable[[], Opener], deg
     dense = _Replay(problem, opener, degree)
     if problem.t_eval is None:
         t, states = both_sides(problem, *dense.step_ends)
-        return Trajectory(t, states, dense, {"steps": dense.steps.size - 1}, dense.met, (float(t[-1]), states[-1]))
+        return Trajectory(
+            t, states, dense, {"steps": dense.steps.size - 1}, met=dense.met, end=(float(t[-1]), states[-1])
+        )
     times = np.asarray(problem.t_eval, dtype=float)
     rows: list[Array] = []
     steps = 0
@@ -299,7 +301,7 @@ def _trajectory(problem: Problem | DaeProblem, opener: Callable[[], Opener], deg
     last = found[-1][1][-1]
     none = np.empty((0, last.state.size))
     states = np.concatenate([none, *rows])
-    return Trajectory(times[: len(states)], states, dense, {"steps": steps}, met, (last.end, last.state))
+    return Trajectory(times[: len(states)], states, dense, {"steps": steps}, met=met, end=(last.end, last.state))
 
 
 class _Replay:

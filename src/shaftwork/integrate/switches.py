@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shaftwork.integrate.problem import Array
 
@@ -12,6 +13,8 @@ from shaftwork.integrate.problem import Array
 CHATTER_STEPS, CHATTER_SPAN = 200, 1e-9
 # A switch that is on the wrong side by more than this part of its largest value has missed its event.
 WRONG_SIDE = 1e-9
+# How far rounding may have moved time and states, as a part of them.
+ROUNDINGS = 256 * float(np.finfo(float).eps)
 # Where in a trial step a switch that starts at zero is looked at: as early as it is not lost in rounding.
 EARLY = (1e-4, 1e-2, 1e-1)
 
@@ -35,6 +38,11 @@ def settle(program: Any, integrator: Any, horizon: float) -> None:
     timed = signs * program.timed
     middle = program.switch_signs(integrator.time + horizon / 2, integrator.state, parameters, timed)
     signs[:] = program.switch_signs(integrator.time, integrator.state, parameters, middle * program.timed)
+    if (near := _within_rounding(program, integrator) & ~program.timed).any():
+        kept = signs.copy()
+        signs[near] = 0.0
+        found = _early_signs(program, integrator, horizon)
+        signs[:] = np.where(near & (found != 0.0), found, kept)
     for _ in range(signs.size):
         zero = (signs == 0.0) & ~program.timed
         if not zero.any():
@@ -46,6 +54,15 @@ def settle(program: Any, integrator: Any, horizon: float) -> None:
         if program.held is not None:  # a whole number, from which the motion starts downwards
             for number in program.held.by_switch:
                 program.step(number, integrator) if signs[number] < 0 else None
+
+
+def _within_rounding(program: Any, integrator: Any) -> NDArray[np.bool_]:
+    """The switches whose side rounding decides: those at which an event, of another or of a guard, has just ended a run."""
+    time, state, parameters = integrator.time, integrator.state, integrator.pars
+    values = program.switch_values(time, state, parameters)
+    moved = state * (1.0 + ROUNDINGS * np.where(np.arange(state.size) % 2, 1.0, -1.0))
+    others = program.switch_values(time + ROUNDINGS * abs(time), moved, parameters)
+    return np.asarray((values != 0.0) & (np.abs(values) <= np.abs(others - values)))
 
 
 def _early_signs(program: Any, integrator: Any, horizon: float) -> Array:
@@ -96,16 +113,19 @@ class Watch:
         program: a `codegen.heyoka.HeyokaProgram`.
         start: where the run starts, s.
         duration: length of the whole run in s.
+        size: (switches,) of the switches at the start.
     """
 
-    def __init__(self, program: Any, start: float, duration: float) -> None:
+    def __init__(self, program: Any, start: float, duration: float, size: Array) -> None:
         self._program = program
         self._short = CHATTER_SPAN * duration
         self._short_steps = 0
         self._last = start
         self.last_good: tuple[float, Array] | None = None
         """Time in s and state (n,) at the start of the step that stopped the run or failed."""
-        self._largest: Array = np.zeros(len(program.switches))
+        self._largest: Array = size
+        counting = () if program.held is None else tuple(program.held.by_switch)
+        self._turns = ~program.timed & ~np.isin(np.arange(size.size), counting)
         self.reason: str | None = None
 
     def __call__(self, integrator: Any) -> bool:
@@ -114,9 +134,12 @@ class Watch:
         np.maximum(self._largest, np.abs(values), out=self._largest)
         # What switches by the time alone has its sign for the piece, and nothing can drive it back.
         wrong = (signs * values < -WRONG_SIDE * self._largest) & ~self._program.timed
-        if wrong.any():
+        past = signs * values < 0.0
+        if past.any():
             # Right at its event (heyoka still "cools" it down) a switch may be on the wrong side by rounding.
-            wrong &= [cooling is None for cooling in integrator.te_cooldowns[: wrong.size]]
+            past &= [cooling is None for cooling in integrator.te_cooldowns[: past.size]]
+            wrong &= past
+            signs[past & ~wrong & self._turns] *= -1.0  # the step ended at another event, at the very same instant
         self._short_steps = self._short_steps + 1 if integrator.time - self._last < self._short else 0
         before, self._last = self._last, integrator.time
         if wrong.any() or self._short_steps > CHATTER_STEPS:

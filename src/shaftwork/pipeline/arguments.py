@@ -22,6 +22,29 @@ DELAYING = ("length", "density", "shear_modulus")
 OutputTimes = int | Sequence[float] | Array | Literal["steps"] | None
 
 
+@dataclasses.dataclass(frozen=True)
+class Demand:
+    """What is asked of a run.
+
+    Args:
+        span: start and end, s.
+        rtol: relative tolerance.
+        atol: absolute tolerance, or one for each state; None for one that suits them.
+        t_eval: output times, or None for the ends of the steps.
+        engine: its name, or "auto".
+        max_steps: steps before the engine gives up.
+        progress: told the time that is reached, or None.
+    """
+
+    span: tuple[float, float]
+    rtol: float
+    atol: float | Sequence[float] | None
+    t_eval: Array | None
+    engine: str
+    max_steps: int
+    progress: Callable[[float], None] | None
+
+
 def watched_by(rhs: Callable[[float, Array], Array], progress: Callable[[float], None]) -> Callable[..., Array]:
     """A right-hand side that tells somebody the time at which it is asked."""
 

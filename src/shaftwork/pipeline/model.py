@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache, cached_property
@@ -20,6 +19,7 @@ from shaftwork.integrate import choice
 from shaftwork.integrate.problem import LinearInputs, Problem, Trajectory
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import (
+    Demand,
     OutputTimes,
     absolute_tolerances,
     checked_parameter,
@@ -30,7 +30,6 @@ from shaftwork.pipeline.arguments import (
     watched_by,
 )
 from shaftwork.pipeline.implicit import at_rest, solve_loops
-from shaftwork.pipeline.phases import Demand, Phases, motion
 from shaftwork.pipeline.prepared import Prepared, nominal_tolerances
 from shaftwork.reduction.form import StateForm
 from shaftwork.results.solution import Solution
@@ -110,24 +109,17 @@ class Model(CompiledModel):
             options: dict[str, Any] = {"t_start": t_start, "rtol": rtol, "atol": atol, "t_eval": t_eval}
             options |= {"engine": engine, "initial": initial, "max_steps": max_steps, "progress": progress}
             return self._variant(values).simulate(t_end, **options)
-        if self._phases is not None:
-            demand = Demand(
-                time_span(t_start, t_end),
-                relative_tolerance(rtol),
-                atol,
-                output_times(t_eval, *time_span(t_start, t_end)),
-                engine,
-                max_steps,
-                progress,
-            )
-            return motion(self._phases, values, initial, demand, self.name)
-        prepared = self.prepare(self.vector(values) if values else self.defaults)
         span = time_span(t_start, t_end)
-        x0, waves = self.start(prepared, initial, span)
-        problem = self._problem(prepared, span, x0, relative_tolerance(rtol), atol, t_eval, max_steps)
-        if progress is not None:
-            problem = dataclasses.replace(problem, rhs=watched_by(problem.rhs, progress))
-        trajectory, name, why = self._solve(prepared, problem, waves, engine)
+        times = output_times(t_eval, *span)
+        demand = Demand(span, relative_tolerance(rtol), atol, times, engine, max_steps, progress)
+        return self._motion(values, initial, demand)
+
+    def _motion(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
+        prepared = self.prepare(self.vector(values) if values else self.defaults)
+        x0, waves = self.start(prepared, initial, demand.span)
+        problem = self._problem(prepared, x0, demand)
+        trajectory, name, why = self._solve(prepared, problem, waves, demand.engine)
+        instants = self.switching.timeline(prepared.p, *demand.span)
         return Solution(
             name=self.name,
             t=trajectory.t,
@@ -137,7 +129,7 @@ class Model(CompiledModel):
             why=why,
             statistics=trajectory.statistics,
             dense=trajectory.dense,
-            observer=ModelObserver(self.form, lambda: prepared.bound, self.switching.timeline(prepared.p, *span)),
+            observer=ModelObserver(self.form, lambda: prepared.bound, instants),
         )
 
     def steady_state(
@@ -160,6 +152,9 @@ class Model(CompiledModel):
         values = self._checked_all(parameters)
         if self._changes_structure(values):
             return self._variant(values).steady_state(t, initial=initial)
+        return self._steady(values, t, initial)
+
+    def _steady(self, values: Mapping[str, float], t: float, initial: Given) -> dict[str, float]:
         if self.form.waves:
             return self._twin.steady_state(t, initial=initial, parameters=values)
         prepared = self.prepare(self.vector(values) if values else self.defaults)
@@ -188,11 +183,14 @@ class Model(CompiledModel):
             SignalError: there is no such input or output.
             SimulationError: a law has no finite slope at the point, or a shaft is a wave, which no matrix holds.
         """
-        from shaftwork.pipeline.analysis import linearized
-
         values = self._checked_all(parameters)
         if self._changes_structure(values):
             return self._variant(values).linearize(at, inputs=inputs, outputs=outputs, t=t)
+        return self._near(values, at, t, inputs, outputs)
+
+    def _near(self, values: Mapping[str, float], at: Point, t: Time, inputs: Names, outputs: Names) -> LinearModel:
+        from shaftwork.pipeline.analysis import linearized
+
         p = self.vector(values)
         return linearized(self, p, at, t, self.settled(p), inputs, outputs)
 
@@ -202,9 +200,12 @@ class Model(CompiledModel):
 
     def choose_engine(self, t_end: float, *, t_start: float = 0.0, rtol: float = 1e-8) -> tuple[str, str]:
         """The engine that "auto" takes for a motion, and why."""
-        prepared, span = self.prepare(self.defaults), time_span(t_start, t_end)
-        x0, _ = self.start(prepared, None, span)
-        return self._engine(prepared, self._problem(prepared, span, x0, rtol, None, None, 1), "auto")
+        return self._choice(Demand(time_span(t_start, t_end), rtol, None, None, "auto", 1, None))
+
+    def _choice(self, demand: Demand) -> tuple[str, str]:
+        prepared = self.prepare(self.defaults)
+        x0, _ = self.start(prepared, None, demand.span)
+        return self._engine(prepared, self._problem(prepared, x0, demand), "auto")
 
     def _solve(
         self, prepared: Prepared, problem: Problem, waves: WaveStart | None, engine: str
@@ -247,19 +248,11 @@ class Model(CompiledModel):
         self._choices = [*self._choices[1 - VARIANTS :], (key, prepared.p, chosen)]
         return chosen
 
-    def _problem(
-        self,
-        prepared: Prepared,
-        span: tuple[float, float],
-        x0: Array,
-        rtol: float,
-        atol: float | Sequence[float] | None,
-        t_eval: OutputTimes,
-        max_steps: int,
-    ) -> Problem:
+    def _problem(self, prepared: Prepared, x0: Array, demand: Demand) -> Problem:
+        span, rtol, atol, progress = demand.span, demand.rtol, demand.atol, demand.progress
         instants = self.switching.timeline(prepared.p, *span)
         return Problem(
-            rhs=prepared.rhs,
+            rhs=prepared.rhs if progress is None else watched_by(prepared.rhs, progress),
             jacobian=prepared.jacobian,
             x0=x0,
             t0=span[0],
@@ -273,11 +266,11 @@ class Model(CompiledModel):
             switches=(lambda t, x: prepared.bound.switches(t, x))  # noqa: PLW0108 (which makes the matrices)
             if self.arrays.inputs.switching
             else None,
-            t_eval=output_times(t_eval, *span),
+            t_eval=demand.t_eval,
             linear=None if self.degree is None else prepared.linear,
             driven=prepared.linear if self.degree is None else None,
             symbolic=prepared.symbolic,
-            max_steps=max_steps,
+            max_steps=demand.max_steps,
         )
 
     def prepare(self, p: Array) -> Prepared:
@@ -308,18 +301,6 @@ class Model(CompiledModel):
             return build(self.rows.states, time, self.rows.parameters, self.rows.rates)
         except CompileError:
             return None
-
-    @cached_property
-    def _phases(self) -> Phases | None:
-        """The phases of a network whose parts change their mode, or None where none does."""
-        if not any(part.modes for part in self.form.graph.parts) or self.form.waves or self._is_phase:
-            return None
-        return Phases(self, self._rebuild)
-
-    @property
-    def _is_phase(self) -> bool:
-        """Whether it is itself the model of a phase."""
-        return any(item.choices for item in self.netlist.placed)
 
     @cached_property
     def switching(self) -> Switching:

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self
 
+from shaftwork.components.modes import ALL_IN_ONE
 from shaftwork.core.errors import NetworkError, NetworkWarning, ParameterError, Problem, SignalError
 from shaftwork.equations.kirchhoff import kirchhoff
 from shaftwork.equations.records import Equations
@@ -17,6 +18,7 @@ from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.netlist import Netlist
 from shaftwork.network.storage import read_netlist, write_netlist
 from shaftwork.pipeline.model import Model
+from shaftwork.pipeline.phased import PhasedModel
 from shaftwork.reduction.diagnosis import diagnose
 from shaftwork.reduction.form import StateForm, state_form
 from shaftwork.results.solution import Solution
@@ -215,8 +217,13 @@ class Network(NetworkBuilder):
 
 
 def _sound(netlist: Netlist, accepted: str = "") -> StateForm:
-    """The state form of a network without errors but for an accepted kind; warnings are issued."""
+    """The state form of a network without errors but for an accepted kind; warnings are issued.
+
+    Beside travelling waves parts that change their mode have the laws of all their modes in one.
+    """
     _, form, problems = diagnose(netlist)
+    if form is not None and form.waves and (modal := [part.name for part in form.graph.parts if part.modes]):
+        _, form, problems = diagnose(netlist.with_choices(dict.fromkeys(modal, ALL_IN_ONE)))
     if errors := tuple(found for found in problems if found.severity == "error" and found.kind != accepted):
         raise NetworkError(f"'{netlist.name}' cannot be assembled", errors)
     for problem in problems:
@@ -231,7 +238,9 @@ def _compiled(netlist: Netlist, angles: tuple[str, ...], accepted: str) -> Model
         form = _sound(netlist, accepted)
         if angles:
             form = state_form(form.graph, tuple(_branch_of(form.graph, name) for name in angles))
-        return Model(form, netlist, lambda changed: _compiled(changed, angles, accepted))
+        chosen = form.waves or any(item.choices for item in netlist.placed)
+        made = PhasedModel if any(part.modes for part in form.graph.parts) and not chosen else Model
+        return made(form, netlist, lambda changed: _compiled(changed, angles, accepted))
 
 
 @contextmanager

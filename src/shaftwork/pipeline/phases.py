@@ -8,33 +8,29 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.observer import ModelObserver
-from shaftwork.codegen.phase_observer import PhaseObserver, Stretch, Stretches
 from shaftwork.codegen.timeline import Timeline
 from shaftwork.components.modes import Choice
 from shaftwork.core.errors import NetworkError, ParameterError, SimulationError
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import Problem, Reaction, Trajectory
 from shaftwork.network.netlist import Netlist
-from shaftwork.pipeline.arguments import watched_by
+from shaftwork.pipeline.arguments import Demand, absolute_tolerances, watched_by
 from shaftwork.pipeline.assemblies import Assembly, ModeNames, elements_of
 from shaftwork.pipeline.implicit import at_rest
 from shaftwork.pipeline.settling import Change, Moment, Settling
-from shaftwork.results.solution import PhaseRow, Solution
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.model import Model
 
 # So many changes of mode, each within this part of the run of the one before, are chatter.
 CHATTER_EVENTS, CHATTER_SPAN = 200, 1e-9
-# Engines that follow guards. An error grows with every change of mode, by some hundreds on the way through sixty
-# contacts, so they run with this part of the tolerance that is asked for, and with no looser one than the second number.
+# Engines that follow guards. An error grows with every change of mode, by some hundreds through sixty contacts, so
+# they run with this part of the tolerance that is asked for, and with no looser one than the second number.
 FOLLOWING = {
     "heyoka": (1.0, 1.0),
     "scipy": (1 / 30, 1e-7),
@@ -43,6 +39,7 @@ FOLLOWING = {
     "sundials-adams": (1 / 100, 1e-8),
 }
 TIGHTEST_RTOL = 1e-14
+STILL = "Nothing moves, and what holds is known at every time."
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,19 +70,6 @@ class Span:
     assembly: Assembly
     trajectory: Trajectory
     phases: tuple[Phase, ...]
-
-
-@dataclass(frozen=True)
-class Demand:
-    """What is asked of a run; see `Model.simulate`. The output times are None for those of the steps."""
-
-    span: tuple[float, float]
-    rtol: float
-    atol: Any
-    t_eval: Array | None
-    engine: str
-    max_steps: int
-    progress: Callable[[float], None] | None
 
 
 class Phases:
@@ -183,12 +167,16 @@ class Run:
     def _start(self, initial: Mapping[str, float] | None) -> Moment:
         """The states and modes at the start, before modes have settled."""
         assembly = self.phases.assembly(self.phases.first)
-        loose = self.settling.moment(self.phases.first, assembly)
-        prepared = assembly.prepared(loose.p)
-        x, _ = assembly.model.start(prepared, initial, self.demand.span)
-        after = self.timeline(assembly, loose.p).sides(self.demand.span[0])[1]
-        modes = assembly.first_modes(after, x, loose.p)
-        return self.settling.changed(replace(loose, x=x), after, modes)
+        p = self.settling.moment(self.phases.first, assembly).p
+        x, _ = assembly.model.start(assembly.prepared(p), initial, self.demand.span)
+        return self.settling.started(self.timeline(assembly, p).sides(self.demand.span[0])[1], x)
+
+    def choose(self) -> tuple[str, str]:
+        """The engine for the first phase, and why."""
+        start = self.demand.span[0]
+        moment = self._settle(start, self._start(None), None)
+        problem = self._problem(start, moment)
+        return self.phases.engine(moment.assembly, problem, self.demand.engine) if problem.x0.size else ("exact", STILL)
 
     def timeline(self, assembly: Assembly, p: Array) -> Timeline:
         """The instants at which inputs jump or bend."""
@@ -222,32 +210,34 @@ class Run:
                 "Give it damping or its neighbours an inertia, or let it rest."
             )
 
-    def _span(self, t: float, moment: Moment) -> tuple[float, Moment, int | None]:
-        """One run of the engine, up to a change of equations or the next instant at which an input jumps."""
+    def _problem(self, t: float, moment: Moment) -> Problem:
+        """The motion from a time on, up to the next instant at which an input jumps."""
         demand, assembly, times = self.demand, moment.assembly, self.timeline(moment.assembly, moment.p)
         end = min(next((time for time in times.times if time > t), np.inf), demand.span[1])
         problem = assembly.problem(moment.p, moment.modes, moment.x, moment.bands, (t, end), times)
         atol = demand.rtol * problem.atol
         if demand.atol is not None:
-            atol[: moment.x.size] = demand.atol
-        passing = _Passing(self, moment, t)
-        problem = replace(
+            atol[: moment.x.size] = absolute_tolerances(demand.atol, moment.x.size)
+        return replace(
             problem,
             rtol=demand.rtol,
             atol=atol,
             t_eval=self._outputs(t, end),
             max_steps=demand.max_steps - self.steps,
-            react=passing,
             rhs=problem.rhs if demand.progress is None else watched_by(problem.rhs, demand.progress),
         )
-        trajectory = self._solve(assembly, problem)
+
+    def _span(self, t: float, moment: Moment) -> tuple[float, Moment, int | None]:
+        """One run of the engine, up to a change of equations or the next instant at which an input jumps."""
+        passing = _Passing(self, moment, t)
+        trajectory = self._solve(moment.assembly, replace(self._problem(t, moment), react=passing))
         self.steps += trajectory.statistics.get("steps", 0)
-        self.spans.append(Span(assembly, trajectory, tuple(passing.phases)))
+        self.spans.append(Span(moment.assembly, trajectory, tuple(passing.phases)))
         assert trajectory.end is not None  # noqa: S101 (engines that follow guards say it)
         t, x = trajectory.end
         x = x[: moment.x.size]
-        if trajectory.met is None and assembly.model.form.has_impulses:
-            x = assembly.bound(moment.p).impulse(x, *times.sides(t))
+        if trajectory.met is None and moment.assembly.model.form.has_impulses:
+            x = moment.assembly.bound(moment.p).impulse(x, *self.timeline(moment.assembly, moment.p).sides(t))
         return t, replace(passing.moment, x=x), trajectory.met
 
     def _outputs(self, t: float, end: float) -> Array | None:
@@ -298,114 +288,3 @@ class _Passing:
         reaction = Reaction(moment.p, moment.assembly.sides(moment.modes), np.array(moment.bands))
         self._reactions.append(reaction)
         return reaction
-
-
-def motion(
-    phases: Phases, values: Mapping[str, float], initial: Mapping[str, float] | None, demand: Demand, name: str
-) -> Solution:
-    """A motion through all its phases."""
-    run = Run(phases, values, demand)
-    run.march(initial)
-    return solution(run, name)
-
-
-def solution(run: Run, name: str) -> Solution:
-    """The motion as a whole, to be read."""
-    names = run.spans[0].assembly.stores.names
-    whole = _Whole(run)
-    return Solution(
-        name=name,
-        t=np.concatenate([span.trajectory.t for span in run.spans]),
-        x=np.concatenate([_stored(span, names) for span in run.spans]),
-        states=names,
-        engine=run.engine,
-        why=run.why,
-        statistics={"steps": run.steps, "changes": len(run.changes)},
-        dense=whole,
-        observer=PhaseObserver(names, whole.stretches),
-        events=tuple(_event(change) for change in run.changes if _is_event(change)),
-        phases=_table(run),
-    )
-
-
-def _stored(span: Span, names: tuple[str, ...]) -> Array:
-    """(k, stores) all that is stored at the output times of a span."""
-    t, states = span.trajectory.t, span.trajectory.x[:, : len(span.assembly.model.states)]
-    if not t.size:
-        return np.empty((0, len(names)))
-    stores = span.assembly.stores
-    if stores.by_loops:
-        return stores.of(lambda: span.assembly.bound(span.phases[0].p), t, states)
-    starts = np.array([phase.start for phase in span.phases])
-    made = np.empty((t.size, len(names)))
-    index = np.clip(np.searchsorted(starts, t, side="right") - 1, 0, None)
-    for number in np.unique(index).tolist():
-        here = index == number
-        made[here] = stores.of(partial(span.assembly.bound, span.phases[number].p), t[here], states[here])
-    return made
-
-
-class _Whole:
-    """All that is stored at any time of a motion; what it needs is made when it is first asked."""
-
-    def __init__(self, run: Run) -> None:
-        self._run = run
-
-    @cache
-    def stretches(self) -> Stretches:
-        """The phases as they are read."""
-        return Stretches([_stretch(self._run, span, phase) for span in self._run.spans for phase in span.phases])
-
-    @property
-    def steps(self) -> Array:
-        """Ends of the integration steps; where an engine began anew the time is listed twice."""
-        return np.concatenate([span.trajectory.steps for span in self._run.spans])
-
-    def __call__(self, times: Array) -> Array:
-        return self.stretches().dense(times)
-
-
-def _stretch(run: Run, span: Span, phase: Phase) -> Stretch:
-    assembly, states = span.assembly, span.assembly.model.states
-    size, dense = len(states), span.trajectory.dense
-    instants = run.timeline(assembly, phase.p)
-    bind = partial(assembly.bound, phase.p)
-    return Stretch(
-        start=phase.start,
-        key=(id(assembly), phase.p.tobytes()),
-        stores=assembly.stores,
-        bind=bind,
-        observer=ModelObserver(assembly.model.form, bind, instants),
-        instants=instants,
-        dense=lambda times: dense(times)[:, :size],
-        states=states,
-    )
-
-
-def _is_event(change: Change) -> bool:
-    modes = change.element.modes
-    return change.rebound or modes[change.before].words != modes[change.after].words
-
-
-def _event(change: Change) -> tuple[float, str, str, str]:
-    modes = change.element.modes
-    after = "rebound" if change.rebound else modes[change.after].words
-    return change.time, change.element.name, modes[change.before].words, after
-
-
-def _table(run: Run) -> tuple[PhaseRow, ...]:
-    """The phases in words: those that say the same are one."""
-    rows: list[PhaseRow] = []
-    phases = [phase for span in run.spans for phase in span.phases]
-    ends = [*(phase.start for phase in phases[1:]), run.demand.span[1]]
-    words: dict[ModeNames, dict[str, str]] = {}
-    for phase, end in zip(phases, ends, strict=True):
-        if phase.modes not in words:
-            pairs = zip(run.phases.elements, phase.modes, strict=True)
-            words[phase.modes] = {element.name: element.modes[name].words for element, name in pairs}
-        modes = words[phase.modes]
-        if rows and rows[-1].modes == modes:
-            rows[-1] = replace(rows[-1], end=end)
-        elif end > phase.start:
-            rows.append(PhaseRow(phase.start, end, modes))
-    return tuple(rows)

@@ -65,6 +65,17 @@ class Settling:
             self._vectors[modes] = assembly.vector(self._values, self._phases.numbers(modes))
         return Moment(modes, assembly, self._vectors[modes], np.empty(0))
 
+    def started(self, t: float, x: Array) -> Moment:
+        """The modes in which a motion starts, from the states of the equations in which no mode joins anything.
+
+        Args:
+            t: time in s at which inputs are read.
+            x: (n,) states.
+        """
+        first = self._phases.first
+        loose = replace(self.moment(first, self._phases.assembly(first)), x=x)
+        return self.changed(loose, t, loose.assembly.first_modes(t, x, loose.p))
+
     def changed(self, moment: Moment, t: float, modes: ModeNames) -> Moment:
         """The same instant in other modes: all that is stored goes over.
 
@@ -75,9 +86,10 @@ class Settling:
         new = self.moment(modes, assembly)
         if assembly is moment.assembly:
             return replace(new, x=moment.x)
-        return replace(new, x=assembly.stores.states(assembly.bound(new.p), t, self._held(moment, t)))
+        return replace(new, x=assembly.stores.states(assembly.bound(new.p), t, self.held(moment, t)))
 
-    def _held(self, moment: Moment, t: float) -> dict[str, float]:
+    def held(self, moment: Moment, t: float) -> dict[str, float]:
+        """All that is stored, by name."""
         assembly = moment.assembly
         values = assembly.stores.of(lambda: assembly.bound(moment.p), np.array([t]), moment.x[None, :])[0]
         return dict(zip(assembly.stores.names, values.tolist(), strict=True))
@@ -96,8 +108,10 @@ class Settling:
         """
         changes: list[Change] = []
         seen: dict[ModeNames, None] = {}
+        # a guard is met where it is beyond zero by its band, which then still is the band of what is the same after it
+        ended = moment
         if met is None:
-            moment, found = self._violated(moment, after)
+            moment, found = self._violated(moment, after, ended)
         else:
             found = next(pair for pair in moment.assembly.watched(moment.modes) if pair[1].guard == met)
         while found is not None:
@@ -106,29 +120,32 @@ class Settling:
             if moment.modes in seen and not change.rebound:
                 raise self._endless(t, changes)
             seen[moment.modes] = None
-            moment, found = self._violated(moment, after)
+            moment, found = self._violated(moment, after, ended)
         return moment, changes
 
-    def _violated(self, moment: Moment, t: float) -> tuple[Moment, tuple[int, Watched] | None]:
+    def _violated(self, moment: Moment, t: float, ended: Moment) -> tuple[Moment, tuple[int, Watched] | None]:
         """The guard that is farthest beyond its limit, or on it and about to go beyond; the moment with its bands."""
         now, bands, ahead, unsure = self._course(moment, t)
-        moment = replace(moment, bands=bands)
+        # a phase that started right at its limit would be taken to have met it
+        clear = [8 * band if band < 4 * abs(g) < 16 * band else band for g, band in zip(now, bands, strict=True)]
+        moment = replace(moment, bands=clear)
+        wide = bands if ended.assembly is not moment.assembly else list(map(max, bands, ended.bands or bands))
         worst, largest = None, 0.0
         on_limit = []
         for pair in moment.assembly.watched(moment.modes):
             k, side = pair[1].guard, pair[1].side
             value = side * now[k]
-            if value > bands[k]:
-                if value > largest:
-                    worst, largest = pair, value
-            elif value >= -bands[k]:
+            if value < -wide[k]:
+                continue
+            if value <= wide[k] or pair[1].leave.rebound is not None:  # only what comes nearer is thrown back
                 on_limit.append(pair)
-        if worst is None:
-            for pair in on_limit:
-                k, side = pair[1].guard, pair[1].side
-                value = side * ahead[k]
-                if value > max(unsure[k], largest):
-                    worst, largest = pair, value
+            elif value > largest:
+                worst, largest = pair, value
+        for pair in on_limit if worst is None else ():
+            k, side = pair[1].guard, pair[1].side
+            gain = side * (ahead[k] - now[k])
+            if gain > unsure[k] and gain > largest:
+                worst, largest = pair, gain
         return moment, worst
 
     def _course(self, moment: Moment, t: float) -> tuple[list[float], list[float], list[float], list[float]]:
@@ -147,7 +164,7 @@ class Settling:
         ahead = motion(t + step, [v + step * rate for v, rate in zip(x, rates, strict=True)])[1]
         beside = motion(t + step, [v + step * rate for v, rate in zip(moved, others, strict=True)])[1]
         bands = [abs(n - g) + abs(later[k] - g) for k, (n, g) in enumerate(zip(near, now, strict=True))]
-        unsure = [band + abs(b - a) for band, a, b in zip(bands, ahead, beside, strict=True)]
+        unsure = [abs((b - n) - (a - g)) for a, b, g, n in zip(ahead, beside, now, near, strict=True)]
         return now, bands, ahead, unsure
 
     def _follow(self, t: float, after: float, moment: Moment, number: int, ended: Watched) -> tuple[Moment, Change]:
@@ -187,7 +204,7 @@ class Settling:
         rest = assembly.constant(number, leave.rest, p)
         if share * abs(assembly.across(number, t, moment.x, p)) <= rest:
             return None
-        held, plastic = self._held(moment, t), self._held(joined, t)
+        held, plastic = self.held(moment, t), self.held(joined, t)
         thrown = {name: plastic[name] + share * (plastic[name] - value) for name, value in held.items()}
         return replace(moment, x=assembly.stores.states(assembly.bound(p), t, thrown))
 

@@ -16,6 +16,7 @@ from shaftwork.codegen.operating import initial_state
 from shaftwork.codegen.recovery import History
 from shaftwork.codegen.waves import WaveSystem
 from shaftwork.components.base import Component
+from shaftwork.components.modes import ALL_IN_ONE
 from shaftwork.components.shaft_models import Lumped, Wave
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import AccuracyWarning, NetworkWarning, ParameterError
@@ -82,7 +83,9 @@ def twin(netlist: Netlist) -> Netlist:
             return part
         return dataclasses.replace(part, model=Lumped(1 if part.friction == 0 else 2))
 
-    return Netlist(netlist.name, tuple(dataclasses.replace(item, part=stiff(item.part)) for item in netlist.placed))
+    # the laws of all modes in one, as beside the waves; a part without modes has no choice
+    placed = (dataclasses.replace(item, part=stiff(item.part), choices=ALL_IN_ONE) for item in netlist.placed)
+    return Netlist(netlist.name, tuple(placed))
 
 
 def start_of_waves(

@@ -79,7 +79,7 @@ class Readings:
         if tree in self.rows.across:
             return self.rows.across[tree]
         # a spring in series with others: its speed is the rate of its torque over its stiffness
-        rates = Add(*(gain * self._rate_of_through(link) for link, gain in self._cutsets[tree]))
+        rates = Add(*(gain * self._rate_of_through(link) for link, gain in self._cutsets.get(tree, ())))
         return -rates / self._law(tree)
 
     def _rate_of_through(self, link: int) -> Expr:

@@ -6,7 +6,8 @@ residual measures the error of the integration, independent of any reference.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -29,6 +30,8 @@ class EnergyBalance:
         supplied: (s,) work of all sources since the start, J.
         lost: (s,) heat since the start, J.
         work: work that went through the sources, both ways counted as positive, J.
+        lost_in: heat of the whole run by part, J; an impact's is that of the part whose change of mode it came with.
+        supplied_by: work of the whole run by source, J.
     """
 
     t: Array
@@ -36,6 +39,8 @@ class EnergyBalance:
     supplied: Array
     lost: Array
     work: float
+    lost_in: Mapping[str, float] = field(default_factory=dict)
+    supplied_by: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def residual(self) -> float:
@@ -54,17 +59,39 @@ def energy_balance(observer: Observer, dense: Dense, steps: Array) -> EnergyBala
         steps: (s,) times between which `dense` is smooth.
     """
     before, after = _stored_on_both_sides(observer, dense, steps)
-    impulses = np.cumsum(after - before)
+    impulses, hits = _impulses(observer, steps, after - before)
     panels = 1
-    supplied, lost, work = _integrate(observer, dense, steps, panels)
+    found = _integrate(observer, dense, steps, panels)
     for _ in range(HALVINGS):
         panels *= 2
         finer = _integrate(observer, dense, steps, panels)
-        change = np.abs(finer[0] - supplied).max() + np.abs(finer[1] - lost).max()
-        supplied, lost, work = finer
-        if change <= TIGHT * max(work, float(np.abs(lost).max())):
+        change = np.abs(finer.supplied - found.supplied).max() + np.abs(finer.lost - found.lost).max()
+        found = finer
+        if change <= TIGHT * max(found.work, float(np.abs(found.lost).max())):
             break
-    return EnergyBalance(steps, after, supplied + impulses, lost, work + float(np.abs(after - before).sum()))
+    lost_in = dict(found.lost_in)
+    for part, energy in hits:
+        lost_in[part] = lost_in.get(part, 0.0) + float(energy.sum())
+    return EnergyBalance(
+        t=steps,
+        stored=after,
+        supplied=found.supplied + np.cumsum(impulses),
+        lost=found.lost + np.cumsum(sum((energy for _, energy in hits), start=np.zeros(len(steps)))),
+        work=found.work + float(np.abs(impulses).sum()),
+        lost_in=lost_in,
+        supplied_by=found.supplied_by,
+    )
+
+
+def _impulses(observer: Observer, steps: Array, jumps: Array) -> tuple[Array, list[tuple[str, Array]]]:
+    """(s,) energy that sources give at once, and by part the (s,) that is lost at once, in an impact."""
+    given, lost = jumps.copy(), {}
+    for time, part in observer.impacts:
+        places = np.flatnonzero(steps == time)
+        energy = lost.setdefault(part, np.zeros(len(steps)))
+        energy[places] -= given[places]
+        given[places] = 0.0
+    return given, list(lost.items())
 
 
 def _stored_on_both_sides(observer: Observer, dense: Dense, steps: Array) -> tuple[Array, Array]:
@@ -75,7 +102,18 @@ def _stored_on_both_sides(observer: Observer, dense: Dense, steps: Array) -> tup
     return stored[::2], stored[1::2]
 
 
-def _integrate(observer: Observer, dense: Dense, steps: Array, panels: int) -> tuple[Array, Array, float]:
+@dataclass(frozen=True)
+class _Work:
+    """What went through the parts: running sums (s,), and totals by part."""
+
+    supplied: Array
+    lost: Array
+    work: float
+    lost_in: Mapping[str, float]
+    supplied_by: Mapping[str, float]
+
+
+def _integrate(observer: Observer, dense: Dense, steps: Array, panels: int) -> _Work:
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
     edges = (steps[:-1, None] + np.diff(steps)[:, None] * np.linspace(0, 1, panels + 1)[:-1]).ravel()
     half = np.repeat(np.diff(steps) / panels / 2, panels)
@@ -87,9 +125,13 @@ def _integrate(observer: Observer, dense: Dense, steps: Array, panels: int) -> t
         by_step = (power * weight).reshape(len(steps) - 1, -1).sum(axis=1)
         return np.concatenate([[0.0], np.cumsum(by_step)])
 
-    given = _total(supplied, len(times))
-    work = float(sum((np.abs(power) @ weight for power in supplied.values()), start=0.0))
-    return running(given), running(_total(lost, len(times))), work
+    return _Work(
+        supplied=running(_total(supplied, len(times))),
+        lost=running(_total(lost, len(times))),
+        work=float(sum((np.abs(power) @ weight for power in supplied.values()), start=0.0)),
+        lost_in={name: float(power @ weight) for name, power in lost.items()},
+        supplied_by={name: float(power @ weight) for name, power in supplied.items()},
+    )
 
 
 def _total(by_part: dict[str, Array], size: int) -> Array:

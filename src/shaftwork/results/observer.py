@@ -32,6 +32,11 @@ class Observer(Protocol):
         """(k, places) a quantity along a part at times t (k,) with states x (k, n), with the motion behind them."""
         ...
 
+    @property
+    def impacts(self) -> tuple[tuple[float, str], ...]:
+        """Times in s at which energy may be lost at once, and the part that loses it."""
+        ...
+
     def stored(self, t: Array, x: Array, dense: Dense) -> dict[str, Array]:
         """By part, stored energy in J at times t (k,) with states x (k, n), with the motion behind them.
 

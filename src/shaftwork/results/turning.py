@@ -14,7 +14,7 @@ Read = Callable[[Array], Array]
 """From ascending times (k,) to the values of a quantity there."""
 
 PANELS, SAMPLES = 4, 2000
-"""Of one integration step and of the whole run at least, before the panels are halved: an exact engine needs few steps."""
+"""Of a step and of the whole run at least, before the panels are halved: an exact engine needs few steps."""
 HALVINGS = 9
 SETTLED = 0.01
 """The panels are halved until as many turning points are found as before and the way up and down is longer by less."""

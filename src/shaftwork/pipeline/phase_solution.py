@@ -1,0 +1,128 @@
+"""The solution of a motion through phases: what was found in each, read as one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property, partial
+
+import numpy as np
+
+from shaftwork.codegen.elements import Array
+from shaftwork.codegen.observer import ModelObserver
+from shaftwork.codegen.phase_observer import PhaseObserver, Stretch, Stretches
+from shaftwork.pipeline.assemblies import ModeNames
+from shaftwork.pipeline.phases import Phase, Run, Span
+from shaftwork.pipeline.settling import Change
+from shaftwork.results.solution import PhaseRow, Solution
+
+
+def solution(run: Run, name: str) -> Solution:
+    """The motion as a whole, to be read."""
+    names = run.spans[0].assembly.stores.names
+    whole = _Whole(run)
+    return Solution(
+        name=name,
+        t=np.concatenate([span.trajectory.t for span in run.spans]),
+        x=np.concatenate([_stored(span, names) for span in run.spans]),
+        states=names,
+        engine=run.engine,
+        why=run.why,
+        statistics={"steps": run.steps, "changes": len(run.changes)},
+        dense=whole,
+        observer=PhaseObserver(names, lambda: lambda: whole.stretches, _impacts(run)),
+        events=tuple(_event(change) for change in run.changes if _is_event(change)),
+        phases=_table(run),
+    )
+
+
+def _stored(span: Span, names: tuple[str, ...]) -> Array:
+    """(k, stores) all that is stored at the output times of a span."""
+    t, states = span.trajectory.t, span.trajectory.x[:, : len(span.assembly.model.states)]
+    if not t.size:
+        return np.empty((0, len(names)))
+    stores = span.assembly.stores
+    if stores.by_loops:
+        return stores.of(lambda: span.assembly.bound(span.phases[0].p), t, states)
+    starts = np.array([phase.start for phase in span.phases])
+    made = np.empty((t.size, len(names)))
+    index = np.clip(np.searchsorted(starts, t, side="right") - 1, 0, None)
+    for number in np.unique(index).tolist():
+        here = index == number
+        made[here] = stores.of(partial(span.assembly.bound, span.phases[number].p), t[here], states[here])
+    return made
+
+
+class _Whole:
+    """All that is stored at any time of a motion; what it needs is made when it is first asked."""
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+
+    @cached_property
+    def stretches(self) -> Stretches:
+        """The phases as they are read."""
+        return Stretches([_stretch(self._run, span, phase) for span in self._run.spans for phase in span.phases])
+
+    @property
+    def steps(self) -> Array:
+        """Ends of the integration steps."""
+        return np.unique(np.concatenate([span.trajectory.steps for span in self._run.spans]))
+
+    def __call__(self, times: Array) -> Array:
+        return self.stretches.dense(times)
+
+
+def _stretch(run: Run, span: Span, phase: Phase) -> Stretch:
+    assembly, states = span.assembly, span.assembly.model.states
+    size, dense = len(states), span.trajectory.dense
+    instants = run.timeline(assembly, phase.p)
+    bind = partial(assembly.bound, phase.p)
+    return Stretch(
+        start=phase.start,
+        key=(id(assembly), phase.p.tobytes()),
+        stores=assembly.stores,
+        bind=bind,
+        observer=ModelObserver(assembly.model.form, bind, instants),
+        instants=instants,
+        dense=lambda times: dense(times)[:, :size],
+        states=states,
+    )
+
+
+def _impacts(run: Run) -> tuple[tuple[float, str], ...]:
+    """Changes at which speeds may jump: of several at one time the first."""
+    found: dict[float, str] = {}
+    for change in run.changes:
+        modes = change.element.modes
+        if change.rebound or modes[change.before].form != modes[change.after].form:
+            found.setdefault(change.time, change.element.part.name)
+    return tuple(found.items())
+
+
+def _is_event(change: Change) -> bool:
+    modes = change.element.modes
+    return change.rebound or modes[change.before].words != modes[change.after].words
+
+
+def _event(change: Change) -> tuple[float, str, str, str]:
+    modes = change.element.modes
+    after = "rebound" if change.rebound else modes[change.after].words
+    return change.time, change.element.name, modes[change.before].words, after
+
+
+def _table(run: Run) -> tuple[PhaseRow, ...]:
+    """The phases in words: those that say the same are one."""
+    rows: list[PhaseRow] = []
+    phases = [phase for span in run.spans for phase in span.phases]
+    ends = [*(phase.start for phase in phases[1:]), run.demand.span[1]]
+    words: dict[ModeNames, dict[str, str]] = {}
+    for phase, end in zip(phases, ends, strict=True):
+        if phase.modes not in words:
+            pairs = zip(run.phases.elements, phase.modes, strict=True)
+            words[phase.modes] = {element.name: element.modes[name].words for element, name in pairs}
+        modes = words[phase.modes]
+        if rows and rows[-1].modes == modes:
+            rows[-1] = replace(rows[-1], end=end)
+        elif end > phase.start:
+            rows.append(PhaseRow(phase.start, end, modes))
+    return tuple(rows)

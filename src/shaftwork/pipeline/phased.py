@@ -1,0 +1,94 @@
+"""The model of a network whose parts change their mode."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from shaftwork.codegen.linear import Linearization
+from shaftwork.codegen.operating import initial_state, steady_state
+from shaftwork.core.errors import SimulationError
+from shaftwork.pipeline.analysis import Given, Names, Point, Time, input_names, operating_point
+from shaftwork.pipeline.arguments import Demand
+from shaftwork.pipeline.model import Model
+from shaftwork.pipeline.phase_solution import solution
+from shaftwork.pipeline.phases import Phases, Run
+from shaftwork.pipeline.settling import Moment, Settling
+from shaftwork.results.linear import LinearModel, linear_model
+from shaftwork.results.solution import Solution
+
+MOST_CHANGES = 100
+"""Changes of mode on the way to a steady operation."""
+
+
+class PhasedModel(Model):
+    """A network with parts that change their mode, ready to be simulated again and again.
+
+    Its states, right-hand side and equations are those in the first mode of every part, in which everything moves.
+    """
+
+    @cached_property
+    def phases(self) -> Phases:
+        """The equations of every combination of modes that a motion has come to."""
+        return Phases(self, self._rebuild)
+
+    def _motion(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
+        run = Run(self.phases, values, demand)
+        run.march(initial)
+        return solution(run, self.name)
+
+    def _choice(self, demand: Demand) -> tuple[str, str]:
+        return Run(self.phases, {}, demand).choose()
+
+    def _steady(self, values: Mapping[str, float], t: float, initial: Given) -> dict[str, float]:
+        """Steady states of one set of equations after another, until no mode changes there."""
+        first = self.phases.assembly(self.phases.first)
+        when = t if math.isfinite(t) else first.model.settled(first.vector(values, {}))
+        settling = Settling(self.phases, values, (0.0, 1.0))
+        moment = self._moment(settling, when, initial)
+        for _ in range(MOST_CHANGES):
+            bound = moment.assembly.bound(moment.p)
+            if not math.isfinite(t) and (moving := bound.moving_sources(when)):
+                raise SimulationError(
+                    f"{', '.join(moving)} never stops changing, so there is no steady operation. "
+                    f"Name the time at which the sources are to be read: steady_state(t=...)."
+                )
+            x = steady_state(bound, moment.x, when) if moment.x.size else moment.x
+            moment, changes = settling.settle(when, when, replace(moment, x=x), None)
+            if not changes:
+                return settling.held(moment, when)
+        raise SimulationError(
+            f"No steady operation was found: after {MOST_CHANGES} changes '{changes[-1].element.name}' still goes from "
+            f"'{changes[-1].before}' to '{changes[-1].after}'. Give a start near the operating point."
+        )
+
+    def _near(self, values: Mapping[str, float], at: Point, t: Time, inputs: Names, outputs: Names) -> LinearModel:
+        first = self.phases.assembly(self.phases.first)
+        settling = Settling(self.phases, values, (0.0, 1.0))
+        p = first.vector(values, self.phases.numbers(self.phases.first))
+        if isinstance(at, Solution):
+            time, held = self._of(at)
+            time = time if t is None else t
+            moment = settling.started(time, first.stores.states(first.bound(p), time, held))
+        else:
+            time, x = operating_point(first.model, p, at, t, first.model.settled(p))
+            moment = settling.started(time, x)
+        moment, _ = settling.settle(time, time, moment, None)
+        model = moment.assembly.model
+        slopes = Linearization(model, moment.p, moment.x, time, input_names(model, inputs))
+        named = None if outputs is None else (outputs,) if isinstance(outputs, str) else tuple(outputs)
+        return linear_model(self.name, slopes, named, moment.x, time)
+
+    @staticmethod
+    def _of(motion: Solution) -> tuple[float, dict[str, float]]:
+        return float(motion.t[0]), dict(zip(motion.states, np.asarray(motion.x[0]).tolist(), strict=True))
+
+    def _moment(self, settling: Settling, t: float, initial: Given) -> Moment:
+        first = self.phases.assembly(self.phases.first)
+        p = settling.moment(self.phases.first, first).p
+        moment = settling.started(t, initial_state(first.bound(p), initial or {}, t))
+        return settling.settle(t, t, moment, None)[0]

@@ -1,0 +1,128 @@
+"""What the loads ask of their shaft, at steady speeds; random loads from their seed.
+
+Statistical bounds are set for a false alarm of one in a million, were the seeds drawn anew; the seeds here are fixed.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from statistics import NormalDist
+
+import numpy as np
+import pytest
+
+import shaftwork as sw
+from shaftwork.components import noise
+
+FALSE_ALARM = 1e-6
+FAST = 10.0
+"""A speed in rad/s at which tanh(omega / 0.01) is 1 to the last bit."""
+
+
+def torque_at(load: sw.Component, omega: float) -> float:
+    """Torque on the node at a steady speed."""
+    net = sw.Network("steady")
+    net.add(sw.SpeedSource("drive", omega=omega), "shaft")
+    net.add(load, "shaft")
+    return float(net.simulate(1.0)[f"{load.name}.tau"][-1])
+
+
+def test_crane_travel_is_the_weight_times_the_specific_resistance_at_the_wheel() -> None:
+    """Marinkovic 2012 prints 4.0 t, 0.25 m and 22.4 N m, which are w + kappa = 22.4 / (4000 * 9.81 * 0.125)."""
+    load = sw.CraneTravel("load", mass=4000.0, diameter=0.25, w=0.0042, kappa=22.4 / 4905.0 - 0.0042)
+    assert torque_at(load, FAST) == pytest.approx(-22.4, rel=1e-14)
+    assert torque_at(load, -FAST) == pytest.approx(22.4, rel=1e-14)
+    assert torque_at(load, 0.0) == 0.0
+
+
+def test_wheel_friction_is_of_rolling_and_of_the_bearings() -> None:
+    assert sw.CraneTravel.wheel_friction(0.25, 0.0005, 0.002, 0.05) == pytest.approx((0.001 + 0.0001) / 0.25)
+    with pytest.raises(sw.ParameterError, match="above 0"):
+        sw.CraneTravel.wheel_friction(0.0, 0.0005, 0.002, 0.05)
+
+
+def test_a_hoist_pulls_downwards_both_ways_and_its_gear_loses_both_ways() -> None:
+    load = sw.Hoist("load", mass=1000.0, radius=0.2, ratio=40.0, efficiency=0.8)
+    weight = 1000.0 * 9.81 * 0.2 / 40.0
+    assert torque_at(load, FAST) == pytest.approx(-weight / 0.8)
+    assert torque_at(load, -FAST) == pytest.approx(-weight * 0.8)
+    ideal = sw.Hoist("load", mass=1000.0, radius=0.2, ratio=40.0)
+    assert torque_at(ideal, FAST) == torque_at(ideal, -FAST) == pytest.approx(-weight)
+
+
+@pytest.mark.parametrize("kind", [sw.FanLoad, sw.PumpLoad])
+def test_fans_and_pumps_pass_their_nominal_point_along_a_square(kind) -> None:
+    load, nominal = kind("load", tau_n=50.0, n_n=1450.0, static=0.2), 2 * math.pi * 1450.0 / 60
+    for share in (1.0, 0.5, -0.5):
+        wanted = -math.copysign(50.0 * (0.8 * share**2 + 0.2), share)
+        assert torque_at(load, share * nominal) == pytest.approx(wanted)
+
+
+def test_a_conveyor_lifts_rubs_and_drags() -> None:
+    load = sw.Conveyor("load", mass=800.0, radius=0.25, friction=0.02, incline=0.1, d=30.0)
+    weight, drag = 800.0 * 9.81 * 0.25, 30.0 * 0.25**2 * FAST
+    up, along = weight * math.sin(0.1), 0.02 * weight * math.cos(0.1)
+    assert torque_at(load, FAST) == pytest.approx(-up - along - drag)
+    assert torque_at(load, -FAST) == pytest.approx(-up + along + drag)
+
+
+def random_load(kind: str, *, intervals: int, seed: float = 1.0, std: float = 10.0) -> np.ndarray:
+    """The resistance at the middle of each interval."""
+    net = sw.Network("travel")
+    net.add(sw.SpeedSource("drive", omega=FAST), "shaft")
+    net.add(sw.RandomLoad("w", mean=22.4, std=std, interval=0.05, seed=seed, kind=kind), "shaft")
+    times = 0.05 * (np.arange(intervals) + 0.5)
+    return -net.simulate(0.05 * intervals, t_eval=times)["w.tau"]
+
+
+def test_a_held_random_load_has_the_asked_distribution_with_nothing_below_zero() -> None:
+    """Kolmogorov's test against the normal distribution above zero; below it is what the normal one has there."""
+    n = 4000
+    sample, normal = np.sort(random_load("held", intervals=n)), NormalDist(22.4, 10.0)
+    bound = math.sqrt(math.log(2 / FALSE_ALARM) / 2 / n)
+    assert sample[0] == 0.0
+    assert abs((sample == 0).mean() - normal.cdf(0.0)) < bound
+    wanted = np.array([normal.cdf(value) for value in sample])
+    assert np.abs(wanted - (np.arange(n) + 0.5) / n)[sample > 0].max() < bound
+    np.testing.assert_array_equal(random_load("held", intervals=5, std=0.0), 22.4)
+
+
+def test_a_random_load_is_a_function_of_time_and_seed_alone() -> None:
+    """Not of the length of the run; the sample numbers are those of the noise itself, bit for bit."""
+    for kind, function in (("held", noise.held), ("band-limited", noise.smooth)):
+        load = random_load(kind, intervals=40, seed=3.0)
+        np.testing.assert_array_equal(load, random_load(kind, intervals=60, seed=3.0)[:40])
+        places = 0.05 * (np.arange(40) + 0.5) / 0.05
+        np.testing.assert_array_equal(load, np.maximum(0.0, 22.4 + 10.0 * function(places, 3.0)))
+        assert (load != random_load(kind, intervals=40, seed=4.0)).all()
+
+
+def test_another_seed_needs_no_new_model() -> None:
+    net = sw.Network("travel")
+    net.add(sw.SpeedSource("drive", omega=FAST), "shaft")
+    net.add(sw.RandomLoad("w", mean=22.4, std=10.0, interval=0.05), "shaft")
+    model = net.compile()
+    for seed in (2.0, 5.0):
+        found = model.simulate(1.0, t_eval=[0.01], parameters={"w.seed": seed})["w.tau"]
+        assert found == pytest.approx(-22.4 - 10.0 * noise.normal(0, seed))
+
+
+def test_a_random_load_is_saved_by_its_numbers(tmp_path: Path) -> None:
+    net = sw.Network("travel")
+    net.add(sw.SpeedSource("drive", omega=FAST), "shaft")
+    net.add(sw.RandomLoad("w", mean=22.4, std=10.0, interval=0.05, seed=4.0, kind="band-limited"), "shaft")
+    net.add(sw.BucketWheelLoad("dig", radius=3.0, edge=0.7, soil=sw.Soil(5e4, 1e4), buckets=9), "shaft")
+    net.save(tmp_path / "travel.toml")
+    text = (tmp_path / "travel.toml").read_text()
+    assert 'kind = "band-limited"' in text
+    assert 'soil = "Soil(mean=50000.0, std=10000.0)"' in text
+    first, again = net.simulate(1.0), sw.Network.load(tmp_path / "travel.toml").simulate(1.0)
+    for signal in ("w.tau", "dig.tau"):
+        np.testing.assert_array_equal(first[signal], again[signal])
+
+
+def test_a_wrong_kind_is_answered_with_the_kinds() -> None:
+    net = sw.Network("travel")
+    net.add(sw.RandomLoad("w", mean=22.4, std=10.0, interval=0.05, kind="white"), "shaft")
+    assert any("held, band-limited" in str(problem) for problem in net.check())
