@@ -1,4 +1,4 @@
-"""Digging torque of a bucket wheel by the algorithm of 6 steps of Marinkovic 2012, 2.2.3, in plain Python, bucket by bucket."""
+"""Digging torque of a bucket wheel by the algorithm of 6 steps of Marinkovic 2012, 2.2.3, bucket by bucket."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -205,8 +205,18 @@ def _read(bound: BoundArrays, quantities: Iterable[str], t0: float, x: Array) ->
     return np.array([observer.signal(name, times, x) for name in quantities])
 
 
-def steady_state(bound: BoundArrays, start: Array, t: float, *, tolerance: float = 1e-12, limit: int = 2000) -> Array:
+def steady_state(
+    bound: BoundArrays,
+    start: Array,
+    t: float,
+    *,
+    tolerance: float = 1e-12,
+    limit: int = 2000,
+    ends: Callable[[Array], bool] | None = None,
+) -> Array:
     """States at which nothing changes, reached from a start the way the drive itself would reach it.
+
+    Where `ends` says of states that other equations hold there, the way ends just beyond.
 
     Law: implicit Euler steps (I/h - J) dx = rhs, each with one iteration of Newton's method. A step is taken where its
     defect is small, and the next is then longer: first the motion of the drive is followed, so that of several steady
@@ -233,9 +243,12 @@ def steady_state(bound: BoundArrays, start: Array, t: float, *, tolerance: float
         defect = np.linalg.norm(weights * (trial / h - new)) / max(
             np.linalg.norm(weights * rate), np.linalg.norm(weights * size) * tolerance, np.finfo(float).tiny
         )
-        if not defect < DEFECT:
+        over = ends is not None and ends(x + trial)
+        if not defect < DEFECT or (over and h > SMALLEST_STEP):
             h = h / 4
             continue
+        if over:
+            return np.asarray(x + trial)
         x, rate, step, h = x + trial, new, trial, min(h * (2.0 if defect > DEFECT / 10 else 8.0), 1e12)
     worst = int(np.argmax(np.abs(weights * rate)))
     raise SimulationError(

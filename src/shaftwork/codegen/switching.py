@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sympy import Expr, Symbol
+from sympy import Expr, Symbol, pi, sin
 
 from shaftwork.codegen.code import scalar, vectorised
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.timeline import CLEARANCE, NOTHING, Timeline, timeline
-from shaftwork.components.laws import line, switches, whole_line
+from shaftwork.components.laws import line, switches
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ParameterError
 from shaftwork.network.graph import GraphPart
@@ -134,7 +134,7 @@ def _switches(form: StateForm) -> Iterator[_Switch]:
 def _made(
     part: GraphPart, argument: Expr, levels: Sequence[float], symbols: tuple[Symbol, ...], places: tuple[int, ...]
 ) -> _Switch:
-    whole = whole_line(argument) if tuple(levels) == (0.0,) else None
+    whole = _whole_line(argument) if tuple(levels) == (0.0,) else None
     straight = whole or line(argument)
     return _Switch(
         part.name,
@@ -145,6 +145,12 @@ def _made(
         vectorised((TIME, *symbols), argument),
         whole is not None,
     )
+
+
+def _whole_line(argument: Expr) -> tuple[Expr, Expr] | None:
+    """Slope and offset of a line in t that is a whole number where an argument is zero, else None: x of sin(pi x)."""
+    _, factor = argument.as_coeff_Mul()
+    return line(factor.args[0] / pi) if isinstance(factor, sin) else None
 
 
 def _straight(switch: _Switch, p: Array) -> tuple[float, float]:

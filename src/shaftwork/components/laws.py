@@ -366,12 +366,6 @@ def line(expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr] | None:
     return polynomial.coeff_monomial(t), polynomial.coeff_monomial(1)
 
 
-def whole_line(argument: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr] | None:
-    """Slope and offset of a line in t that is a whole number where an argument is zero, else None: x of sin(pi x)."""
-    _, factor = argument.as_coeff_Mul()
-    return line(factor.args[0] / sympy.pi) if isinstance(factor, sympy.sin) else None
-
-
 def _latex_call(name: str, node: _TableFunction, printer: Any, exponent: str | None) -> str:
     power = "" if exponent is None else f"^{{{exponent}}}"
     argument, table = _printed(node.argument, printer), _printed(node.table, printer)

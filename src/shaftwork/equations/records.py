@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 from sympy import Add, Eq, Expr, Float, Symbol
 
+from shaftwork.core.errors import ParameterError
 from shaftwork.equations.assembly import Assembly, Group, Sides
 from shaftwork.equations.notation import Letter, notation
 from shaftwork.reduction.form import StateForm
@@ -180,6 +181,7 @@ class Equations:
         states: rates of the states.
         eliminated: dependent stores, speeds without a store, reactions of couplings and prescribed speeds.
         notes: what was left out or decided by numerical values, in words.
+        in_phase: from the name of a phase to the equations there, where parts change their mode.
     """
 
     form: StateForm
@@ -191,6 +193,7 @@ class Equations:
     states: tuple[StateEquation, ...]
     eliminated: tuple[Eliminated, ...]
     notes: tuple[str, ...]
+    in_phase: Callable[[str], Equations] | None = None
 
     @cached_property
     def _notation(self) -> tuple[Mapping[str, str], tuple[Letter, ...]]:
@@ -240,18 +243,25 @@ class Equations:
 
         return second_order(self.form.graph)
 
-    def latex(self, form: Form | None = None, *, values: bool = False) -> str:
+    def latex(self, form: Form | None = None, *, values: bool = False, phase: str | None = None) -> str:
         """The equations as the body of a LaTeX document (needs amsmath), or for a notebook cell.
 
         Args:
             form: "kirchhoff" (balances, loops, laws), "state" (rates) or "second-order"; by default the first two.
             values: print the parameters' values instead of their symbols.
+            phase: the equations of this phase of a motion, "gap open, load stuck"; by default those in the first mode
+                of every part.
 
         Raises:
             CompileError: second-order form of a network with electrical nodes.
+            ParameterError: there is no such phase.
         """
         from shaftwork.equations.report import body
 
+        if phase is not None:
+            if self.in_phase is None:
+                raise ParameterError(f"phase = {phase!r}: no part of '{self.form.graph.name}' changes its mode.")
+            return self.in_phase(phase).latex(form, values=values)
         return body(self, form, values=values)
 
     def document(self, *, values: bool = False) -> str:

@@ -43,6 +43,7 @@ def settle(program: Any, integrator: Any, horizon: float) -> None:
         signs[near] = 0.0
         found = _early_signs(program, integrator, horizon)
         signs[:] = np.where(near & (found != 0.0), found, kept)
+        _enter(program, integrator, signs)
     for _ in range(signs.size):
         zero = (signs == 0.0) & ~program.timed
         if not zero.any():
@@ -51,9 +52,15 @@ def settle(program: Any, integrator: Any, horizon: float) -> None:
         if np.array_equal(found, signs):
             return
         signs[:] = found
-        if program.held is not None:  # a whole number, from which the motion starts downwards
-            for number in program.held.by_switch:
-                program.step(number, integrator) if signs[number] < 0 else None
+        _enter(program, integrator, signs)
+
+
+def _enter(program: Any, integrator: Any, signs: Array) -> None:
+    """Let held functions step where the motion starts at the end of a whole number and leaves it."""
+    if program.held is not None:
+        for number in program.held.by_switch:
+            if signs[number] < 0:
+                program.step(number, integrator)
 
 
 def _within_rounding(program: Any, integrator: Any) -> NDArray[np.bool_]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import gc
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -18,6 +19,7 @@ from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.netlist import Netlist
 from shaftwork.network.storage import read_netlist, write_netlist
 from shaftwork.pipeline.model import Model
+from shaftwork.pipeline.phase_names import in_phase
 from shaftwork.pipeline.phased import PhasedModel
 from shaftwork.reduction.diagnosis import diagnose
 from shaftwork.reduction.form import StateForm, state_form
@@ -72,17 +74,29 @@ class Network(NetworkBuilder):
         netlist = self.netlist()
         return self._of(expanded(netlist, _sound(netlist).graph))
 
-    def equations(self, *, expand: bool = False) -> Equations:
+    def equations(self, *, expand: bool = False, phase: str | None = None) -> Equations:
         """Kirchhoff's node and loop equations, laws, states and what was eliminated.
 
         Args:
             expand: of the network with its shafts written out part by part.
+            phase: a phase of the motion, "gap open, load stuck"; by default every part is in its first mode.
 
         Raises:
             NetworkError: the network cannot be assembled; lists every reason.
-            ParameterError: `expand`, and a shaft's model is no chain of springs, as `Lumped` is.
+            ParameterError: `expand`, and a shaft's model is no chain of springs, as `Lumped` is; or there is no such
+                phase.
         """
-        return self.expanded().equations() if expand else kirchhoff(_sound(self.netlist()))
+        if expand:
+            return self.expanded().equations(phase=phase)
+        netlist = self.netlist()
+        form = _sound(netlist)
+        if not any(part.modes for part in form.graph.parts) and phase is None:
+            return kirchhoff(form)
+
+        def chosen(name: str) -> Equations:
+            return kirchhoff(_sound(in_phase(netlist, form.graph, name)))
+
+        return dataclasses.replace(kirchhoff(form) if phase is None else chosen(phase), in_phase=chosen)
 
     def compile(
         self,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -57,7 +57,9 @@ class PhasedModel(Model):
                     f"{', '.join(moving)} never stops changing, so there is no steady operation. "
                     f"Name the time at which the sources are to be read: steady_state(t=...)."
                 )
-            x = steady_state(bound, moment.x, when) if moment.x.size else moment.x
+            x = moment.x
+            if x.size:
+                x = steady_state(bound, x, when, ends=partial(settling.ends, moment, when))
             moment, changes = settling.settle(when, when, replace(moment, x=x), None)
             if not changes:
                 return settling.held(moment, when)

@@ -94,6 +94,12 @@ class Settling:
         values = assembly.stores.of(lambda: assembly.bound(moment.p), np.array([t]), moment.x[None, :])[0]
         return dict(zip(assembly.stores.names, values.tolist(), strict=True))
 
+    def ends(self, moment: Moment, t: float, x: Array) -> bool:
+        """Whether states are beyond a guard of the modes of a moment."""
+        now = moment.assembly.motion(moment.p)(t, x.tolist())[1]
+        wide = moment.bands or [0.0] * len(now)
+        return any(made.side * now[made.guard] > wide[made.guard] for _, made in moment.assembly.watched(moment.modes))
+
     def settle(self, t: float, after: float, moment: Moment, met: int | None) -> tuple[Moment, list[Change]]:
         """The modes that go on, and the changes that lead there.
 
@@ -213,5 +219,5 @@ class Settling:
         others = dict.fromkeys(change.element.name for change in changes)
         return SimulationError(
             f"At t = {t:.9g} s no modes of {', '.join(others)} are consistent: '{last.element.name}' changes for ever "
-            f"between '{last.before}' and '{last.after}'. Give the node between them an inertia, or one of them damping."
+            f"between '{last.before}' and '{last.after}'. Give the node between them an inertia or damping."
         )

@@ -1,0 +1,62 @@
+"""Phases by their names: "gap open, load stuck" to the modes of every part."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from shaftwork.components.modes import Choice, Mode, Modes
+from shaftwork.core.errors import ParameterError
+from shaftwork.network.graph import CircuitGraph, GraphPart
+from shaftwork.network.netlist import Netlist
+
+
+def in_phase(netlist: Netlist, graph: CircuitGraph, phase: str) -> Netlist:
+    """The network as it is in a phase: each part with the branches and the law of its mode alone.
+
+    Args:
+        netlist: of the network.
+        graph: of the same network.
+        phase: parts and modes, "gap open, load stuck"; parts that are not named are in their first mode.
+
+    Raises:
+        ParameterError: no part or mode has this name.
+    """
+    if not isinstance(phase, str):
+        raise ParameterError(f"phase = {phase!r} must be a text such as 'gap open'. {_known(graph)}")
+    found: dict[tuple[str, str], Mode] = {}
+    for words in filter(None, (part.strip() for part in phase.split(","))):
+        part, modes, mode = _named(graph, words)
+        found[part.name, modes.label] = mode
+    chosen = {
+        part.name: tuple(_choice(found.get((part.name, modes.label), modes.options[0])) for modes in part.modes)
+        for part in graph.parts
+        if part.modes
+    }
+    return netlist.with_choices(chosen)
+
+
+def _choice(mode: Mode) -> Choice:
+    return Choice(mode.form, mode.value)
+
+
+def _elements(graph: CircuitGraph) -> Iterator[tuple[str, GraphPart, Modes]]:
+    for part in graph.parts:
+        for modes in part.modes:
+            yield (f"{part.name}.{modes.label}" if modes.label else part.name), part, modes
+
+
+def _named(graph: CircuitGraph, words: str) -> tuple[GraphPart, Modes, Mode]:
+    for name, part, modes in _elements(graph):
+        for mode in modes.options:
+            if words in (f"{name} {mode.words}", f"{name} {mode.name}"):
+                return part, modes, mode
+    raise ParameterError(f"There is no phase '{words}'. {_known(graph)}")
+
+
+def _known(graph: CircuitGraph) -> str:
+    known = [f"{name} {_either(modes.options)}" for name, _, modes in _elements(graph)]
+    return f"There are: {'; '.join(known)}." if known else "No part of this network changes its mode."
+
+
+def _either(options: Sequence[Mode]) -> str:
+    return " | ".join(dict.fromkeys(mode.words for mode in options))
