@@ -21,8 +21,9 @@ import shaftwork as sw
 Run = Callable[[float], tuple[int, np.ndarray]]
 """From a relative tolerance to the number of events and the end state."""
 ENGINES = ("heyoka", "scipy", "sundials", "scipy-radau")
-SLOWEST = 1e-10
-"""The tightest tolerance that is asked of Radau's formulas, which are of order 5."""
+FEW = (1e-3, 1e-6, 1e-8, 1e-10, 1e-12)
+RADAU = (1e-3, 1e-6, 1e-8)
+"""Its formulas are of order 5: tighter tolerances cost seconds."""
 
 
 def crane_model() -> sw.Model:
@@ -66,7 +67,7 @@ def scipy_by_hand(max_step: float) -> Run:
     return run
 
 
-def points(run: Run, rtols: Sequence[float], samples: int = 5) -> tuple[Point, ...]:
+def points(run: Run, rtols: Sequence[float], samples: int = 3) -> tuple[Point, ...]:
     """What every tolerance gave; an infinite error where it failed or lost an event."""
     count, truth = rival.truth()
     made = []
@@ -96,20 +97,20 @@ def main() -> None:
     model = crane_model()
     curves = {f"scipy by hand, steps up to {step:g} s": points(scipy_by_hand(step), RTOLS) for step in (math.inf, 0.01)}
     for engine in ENGINES:
-        rtols = [rtol for rtol in RTOLS if engine != "scipy-radau" or rtol >= SLOWEST]
+        rtols = {"heyoka": RTOLS, "scipy-radau": RADAU}.get(engine, FEW)
         curves[f"Shaftwork, {engine}"] = points(shaftwork(model, engine), rtols)
     for name, curve in curves.items():
         print(f"\n{name}\n      rtol  events    error     CPU ms")
         for point in curve:
-            print(f"  {point.rtol:8.0e}  {point.events:6}  {point.error:7.0e}  {1e3 * point.cpu:9.2f}")
+            verdict = f"{point.error:7.0e}" if math.isfinite(point.error) else "  wrong"
+            print(f"  {point.rtol:8.0e}  {point.events:6}  {verdict}  {1e3 * point.cpu:9.2f}")
     by_hand = [name for name in curves if name.startswith("scipy")]
     print("\nCPU in ms at a true error of, and how many times less than the faster run of scipy by hand")
-    for error in (1e-6, 1e-8, 1e-9, 1e-10):
+    for error in (1e-6, 1e-8, 1e-9):
         best = min(cheapest(curves[name], error) for name in by_hand)
         print(f"  {error:.0e}  {'scipy by hand':24} {1e3 * best:9.2f}")
         for name, curve in curves.items():
-            if name not in by_hand:
-                cost = cheapest(curve, error)
+            if name not in by_hand and math.isfinite(cost := cheapest(curve, error)):
                 print(f"         {name:24} {1e3 * cost:9.2f}  {best / cost:6.2f}")
 
 

@@ -40,6 +40,7 @@ OUTPUT = ("text", "toml", "latex")
 FAMILIES = (
     "rotation",
     "contacts",
+    "friction",
     "shafts",
     "translation",
     "sources",

@@ -30,7 +30,7 @@ def torque_at(load: sw.Component, omega: float) -> float:
 
 def test_crane_travel_is_the_weight_times_the_specific_resistance_at_the_wheel() -> None:
     """Marinkovic 2012 prints 4.0 t, 0.25 m and 22.4 N m, which are w + kappa = 22.4 / (4000 * 9.81 * 0.125)."""
-    load = sw.CraneTravel("load", mass=4000.0, diameter=0.25, w=0.0042, kappa=22.4 / 4905.0 - 0.0042)
+    load = sw.CraneTravel("load", m=4000.0, diameter=0.25, w=0.0042, kappa=22.4 / 4905.0 - 0.0042)
     assert torque_at(load, FAST) == pytest.approx(-22.4, rel=1e-14)
     assert torque_at(load, -FAST) == pytest.approx(22.4, rel=1e-14)
     assert torque_at(load, 0.0) == 0.0
@@ -43,11 +43,11 @@ def test_wheel_friction_is_of_rolling_and_of_the_bearings() -> None:
 
 
 def test_a_hoist_pulls_downwards_both_ways_and_its_gear_loses_both_ways() -> None:
-    load = sw.Hoist("load", mass=1000.0, radius=0.2, ratio=40.0, efficiency=0.8)
+    load = sw.Hoist("load", m=1000.0, radius=0.2, ratio=40.0, efficiency=0.8)
     weight = 1000.0 * 9.81 * 0.2 / 40.0
     assert torque_at(load, FAST) == pytest.approx(-weight / 0.8)
     assert torque_at(load, -FAST) == pytest.approx(-weight * 0.8)
-    ideal = sw.Hoist("load", mass=1000.0, radius=0.2, ratio=40.0)
+    ideal = sw.Hoist("load", m=1000.0, radius=0.2, ratio=40.0)
     assert torque_at(ideal, FAST) == torque_at(ideal, -FAST) == pytest.approx(-weight)
 
 
@@ -60,7 +60,7 @@ def test_fans_and_pumps_pass_their_nominal_point_along_a_square(kind) -> None:
 
 
 def test_a_conveyor_lifts_rubs_and_drags() -> None:
-    load = sw.Conveyor("load", mass=800.0, radius=0.25, friction=0.02, incline=0.1, d=30.0)
+    load = sw.Conveyor("load", m=800.0, radius=0.25, friction=0.02, incline=0.1, d=30.0)
     weight, drag = 800.0 * 9.81 * 0.25, 30.0 * 0.25**2 * FAST
     up, along = weight * math.sin(0.1), 0.02 * weight * math.cos(0.1)
     assert torque_at(load, FAST) == pytest.approx(-up - along - drag)

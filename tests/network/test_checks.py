@@ -170,7 +170,7 @@ def test_a_wrong_unit_is_said_with_the_right_one() -> None:
         (sympy.Symbol("k") * laws.t, "contains the symbol k, which has no value"),
         (sympy.Function("f")(laws.t), "contains the unknown function f"),
         (sympy.I * laws.t, "is not a finite real law"),
-        (sympy.floor(laws.t), "contains the unknown function floor"),
+        (sympy.ceiling(laws.t), "contains the unknown function ceiling"),
         (3.0 * sympy.erf(laws.omega) + 1, "contains the unknown function erf"),
         (sympy.Mod(laws.t, 2), "contains the unknown function Mod"),
         (sympy.gamma(laws.t), "contains the unknown function gamma"),
@@ -202,7 +202,7 @@ def test_laws_of_time_speed_angle_and_tables_are_allowed() -> None:
 
 
 def test_an_unknown_function_is_answered_with_those_of_the_grammar() -> None:
-    problem = typed(sources.TorqueSource("motor", tau=sympy.floor(laws.t)), "rotor")
+    problem = typed(sources.TorqueSource("motor", tau=sympy.ceiling(laws.t)), "rotor")
     for name in (*FUNCTIONS, "Piecewise", "Table"):
         assert name in problem.hint
 

@@ -59,7 +59,7 @@ class HeyokaProgram:
     held: HeldParameters | None = None
     stepping: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
     _compiled: dict[float, Any] = field(default_factory=dict, repr=False, compare=False)
-    _switch_values: list[Any] = field(default_factory=list, repr=False, compare=False)
+    _functions: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     def guard_met(self, outcome: Any) -> int | None:
         """The guard that an outcome of heyoka means, or None where it means something else."""
@@ -74,11 +74,18 @@ class HeyokaProgram:
 
     def switch_values(self, t: float, x: Array, parameters: Array) -> Array:
         """Values of the switches (k,) at time t in s, state x (n,) and all parameters, the signs included."""
-        if not self._switch_values:
+        return self._values("switches", self.switches, t, x, parameters)
+
+    def guard_values(self, t: float, x: Array, parameters: Array) -> Array:
+        """Values of the guards (k,); arguments as for `switch_values`."""
+        return self._values("guards", self.guards, t, x, parameters)
+
+    def _values(self, name: str, expressions: tuple[Any, ...], t: float, x: Array, parameters: Array) -> Array:
+        if name not in self._functions:
             import heyoka
 
-            self._switch_values.append(heyoka.cfunc(list(self.switches), vars=list(self.variables), compact_mode=True))
-        compiled = self._switch_values[0]
+            self._functions[name] = heyoka.cfunc(list(expressions), vars=list(self.variables), compact_mode=True)
+        compiled = self._functions[name]
         values: Array = compiled(x, pars=parameters[: compiled.nparams], time=t)
         return values
 

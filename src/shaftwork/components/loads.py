@@ -75,12 +75,12 @@ class ViscousLoad(Component):
 class CraneTravel(Component):
     """The travel resistance of a crane at the shaft of its wheels, always against the motion.
 
-    Law: torque on the node -tau_w tanh(omega / omega_s), tau_w = mass g (w + kappa) diameter / 2 with g = 9.81 m/s^2.
-    The mass itself is no part of it: give the node an Inertia of mass diameter^2 / 4, or a Wheel with a Mass.
+    Law: torque on the node -tau_w tanh(omega / omega_s), tau_w = m g (w + kappa) diameter / 2 with g = 9.81 m/s^2.
+    The mass itself is no part of it: give the node an Inertia of m diameter^2 / 4, or a Wheel with a Mass.
     Source: Marinkovic 2012, (7), (8); with its 4.0 t and 0.25 m, 22.4 N m are w + kappa = 0.004567.
     """
 
-    mass: float = parameter("kg", "of crane and load together", at_least=0, latex=r"m_\Sigma")
+    m: float = parameter("kg", "mass of crane and load together", at_least=0, latex=r"m_\Sigma")
     diameter: float = parameter("m", "of the wheels on the rail", above=0, latex="D")
     w: float = parameter("1", "specific resistance of friction, see `wheel_friction`", at_least=0)
     kappa: float = parameter("1", "resistance of wheels that run askew", at_least=0, default=0.0, latex=r"\kappa")
@@ -90,7 +90,7 @@ class CraneTravel(Component):
     ports: ClassVar = (Port("a"),)
 
     def derived(self, p: Any) -> Iterator[Derived]:
-        size = p.mass * GRAVITY * (p.w + p.kappa) * p.diameter / 2
+        size = p.m * GRAVITY * (p.w + p.kappa) * p.diameter / 2
         yield Derived("tau_w", size, "N*m", "travel resistance", r"\tau_w")
 
     def branches(self, p: Any) -> Iterator[Branch]:
@@ -122,12 +122,12 @@ class Hoist(Component):
     """A load that hangs on the rope of a drum, behind a gear: it pulls downwards whichever way it moves.
 
     Law: torque on the node -tau_h (1/efficiency + efficiency) / 2 - tau_h (1/efficiency - efficiency) / 2
-    tanh(omega / omega_s), tau_h = mass g radius / ratio: tau_h / efficiency while it is hoisted, efficiency tau_h while
+    tanh(omega / omega_s), tau_h = m g radius / ratio: tau_h / efficiency while it is hoisted, efficiency tau_h while
     it is lowered. A positive speed hoists. The efficiency holds for the weight; that of accelerating the load is left
-    out, and its mass is no part of it: give the node an Inertia of mass (radius / ratio)^2.
+    out, and its mass is no part of it: give the node an Inertia of m (radius / ratio)^2.
     """
 
-    mass: float = parameter("kg", "of the load and its tackle", at_least=0, latex="m")
+    m: float = parameter("kg", "mass of the load and its tackle", at_least=0)
     radius: float = parameter("m", "of the drum", above=0, latex="r")
     ratio: float = parameter("1", "node speed over drum speed", above=0, default=1.0, latex="i")
     efficiency: float = parameter("1", "from the node to the load", above=0, at_most=1, default=1.0, latex=r"\eta")
@@ -137,7 +137,7 @@ class Hoist(Component):
     ports: ClassVar = (Port("a"),)
 
     def derived(self, p: Any) -> Iterator[Derived]:
-        yield Derived("tau_h", p.mass * GRAVITY * p.radius / p.ratio, "N*m", "weight at the shaft", r"\tau_h")
+        yield Derived("tau_h", p.m * GRAVITY * p.radius / p.ratio, "N*m", "weight at the shaft", r"\tau_h")
 
     def branches(self, p: Any) -> Iterator[Branch]:
         yield ThroughLaw(p.tau_h * (1 / p.efficiency + p.efficiency) / 2)
@@ -195,12 +195,12 @@ class PumpLoad(Component):
 class Conveyor(Component):
     """A belt that carries a mass up or along: its weight, friction against the motion, and drag that rises with speed.
 
-    Law: torque on the node -radius (mass g sin(incline) + friction mass g cos(incline) tanh(omega / omega_s)
+    Law: torque on the node -radius (m g sin(incline) + friction m g cos(incline) tanh(omega / omega_s)
     + d radius omega). A positive speed carries upwards where the incline is positive. The mass itself is no part of it:
-    give the node an Inertia of mass radius^2.
+    give the node an Inertia of m radius^2.
     """
 
-    mass: float = parameter("kg", "on the belt and of the belt", at_least=0, latex="m")
+    m: float = parameter("kg", "mass on the belt and of the belt", at_least=0)
     radius: float = parameter("m", "of the drum", above=0, latex="r")
     friction: float = parameter("1", "coefficient of friction of the idlers", at_least=0, latex=r"\mu")
     incline: float = parameter("rad", "of the belt", at_least=-1.57, at_most=1.57, default=0.0, latex=r"\delta")
@@ -211,7 +211,7 @@ class Conveyor(Component):
     ports: ClassVar = (Port("a"),)
 
     def branches(self, p: Any) -> Iterator[Branch]:
-        weight = p.mass * GRAVITY * p.radius
+        weight = p.m * GRAVITY * p.radius
         yield ThroughLaw(weight * sin(p.incline))
         yield against_motion(p.friction * weight * cos(p.incline), p)
         yield ThroughLaw(p.d * p.radius**2 * ACROSS)

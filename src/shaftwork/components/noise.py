@@ -130,6 +130,7 @@ class HeldNoise(sympy.Function):  # type: ignore[misc]
 
     @classmethod
     def eval(cls, x: sympy.Expr, seed: sympy.Expr) -> sympy.Expr | None:
+        """A number for numbers; else the noise of the whole number below x."""
         if x.is_number and seed.is_number:
             return sympy.Float(held(float(x), float(seed)))
         # so all that makes a law switch at whole numbers is its floors
@@ -163,6 +164,7 @@ class SmoothNoise(sympy.Function):  # type: ignore[misc]
 
     @classmethod
     def eval(cls, x: sympy.Expr, seed: sympy.Expr, order: sympy.Expr = sympy.S.Zero) -> sympy.Expr | None:
+        """A number for numbers, else None: it stays as it is."""
         return sympy.Float(smooth(float(x), float(seed), order)) if x.is_number and seed.is_number else None
 
     @property

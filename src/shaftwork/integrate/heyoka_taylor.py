@@ -102,17 +102,17 @@ class _Run:
             if outcome == "step_limit" and longest < math.inf and left > 1:
                 longest = math.inf
                 continue
-            if outcome == "cb_stop" and watch is not None and watch.reason is None:
+            self.met = self._guard_met(raw, outcome, watch)
+            if self.met is None and outcome == "cb_stop" and watch is not None and watch.reason is None:
                 settle(self.program, integrator, piece.end - piece.start)
                 continue
-            if outcome == GUARD and self._reacts(raw):
+            if self.met is not None and self._reacts(self.met):
+                self.met = None
                 if watch is not None:  # a switch may be at zero where the guard was met
                     settle(self.program, integrator, piece.end - integrator.time)
                 continue
             break
-        if outcome == GUARD:
-            self.met = self.program.guard_met(raw)
-        elif outcome not in ("time_limit", "success"):
+        if self.met is None and outcome not in ("time_limit", "success"):
             raise self._failure(piece, outcome, watch)
         self.state = integrator.state.copy()
         if not np.isfinite(self.state).all():
@@ -124,12 +124,23 @@ class _Run:
         # where a value is exactly zero at the start of a step, heyoka finds none of its later zeros in that step
         self.integrator.pars[first:] = np.concatenate([sides, np.maximum(offsets, NOTHING)])
 
-    def _reacts(self, raw: Any) -> bool:
+    def _guard_met(self, raw: Any, outcome: str, watch: Watch | None) -> int | None:
+        """The guard at which the run has stopped, by its own event or at that of a switch at the very same instant."""
+        if outcome == GUARD:
+            return self.program.guard_met(raw)
+        if watch is None or self.problem.guards is None or watch.reason is not None:
+            return None
+        values = self.program.guard_values(self.integrator.time, self.integrator.state, self.integrator.pars)
+        first = self.program.parameter_count + len(self.program.switches)
+        sides, offsets = np.split(self.integrator.pars[first:], 2)
+        beyond = np.where(sides == 0.0, -np.inf, sides * values - offsets)
+        return int(np.argmax(beyond)) if beyond.size and beyond.max() > 0.0 else None
+
+    def _reacts(self, met: int) -> bool:
         """Whether the run goes on past the guard that it has met."""
         if self.problem.react is None:
             return False
         integrator = self.integrator
-        met = self.program.guard_met(raw)
         reaction = self.problem.react(self.reactions, met, integrator.time, integrator.state.copy())
         if reaction is None:
             return False

@@ -147,6 +147,8 @@ class Watch:
             past &= [cooling is None for cooling in integrator.te_cooldowns[: past.size]]
             wrong &= past
             signs[past & ~wrong & self._turns] *= -1.0  # the step ended at another event, at the very same instant
+        if self._program.guards and not wrong.any() and self._ended_at_a_switch(integrator):
+            return False  # a guard may have been met there too, and heyoka would not see it any more
         self._short_steps = self._short_steps + 1 if integrator.time - self._last < self._short else 0
         before, self._last = self._last, integrator.time
         if wrong.any() or self._short_steps > CHATTER_STEPS:
@@ -161,3 +163,8 @@ class Watch:
         self.last_good = integrator.time, integrator.state.copy()
         # A switch that rested at zero and now leaves it needs its sign.
         return not bool((values[(signs == 0.0) & ~self._program.timed] != 0.0).any())
+
+    def _ended_at_a_switch(self, integrator: Any) -> bool:
+        """Whether the last step ended where a switch passed through zero."""
+        cooling = (found for found in integrator.te_cooldowns[: len(self._program.switches)] if found is not None)
+        return any(passed == 0.0 for passed, _ in cooling)

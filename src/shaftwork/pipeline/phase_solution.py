@@ -29,7 +29,7 @@ def solution(run: Run, name: str) -> Solution:
         why=run.why,
         statistics={"steps": run.steps, "changes": len(run.changes)},
         dense=whole,
-        observer=PhaseObserver(names, lambda: lambda: whole.stretches, _impacts(run)),
+        observer=PhaseObserver(names, lambda: whole.stretches, _impacts(run)),
         events=tuple(_event(change) for change in run.changes if _is_event(change)),
         phases=_table(run),
     )

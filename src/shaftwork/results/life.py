@@ -67,8 +67,11 @@ def _places(solution: Solution, name: str) -> tuple[float, ...]:
 
 
 def _twisted(solution: Solution) -> tuple[str, ...]:
-    """The torques of all that is twisted: springs have a twist, long shafts a torque along them."""
+    """The torques of all that is twisted: springs and gaps have a twist, long shafts a torque along them."""
     units = solution.observer.units
-    springs = (name.removesuffix(".phi_rel") + ".tau" for name in units if name.endswith(".phi_rel"))
+    parts = dict.fromkeys(name.rpartition(".")[0] for name in units)
+    twisted = (
+        part for part in parts if f"{part}.phi_rel" in units or {f"{part}.phi", f"{part}.omega_rel"} <= units.keys()
+    )
     along = (name for name in solution.observer.profiles if name.endswith(".tau"))
-    return (*(name for name in springs if name in units), *along)
+    return (*(f"{part}.tau" for part in twisted if f"{part}.tau" in units), *along)

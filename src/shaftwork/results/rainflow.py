@@ -147,16 +147,19 @@ def rainflow(read: Read, steps: Array, *, title: str, name: str, unit: str, smal
         raise MissingExtraError("rainflow", "life", "Solution.rainflow()") from None
     fraction = in_si("smallest", smallest, at_least=0, at_most=1)
     turning = turning_points(read, steps, smallest=fraction)
-    last = len(turning.t) - 1
+    values = turning.values
+    gate = fraction * float(np.ptp(values))
+    # which cycle closes which is decided on values without noise: a torque that returns to zero returns to the same one
+    series = (np.round(values / gate) if gate else values).tolist()
     # the package knows an end by a value that follows: without one a single ramp would be no cycle
-    series = [*turning.values.tolist(), float(turning.values[-1])]
-    found = sorted(extract_cycles(series), key=lambda cycle: cycle[3:])
-    table = np.array([cycle[:3] for cycle in found]).reshape(-1, 3)
-    places = np.minimum(np.array([cycle[3:] for cycle in found], dtype=np.intp).reshape(-1, 2), last)
-    kept = table[:, 0] > fraction * float(np.ptp(turning.values))
-    ranges, means, counts = table[kept].T
-    start, end = turning.t[places[kept]].T
-    return Rainflow(title, name, unit, float(steps[-1] - steps[0]), turning, ranges, means, counts, start, end)
+    found = sorted((first, second, count) for _, _, count, first, second in extract_cycles([*series, series[-1]]))
+    table = np.array(found, dtype=float).reshape(-1, 3)
+    first, second = np.minimum(table[:, :2].astype(np.intp), len(values) - 1).T
+    ranges, means = np.abs(values[second] - values[first]), 0.5 * (values[first] + values[second])
+    kept = ranges > gate
+    start, end = turning.t[first][kept], turning.t[second][kept]
+    duration = float(steps[-1] - steps[0])
+    return Rainflow(title, name, unit, duration, turning, ranges[kept], means[kept], table[kept, 2], start, end)
 
 
 def _picture(cycles: Rainflow, bins: int | tuple[int, int]) -> Figure:

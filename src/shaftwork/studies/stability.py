@@ -16,7 +16,8 @@ import numpy as np
 from shaftwork.components.shaft_models import ShaftModel, Wave
 from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError
 from shaftwork.integrate.choice import ENGINES, available
-from shaftwork.pipeline.model import NOMINAL, Model
+from shaftwork.pipeline.model import Model
+from shaftwork.pipeline.prepared import NOMINAL
 from shaftwork.results.observer import Array
 from shaftwork.studies.arguments import engine_names, several, shaft_models
 from shaftwork.studies.stability_cases import CASES, TORQUE, Case
