@@ -7,7 +7,7 @@ import os
 import sys
 import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError
 
 if TYPE_CHECKING:
+    from shaftwork.equations.records import Equations
     from shaftwork.pipeline.network import Network
     from shaftwork.results.solution import Solution
     from shaftwork.scenes.catalog import Scene
@@ -27,6 +28,8 @@ FALLBACK_END = 10.0
 """End time of a model file when none is given, s."""
 COMPARED = 1.0
 """Models are compared over at most so much motion when no end is given, s: errors show early."""
+LISTED = 12
+"""Phases shown of the beginning, and as many of the end, of a motion that has more."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -96,6 +99,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     latex = command("latex", _latex, "print the equations as LaTeX")
     latex.add_argument("--form", choices=("kirchhoff", "state", "second-order"), help="which equations (default: all)")
+    latex.add_argument("--phase", metavar="WORDS", help="of one phase, such as 'gap open, load stuck'")
     latex.add_argument("--values", action="store_true", help="numbers instead of symbols")
     latex.add_argument("--document", action="store_true", help="a whole document that pdflatex compiles")
     compare = command("compare", _compare, "lumped against distributed shafts: error against run time")
@@ -143,6 +147,7 @@ def _run(options: argparse.Namespace) -> None:
     print(", ".join(f"{count} {name}" for name, count in solution.statistics.items()), end="; ")
     print(f"energy residual {solution.energy_residual:.1e} of the work done\n")
     _table(solution, signals)
+    _phases(solution)
     if options.out:
         _write(solution, signals, options.out)
 
@@ -216,7 +221,7 @@ def _table(solution: Solution, signals: Sequence[str]) -> None:
     width = max(len(name) for name in signals)
     print(f"{'':{width}}  {'unit':8} {'minimum':>12} {'at s':>8} {'maximum':>12} {'at s':>8} {'mean':>12} {'end':>12}")
     for name in signals:
-        values, t = solution[name], solution.t
+        values, t = solution[name] + 0.0, solution.t  # no -0 on the screen
         low, high = int(values.argmin()), int(values.argmax())
         mean = float(((values[1:] + values[:-1]) / 2) @ (t[1:] - t[:-1]) / (t[-1] - t[0]))
         print(
@@ -225,27 +230,59 @@ def _table(solution: Solution, signals: Sequence[str]) -> None:
         )
 
 
+def _phases(solution: Solution) -> None:
+    """The phases of a motion in words; those in the middle of a long list are counted alone."""
+    rows = solution.phases
+    if not rows:
+        return
+    print(f"\n{'from s':>9} {'to s':>9}  {len(rows)} phases, {len(solution.events)} events")
+    for number, row in enumerate(rows):
+        if not LISTED <= number < len(rows) - LISTED:
+            print(f"{row.start:9.4f} {row.end:9.4f}  {row.name}")
+        elif number == LISTED:
+            print(f"{'...':>9} {'...':>9}  {len(rows) - 2 * LISTED} more")
+
+
 def _write(solution: Solution, signals: Sequence[str], folder: Path) -> None:
     import numpy as np
 
-    table = folder / "signals.csv"
+    written = [folder / "signals.csv", folder / "signals.png"]
     columns = np.column_stack([solution.t, *(solution[name] for name in signals)])
     header = ",".join(["t [s]", *(f"{name} [{solution.observer.units[name]}]" for name in signals)])
-    np.savetxt(table, columns, delimiter=",", header=header, comments="", fmt="%.12g")
-    picture = folder / "signals.png"
-    solution.plot(*signals).savefig(picture, dpi=150)
-    print(f"\nwritten: {table}, {picture}")
+    np.savetxt(written[0], columns, delimiter=",", header=header, comments="", fmt="%.12g")
+    solution.plot(*signals).savefig(written[1], dpi=150)
+    if solution.phases:
+        parts = solution.phases[0].modes
+        phases = ((row.start, row.end, *row.modes.values()) for row in solution.phases)
+        written.append(_rows(folder / "phases.csv", ("start [s]", "end [s]", *parts), phases))
+        written.append(_rows(folder / "events.csv", ("t [s]", "part", "from", "to"), solution.events))
+    print(f"\nwritten: {', '.join(str(path) for path in written)}")
+
+
+def _rows(path: Path, head: Sequence[str], rows: Iterable[Sequence[object]]) -> Path:
+    import csv
+
+    with path.open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows([head, *rows])
+    return path
 
 
 def _latex(options: argparse.Namespace) -> None:
-    net, _ = _load(options.model)
-    equations = net.equations()
-    if options.document:
-        print(equations.document(values=options.values))
-    elif options.form:
-        print(equations.latex(form=options.form, values=options.values))
+    net, scene = _load(options.model)
+    if options.phase:
+        print(_typeset(net.equations(phase=options.phase), options))
+    elif options.document or not (scene and scene.phases):
+        print(_typeset(net.equations(), options))
     else:
-        print(equations.latex(values=options.values))
+        for phase in scene.phases:
+            print(rf"\section*{{{phase}}}")
+            print(_typeset(net.equations(phase=phase), options))
+
+
+def _typeset(equations: Equations, options: argparse.Namespace) -> str:
+    if options.document:
+        return equations.document(values=options.values)
+    return equations.latex(form=options.form, values=options.values)
 
 
 def _check(options: argparse.Namespace) -> None:

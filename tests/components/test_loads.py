@@ -33,7 +33,9 @@ def test_crane_travel_is_the_weight_times_the_specific_resistance_at_the_wheel()
     load = sw.CraneTravel("load", m=4000.0, diameter=0.25, w=0.0042, kappa=22.4 / 4905.0 - 0.0042)
     assert torque_at(load, FAST) == pytest.approx(-22.4, rel=1e-14)
     assert torque_at(load, -FAST) == pytest.approx(22.4, rel=1e-14)
-    assert torque_at(load, 0.0) == 0.0
+    rounded = sw.CraneTravel("load", m=4000.0, diameter=0.25, w=0.0042, omega_s=0.02)
+    assert torque_at(rounded, 0.0) == 0.0
+    assert torque_at(rounded, 0.01) == pytest.approx(-4905.0 * 0.0042 * math.tanh(0.5))
 
 
 def test_wheel_friction_is_of_rolling_and_of_the_bearings() -> None:
@@ -65,6 +67,18 @@ def test_a_conveyor_lifts_rubs_and_drags() -> None:
     up, along = weight * math.sin(0.1), 0.02 * weight * math.cos(0.1)
     assert torque_at(load, FAST) == pytest.approx(-up - along - drag)
     assert torque_at(load, -FAST) == pytest.approx(-up + along + drag)
+
+
+def test_a_hoist_holds_between_what_it_takes_to_lift_and_to_lower() -> None:
+    """Its losses alone: at rest to the last bit inside, and with the surplus torque on the inertia outside."""
+    weight, J = 1000.0 * 9.81 * 0.2 / 40.0, 0.5
+    for torque, surplus in ((1.2 * weight, 0.0), (0.85 * weight, 0.0), (1.3 * weight, 0.05), (0.7 * weight, -0.1)):
+        net = sw.Network("hoist")
+        net.add(sw.TorqueSource("motor", tau=torque), "drum")
+        net.add(sw.Inertia("J", J=J), "drum")
+        net.add(sw.Hoist("load", m=1000.0, radius=0.2, ratio=40.0, efficiency=0.8), "drum")
+        speed = net.simulate(1.0)["J.omega"]
+        assert speed[-1] == pytest.approx(surplus * weight / J, rel=1e-9, abs=0.0)
 
 
 def random_load(kind: str, *, intervals: int, seed: float = 1.0, std: float = 10.0) -> np.ndarray:

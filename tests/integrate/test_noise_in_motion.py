@@ -40,6 +40,7 @@ def body(tau: object) -> sw.Network:
 
 LOADS = {
     "held in time": sw.RandomLoad("w", mean=22.4, std=10.0, interval=0.05, seed=1.0),
+    "held and rounded": sw.RandomLoad("w", mean=22.4, std=10.0, interval=0.05, seed=1.0, omega_s=0.01),
     "smooth in time": sw.RandomLoad("w", mean=22.4, std=10.0, interval=0.05, seed=1.0, kind="band-limited"),
     "held in angle": -(22.4 + 10 * sw.HeldNoise(ANGLE, 1)) * sympy.tanh(sw.omega / 0.01),
     "smooth in angle": -(22.4 + 10 * sw.SmoothNoise(ANGLE, 1)) * sympy.tanh(sw.omega / 0.01),
@@ -93,6 +94,36 @@ def test_noise_of_the_angle_steps_where_an_independent_march_from_pitch_to_pitch
     sol = body(3 - 0.2 * sw.omega + sw.HeldNoise(sw.phi / 0.5, 7.0)).simulate(5.0, engine=engine, rtol=1e-10)
     true = steps_of_angle(0.5, 3.0, 0.2, 7.0, 5.0)
     assert sol["J.omega"][-1] == pytest.approx(true, rel=WORTH[engine] * 1e-10)
+
+
+def slips_and_sticks(tau: float, J: float, load: np.ndarray, interval: float) -> np.ndarray:
+    """Speed at the end of each interval, of one mass under a constant torque and a resistance that is held in each."""
+    omega, speeds = 0.0, []
+    for size in load.tolist():
+        if omega == 0 and tau <= size:
+            speeds.append(0.0)
+            continue
+        rate = (tau - size) / J
+        omega = max(0.0, omega + rate * interval)  # the torque is positive: it never turns backwards
+        speeds.append(omega)
+    return np.array(speeds)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_mass_sticks_and_breaks_away_as_its_random_resistance_rises_and_falls(engine: str) -> None:
+    """While it sticks no law of a branch changes, and the step of the resistance alone sets it free."""
+    net = sw.Network("travel")
+    net.add(sw.TorqueSource("m", tau=21.0), "a")
+    net.add(sw.Inertia("J", J=2.0), "a")
+    net.add(sw.RandomLoad("w", mean=22.4, std=10.0, interval=0.05, seed=3.0), "a")
+    sol = net.simulate(5.0, engine=engine, rtol=1e-9, t_eval=0.025 * np.arange(1, 201))  # middles and ends
+    load = np.maximum(0.0, 22.4 + 10.0 * noise.held(np.arange(100), 3.0))
+    true = slips_and_sticks(21.0, 2.0, load, 0.05)
+    assert (true == 0).sum() > 10
+    assert (np.diff(np.sign(true)) > 0).sum() > 3
+    np.testing.assert_allclose(sol["J.omega"][1::2], true, atol=1e-7)
+    rests = (true == 0) & (np.append(0.0, true[:-1]) == 0)
+    assert (sol["J.omega"][::2][rests] == 0).all()
 
 
 FLOOR = sympy.floor(sw.phi)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import shaftwork as sw
-from shaftwork.scenes.crane import RATED_SPEED, RATED_TORQUE, WHEEL_RADIUS
+from shaftwork.scenes.crane import MOTOR, WHEEL_RADIUS
 from shaftwork.scenes.shaft_chain import PRINTED_SHEAR_MODULUS
 from tests.reference.mna import Piece, spectrum
 
@@ -36,8 +36,8 @@ def test_the_crane_travels_at_about_1_08_m_s_after_about_5_s() -> None:
 
 def test_the_crane_motor_passes_through_its_rated_point() -> None:
     motor = sw.scenes.crane_start().parts[0]
-    slip = 1 - RATED_SPEED / motor.n_sync
-    assert 2 * motor.tau_k / (slip / motor.s_k + motor.s_k / slip) == pytest.approx(RATED_TORQUE)
+    slip = 1 - MOTOR.n_n / motor.n_sync
+    assert 2 * motor.tau_k / (slip / motor.s_k + motor.s_k / slip) == pytest.approx(MOTOR.tau_n)
 
 
 def test_the_chain_has_the_frequencies_of_its_elements_and_nears_the_exact_shaft() -> None:

@@ -51,6 +51,10 @@ class BoundArrays:
         loops = program.loop_places
         self.loops = LoopSolver(program.inputs, part, loops, program.loop_in_tree, self.p) if loops.size else None
 
+    def with_laws(self, p: Array) -> BoundArrays:
+        """The same matrices for a parameter vector that differs in the laws alone."""
+        return BoundArrays(self.program, p, self.part)
+
     def values(self, t: Any, x: Array) -> tuple[Array, Array]:
         """Outputs y and inputs u at states x, (n,) or (n, k) with t (k,)."""
         if self.loops is not None:

@@ -84,9 +84,9 @@ def vectorised(symbols: Sequence[Symbol], expression: Expr) -> Callable[..., Any
 
 
 def vectorised_list(symbols: Sequence[Symbol], expressions: Sequence[Expr]) -> Callable[..., Any]:
-    """Several expressions as one function of arrays or floats; what they share is computed once."""
+    """Several expressions as one function of arrays or floats."""
     plain = {symbol: Symbol(f"v{k}", real=True) for k, symbol in enumerate(symbols)}
     renamed = [expression.xreplace(plain) for expression in expressions]
     printer, modules = _Vectorised(SETTINGS), [NUMERICAL, "numpy"]
-    function: Callable[..., Any] = lambdify(list(plain.values()), renamed, modules=modules, printer=printer, cse=True)
+    function: Callable[..., Any] = lambdify(list(plain.values()), renamed, modules=modules, printer=printer, cse=False)
     return function

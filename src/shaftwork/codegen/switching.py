@@ -112,23 +112,30 @@ class Switching:
 
 def _switches(form: StateForm) -> Iterator[_Switch]:
     """The switches of time alone, each once."""
-    kinds = (Kind.LAW, Kind.THROUGH_SOURCE, Kind.ACROSS_SOURCE)
     found: dict[Expr, tuple[tuple[Expr, Sequence[float]], ...]] = {}
     seen: set[Any] = set()
-    for branch in form.graph.branches:
-        template, part = branch.template, form.graph.part_of(branch.index)
-        if template.kind not in kinds:
-            continue
-        if template.law not in found:
-            moving = switches(template.law) if template.law.has(TIME) else ()
-            found[template.law] = tuple((argument, levels) for argument, levels in moving if argument.has(TIME))
-        for argument, levels in found[template.law]:
-            symbols = tuple(symbol for symbol in template.symbols if argument.has(symbol))
+    for part, law, parameters in _laws(form):
+        if law not in found:
+            moving = switches(law) if law.has(TIME) else ()
+            found[law] = tuple((argument, levels) for argument, levels in moving if argument.has(TIME))
+        for argument, levels in found[law]:
+            symbols = tuple(symbol for symbol in parameters if argument.has(symbol))
             places = tuple(part.parameters[symbol.name] for symbol in symbols)
             key = (argument, tuple(levels), places)
             if argument.free_symbols <= {TIME, *symbols} and key not in seen:
                 seen.add(key)
                 yield _made(part, argument, levels, symbols, places)
+
+
+def _laws(form: StateForm) -> Iterator[tuple[GraphPart, Expr, tuple[Symbol, ...]]]:
+    """The laws of all branches, and what ends the modes of all parts, with the parameters that may stand in them."""
+    for branch in form.graph.branches:
+        if branch.template.kind in (Kind.LAW, Kind.THROUGH_SOURCE, Kind.ACROSS_SOURCE):
+            yield form.graph.part_of(branch.index), branch.template.law, branch.template.symbols
+    for part in form.graph.parts:
+        symbols = tuple(Symbol(name, real=True) for name in part.parameters)
+        for mode in (mode for element in part.modes for mode in element.options):
+            yield from ((part, leave.when, symbols) for leave in mode.leaves)
 
 
 def _made(

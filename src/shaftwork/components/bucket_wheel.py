@@ -9,12 +9,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from sympy import Expr, Float, Max, Min, Piecewise, Rational, floor, pi, sin
+from sympy import Expr, Float, Max, Min, Piecewise, Rational, floor, pi, sin, tanh
 
 from shaftwork.components.base import Component, Derived, Port, Role, component
-from shaftwork.components.branches import INTEGRAL, Branch
+from shaftwork.components.branches import ACROSS, INTEGRAL, Branch, ThroughLaw
 from shaftwork.components.laws import t
-from shaftwork.components.loads import against_motion, rounding
+from shaftwork.components.loads import rounding
 from shaftwork.components.noise import HeldNoise
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si, parameter
@@ -109,7 +109,7 @@ class BucketWheelLoad(Component):
     seed: float = parameter("1", "any number; other numbers, other noise", default=1.0, latex="z")
     t_on: float = parameter("s", "time at which it begins to dig", at_least=0, default=0.0, latex=r"t_{on}")
     rise: float = parameter("s", "time in which it comes to its full depth", at_least=0, default=0.0, latex=r"t_r")
-    omega_s: float = rounding()
+    omega_s: float = rounding(0.01)
 
     role: ClassVar[Role] = "loss"
     ports: ClassVar = (Port("a"),)
@@ -135,7 +135,7 @@ class BucketWheelLoad(Component):
             _resistance(last - k, p) * _profile(INTEGRAL - pitch * (last - k), k, p)
             for k in range((p.buckets + 1) // 2)  # alpha is at most pi: only half of the buckets are in the soil
         )
-        yield against_motion(_depth(p) * p.radius * p.edge * force, p)
+        yield ThroughLaw(_depth(p) * p.radius * p.edge * force * tanh(ACROSS / p.omega_s))
 
 
 def _resistance(number: Expr, p: Any) -> Expr:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator
 from enum import Enum
 from typing import Any, ClassVar
 
-from sympy import Abs, Expr, Float, Max, cos, pi, sin, tanh
+from sympy import Abs, Expr, Float, Integer, Max, Symbol, cos, pi, sin, tanh
 
 from shaftwork.components.base import Component, Derived, Port, Role, component
-from shaftwork.components.branches import ACROSS, Branch, ThroughLaw
+from shaftwork.components.branches import ACROSS, THROUGH, Branch, ThroughLaw
 from shaftwork.components.friction import rubbing, rubs
 from shaftwork.components.laws import t
-from shaftwork.components.modes import Modes
+from shaftwork.components.modes import Leave, Modes
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si, parameter
@@ -21,14 +22,54 @@ GRAVITY = Float("9.81")
 """m/s^2, as Marinkovic 2012, (8)."""
 
 
-def against_motion(size: Any, p: Any) -> ThroughLaw:
-    """A torque of a given size against the motion of the part's node, rounded below the speed `p.omega_s`."""
-    return ThroughLaw(size * tanh(ACROSS / p.omega_s))
+def rounding(default: float = 0.0) -> Any:
+    """Declares the speed below which a torque against the motion is rounded; zero where it sticks truly."""
+    meaning = "speed below which it is rounded" + ("" if default else "; zero for true stick")
+    lowest = 1e-6 if default else 0
+    return parameter("rad/s", meaning, at_least=lowest, default=default, latex=r"\omega_s")
 
 
-def rounding() -> Any:
-    """Declares `omega_s` of a part that has a torque `against_motion`."""
-    return parameter("rad/s", "speed below which it is rounded", at_least=1e-6, default=0.01, latex=r"\omega_s")
+class Resistance(Component):
+    """Base of the loads with a torque against the motion, and perhaps others that have a direction of their own.
+
+    Where its parameter `omega_s` is zero it sticks: the node rests until the torque on it is more than `against`.
+    """
+
+    role: ClassVar[Role] = "loss"
+    ports: ClassVar = (Port("a"),)
+
+    def against(self, p: Any) -> Expr:
+        """The size of the torque against the motion, in parameters and time."""
+        raise NotImplementedError
+
+    def besides(self, p: Any) -> Expr:  # noqa: ARG002
+        """What the load takes besides, in parameters and speed; by default nothing."""
+        return Integer(0)
+
+    def modes(self, p: Any) -> Iterator[Modes]:
+        size, besides = self.against(p), self.besides(p).subs(ACROSS, 0)
+        if p.omega_s == 0 and size != 0:
+            letters = {Symbol(made.name, real=True): made.law for made in self.derived(p)}
+            yield _loaded(rubbing(size.xreplace(letters)), besides.xreplace(letters))
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        size, besides = self.against(p), self.besides(p)
+        yield ThroughLaw(besides)
+        if size != 0 and p.omega_s == 0:
+            yield from rubs(size, p, None)
+        elif size != 0:
+            yield ThroughLaw(size * tanh(ACROSS / p.omega_s))
+
+
+def _loaded(modes: Modes, besides: Expr) -> Modes:
+    """Modes of what rubs beside another torque, which is no part of the torque that it holds."""
+    own = {THROUGH: THROUGH - besides}
+
+    def loaded(leave: Leave) -> Leave:
+        return dataclasses.replace(leave, when=leave.when.xreplace(own))
+
+    options = (dataclasses.replace(mode, leaves=tuple(map(loaded, mode.leaves))) for mode in modes.options)
+    return dataclasses.replace(modes, options=tuple(options))
 
 
 @component
@@ -72,10 +113,10 @@ class ViscousLoad(Component):
 
 
 @component
-class CraneTravel(Component):
+class CraneTravel(Resistance):
     """The travel resistance of a crane at the shaft of its wheels, always against the motion.
 
-    Law: torque on the node -tau_w tanh(omega / omega_s), tau_w = m g (w + kappa) diameter / 2 with g = 9.81 m/s^2.
+    Law: torque on the node -sign(omega) tau_w, tau_w = m g (w + kappa) diameter / 2 with g = 9.81 m/s^2.
     The mass itself is no part of it: give the node an Inertia of m diameter^2 / 4, or a Wheel with a Mass.
     Source: Marinkovic 2012, (7), (8); with its 4.0 t and 0.25 m, 22.4 N m are w + kappa = 0.004567.
     """
@@ -86,15 +127,12 @@ class CraneTravel(Component):
     kappa: float = parameter("1", "resistance of wheels that run askew", at_least=0, default=0.0, latex=r"\kappa")
     omega_s: float = rounding()
 
-    role: ClassVar[Role] = "loss"
-    ports: ClassVar = (Port("a"),)
-
     def derived(self, p: Any) -> Iterator[Derived]:
         size = p.m * GRAVITY * (p.w + p.kappa) * p.diameter / 2
         yield Derived("tau_w", size, "N*m", "travel resistance", r"\tau_w")
 
-    def branches(self, p: Any) -> Iterator[Branch]:
-        yield against_motion(p.tau_w, p)
+    def against(self, p: Any) -> Expr:
+        return p.tau_w
 
     @staticmethod
     def wheel_friction(diameter: float, lever_arm: float, bearing_friction: float, bearing_diameter: float) -> float:
@@ -118,13 +156,13 @@ class CraneTravel(Component):
 
 
 @component
-class Hoist(Component):
+class Hoist(Resistance):
     """A load that hangs on the rope of a drum, behind a gear: it pulls downwards whichever way it moves.
 
-    Law: torque on the node -tau_h (1/efficiency + efficiency) / 2 - tau_h (1/efficiency - efficiency) / 2
-    tanh(omega / omega_s), tau_h = m g radius / ratio: tau_h / efficiency while it is hoisted, efficiency tau_h while
-    it is lowered. A positive speed hoists. The efficiency holds for the weight; that of accelerating the load is left
-    out, and its mass is no part of it: give the node an Inertia of m (radius / ratio)^2.
+    Law: torque on the node -tau_h / efficiency while it is hoisted, -efficiency tau_h while it is lowered, with
+    tau_h = m g radius / ratio: the mean of the two always, and half their difference against the motion. A positive
+    speed hoists. The efficiency holds for the weight; that of accelerating the load is left out, and its mass is no
+    part of it: give the node an Inertia of m (radius / ratio)^2.
     """
 
     m: float = parameter("kg", "mass of the load and its tackle", at_least=0)
@@ -133,15 +171,14 @@ class Hoist(Component):
     efficiency: float = parameter("1", "from the node to the load", above=0, at_most=1, default=1.0, latex=r"\eta")
     omega_s: float = rounding()
 
-    role: ClassVar[Role] = "loss"
-    ports: ClassVar = (Port("a"),)
-
     def derived(self, p: Any) -> Iterator[Derived]:
         yield Derived("tau_h", p.m * GRAVITY * p.radius / p.ratio, "N*m", "weight at the shaft", r"\tau_h")
 
-    def branches(self, p: Any) -> Iterator[Branch]:
-        yield ThroughLaw(p.tau_h * (1 / p.efficiency + p.efficiency) / 2)
-        yield against_motion(p.tau_h * (1 / p.efficiency - p.efficiency) / 2, p)
+    def against(self, p: Any) -> Expr:
+        return p.tau_h * (1 / p.efficiency - p.efficiency) / 2
+
+    def besides(self, p: Any) -> Expr:
+        return p.tau_h * (1 / p.efficiency + p.efficiency) / 2
 
 
 def _rising(p: Any) -> Expr:
@@ -151,10 +188,10 @@ def _rising(p: Any) -> Expr:
 
 
 @component
-class FanLoad(Component):
+class FanLoad(Resistance):
     """A fan: a torque that rises with the square of the speed, and the friction of its bearings.
 
-    Law: torque on the node -tau_n ((1 - static) w |w| + static tanh(omega / omega_s)), w = omega / (2 pi n_n / 60).
+    Law: torque on the node -tau_n ((1 - static) w |w| + static sign(w)), w = omega / (2 pi n_n / 60).
     """
 
     tau_n: float = parameter("N*m", "torque at the nominal speed", at_least=0, latex=r"\tau_n")
@@ -162,20 +199,19 @@ class FanLoad(Component):
     static: float = parameter("1", "share of friction in it", at_least=0, at_most=1, default=0.0, latex=r"\sigma")
     omega_s: float = rounding()
 
-    role: ClassVar[Role] = "loss"
-    ports: ClassVar = (Port("a"),)
+    def against(self, p: Any) -> Expr:
+        return p.static * p.tau_n
 
-    def branches(self, p: Any) -> Iterator[Branch]:
-        yield ThroughLaw(_rising(p))
-        yield against_motion(p.static * p.tau_n, p)
+    def besides(self, p: Any) -> Expr:
+        return _rising(p)
 
 
 @component
-class PumpLoad(Component):
+class PumpLoad(Resistance):
     """A pump that lifts a liquid behind a check valve: a static share for the height, the rest as the square of speed.
 
-    Law: torque on the node -tau_n ((1 - static) w |w| + static tanh(omega / omega_s)), w = omega / (2 pi n_n / 60). The
-    valve holds the liquid, so that nothing drives the pump backwards from rest.
+    Law: torque on the node -tau_n ((1 - static) w |w| + static sign(w)), w = omega / (2 pi n_n / 60). The valve holds
+    the liquid, so that nothing drives the pump backwards from rest.
     """
 
     tau_n: float = parameter("N*m", "torque at the nominal speed", at_least=0, latex=r"\tau_n")
@@ -183,19 +219,18 @@ class PumpLoad(Component):
     static: float = parameter("1", "share of the height in it", at_least=0, at_most=1, default=0.5, latex=r"\sigma")
     omega_s: float = rounding()
 
-    role: ClassVar[Role] = "loss"
-    ports: ClassVar = (Port("a"),)
+    def against(self, p: Any) -> Expr:
+        return p.static * p.tau_n
 
-    def branches(self, p: Any) -> Iterator[Branch]:
-        yield ThroughLaw(_rising(p))
-        yield against_motion(p.static * p.tau_n, p)
+    def besides(self, p: Any) -> Expr:
+        return _rising(p)
 
 
 @component
-class Conveyor(Component):
+class Conveyor(Resistance):
     """A belt that carries a mass up or along: its weight, friction against the motion, and drag that rises with speed.
 
-    Law: torque on the node -radius (m g sin(incline) + friction m g cos(incline) tanh(omega / omega_s)
+    Law: torque on the node -radius (m g sin(incline) + friction m g cos(incline) sign(omega)
     + d radius omega). A positive speed carries upwards where the incline is positive. The mass itself is no part of it:
     give the node an Inertia of m radius^2.
     """
@@ -207,14 +242,11 @@ class Conveyor(Component):
     d: float = parameter("N*s/m", "drag per belt speed", at_least=0, default=0.0)
     omega_s: float = rounding()
 
-    role: ClassVar[Role] = "loss"
-    ports: ClassVar = (Port("a"),)
+    def against(self, p: Any) -> Expr:
+        return p.friction * p.m * GRAVITY * p.radius * cos(p.incline)
 
-    def branches(self, p: Any) -> Iterator[Branch]:
-        weight = p.m * GRAVITY * p.radius
-        yield ThroughLaw(weight * sin(p.incline))
-        yield against_motion(p.friction * weight * cos(p.incline), p)
-        yield ThroughLaw(p.d * p.radius**2 * ACROSS)
+    def besides(self, p: Any) -> Expr:
+        return p.m * GRAVITY * p.radius * sin(p.incline) + p.d * p.radius**2 * ACROSS
 
 
 class NoiseKind(Enum):
@@ -240,10 +272,10 @@ class NoiseKind(Enum):
 
 
 @component
-class RandomLoad(Component):
+class RandomLoad(Resistance):
     """A resistance of random size, normally distributed, always against the motion.
 
-    Law: torque on the node -max(0, mean + std nu(t / interval)) tanh(omega / omega_s), with nu a standard normal noise:
+    Law: torque on the node -sign(omega) max(0, mean + std nu(t / interval)), with nu a standard normal noise:
     held for each interval (`HeldNoise`), or smooth and band-limited, its power halved at 0.22 / interval
     (`SmoothNoise`). Where the normal distribution falls below zero there is no resistance: nothing drives.
     The same seed gives the same load, as a function of time. Source: Marinkovic 2012, section 3, figure 11.
@@ -256,13 +288,6 @@ class RandomLoad(Component):
     kind: NoiseKind | str = parameter("1", "held or band-limited", default=NoiseKind.HELD, record=NoiseKind)
     omega_s: float = rounding()
 
-    role: ClassVar[Role] = "loss"
-    ports: ClassVar = (Port("a"),)
-
-    def branches(self, p: Any) -> Iterator[Branch]:
-        yield against_motion(self._size(p), p)
-
-    @staticmethod
-    def _size(p: Any) -> Expr:
+    def against(self, p: Any) -> Expr:
         noise = HeldNoise if p.kind is NoiseKind.HELD else SmoothNoise
         return Max(0, p.mean + p.std * noise(t / p.interval, p.seed)) if p.std != 0 else p.mean

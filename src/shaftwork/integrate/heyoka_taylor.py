@@ -104,7 +104,8 @@ class _Run:
                 continue
             self.met = self._guard_met(raw, outcome, watch)
             if self.met is None and outcome == "cb_stop" and watch is not None and watch.reason is None:
-                settle(self.program, integrator, piece.end - piece.start)
+                if watch.leaves:
+                    settle(self.program, integrator, piece.end - piece.start)
                 continue
             if self.met is not None and self._reacts(self.met):
                 self.met = None

@@ -134,6 +134,8 @@ class Watch:
         counting = () if program.held is None else tuple(program.held.by_switch)
         self._turns = ~program.timed & ~np.isin(np.arange(size.size), counting)
         self.reason: str | None = None
+        self.leaves = False
+        """Whether a switch that rested at zero has stopped the run."""
 
     def __call__(self, integrator: Any) -> bool:
         values = self._program.switch_values(integrator.time, integrator.state, integrator.pars)
@@ -147,8 +149,6 @@ class Watch:
             past &= [cooling is None for cooling in integrator.te_cooldowns[: past.size]]
             wrong &= past
             signs[past & ~wrong & self._turns] *= -1.0  # the step ended at another event, at the very same instant
-        if self._program.guards and not wrong.any() and self._ended_at_a_switch(integrator):
-            return False  # a guard may have been met there too, and heyoka would not see it any more
         self._short_steps = self._short_steps + 1 if integrator.time - self._last < self._short else 0
         before, self._last = self._last, integrator.time
         if wrong.any() or self._short_steps > CHATTER_STEPS:
@@ -162,7 +162,9 @@ class Watch:
             return False
         self.last_good = integrator.time, integrator.state.copy()
         # A switch that rested at zero and now leaves it needs its sign.
-        return not bool((values[(signs == 0.0) & ~self._program.timed] != 0.0).any())
+        self.leaves = bool((values[(signs == 0.0) & ~self._program.timed] != 0.0).any())
+        # Where a switch turns a guard may be met too, and heyoka would not see it any more.
+        return not (self.leaves or (self._program.guards and self._ended_at_a_switch(integrator)))
 
     def _ended_at_a_switch(self, integrator: Any) -> bool:
         """Whether the last step ended where a switch passed through zero."""

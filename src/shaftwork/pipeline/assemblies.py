@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property, lru_cache
+from itertools import count
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from shaftwork.codegen.code import scalar, vectorised_list
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.stores import Stores
 from shaftwork.codegen.timeline import Timeline
-from shaftwork.components.branches import ACROSS
+from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.laws import pieces_degree
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Leave, Mode, Modes
@@ -32,6 +33,10 @@ from shaftwork.reduction.rows import Rows
 if TYPE_CHECKING:
     from shaftwork.pipeline.model import Model
 
+KEPT = 64
+"""Parameter vectors whose matrices are kept."""
+FEW = 50
+"""Right-hand sides that are not worth code of their own."""
 SAMPLES = 64
 """Times at which a guard is looked at to know its size."""
 
@@ -107,7 +112,7 @@ class Assembly:
         self._across: dict[int, Callable[..., Any]] = {}
         self._sides: dict[ModeNames, Array] = {}
         self._ends: dict[ModeNames, tuple[tuple[int, Watched], ...]] = {}
-        self._guards: dict[bytes, Callable[[Array, Array], Array]] = {}
+        self._numbers = [self._places[element.number] for element in elements if element.number in self._places]
 
     def _leaves(self, readings: Readings, part: GraphPart, modes: Modes, mode: Mode) -> Iterator[Watched]:
         for leave in mode.leaves:
@@ -143,51 +148,63 @@ class Assembly:
         return p
 
     def prepared(self, p: Array) -> Prepared:
-        """What depends on the parameter vector alone; kept for every combination of modes."""
-        key = p.tobytes()
+        """What the numbers of modes do not enter, for the other parameters."""
+        plain = p.copy()
+        plain[self._numbers] = 0.0
+        key = plain.tobytes()
         if key not in self._prepared:
-            self._prepared[key] = self.model.prepare(p)
+            while len(self._prepared) >= KEPT:
+                del self._prepared[next(iter(self._prepared))]
+            self._prepared[key] = self.model.prepare(plain)
         return self._prepared[key]
 
     def bound(self, p: Array) -> BoundArrays:
-        """The equations for a parameter vector."""
-        return self.prepared(p).bound
+        """The equations with their parameters; matrices hold no number of a mode."""
+        return self.prepared(p).bound.with_laws(p)
 
     def guards(self, p: Array) -> Callable[[Array, Array], Array]:
         """All guards as a function of times (k,) and states (k, n) to (k, guards)."""
-        key = p.tobytes()
-        if key not in self._guards:
-            function, parameters, size = self._function, tuple(p.tolist()), len(self._expressions)
+        function, parameters, size = self._function, tuple(p.tolist()), len(self._expressions)
 
-            def values(times: Array, states: Array) -> Array:
-                made = np.empty((times.size, size))
-                with np.errstate(all="ignore"):
-                    for column, value in enumerate(function(times, *states.T, *parameters)):
-                        made[:, column] = value
-                return made
+        def values(times: Array, states: Array) -> Array:
+            made = np.empty((times.size, size))
+            with np.errstate(all="ignore"):
+                for column, value in enumerate(function(times, *states.T, *parameters)):
+                    made[:, column] = value
+            return made
 
-            self._guards[key] = values
-        return self._guards[key]
+        return values
 
     def first_modes(self, t: float, x: Array, p: Array) -> ModeNames:
         """The mode of each element in which a motion starts, in the equations in which nothing is joined by a mode."""
-        return tuple(self.start_of(number, "", t, x, p) for number in range(len(self.elements)))
+        shown = self._shown(t, *x.tolist(), *p.tolist())
+        return tuple(self._start(number, "", t, shown) for number in range(len(self.elements)))
 
     def start_of(self, number: int, besides: str, t: float, x: Array, p: Array) -> str:
         """The mode of an element in which a motion would start, besides one."""
-        holds = self._starts[number](np.array([t]), *x[:, None], *p.tolist())
-        options = self.elements[number].modes.options
-        return next(m.name for m, found in zip(options, holds, strict=True) if np.all(found) and m.name != besides)
+        return self._start(number, besides, t, self._shown(t, *x.tolist(), *p.tolist()))
+
+    def _start(self, number: int, besides: str, t: float, shown: Sequence[Any]) -> str:
+        modes = self.elements[number].modes
+        first = sum(2 + len(self._symbols(k)) for k in range(number))
+        symbols = self._symbols(number)
+        holds = starts_of(modes, symbols)(t, *shown[first : first + 2 + len(symbols)])
+        return next(m.name for m, found in zip(modes.options, holds, strict=True) if found and m.name != besides)
+
+    def _symbols(self, number: int) -> tuple[Symbol, ...]:
+        return conditional(self.elements[number].modes)
 
     @cached_property
-    def _starts(self) -> tuple[Callable[..., Any], ...]:
-        rows, made = self._rows, []
-        for element in self.elements:
+    def _shown(self) -> Callable[..., Any]:
+        """Of each element the speed across it, its twist and the parameters in its conditions, one after another."""
+        shown = []
+        for number, element in enumerate(self.elements):
             part = self._parts[element.part.name]
-            holds = [self._readings.guard(part, element.modes, mode.starts) for mode in element.modes.options]
-            conditions = [Piecewise((Integer(1), found), (Integer(0), True)) for found in holds]
-            made.append(vectorised_list((TIME, *rows.states, *rows.parameters), conditions))
-        return tuple(made)
+            reads = any(mode.starts.has(INTEGRAL) for mode in element.modes.options)
+            for symbol in (ACROSS, INTEGRAL, *self._symbols(number)):
+                known = symbol != INTEGRAL or reads
+                shown.append(self._readings.guard(part, element.modes, symbol) if known else Integer(0))
+        return vectorised_list((TIME, *self._rows.states, *self._rows.parameters), shown)
 
     @property
     def _rows(self) -> Rows:
@@ -217,20 +234,25 @@ class Assembly:
 
         Its states are those of the model and, behind them, the integrals of the guards in `clocks`.
         """
-        prepared, guards = self.prepared(p), self.guards(p)
+        guards, bound, rates = self.guards(p), cache(lambda: self.bound(p)), self._rates(p)
         clocks, size = list(self.clocks), x.size
         sides = self.sides(modes)
         watch = Guards(guards if not clocks else lambda t, y: guards(t, y[:, :size]), sides, np.array(bands))
-        switching = self.model.arrays.inputs.switching
-        rhs, jacobian, switches = prepared.rhs, prepared.jacobian, lambda t, y: prepared.bound.switches(t, y[:, :size])
+
+        def rhs(t: float, y: Array) -> Array:
+            return rates(t, y)
+
+        def jacobian(t: float, y: Array) -> Any:
+            return bound().jacobian(t, y)
+
         if clocks:
 
             def rhs(t: float, y: Array) -> Array:
                 wound = guards(np.array([t]), y[None, :size])[0, clocks]
-                return np.concatenate([prepared.rhs(t, y[:size]) if size else np.empty(0), wound])
+                return np.concatenate([rates(t, y[:size]) if size else np.empty(0), wound])
 
             def jacobian(t: float, y: Array) -> Any:
-                return sparse.block_diag((prepared.jacobian(t, y[:size]), sparse.csc_array((len(clocks),) * 2)), "csc")
+                return sparse.block_diag((bound().jacobian(t, y[:size]), sparse.csc_array((len(clocks),) * 2)), "csc")
 
         return Problem(
             rhs=rhs,
@@ -239,12 +261,23 @@ class Assembly:
             t0=span[0],
             t_end=span[1],
             names=(*self.model.states, *(f"guard {k}" for k in clocks)),
-            atol=np.concatenate([prepared.atol, self._sizes(guards, x, span)]),
+            atol=np.concatenate([self.prepared(p).atol, self._sizes(guards, x, span)]),
             sides=times.sides,
-            switches=switches if switching else None,
+            switches=(lambda t, y: bound().switches(t, y[:, :size])) if self.model.arrays.inputs.switching else None,
             guards=watch,
             symbolic=lambda: None if self.program is None else self.program.bind(p),
         )
+
+    def _rates(self, p: Array) -> Callable[[float, Array], Array]:
+        """The right-hand side; an engine that asks for it often gets code of its own."""
+        motion, asked, scalar_program = self.motion(p), count(), self.model.scalar
+        assert scalar_program is not None  # noqa: S101 (there are rows)
+        own = cache(lambda: scalar_program.bind(p))
+
+        def rates(t: float, x: Array) -> Array:
+            return np.array(motion(t, x.tolist())[0]) if next(asked) < FEW else own()(t, x)
+
+        return rates
 
     def _sizes(self, guards: Callable[[Array, Array], Array], x: Array, span: tuple[float, float]) -> Array:
         """The size of each clock over a phase, as far as the time alone tells."""
@@ -312,3 +345,17 @@ class Assembly:
 def _winds(guard: Expr) -> bool:
     """Whether a guard changes with time other than along straight pieces."""
     return bool(guard.has(TIME)) and pieces_degree(guard) is None
+
+
+@lru_cache(maxsize=256)
+def conditional(modes: Modes) -> tuple[Symbol, ...]:
+    """The parameters in the conditions under which a motion starts in the modes of an element."""
+    found = set[Symbol]().union(*(mode.starts.free_symbols for mode in modes.options))
+    return tuple(sorted(found - {TIME, ACROSS, INTEGRAL}, key=str))
+
+
+@lru_cache(maxsize=256)
+def starts_of(modes: Modes, symbols: tuple[Symbol, ...]) -> Callable[..., list[bool]]:
+    """From the time, the speed across, the twist and parameters to whether a motion may start in each mode."""
+    conditions = [Piecewise((Integer(1), mode.starts), (Integer(0), True)) for mode in modes.options]
+    return scalar([TIME, ACROSS, INTEGRAL, *symbols], conditions, shared=False)

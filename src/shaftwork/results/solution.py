@@ -191,7 +191,7 @@ class Solution:
         """What the motion takes from the life of a part, at the worst place of a long shaft (extra `life`).
 
         Args:
-            name: of the quantity; by default the torques of all shafts and springs.
+            name: of the quantity; by default the torques of all shafts, springs and gaps.
             sn: the S-N line; without `name` one for all, or one by the name of each quantity.
             smallest: as in `rainflow`.
 

@@ -16,6 +16,8 @@ Read = Callable[[Array], Array]
 PANELS, SAMPLES = 4, 2000
 """Of a step and of the whole run at least, before the panels are halved: an exact engine needs few steps."""
 HALVINGS = 9
+ROUNDING = 1e-3
+"""A peak that is higher by this fraction of what counts as a change is no later one."""
 SETTLED = 0.01
 """The panels are halved until as many turning points are found as before and the way up and down is longer by less."""
 ROUNDS = 4
@@ -72,14 +74,14 @@ def _turns(values: Array, smallest: float) -> NDArray[np.intp]:
     """Indices of the first value and of every peak and valley after it that differ by more than `smallest`."""
     slopes = np.sign(np.diff(values))
     moving = np.flatnonzero(slopes)
-    extremes = moving[1:][slopes[moving[1:]] != slopes[moving[:-1]]]
+    extremes = moving[:-1][slopes[moving[1:]] != slopes[moving[:-1]]] + 1  # of a rest at the top its begin
     turns = [0]
     reached = 0  # the furthest since the last turn; it is a turn once the way back from it is long enough
     for k in [*extremes.tolist(), len(values) - 1]:
-        onwards = (values[k] - values[reached]) * (values[reached] - values[turns[-1]])
-        if reached != turns[-1] and onwards >= 0:
-            reached = k
-        elif abs(values[k] - values[reached]) > smallest:
+        step = values[k] - values[reached]
+        if reached != turns[-1] and step * (values[reached] - values[turns[-1]]) >= 0:
+            reached = k if abs(step) > ROUNDING * smallest else reached
+        elif abs(step) > smallest:
             if reached:
                 turns.append(reached)
             reached = k

@@ -21,6 +21,7 @@ class Scene:
         t_end: end of the motion, s.
         signals: the quantities worth looking at.
         chosen: what the source does not print and how it was chosen.
+        phases: the phases that the source has equations for, in its order; the others follow from them.
     """
 
     name: str
@@ -30,6 +31,7 @@ class Scene:
     t_end: float
     signals: tuple[str, ...]
     chosen: tuple[str, ...] = ()
+    phases: tuple[str, ...] = ()
 
     def __call__(self, **options: Any) -> Network:
         return self.build(**options)
