@@ -51,6 +51,7 @@ FAMILIES = (
     "drives",
     "controllers",
     "induction_machine",
+    "bldc",
     "electrical",
 )
 """The modules of components in the order in which they are shown."""

@@ -20,8 +20,8 @@ def test_scenes_are_listed_with_their_source(capsys: pytest.CaptureFixture[str])
     assert main(["scenes"]) == DONE
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines] == list(sw.scenes.SCENES)
-    assert "Marinkovic 2012" in lines[0]
-    assert "Popenda 2019" in lines[1]
+    for line, scene in zip(lines, sw.scenes.SCENES.values(), strict=True):
+        assert line.endswith(f"({scene.source})")
 
 
 def test_run_prints_a_table_and_writes_curves_and_csv(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -40,6 +40,38 @@ def test_a_saved_network_runs_like_the_scene(tmp_path: Path, capsys: pytest.Capt
     sw.scenes.crane_start().save(path)
     assert main(["run", str(path), "--t-end", "1", "--engine", "scipy", "--rtol", "1e-6"]) == DONE
     assert "J1.omega" in capsys.readouterr().out
+
+
+def test_run_tells_phases_and_writes_them_with_the_events(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "six-phases", "--out", str(tmp_path)]) == DONE
+    printed = capsys.readouterr().out
+    sol = sw.scenes.six_phases().simulate(sw.scenes.SCENES["six-phases"].t_end)
+    assert f"{len(sol.phases)} phases, {len(sol.events)} events" in printed
+    assert f"   0.0000    0.0187  {sol.phases[0].name}\n" in printed
+    assert f"   10.0000  {sol.phases[-1].name}\n" in printed
+    assert " more\n" in printed
+    assert "-0 " not in printed
+    phases, events = (
+        list(csv.reader((tmp_path / f"{name}.csv").read_text(encoding="utf-8").splitlines()))
+        for name in ("phases", "events")
+    )
+    assert phases[:2] == [
+        ["start [s]", "end [s]", *sol.phases[0].modes],
+        ["0.0", phases[1][1], "released", "open", "stuck"],
+    ]
+    assert len(phases) == 1 + len(sol.phases)
+    assert [row[1:] for row in events[1:]] == [list(event[1:]) for event in sol.events]
+
+
+def test_latex_prints_the_phases_of_a_scene_or_the_one_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+    scene = sw.scenes.SCENES["six-phases"]
+    assert main(["latex", "six-phases", "--form", "state"]) == DONE
+    printed = capsys.readouterr().out
+    assert printed.count(r"\section*") == len(scene.phases)
+    assert main(["latex", "six-phases", "--form", "state", "--phase", scene.phases[1]]) == DONE
+    assert f"{scene.phases[1]}}}\n{capsys.readouterr().out}" in printed
+    assert main(["latex", "six-phases", "--phase", "shaft broken"]) == WRONG_INPUT
+    assert "There is no phase 'shaft broken'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("form", ["kirchhoff", "state", "second-order"])
@@ -66,11 +98,11 @@ def test_check_tells_structure_states_time_constants_and_engine(capsys: pytest.C
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
-        (["run", "crane"], WRONG_INPUT, "crane-start"),
+        (["run", "cran"], WRONG_INPUT, "crane-start"),
         (["run", "missing.toml"], WRONG_INPUT, "missing.toml"),
         (["run", "crane-start", "--t-end", "-1"], WRONG_INPUT, "after t_start"),
         (["check", "crane-start.txt"], WRONG_INPUT, ".toml"),
-        (["run", "crane-start", "--engine", "exact"], WRONG_INPUT, "Take the engine 'auto'"),
+        (["run", "crane-start", "--engine", "exact"], WRONG_INPUT, "Take one of: heyoka"),
     ],
 )
 def test_wrong_input_ends_with_2_and_one_message(

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from shaftwork import scenes, studies
     from shaftwork.components.base import Component, Port, Signal, component
+    from shaftwork.components.bldc import *
     from shaftwork.components.branches import (
         ACROSS,
         INTEGRAL,

@@ -44,6 +44,7 @@ class HeyokaProgram:
         guards: heyoka expressions at whose change of sign a run ends; behind the signs of the switches there is a
             parameter for each: 1 where its rise through zero ends the run, -1 where its fall does, 0 where neither; and
             behind these another for each, how far beyond zero it has to go.
+        listeners: the last one is asked at a guard, with its number and the integrator, whether the run goes on.
         held: functions that are constant between switches; they are the last of the parameters.
         stepping: which of the switches depend on them.
     """
@@ -58,6 +59,7 @@ class HeyokaProgram:
     guards: tuple[Any, ...] = ()
     held: HeldParameters | None = None
     stepping: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    listeners: list[Callable[[int, Any], bool]] = field(default_factory=list, repr=False, compare=False)
     _compiled: dict[float, Any] = field(default_factory=dict, repr=False, compare=False)
     _functions: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
@@ -141,10 +143,7 @@ class HeyokaProgram:
                     for number, switch in enumerate(self.switches)
                 ),
                 *(heyoka.t_event(value**2 - NEAR**2, callback=_go_on) for value in self.fading),
-                *(
-                    _end(heyoka.par[index], heyoka.par[index + len(self.guards)], guard)
-                    for index, guard in enumerate(self.guards, self.parameter_count + len(self.switches))
-                ),
+                *(self._end(number, guard) for number, guard in enumerate(self.guards)),
             ]
         return heyoka.taylor_adaptive(
             list(zip(self.variables, self.rows, strict=True)),
@@ -153,6 +152,20 @@ class HeyokaProgram:
             compact_mode=len(self.rows) > LARGEST_UNROLLED,
             **options,
         )
+
+    def _end(self, number: int, guard: Any) -> Any:
+        """The event that a guard rises through an offset on its side; the run goes on if whoever listens says so."""
+        import heyoka
+
+        first = self.parameter_count + len(self.switches) + number
+        side, offset = heyoka.par[first], heyoka.par[first + len(self.guards)]
+        met = heyoka.select(side, side * guard - offset, heyoka.expression(-1.0))
+
+        def ask(integrator: Any, _direction: int) -> bool:
+            return bool(self.listeners) and self.listeners[-1](number, integrator)
+
+        # heyoka's own cooldown grows with the tolerance, and hides what follows soon
+        return heyoka.t_event(met, direction=heyoka.event_direction.positive, callback=ask, cooldown=COOLDOWN)
 
     def _passed(self, number: int) -> Callable[[Any, int], bool]:
         """What happens where a switch leaves its side: it has the other, or a whole number gives way to the next."""
@@ -228,15 +241,6 @@ def _in_pieces(rows: tuple[sympy.Expr, ...]) -> tuple[sympy.Expr, ...]:
 def _go_on(_integrator: Any, _direction: int) -> bool:
     """The callback of an event that only ends a step."""
     return True
-
-
-def _end(side: Any, offset: Any, guard: Any) -> Any:
-    """The event that a guard rises through an offset on its side, at which a run ends."""
-    import heyoka
-
-    met = heyoka.select(side, side * guard - offset, heyoka.expression(-1.0))
-    # heyoka's own cooldown grows with the tolerance, and hides what follows soon
-    return heyoka.t_event(met, direction=heyoka.event_direction.positive, cooldown=COOLDOWN)
 
 
 def _crossing(sign: Any, switch: Any, passed: Callable[[Any, int], bool]) -> Any:

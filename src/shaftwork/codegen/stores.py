@@ -40,6 +40,8 @@ class Stores:
         self.names = (*made, *angles)
         """Every store and angle, named as a state whether it is one or not."""
         self._states = [state.name for state in form.states]
+        self._map: tuple[Any, Array] | None = None
+        self._dense: tuple[Any, Array] | None = None
 
     @cached_property
     def _columns(self) -> list[int]:
@@ -60,17 +62,21 @@ class Stores:
         """
         if -1 not in self._columns:
             return x[:, self._columns]
-        return self._by_loops(bind().part.loops, x) if self.by_loops else self._recovered(bind(), t, x)
+        return x @ self._loop_map(bind().part.loops) if self.by_loops else self._recovered(bind(), t, x)
 
-    def _by_loops(self, loops: Any, x: Array) -> Array:
-        across = list(self._form.across_states)
-        other = [self._branches[name] for name, column in zip(self.names, self._columns, strict=True) if column < 0]
-        follow = x[:, : len(across)] @ loops[across][:, other].toarray()
-        made = np.empty((len(x), len(self.names)))
-        known = np.array(self._columns) >= 0
-        made[:, known] = x[:, [column for column in self._columns if column >= 0]]
-        made[:, ~known] = follow
-        return made
+    def _loop_map(self, loops: Any) -> Array:
+        """(n, stores) what the states are multiplied by; the last one is kept."""
+        if self._map is None or self._map[0] is not loops:
+            dense, made = loops.toarray(), np.zeros((len(self._states), len(self.names)))
+            for column, name in enumerate(self.names):
+                if name in self._states:
+                    made[self._states.index(name), column] = 1.0
+                else:
+                    made[: len(self._form.across_states), column] = dense[
+                        list(self._form.across_states), self._branches[name]
+                    ]
+            self._map = loops, made
+        return self._map[1]
 
     def _recovered(self, bound: BoundArrays, t: Array, x: Array) -> Array:
         history, columns = History(bound, t, x), []
@@ -91,27 +97,33 @@ class Stores:
             t: time in s at which inputs are read.
             held: all that was stored, by name.
         """
-        form, part = self._form, bound.part
+        form, k = self._form, bound.part.coefficients
         x = np.array([held[name] for name in self._states])
         if not (form.dependent_across or form.dependent_through):
             return x
         before = np.zeros(len(form.graph.branches))
         for name, branch in self._branches.items():
             before[branch] = held[name]
-        inputs = bound.program.inputs
-        u = inputs.values(t, np.zeros(inputs.outputs), x, bound.p)
-        k, laws = part.coefficients, len(form.laws)
+        loops = self._loops(bound.part.loops)
+        inputs, laws = bound.program.inputs, len(form.laws)
+        u = inputs.values(t, np.zeros(inputs.outputs), x, bound.p) if inputs.size else np.empty(0)
         across, through = list(form.across_states), list(form.through_states)
         if other := list(form.dependent_across):
-            F = part.loops[across][:, other].toarray()
-            prescribed = part.loops[list(form.across_inputs)][:, other].T @ u[laws:]
+            F = loops[np.ix_(across, other)]
+            prescribed = loops[np.ix_(list(form.across_inputs), other)].T @ u[laws:]
             momentum = k[across] * before[across] + F @ (k[other] * (before[other] - prescribed))
             x[: len(across)] = np.linalg.solve(np.diag(k[across]) + F * k[other] @ F.T, momentum)
         if other := list(form.dependent_through):
-            F = part.loops[other][:, through].toarray()
-            driven = part.loops[other][:, list(form.laws)] @ u[:laws]
+            F = loops[np.ix_(other, through)]
+            driven = loops[np.ix_(other, list(form.laws))] @ u[:laws]
             twist = before[through] / k[through] - F.T @ ((before[other] + driven) / k[other])
             x[len(across) : len(across) + len(through)] = np.linalg.solve(
                 np.diag(1 / k[through]) + F.T / k[other] @ F, twist
             )
         return x
+
+    def _loops(self, loops: Any) -> Array:
+        """The loop matrix in full; the last one is kept."""
+        if self._dense is None or self._dense[0] is not loops:
+            self._dense = loops, loops.toarray()
+        return self._dense[1]

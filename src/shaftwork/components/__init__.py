@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from shaftwork.components import (
+    bldc,
     bucket_wheel,
     contacts,
     controllers,
@@ -27,6 +28,7 @@ __all__ = [
     "Port",
     "Signal",
     "Table",
+    "bldc",
     "bucket_wheel",
     "component",
     "contacts",

@@ -44,7 +44,7 @@ class BLDCMotor(Component):
     b and c lag by 120 and 240 degrees. Each leg of the inverter puts its phase to +U/2 for 30 < theta < 150 degrees, to
     -U/2 for 210 < theta < 330, whatever the current's sign; between them the current goes on through a diode to the
     other side until it is zero, and the phase is open until a diode conducts again. After `dead_time` a switch follows
-    the one before it, at the speed of that instant. The inductance is that of a phase with its share of the mutual ones:
+    the one before it, at the speed of that instant. The inductance of a phase has its share of the mutual ones in it,
     L = L_mu + L_sigma. Rotor inertia is a part of its own. Modes of each leg: high, low, freewheeling, open.
     Source: Popenda 2019, figs 4-13. Analogue: three transformers whose ratios turn with the rotor.
     """

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, ClassVar
 
-from sympy import And, Expr, Min, Not, exp, false, tanh
+from sympy import And, Expr, Min, Ne, Not, exp, false, tanh
 
 from shaftwork.components.base import Component, Port, Role, Signal, component
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, Branch, End, ThroughLaw, rigid
@@ -181,7 +181,7 @@ def conducting(apart: str, joined: str) -> Modes:
     """Joined rigidly while the first end gives to the second, apart while its across value is the smaller one."""
     return Modes(
         (
-            Mode(apart, (Leave(ACROSS, joined),), starts=ACROSS < 0),
+            Mode(apart, (Leave(ACROSS, joined),), starts=Ne(ACROSS, 0)),
             Mode(joined, (Leave(-THROUGH, apart),), 1.0, STUCK),
         )
     )

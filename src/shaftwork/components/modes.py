@@ -12,11 +12,12 @@ the network has other equations. A network makes those of a combination of forms
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from sympy import Expr, Symbol, false, true
 from sympy.logic.boolalg import Boolean
 
-from shaftwork.components.branches import End
+from shaftwork.components.branches import THROUGH, End
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,12 @@ class Mode:
         """How phases and events call it."""
         return self.says or self.name
 
+    @cached_property
+    def gives_way(self) -> tuple[tuple[float, str], ...]:
+        """The sides of THROUGH on which it is limited, and the modes that follow there: where an impact leads to."""
+        slopes = ((leave.when.diff(THROUGH), leave.to) for leave in self.leaves if leave.when.has(THROUGH))
+        return tuple((float(slope), to) for slope, to in slopes if slope.is_number)
+
 
 @dataclass(frozen=True)
 class Modes:
@@ -85,7 +92,11 @@ class Modes:
 
     def __getitem__(self, name: str) -> Mode:
         """A mode by name."""
-        return next(mode for mode in self.options if mode.name == name)
+        return self._by_name[name]
+
+    @cached_property
+    def _by_name(self) -> dict[str, Mode]:
+        return {mode.name: mode for mode in self.options}
 
     @property
     def symbol(self) -> str:

@@ -27,8 +27,8 @@ FIRST_DEFECT, FIRST_TRIALS, SHORTER = 1e-8, 30, 0.25
 Advance = Callable[[Any, Watch | None, int, float], tuple[Any, str, int]]
 # What heyoka's outcomes are called here where a guard ended the run.
 GUARD = "guard"
-# What is as good as zero, and is not.
-NOTHING = 1e-200
+# Output times that heyoka is given at once where a guard is likely to be met before the last of them.
+CHUNK = 32
 # heyoka's outcomes proper are below this number; those above are events that have ended a run.
 FIRST_OUTCOME = -(2**32)
 
@@ -92,9 +92,11 @@ class _Run:
         integrator.pars[:used] = self.parameters[:used]
         integrator.reset_cooldowns() if integrator.with_events else None
         if self.problem.guards is not None:
-            self._guard(self.problem.guards.sides, self.problem.guards.offsets)
+            self._guard(np.concatenate([self.problem.guards.sides, self.problem.guards.offsets]))
         watch = self._watch(piece)
+        self.program.listeners.clear()
         longest = self._first_step(piece)
+        self.program.listeners[:] = [self._listen] if watch is None else []
         while True:
             left = self.problem.max_steps - self.steps
             raw, outcome, steps = advance(integrator, watch, left if longest == math.inf else 1, longest)
@@ -107,10 +109,11 @@ class _Run:
                 if watch.leaves:
                     settle(self.program, integrator, piece.end - piece.start)
                 continue
-            if self.met is not None and self._reacts(self.met):
+            # a switch may be at zero where a guard is met, and settling it takes a step: this guard is not passed at once
+            if self.met is not None and watch is not None and self._reacts(self.met):
                 self.met = None
-                if watch is not None:  # a switch may be at zero where the guard was met
-                    settle(self.program, integrator, piece.end - integrator.time)
+                integrator.reset_cooldowns()
+                settle(self.program, integrator, piece.end - integrator.time)
                 continue
             break
         if self.met is None and outcome not in ("time_limit", "success"):
@@ -119,16 +122,15 @@ class _Run:
         if not np.isfinite(self.state).all():
             raise self._failure(piece, "err_nf_state", watch)
 
-    def _guard(self, sides: Array, offsets: Array) -> None:
-        """Watch the guards from here on."""
-        first = self.program.parameter_count + len(self.program.switches)
-        # where a value is exactly zero at the start of a step, heyoka finds none of its later zeros in that step
-        self.integrator.pars[first:] = np.concatenate([sides, np.maximum(offsets, NOTHING)])
+    def _guard(self, guards: Array) -> None:
+        """Watch the guards from here on, by their sides and offsets."""
+        self.integrator.pars[self.program.parameter_count + len(self.program.switches) :] = guards
 
     def _guard_met(self, raw: Any, outcome: str, watch: Watch | None) -> int | None:
         """The guard at which the run has stopped, by its own event or at that of a switch at the very same instant."""
         if outcome == GUARD:
-            return self.program.guard_met(raw)
+            met: int | None = self.program.guard_met(raw)
+            return met
         if watch is None or self.problem.guards is None or watch.reason is not None:
             return None
         values = self.program.guard_values(self.integrator.time, self.integrator.state, self.integrator.pars)
@@ -142,14 +144,16 @@ class _Run:
         if self.problem.react is None:
             return False
         integrator = self.integrator
-        reaction = self.problem.react(self.reactions, met, integrator.time, integrator.state.copy())
+        reaction = self.problem.react(self.reactions, met, integrator.time, integrator.state)
         if reaction is None:
             return False
         self.reactions += 1
         integrator.pars[: reaction.p.size] = reaction.p
-        self._guard(reaction.sides, reaction.offsets)
-        integrator.reset_cooldowns()
+        self._guard(reaction.guards)
         return True
+
+    def _listen(self, met: int, _integrator: Any) -> bool:
+        return self._reacts(met)
 
     def _first_step(self, piece: Piece) -> float:
         """Longest first step in s, infinite where heyoka's own choice is good.
@@ -228,11 +232,11 @@ class _Run:
 def _on_grid(problem: Problem, times: Array) -> Trajectory:
     run = _Run(problem)
     states = np.empty((times.size, run.state.size))
-    done = 0
+    done, chunk = 0, times.size + 1 if problem.guards is None else CHUNK
     for piece in pieces(problem):
         # An output at a breakpoint belongs to the next piece: it is the state after the jump.
         stop = times.size if piece.end == problem.t_end else int(np.searchsorted(times, piece.end, side="left"))
-        recorder = _GridRecorder(states[done:stop], times[done:stop], piece.end)
+        recorder = _GridRecorder(states[done:stop], times[done:stop], piece.end, chunk)
         run.piece(piece, recorder)
         if run.met is not None:
             done += recorder.filled
@@ -245,8 +249,8 @@ def _on_grid(problem: Problem, times: Array) -> Trajectory:
 class _GridRecorder:
     """Fills rows of output while the integrator passes their times."""
 
-    def __init__(self, rows: Array, times: Array, end: float) -> None:
-        self._rows = rows
+    def __init__(self, rows: Array, times: Array, end: float, chunk: int) -> None:
+        self._rows, self._chunk = rows, chunk
         # The grid always ends with the piece, because the next piece starts from there.
         self._grid = times if times.size and times[-1] == end else np.append(times, end)
         self._filled = 0
@@ -257,19 +261,23 @@ class _GridRecorder:
         return min(self._filled, len(self._rows))
 
     def __call__(self, integrator: Any, watch: Watch | None, limit: int, longest: float) -> tuple[Any, str, int]:
-        pending, now = self._grid[self._filled :], integrator.time
-        extra = int(pending[0] != now)  # heyoka's grid starts at the present time
-        outcome, _, _, steps, _, found = integrator.propagate_grid(
-            np.append(now, pending) if extra else pending,
-            max_steps=max(limit, 1),
-            max_delta_t=longest,
-            callback=watch,
-        )
-        found = found[extra:]
-        kept = found[: len(self._rows) - self._filled]
-        self._rows[self._filled : self._filled + len(kept)] = kept
-        self._filled += len(found)
-        return outcome, _outcome(outcome, watch, arrived=self._filled == self._grid.size), steps
+        taken = 0
+        while True:
+            pending, now = self._grid[self._filled : self._filled + self._chunk], integrator.time
+            extra = int(pending[0] != now)  # heyoka's grid starts at the present time
+            outcome, _, _, steps, _, found = integrator.propagate_grid(
+                np.append(now, pending) if extra else pending,
+                max_steps=max(limit - taken, 1),
+                max_delta_t=longest,
+                callback=watch,
+            )
+            found, taken = found[extra:], taken + steps
+            kept = found[: len(self._rows) - self._filled]
+            self._rows[self._filled : self._filled + len(kept)] = kept
+            self._filled += len(found)
+            arrived = self._filled == self._grid.size
+            if arrived or len(found) < len(pending) or taken >= limit:
+                return outcome, _outcome(outcome, watch, arrived=arrived), taken
 
 
 class _SegmentRecorder:

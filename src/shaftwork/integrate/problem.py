@@ -51,13 +51,11 @@ class Reaction:
 
     Args:
         p: (p,) parameters from there on.
-        sides: of the guards.
-        offsets: of the guards.
+        guards: (2 m,) sides and offsets of the guards.
     """
 
     p: Array
-    sides: Array
-    offsets: Array
+    guards: Array
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,7 @@ def _enter(program: Any, integrator: Any, signs: Array) -> None:
 
 
 def _within_rounding(program: Any, integrator: Any) -> NDArray[np.bool_]:
-    """The switches whose side rounding decides: those at which an event, of another or of a guard, has just ended a run."""
+    """The switches whose side rounding decides: those at which another event has just ended a run."""
     time, state, parameters = integrator.time, integrator.state, integrator.pars
     values = program.switch_values(time, state, parameters)
     moved = state * (1.0 + ROUNDINGS * np.where(np.arange(state.size) % 2, 1.0, -1.0))

@@ -11,7 +11,8 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.phase_observer import PhaseObserver, Stretch, Stretches
 from shaftwork.pipeline.assemblies import ModeNames
-from shaftwork.pipeline.phases import Phase, Run, Span
+from shaftwork.pipeline.passing import Phase
+from shaftwork.pipeline.phases import Run, Span
 from shaftwork.pipeline.settling import Change
 from shaftwork.results.solution import PhaseRow, Solution
 

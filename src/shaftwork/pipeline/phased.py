@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -51,7 +50,7 @@ class PhasedModel(Model):
         settling = Settling(self.phases, values, (0.0, 1.0))
         moment = self._moment(settling, when, initial)
         for _ in range(MOST_CHANGES):
-            bound = moment.assembly.bound(moment.p)
+            bound = moment.regime.assembly.bound(moment.regime.p)
             if not math.isfinite(t) and (moving := bound.moving_sources(when)):
                 raise SimulationError(
                     f"{', '.join(moving)} never stops changing, so there is no steady operation. "
@@ -60,7 +59,7 @@ class PhasedModel(Model):
             x = moment.x
             if x.size:
                 x = steady_state(bound, x, when, ends=partial(settling.ends, moment, when))
-            moment, changes = settling.settle(when, when, replace(moment, x=x), None)
+            moment, changes = settling.settle(when, when, moment._replace(x=x), None)
             if not changes:
                 return settling.held(moment, when)
         raise SimulationError(
@@ -80,8 +79,8 @@ class PhasedModel(Model):
             time, x = operating_point(first.model, p, at, t, first.model.settled(p))
             moment = settling.started(time, x)
         moment, _ = settling.settle(time, time, moment, None)
-        model = moment.assembly.model
-        slopes = Linearization(model, moment.p, moment.x, time, input_names(model, inputs))
+        model = moment.regime.assembly.model
+        slopes = Linearization(model, moment.regime.p, moment.x, time, input_names(model, inputs))
         named = None if outputs is None else (outputs,) if isinstance(outputs, str) else tuple(outputs)
         return linear_model(self.name, slopes, named, moment.x, time)
 
@@ -91,6 +90,6 @@ class PhasedModel(Model):
 
     def _moment(self, settling: Settling, t: float, initial: Given) -> Moment:
         first = self.phases.assembly(self.phases.first)
-        p = settling.moment(self.phases.first, first).p
+        p = settling.regime(self.phases.first).p
         moment = settling.started(t, initial_state(first.bound(p), initial or {}, t))
         return settling.settle(t, t, moment, None)[0]

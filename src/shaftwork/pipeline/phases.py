@@ -17,11 +17,12 @@ from shaftwork.codegen.timeline import Timeline
 from shaftwork.components.modes import Choice
 from shaftwork.core.errors import NetworkError, ParameterError, SimulationError
 from shaftwork.integrate import choice
-from shaftwork.integrate.problem import Problem, Reaction, Trajectory
+from shaftwork.integrate.problem import Problem, Trajectory
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import Demand, absolute_tolerances, watched_by
 from shaftwork.pipeline.assemblies import Assembly, ModeNames, elements_of
 from shaftwork.pipeline.implicit import at_rest
+from shaftwork.pipeline.passing import Passing, Phase
 from shaftwork.pipeline.settling import Change, Moment, Settling
 
 if TYPE_CHECKING:
@@ -40,21 +41,6 @@ FOLLOWING = {
 }
 TIGHTEST_RTOL = 1e-14
 STILL = "Nothing moves, and what holds is known at every time."
-
-
-@dataclass(frozen=True, eq=False)
-class Phase:
-    """A span of time in which no mode changes.
-
-    Args:
-        start: s.
-        modes: of every element.
-        p: parameters of the equations.
-    """
-
-    start: float
-    modes: ModeNames
-    p: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,9 +114,12 @@ class Phases:
                     f"The engine '{asked}' follows no parts that change their mode "
                     f"({', '.join(element.name for element in self.elements)}). Take one of: {', '.join(FOLLOWING)}."
                 )
-            if asked == "sundials" and not choice.is_stiff(problem):
-                return "sundials-adams", "asked for; the motion is not stiff, so Adams' formulas are taken."
-            return asked, "asked for"
+            if asked != "sundials":
+                return asked, "asked for"
+            if (assembly, asked) not in self._engines:
+                adams = "sundials-adams", "asked for; the motion is not stiff, so Adams' formulas are taken."
+                self._engines[assembly, asked] = (asked, "asked for") if choice.is_stiff(problem) else adams
+            return self._engines[assembly, asked]
         if assembly not in self._engines:
             name, why = choice.choose(problem)
             self._engines[assembly] = name, why
@@ -160,14 +149,12 @@ class Run:
         t, end = self.demand.span
         moment = self._settle(t, self._start(initial), None)
         while t < end:
-            t, moment, met = self._span(t, moment)
-            if t < end or met is not None:
-                moment = self._settle(t, moment, met)
+            t, moment = self._span(t, moment)
 
     def _start(self, initial: Mapping[str, float] | None) -> Moment:
         """The states and modes at the start, before modes have settled."""
         assembly = self.phases.assembly(self.phases.first)
-        p = self.settling.moment(self.phases.first, assembly).p
+        p = self.settling.regime(self.phases.first).p
         x, _ = assembly.model.start(assembly.prepared(p), initial, self.demand.span)
         return self.settling.started(self.timeline(assembly, p).sides(self.demand.span[0])[1], x)
 
@@ -176,7 +163,11 @@ class Run:
         start = self.demand.span[0]
         moment = self._settle(start, self._start(None), None)
         problem = self._problem(start, moment)
-        return self.phases.engine(moment.assembly, problem, self.demand.engine) if problem.x0.size else ("exact", STILL)
+        return (
+            self.phases.engine(moment.regime.assembly, problem, self.demand.engine)
+            if problem.x0.size
+            else ("exact", STILL)
+        )
 
     def timeline(self, assembly: Assembly, p: Array) -> Timeline:
         """The instants at which inputs jump or bend."""
@@ -184,8 +175,11 @@ class Run:
             self._timelines[assembly] = assembly.model.switching.timeline(p, *self.demand.span)
         return self._timelines[assembly]
 
+    def _instants(self, moment: Moment) -> Timeline:
+        return self.timeline(moment.regime.assembly, moment.regime.p)
+
     def _settle(self, t: float, moment: Moment, met: int | None) -> Moment:
-        after = self.timeline(moment.assembly, moment.p).sides(t)[1]
+        after = self._instants(moment).sides(t)[1]
         moment, changes = self.settling.settle(t, after, moment, met)
         self.note(t, changes)
         return moment
@@ -212,9 +206,9 @@ class Run:
 
     def _problem(self, t: float, moment: Moment) -> Problem:
         """The motion from a time on, up to the next instant at which an input jumps."""
-        demand, assembly, times = self.demand, moment.assembly, self.timeline(moment.assembly, moment.p)
+        demand, regime, times = self.demand, moment.regime, self._instants(moment)
         end = min(next((time for time in times.times if time > t), np.inf), demand.span[1])
-        problem = assembly.problem(moment.p, moment.modes, moment.x, moment.bands, (t, end), times)
+        problem = regime.assembly.problem(regime.p, regime.modes, moment.x, moment.bands, (t, end), times)
         atol = demand.rtol * problem.atol
         if demand.atol is not None:
             atol[: moment.x.size] = absolute_tolerances(demand.atol, moment.x.size)
@@ -227,18 +221,25 @@ class Run:
             rhs=problem.rhs if demand.progress is None else watched_by(problem.rhs, demand.progress),
         )
 
-    def _span(self, t: float, moment: Moment) -> tuple[float, Moment, int | None]:
+    def _span(self, t: float, moment: Moment) -> tuple[float, Moment]:
         """One run of the engine, up to a change of equations or the next instant at which an input jumps."""
-        passing = _Passing(self, moment, t)
-        trajectory = self._solve(moment.assembly, replace(self._problem(t, moment), react=passing))
+        passing = Passing(self.settling, moment, t, self.note)
+        regime = moment.regime
+        trajectory = self._solve(regime.assembly, replace(self._problem(t, moment), react=passing))
         self.steps += trajectory.statistics.get("steps", 0)
-        self.spans.append(Span(moment.assembly, trajectory, tuple(passing.phases)))
+        self.spans.append(Span(regime.assembly, trajectory, tuple(passing.phases)))
         assert trajectory.end is not None  # noqa: S101 (engines that follow guards say it)
         t, x = trajectory.end
-        x = x[: moment.x.size]
-        if trajectory.met is None and moment.assembly.model.form.has_impulses:
-            x = moment.assembly.bound(moment.p).impulse(x, *self.timeline(moment.assembly, moment.p).sides(t))
-        return t, replace(passing.moment, x=x), trajectory.met
+        x, sides = x[: moment.x.size], self._instants(moment).sides(t)
+        if trajectory.met is None and regime.assembly.model.form.has_impulses:
+            x = regime.assembly.bound(regime.p).impulse(x, *sides)
+        if trajectory.met is not None and passing.beyond is not None and sides == (t, t):
+            moment, changes = passing.beyond
+            self.note(t, changes)
+            return t, moment
+        moment = passing.moment._replace(x=x)
+        over = trajectory.met is None and t >= self.demand.span[1]
+        return t, moment if over else self._settle(t, moment, trajectory.met)
 
     def _outputs(self, t: float, end: float) -> Array | None:
         """The output times of a phase: an event belongs to the next one."""
@@ -259,32 +260,3 @@ class Run:
         if not self.engine:
             self.engine, self.why = name, why
         return trajectory
-
-
-class _Passing:
-    """Lets an engine go on past guards that change a number in its equations only; `Problem.react`.
-
-    Args:
-        run: to which changes are told.
-        moment: at the start of the engine's run.
-        start: s.
-    """
-
-    def __init__(self, run: Run, moment: Moment, start: float) -> None:
-        self._run, self.moment = run, moment
-        self.phases = [Phase(start, moment.modes, moment.p)]
-        self._reactions: list[Reaction] = []
-
-    def __call__(self, number: int, met: int, t: float, x: Array) -> Reaction | None:
-        if number < len(self._reactions):  # the run is made once more, for its dense output
-            return self._reactions[number]
-        before = replace(self.moment, x=x[: self.moment.x.size])
-        moment, changes = self._run.settling.settle(t, t, before, met)
-        if moment.x is not before.x:  # other equations, or an impact in these
-            return None
-        self._run.note(t, changes)
-        self.moment = moment
-        self.phases.append(Phase(t, moment.modes, moment.p))
-        reaction = Reaction(moment.p, moment.assembly.sides(moment.modes), np.array(moment.bands))
-        self._reactions.append(reaction)
-        return reaction

@@ -4,23 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from shaftwork.codegen.elements import Array
+from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError, SimulationError
-from shaftwork.pipeline.assemblies import Assembly, Element, ModeNames, Watched
+from shaftwork.pipeline.assemblies import Assembly, Element, ModeNames, Motion, Watched
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.phases import Phases
 
-EPS = float(np.finfo(float).eps)
 # A guard within so many rounding units of zero is on its limit, and only its further course tells its side.
 ROUNDINGS = 64.0
+# What is as good as zero, and is not.
+NOTHING = 1e-200
+ABOVE, BELOW = 1 + ROUNDINGS * float(np.finfo(float).eps), 1 - ROUNDINGS * float(np.finfo(float).eps)
 # How far ahead that course is looked at: parts of the time in which a state moves by its nominal size, and of the run.
 AHEAD, AHEAD_OF_RUN = 1e-3, 1e-7
+
+# A speed across what is joined, as part of the largest one or of one, up to which it is an error of the run, no impact.
+NO_IMPACT = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,14 +41,45 @@ class Change:
 
 
 @dataclass(frozen=True, eq=False)
-class Moment:
-    """Modes, their equations and parameters, the states, and how far rounding moves each guard."""
+class Regime:
+    """A combination of modes with everything that it takes to go on in it; made once for a run.
+
+    Args:
+        modes: of every element.
+        assembly: the equations.
+        p: their parameters, numbers of modes among them.
+        motion: rates and guards at an instant.
+        sides: (guards,) on which each is met.
+        sizes: nominal size of each state.
+        watched: element and guard of everything that may end one of the modes.
+        ways: by guard, where it leads; found when it is first met.
+    """
 
     modes: ModeNames
     assembly: Assembly
     p: Array
+    motion: Motion
+    sides: Array
+    sizes: list[float]
+    watched: tuple[tuple[int, Watched], ...]
+    ways: dict[int, Any] = field(default_factory=dict)
+
+
+class Moment(NamedTuple):
+    """A combination of modes, the states (n,), and how far rounding moves each guard."""
+
+    regime: Regime
     x: Array
     bands: Sequence[float] = ()
+
+
+def clear_of_limits(now: Sequence[float], bands: Sequence[float]) -> list[float]:
+    """The bands, wider where a guard is right at its own: a phase that starts there would be taken to have met it.
+
+    None is zero: where a value is exactly zero at the start of a step, heyoka finds none of its later zeros in it.
+    """
+    pairs = zip(now, bands, strict=True)
+    return [8 * band if band < 4 * abs(g) < 16 * band else band or NOTHING for g, band in pairs]
 
 
 class Settling:
@@ -56,14 +93,30 @@ class Settling:
 
     def __init__(self, phases: Phases, values: Mapping[str, float], span: tuple[float, float]) -> None:
         self._phases, self._values = phases, dict(values)
+        self.elements = phases.elements
         self._ahead = AHEAD_OF_RUN * (span[1] - span[0])
-        self._vectors: dict[ModeNames, Array] = {}
+        self._regimes: dict[ModeNames, Regime] = {}
 
-    def moment(self, modes: ModeNames, assembly: Assembly) -> Moment:
-        """Modes without states."""
-        if modes not in self._vectors:
-            self._vectors[modes] = assembly.vector(self._values, self._phases.numbers(modes))
-        return Moment(modes, assembly, self._vectors[modes], np.empty(0))
+    def regime(self, modes: ModeNames) -> Regime:
+        """A combination of modes.
+
+        Raises:
+            NetworkError: the equations of these modes contradict each other.
+        """
+        if modes not in self._regimes:
+            assembly = self._phases.assembly(modes)
+            p = assembly.vector(self._values, self._phases.numbers(modes))
+            made = Regime(
+                modes,
+                assembly,
+                p,
+                assembly.motion(p),
+                assembly.sides(modes),
+                assembly.sizes(p),
+                assembly.watched(modes),
+            )
+            self._regimes[modes] = made
+        return self._regimes[modes]
 
     def started(self, t: float, x: Array) -> Moment:
         """The modes in which a motion starts, from the states of the equations in which no mode joins anything.
@@ -72,33 +125,31 @@ class Settling:
             t: time in s at which inputs are read.
             x: (n,) states.
         """
-        first = self._phases.first
-        loose = replace(self.moment(first, self._phases.assembly(first)), x=x)
-        return self.changed(loose, t, loose.assembly.first_modes(t, x, loose.p))
+        loose = self.regime(self._phases.first)
+        return self._changed(Moment(loose, x), t, loose.assembly.first_modes(t, x, loose.p))
 
-    def changed(self, moment: Moment, t: float, modes: ModeNames) -> Moment:
+    def _changed(self, moment: Moment, t: float, modes: ModeNames) -> Moment:
         """The same instant in other modes: all that is stored goes over.
 
         Raises:
             NetworkError: the equations of these modes contradict each other.
         """
-        assembly = self._phases.assembly(modes)
-        new = self.moment(modes, assembly)
-        if assembly is moment.assembly:
-            return replace(new, x=moment.x)
-        return replace(new, x=assembly.stores.states(assembly.bound(new.p), t, self.held(moment, t)))
+        new, old = self.regime(modes), moment.regime
+        if new.assembly is old.assembly:
+            return Moment(new, moment.x)
+        return Moment(new, new.assembly.stores.states(new.assembly.bound(new.p), t, self.held(moment, t)))
 
     def held(self, moment: Moment, t: float) -> dict[str, float]:
         """All that is stored, by name."""
-        assembly = moment.assembly
-        values = assembly.stores.of(lambda: assembly.bound(moment.p), np.array([t]), moment.x[None, :])[0]
+        assembly, p = moment.regime.assembly, moment.regime.p
+        values = assembly.stores.of(lambda: assembly.bound(p), np.array([t]), moment.x[None, :])[0]
         return dict(zip(assembly.stores.names, values.tolist(), strict=True))
 
     def ends(self, moment: Moment, t: float, x: Array) -> bool:
         """Whether states are beyond a guard of the modes of a moment."""
-        now = moment.assembly.motion(moment.p)(t, x.tolist())[1]
+        now = moment.regime.motion(t, x.tolist())[1]
         wide = moment.bands or [0.0] * len(now)
-        return any(made.side * now[made.guard] > wide[made.guard] for _, made in moment.assembly.watched(moment.modes))
+        return any(made.side * now[made.guard] > wide[made.guard] for _, made in moment.regime.watched)
 
     def settle(self, t: float, after: float, moment: Moment, met: int | None) -> tuple[Moment, list[Change]]:
         """The modes that go on, and the changes that lead there.
@@ -119,100 +170,153 @@ class Settling:
         if met is None:
             moment, found = self._violated(moment, after, ended)
         else:
-            found = next(pair for pair in moment.assembly.watched(moment.modes) if pair[1].guard == met)
+            found = next(pair for pair in moment.regime.watched if pair[1].guard == met)
         while found is not None:
-            moment, change = self._follow(t, after, moment, *found)
-            changes.append(change)
-            if moment.modes in seen and not change.rebound:
+            moment, made = self._follow(t, after, moment, *found)
+            changes += made
+            if moment.regime.modes in seen and not made[0].rebound:
                 raise self._endless(t, changes)
-            seen[moment.modes] = None
+            seen[moment.regime.modes] = None
             moment, found = self._violated(moment, after, ended)
         return moment, changes
 
     def _violated(self, moment: Moment, t: float, ended: Moment) -> tuple[Moment, tuple[int, Watched] | None]:
         """The guard that is farthest beyond its limit, or on it and about to go beyond; the moment with its bands."""
-        now, bands, ahead, unsure = self._course(moment, t)
-        # a phase that started right at its limit would be taken to have met it
-        clear = [8 * band if band < 4 * abs(g) < 16 * band else band for g, band in zip(now, bands, strict=True)]
-        moment = replace(moment, bands=clear)
-        wide = bands if ended.assembly is not moment.assembly else list(map(max, bands, ended.bands or bands))
+        regime, x = moment.regime, moment.x.tolist()
+        rates, now = regime.motion(t, x)
+        ulp = ROUNDINGS * math.ulp(t)
+        moved = [v * (ABOVE if k % 2 else BELOW) + ulp * rate for k, (v, rate) in enumerate(zip(x, rates, strict=True))]
+        near = regime.motion(t + ulp, moved)[1]
+        bands = [abs(n - g) for n, g in zip(near, now, strict=True)]
+        wide = bands
+        if ended.bands and ended.regime.assembly is regime.assembly:
+            wide = list(map(max, bands, ended.bands))
         worst, largest = None, 0.0
         on_limit = []
-        for pair in moment.assembly.watched(moment.modes):
-            k, side = pair[1].guard, pair[1].side
-            value = side * now[k]
+        for pair in regime.watched:
+            k = pair[1].guard
+            value = pair[1].side * now[k]
             if value < -wide[k]:
                 continue
             if value <= wide[k] or pair[1].leave.rebound is not None:  # only what comes nearer is thrown back
                 on_limit.append(pair)
             elif value > largest:
                 worst, largest = pair, value
-        for pair in on_limit if worst is None else ():
-            k, side = pair[1].guard, pair[1].side
-            gain = side * (ahead[k] - now[k])
-            if gain > unsure[k] and gain > largest:
-                worst, largest = pair, gain
-        return moment, worst
+        if on_limit and worst is None:
+            worst = self._next(regime, t, x, rates, now, on_limit)
+        return Moment(regime, moment.x, clear_of_limits(now, bands)), worst
 
-    def _course(self, moment: Moment, t: float) -> tuple[list[float], list[float], list[float], list[float]]:
-        """The guards now, how far rounding of states and time moves them; what they are soon after, how surely."""
-        assembly, x = moment.assembly, moment.x.tolist()
-        motion = assembly.motion(moment.p)
-        ulp, tiny = ROUNDINGS * math.ulp(t), ROUNDINGS * EPS
-        rates, now = motion(t, x)
+    def ahead(self, regime: Regime, rates: list[float]) -> float:
+        """How far in s the further course is looked at."""
         step = self._ahead
-        for rate, size in zip(rates, assembly.sizes(moment.p), strict=True):
+        for rate, size in zip(rates, regime.sizes, strict=True):
             if rate and AHEAD * size < step * abs(rate):
                 step = AHEAD * size / abs(rate)
-        moved = [v * (1 + tiny if k % 2 else 1 - tiny) for k, v in enumerate(x)]
-        others, near = motion(t, moved)
-        later = motion(t + ulp, [v + ulp * rate for v, rate in zip(x, rates, strict=True)])[1]
-        ahead = motion(t + step, [v + step * rate for v, rate in zip(x, rates, strict=True)])[1]
-        beside = motion(t + step, [v + step * rate for v, rate in zip(moved, others, strict=True)])[1]
-        bands = [abs(n - g) + abs(later[k] - g) for k, (n, g) in enumerate(zip(near, now, strict=True))]
-        unsure = [abs((b - n) - (a - g)) for a, b, g, n in zip(ahead, beside, now, near, strict=True)]
-        return now, bands, ahead, unsure
+        return step
 
-    def _follow(self, t: float, after: float, moment: Moment, number: int, ended: Watched) -> tuple[Moment, Change]:
+    def _next(
+        self,
+        regime: Regime,
+        t: float,
+        x: list[float],
+        rates: list[float],
+        now: list[float],
+        on_limit: list[tuple[int, Watched]],
+    ) -> tuple[int, Watched] | None:
+        """Of guards on their limit the one that is about to go farthest beyond it, as far as rounding tells."""
+        step = self.ahead(regime, rates)
+        ahead = regime.motion(t + step, [v + step * rate for v, rate in zip(x, rates, strict=True)])[1]
+        gains = [(made.side * (ahead[made.guard] - now[made.guard]), (number, made)) for number, made in on_limit]
+        gains = [pair for pair in gains if pair[0] > 0]
+        if not gains:
+            return None
+        moved = [v * (ABOVE if k % 2 else BELOW) for k, v in enumerate(x)]
+        others, near = regime.motion(t, moved)
+        beside = regime.motion(t + step, [v + step * rate for v, rate in zip(moved, others, strict=True)])[1]
+        sure = [
+            (gain, pair) for gain, pair in gains if gain > abs(beside[k := pair[1].guard] - near[k] - ahead[k] + now[k])
+        ]
+        return max(sure, key=lambda pair: pair[0])[1] if sure else None
+
+    def _follow(
+        self, t: float, after: float, moment: Moment, number: int, ended: Watched
+    ) -> tuple[Moment, list[Change]]:
         """The mode of an element changes, or what hits is thrown back."""
-        element, leave = self._phases.elements[number], ended.leave
-        before = moment.modes[number]
-        to = leave.to or moment.assembly.start_of(number, before, after, moment.x, moment.p)
-        modes = (*moment.modes[:number], to, *moment.modes[number + 1 :])
+        element, leave, regime = self._phases.elements[number], ended.leave, moment.regime
+        before = regime.modes[number]
+        to = leave.to or regime.assembly.start_of(number, before, after, moment.x, regime.p)
+        speed = self._meets(moment, after, element.modes[to], number)
+        slips = next((name for side, name in element.modes[to].gives_way if side * speed > 0), "")
+        if slips:  # its torque is limited, so it takes no speed away at once
+            to, speed = slips, 0.0
         try:
-            new = self.changed(moment, after, modes)
+            if speed or (leave.rebound is not None and not slips):
+                return self._hit(t, after, moment, number, leave)
+            return self._changed(moment, after, _with(regime.modes, {number: to})), [Change(t, element, before, to)]
         except NetworkError:
             return self._around(t, after, moment, number, to)
-        if leave.rebound is not None and (back := self._rebound(moment, new, number, after, ended)) is not None:
-            return back, Change(t, element, before, to, rebound=True)
-        return new, Change(t, element, before, to)
 
-    def _around(self, t: float, after: float, moment: Moment, number: int, to: str) -> tuple[Moment, Change]:
+    def _meets(self, moment: Moment, t: float, to: Mode, number: int) -> float:
+        """The speed across an element that is joined from now on; zero where it is no more than an error of the run."""
+        regime, modes = moment.regime, self._phases.elements[number].modes
+        if to.form in (modes.options[0].form, modes[regime.modes[number]].form):
+            return 0.0
+        speed = regime.assembly.across(number, t, moment.x, regime.p)
+        speeds = moment.x[: len(regime.assembly.model.form.across_states)]
+        return speed if abs(speed) > NO_IMPACT * np.abs(speeds).max(initial=1.0) else 0.0
+
+    def _hit(self, t: float, after: float, moment: Moment, number: int, leave: Leave) -> tuple[Moment, list[Change]]:
+        """An impact: the element is joined for an instant, and for good where nothing throws it back.
+
+        Law: v = v_joined + e (v_joined - v_before), which gives e times the speed back and keeps every momentum.
+        """
+        elements, regime = self._phases.elements, moment.regime
+        speed = abs(regime.assembly.across(number, after, moment.x, regime.p))
+        joined = self._joined(moment, after, number, leave.to, speed)
+        share = regime.assembly.constant(number, leave.rebound, regime.p)
+        rebound = leave.rebound is not None and share * speed > regime.assembly.constant(number, leave.rest, regime.p)
+        changes = [Change(t, elements[number], regime.modes[number], leave.to, rebound)]
+        for k, (before, name) in enumerate(zip(regime.modes, joined.regime.modes, strict=True)):
+            if k != number and name != before:
+                changes.append(Change(t, elements[k], before, name))
+        if not rebound:
+            return joined, changes
+        held, plastic = self.held(moment, after), self.held(joined, after)
+        thrown = {name: plastic[name] + share * (plastic[name] - value) for name, value in held.items()}
+        new = self.regime(_with(joined.regime.modes, {number: regime.modes[number]}))
+        return Moment(new, new.assembly.stores.states(new.assembly.bound(new.p), after, thrown)), changes
+
+    def _joined(self, moment: Moment, t: float, number: int, to: str, speed: float) -> Moment:
+        """After an inelastic impact. What holds by a limited torque gives way in it; a contact is pressed, not pulled."""
+        before, elements, least = moment.regime.modes, self._phases.elements, NO_IMPACT * speed
+        gives = {k: elements[k].modes[name].gives_way for k, name in enumerate(before) if k != number}
+        gives = {k: ways for k, ways in gives.items() if ways}
+        made = {number: to, **{k: ways[0][1] for k, ways in gives.items()}}
+        while True:
+            joined = self._changed(moment, t, _with(before, made))
+            after = joined.regime
+            speeds = {k: after.assembly.across(k, t, joined.x, after.p) for k in gives}
+            ways = {k: [name for side, name in gives[k] if side * speeds[k] > 0] for k in gives}
+            pressed = [k for k in gives if abs(speeds[k]) > least and not ways[k]]
+            if not pressed:
+                break
+            for k in pressed:
+                made[k] = before[k]
+                del gives[k]
+        made |= {k: ways[k][0] if abs(speeds[k]) > least else before[k] for k in gives}
+        return self._changed(joined, t, _with(before, made))
+
+    def _around(self, t: float, after: float, moment: Moment, number: int, to: str) -> tuple[Moment, list[Change]]:
         """Past a mode whose equations contradict others: into the other one that it leads to.
 
         A friction that a prescribed speed turns cannot stick: it passes from slipping one way to slipping the other.
         """
-        element, before = self._phases.elements[number], moment.modes[number]
+        element, modes = self._phases.elements[number], moment.regime.modes
+        before = modes[number]
         others = [leave.to for leave in element.modes[to].leaves if leave.to != before]
         for other in others:
-            modes = (*moment.modes[:number], other, *moment.modes[number + 1 :])
-            return self.changed(moment, after, modes), Change(t, element, before, other)
+            return self._changed(moment, after, _with(modes, {number: other})), [Change(t, element, before, other)]
         raise SimulationError(f"'{element.name}' can neither stay '{before}' nor become '{to}' at t = {t:.9g} s.")
-
-    def _rebound(self, moment: Moment, joined: Moment, number: int, t: float, ended: Watched) -> Moment | None:
-        """The states after an impact with restitution; None where it is too slow for one.
-
-        Law: v = v_joined + e (v_joined - v_before), which gives e times the speed back and keeps every momentum.
-        """
-        leave = ended.leave
-        assembly, p = moment.assembly, moment.p
-        share = assembly.constant(number, leave.rebound, p)
-        rest = assembly.constant(number, leave.rest, p)
-        if share * abs(assembly.across(number, t, moment.x, p)) <= rest:
-            return None
-        held, plastic = self.held(moment, t), self.held(joined, t)
-        thrown = {name: plastic[name] + share * (plastic[name] - value) for name, value in held.items()}
-        return replace(moment, x=assembly.stores.states(assembly.bound(p), t, thrown))
 
     def _endless(self, t: float, changes: list[Change]) -> SimulationError:
         last = changes[-1]
@@ -221,3 +325,8 @@ class Settling:
             f"At t = {t:.9g} s no modes of {', '.join(others)} are consistent: '{last.element.name}' changes for ever "
             f"between '{last.before}' and '{last.after}'. Give the node between them an inertia or damping."
         )
+
+
+def _with(modes: ModeNames, changed: Mapping[int, str]) -> ModeNames:
+    """A combination of modes with some of them changed."""
+    return tuple(changed.get(k, name) for k, name in enumerate(modes))

@@ -76,7 +76,7 @@ EXCAVATOR = enter(
         source="Marinkovic 2012, section 3, figure 13",
         build=excavator,
         t_end=T_END,
-        signals=("shaft.tau", "motor.tau", "digging.tau", "J1.omega", "J2.omega"),
+        signals=("shaft.tau", "motor.tau", "J1.omega", "J2.omega"),
         chosen=(
             "speed at pull-up 537 1/min, with which the start has both T_max and T_min of figure 13; the quartic then "
             "first rises to 5.8 kN m at 105 1/min; synchronous speed 1000 1/min",

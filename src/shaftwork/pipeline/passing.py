@@ -1,0 +1,137 @@
+"""Past the guards at which only a number in the equations changes: the engine need not stop there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from shaftwork.codegen.elements import Array
+from shaftwork.integrate.problem import Reaction
+from shaftwork.pipeline.assemblies import ModeNames
+from shaftwork.pipeline.settling import ABOVE, BELOW, ROUNDINGS, Change, Moment, Regime, Settling, clear_of_limits
+
+
+@dataclass(frozen=True, eq=False)
+class Phase:
+    """A span of time in which no mode changes.
+
+    Args:
+        start: s.
+        modes: of every element.
+        p: parameters of the equations.
+    """
+
+    start: float
+    modes: ModeNames
+    p: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Way:
+    """From one combination of modes to another in the same equations, by one guard.
+
+    Args:
+        to: the modes that follow.
+        side: on which the guard was met.
+        watched: guards and sides of those modes.
+        change: of its element, with the time left open.
+    """
+
+    to: Regime
+    side: float
+    watched: tuple[tuple[int, float], ...]
+    change: Callable[[float], Change]
+
+
+class Passing:
+    """Lets an engine go on past guards; `Problem.react`.
+
+    A change that leaves all other modes as they are is looked up and checked here; any other is settled in full.
+
+    Args:
+        settling: changes modes.
+        moment: at the start of the engine's run.
+        start: s.
+        note: is told what has changed.
+    """
+
+    def __init__(
+        self, settling: Settling, moment: Moment, start: float, note: Callable[[float, list[Change]], None]
+    ) -> None:
+        self._settling, self.moment, self._note = settling, moment, note
+        self._size = moment.x.size
+        self.phases = [Phase(start, moment.regime.modes, moment.regime.p)]
+        self._reactions: list[Reaction] = []
+        self.beyond: tuple[Moment, list[Change]] | None = None
+        """What comes after the last guard, where the engine had to stop for it."""
+
+    def __call__(self, number: int, met: int, t: float, x: Array) -> Reaction | None:
+        if number < len(self._reactions):  # the run is made once more, for its dense output
+            return self._reactions[number]
+        found = self._direct(met, t, x) or self._settled(met, t, x)
+        if found is None:
+            return None
+        self.moment, changes = found
+        regime = self.moment.regime
+        self._note(t, changes)
+        self.phases.append(Phase(t, regime.modes, regime.p))
+        self._reactions.append(Reaction(regime.p, np.concatenate([regime.sides, self.moment.bands])))
+        return self._reactions[-1]
+
+    def _settled(self, met: int, t: float, x: Array) -> tuple[Moment, list[Change]] | None:
+        before = Moment(self.moment.regime, x[: self._size].copy(), self.moment.bands)
+        moment, changes = self._settling.settle(t, t, before, met)
+        if moment.x is before.x:
+            return moment, changes
+        self.beyond = moment, changes  # other states are other equations, or an impact in these
+        return None
+
+    def _direct(self, met: int, t: float, x: Array) -> tuple[Moment, list[Change]] | None:
+        """The modes that follow by this guard alone, or None where it takes more to tell."""
+        way = self._way(met)
+        if way is None:
+            return None
+        motion, states = way.to.motion, x[: self._size].tolist()
+        rates, now = motion(t, states)
+        ulp = ROUNDINGS * math.ulp(t)
+        signs = zip(states, rates, strict=True)
+        moved = [v * (ABOVE if k % 2 else BELOW) + ulp * rate for k, (v, rate) in enumerate(signs)]
+        bands = [abs(n - g) for n, g in zip(motion(t + ulp, moved)[1], now, strict=True)]
+        wide = list(map(max, bands, self.moment.bands))
+        for guard, side in way.watched:
+            if side * now[guard] >= -wide[guard] and (guard != met or side == way.side):
+                return None
+        if way.side * now[met] < 0 or not self._goes_on(way, met, t, states, rates, now):
+            return None
+        return Moment(way.to, x, clear_of_limits(now, bands)), [way.change(t)]
+
+    def _goes_on(
+        self, way: _Way, met: int, t: float, states: list[float], rates: list[float], now: list[float]
+    ) -> bool:
+        """Whether the guard that was met is left behind for good."""
+        step = self._settling.ahead(way.to, rates)
+        ahead = way.to.motion(t + step, [v + step * rate for v, rate in zip(states, rates, strict=True)])[1]
+        return way.side * (ahead[met] - now[met]) > 0
+
+    def _way(self, met: int) -> _Way | None:
+        """Where a guard leads in the same equations."""
+        regime = self.moment.regime
+        if met not in regime.ways:
+            regime.ways[met] = self._find(regime, met)
+        return regime.ways[met]  # type: ignore[no-any-return]
+
+    def _find(self, regime: Regime, met: int) -> _Way | None:
+        pairs = [pair for pair in regime.watched if pair[1].guard == met]
+        (number, ended), elements = pairs[0], self._settling.elements
+        element, leave = elements[number], ended.leave
+        before = regime.modes[number]
+        if len(pairs) > 1 or not leave.to or leave.rebound is not None:
+            return None
+        if element.modes[leave.to].form != element.modes[before].form:
+            return None
+        to = self._settling.regime((*regime.modes[:number], leave.to, *regime.modes[number + 1 :]))
+        watched = tuple((made.guard, made.side) for _, made in to.watched)
+        return _Way(to, ended.side, watched, lambda t: Change(t, element, before, leave.to))

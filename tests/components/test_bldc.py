@@ -1,0 +1,134 @@
+"""The six-step motor beside equations written by hand, its balances, its average, closed forms at a locked rotor."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+import sympy
+
+import shaftwork as sw
+from shaftwork.components.bldc import _shape
+from tests.reference.bldc import Motor, simulate
+
+# Popenda 2019: back EMF 212 V at 3000 1/min, taken as the flat top of a phase; L_mu 7.4 mH and L_sigma 1.6 mH together
+# as the inductance of a phase. Chosen: the mean rectified voltage of 400 V mains, and two pole pairs.
+DATA = {"U": 540.0, "R": 0.5, "L": 0.009, "k": 212 / (100 * np.pi), "pole_pairs": 2.0}
+RATED, J, END = 12.73, 0.025, 0.05
+
+
+def _motor(kind: type[sw.Component] = sw.BLDCMotor, **changed: float) -> sw.Network:
+    net = sw.Network("six steps")
+    net.add(kind("m", **(DATA | changed)), "rotor")
+    net.add(sw.Inertia("J", J=J), "rotor")
+    net.add(sw.TorqueSource("load", tau=-RATED * sympy.tanh(sw.omega)), "rotor")
+    return net
+
+
+@cache
+def _model(**changed: float) -> sw.Model:
+    return _motor(**changed).compile()
+
+
+@cache
+def _truth(**changed: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    t = np.linspace(0, END, 301)
+    motor = Motor(**(DATA | changed), J=J, load=lambda w: RATED * np.tanh(w))
+    return t, *simulate(motor, t)
+
+
+CASES = [{}, {"flat": 1.8}, {"dead_time": 1e-4}]
+
+
+@pytest.mark.parametrize("changed", CASES, ids=str)
+@pytest.mark.parametrize("engine", ["scipy", "heyoka", "sundials"])
+def test_every_engine_follows_the_motor_written_by_hand(engine: str, changed: dict[str, float]) -> None:
+    """Run-up from rest through some hundred commutations, diodes and open phases included."""
+    pytest.importorskip({"heyoka": "heyoka", "sundials": "sksundae"}.get(engine, "scipy"))
+    t, x, _ = _truth(**changed)
+    sol = _model(**changed).simulate(END, rtol=1e-10, engine=engine, t_eval=t)
+    names = ("m.i_a", "m.i_b", "m.i_c", "J.omega")
+    # 1e-10 a step, and a commutation moves in time by the error of the angle before it
+    for name, column in zip(names, x.T, strict=False):
+        assert np.abs(sol[name] - column).max() < 1e-6 * np.abs(column).max(), name
+    total = sol["m.i_a"] + sol["m.i_b"] + sol["m.i_c"]
+    assert np.abs(total).max() <= 8 * np.finfo(float).eps * np.abs(x[:, :3]).max()
+
+
+def test_switches_turn_at_their_angles_exactly() -> None:
+    """Every 60 degrees from 30 on, to the rounding of the angle and of the time."""
+    model = _model()
+    sol = model.simulate(END, rtol=1e-9)
+    times = np.array([row[0] for row in sol.events if row[3] in ("high", "low")])
+    assert times.size > 10
+    angle = DATA["pole_pairs"] * model.simulate(END, rtol=1e-9, t_eval=times)["m.phi"]
+    steps = angle / (np.pi / 3) - 0.5
+    np.testing.assert_allclose(steps, np.round(steps), atol=1e-11)
+    assert np.all(np.diff(np.round(steps)) == 1)
+
+
+def test_electrical_power_is_mechanical_power_copper_loss_and_what_is_stored() -> None:
+    """Over the run, phase by phase of the motion, by a fine trapezoidal rule between outputs at its events."""
+    model = _model()
+    sol = model.simulate(END, rtol=1e-10)
+    assert sol.energy_residual < 1e-8
+    edges = np.unique([0.0, *(row[0] for row in sol.events), END])
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    half = np.diff(edges) / 2
+    t = (edges[:-1, None] + half[:, None] * (1 + nodes)).ravel()
+    inside = model.simulate(END, rtol=1e-10, t_eval=t)
+    by_time = (half[:, None] * weights).ravel()
+    currents, voltages = (np.array([inside[f"m.{name}_{phase}"] for phase in "abc"]) for name in "iu")
+    electrical = by_time @ (currents * voltages).sum(axis=0)
+    copper = DATA["R"] * by_time @ (currents**2).sum(axis=0)
+    mechanical = by_time @ (inside["m.tau"] * inside["J.omega"])
+    last = np.array([sol[f"m.i_{phase}"][-1] for phase in "abc"])
+    stored = DATA["L"] / 2 * (last**2).sum()
+    assert electrical == pytest.approx(mechanical + copper + stored, rel=1e-8)
+
+
+def test_a_locked_rotor_takes_the_current_of_two_phases_in_series() -> None:
+    """At theta = 60 degrees a is high and c is low, b open: i = U / 2R (1 - exp(-R t / L)), tau = 2 k i."""
+    net = sw.Network("locked")
+    net.add(sw.BLDCMotor("m", **DATA), "rotor")
+    net.add(sw.SpeedSource("lock", omega=0.0), "rotor", "ground")
+    start = {"m.phi": np.pi / 3 / DATA["pole_pairs"] + 0.05}
+    sol = net.simulate(0.1, initial=start, rtol=1e-12)
+    current = DATA["U"] / (2 * DATA["R"]) * -np.expm1(-DATA["R"] * sol.t / DATA["L"])
+    np.testing.assert_allclose(np.abs(sol["m.i_b"]), current, rtol=1e-9, atol=1e-9 * current.max())
+    np.testing.assert_allclose(sol["m.tau"], 2 * DATA["k"] * current, rtol=1e-9, atol=1e-9)
+    assert np.all(sol["m.i_a"] + sol["m.i_b"] + sol["m.i_c"] == 0)
+
+
+@pytest.mark.parametrize("pole_pairs", [1.0, 2.0])
+def test_the_mean_of_the_steady_motion_is_that_of_the_averaged_motor(pole_pairs: float) -> None:
+    """The average leaves out the resistance within a step and the fall of the back EMF while a phase hands over."""
+    mean = _motor(sw.AveragedBLDC, pole_pairs=pole_pairs).compile().steady_state()
+    start = {"J.omega": mean["J.omega"]}
+    whole = _motor(pole_pairs=pole_pairs).simulate(0.4, rtol=1e-7, t_eval=4001, initial=start)
+    settled = whole.t > 0.2
+    assert whole["J.omega"][settled].mean() == pytest.approx(mean["J.omega"], rel=5e-3)
+    assert whole["m.tau"][settled].mean() == pytest.approx(RATED, rel=5e-3)
+
+
+def test_the_average_of_a_motor_without_inductance_in_its_commutation_is_a_direct_current_machine() -> None:
+    """At standstill the term of commutation vanishes: the starting current has no part of it."""
+    net = sw.Network("locked average")
+    net.add(sw.AveragedBLDC("m", **DATA), "rotor")
+    net.add(sw.SpeedSource("lock", omega=0.0), "rotor", "ground")
+    sol = net.simulate(0.2, rtol=1e-12)
+    current = DATA["U"] / (2 * DATA["R"]) * -np.expm1(-DATA["R"] * sol.t / DATA["L"])
+    np.testing.assert_allclose(sol["m.i"], current, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(sol["m.tau"], 2 * DATA["k"] * current, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("flat", [1.0, 2 * np.pi / 3, 3.0])
+def test_the_back_emf_is_a_trapezoid_with_flat_tops_of_the_asked_width(flat: float) -> None:
+    angle = np.linspace(-7, 7, 1001)
+    made = sympy.lambdify(
+        sympy.Symbol("x", real=True), _shape(sympy.Symbol("x", real=True), sympy.Float(flat)), "numpy"
+    )
+    wanted = Motor(1, 0, 1, 1, 1, 1, abs, flat=flat)
+    np.testing.assert_allclose(made(angle), [wanted.shapes(at)[0] for at in angle], atol=1e-14)
+    assert np.mean(np.abs(made(angle)) > 1 - 1e-15 * 8) == pytest.approx(flat / np.pi, abs=0.01)
