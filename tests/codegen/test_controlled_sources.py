@@ -171,7 +171,7 @@ def test_controlled_sources_are_printed_with_the_letters_of_what_they_read() -> 
 
 
 @sw.component
-class Chained(sw.Component):
+class ChainedVoltages(sw.Component):
     """Law: two voltages, each the double of the other's node: known at no instant."""
 
     role = "source"
@@ -183,7 +183,7 @@ class Chained(sw.Component):
 
 
 @sw.component
-class Follower(sw.Component):
+class VoltageFollower(sw.Component):
     """Law: the voltage of q is that of p; the current that it takes from p is none."""
 
     role = "source"
@@ -194,7 +194,7 @@ class Follower(sw.Component):
 
 
 @sw.component
-class Pump(sw.Component):
+class VoltagePump(sw.Component):
     """Law: a current into q as large as the voltage of p."""
 
     role = "source"
@@ -215,23 +215,23 @@ def _circuit(source: sw.Component, *others: tuple[sw.Component, tuple[str, ...]]
 def test_what_is_not_known_in_time_is_one_named_problem() -> None:
     at_both = ((sw.Resistor("r", R=1.0), ("p", "ground")), (sw.Resistor("s", R=1.0), ("q", "ground")))
     with pytest.raises(sw.NetworkError, match="controlled source") as caught:
-        _circuit(Chained("loop"), *at_both).compile()
+        _circuit(ChainedVoltages("loop"), *at_both).compile()
     assert {problem.kind for problem in caught.value.problems} == {"controlled source"}
-    assert "what it reads depends on Chained 'loop'" in str(caught.value)
+    assert "what it reads depends on ChainedVoltages 'loop'" in str(caught.value)
 
 
 def test_a_prescribed_voltage_at_a_capacitor_may_not_be_read_from_elsewhere() -> None:
     feed = (sw.Capacitor("c", C=1.0), ("p", "ground")), (sw.Resistor("r", R=1.0), ("p", "ground"))
     with pytest.raises(sw.NetworkError, match=r"controlled source: .* of Capacitor 'd' by what it reads"):
-        _circuit(Follower("f"), *feed, (sw.Capacitor("d", C=1.0), ("q", "ground"))).compile()
-    model = _circuit(Follower("f"), *feed, (sw.Resistor("d", R=2.0), ("q", "ground"))).compile()
+        _circuit(VoltageFollower("f"), *feed, (sw.Capacitor("d", C=1.0), ("q", "ground"))).compile()
+    model = _circuit(VoltageFollower("f"), *feed, (sw.Resistor("d", R=2.0), ("q", "ground"))).compile()
     assert model.simulate(1.0, initial={"c.u": 1.0})["d.u"][-1] == pytest.approx(np.exp(-1), rel=1e-8)
 
 
 def test_a_current_that_meets_an_inductor_alone_is_answered_by_nothing() -> None:
     parts = (sw.Capacitor("c", C=1.0), ("p", "ground")), (sw.Inductor("l", L=1.0), ("q", "ground"))
-    with pytest.raises(sw.NetworkError, match=r"massless node: .* nothing answers the current of Pump 'pump'"):
-        _circuit(Pump("pump"), *parts).compile()
+    with pytest.raises(sw.NetworkError, match=r"massless node: .* nothing answers the current of VoltagePump 'pump'"):
+        _circuit(VoltagePump("pump"), *parts).compile()
 
 
 def test_a_node_between_inductors_has_no_voltage_to_read() -> None:
@@ -239,11 +239,11 @@ def test_a_node_between_inductors_has_no_voltage_to_read() -> None:
     rest = (sw.Capacitor("c", C=1.0), ("c", "ground")), (sw.Resistor("r", R=1.0), ("m", "ground"))
     load = (sw.Resistor("s", R=1.0), ("q", "ground"))
     with pytest.raises(sw.NetworkError, match="where only inductors meet"):
-        _circuit(Follower("f"), *parts, *rest, load).compile()
+        _circuit(VoltageFollower("f"), *parts, *rest, load).compile()
 
 
 @sw.component
-class Brake(sw.Component):
+class DragOfAnother(sw.Component):
     """Law: a torque on a that grows with the square of the speed of b."""
 
     role = "loss"
@@ -259,7 +259,7 @@ def test_a_torque_that_reads_its_own_speed_through_a_damper_is_an_algebraic_loop
     net.add(sw.Inertia("J", J=J), "disc")
     net.add(sw.Damper("slip", d=20.0), "disc", "out")
     net.add(sw.Damper("air", d=1.0), "out", "ground")
-    net.add(Brake("brake"), "out", "out 2")
+    net.add(DragOfAnother("drag"), "out", "out 2")
     net.add(sw.Gear("joint", ratio=1.0), "out", "out 2")
     with pytest.raises(sw.NetworkError, match="algebraic loop"):
         net.compile()

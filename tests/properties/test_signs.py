@@ -241,7 +241,8 @@ def _in_a_test_bed(name: str) -> sw.Solution:
 def test_a_component_absorbs_what_it_stores_and_loses(name: str) -> None:
     """Power at the ports = d(energy)/dt + heat, for every component; a source "loses" what it supplies, negative.
 
-    The derivative is a central difference with h = 1 ms, whose error h^2/6 E''' stays below 1e-5 of the power.
+    The derivative is a central difference with h = 1 ms, whose error h^2/6 E''' stays below 1e-5 of the power; where a
+    mode changes within it, it is none.
     """
     sol = _in_a_test_bed(name)
     lost, supplied = sol.observer.powers(sol.t, sol.x)
@@ -250,7 +251,10 @@ def test_a_component_absorbs_what_it_stores_and_loses(name: str) -> None:
     rate = (energy[2:] - energy[:-2]) / (sol.t[2:] - sol.t[:-2])
     power = sol["subject.power"]
     size = max(np.abs(heat).max(), np.abs(rate).max(), np.abs(sol["push0.power"]).max())
-    np.testing.assert_allclose(power[1:-1], rate + heat[1:-1], atol=1e-5 * size)
+    changes = np.array([row[0] for row in sol.events])
+    kept = np.searchsorted(changes, sol.t[:-2], "right") == np.searchsorted(changes, sol.t[2:], "left")
+    assert kept.mean() > 0.5
+    np.testing.assert_allclose(power[1:-1][kept], (rate + heat[1:-1])[kept], atol=1e-5 * size)
     if REGISTRY[name].role == "coupling" and name != "DCMachine":
         np.testing.assert_allclose(power, 0.0, atol=1e-12 * size)
     if REGISTRY[name].role == "store":

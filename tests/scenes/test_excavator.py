@@ -41,7 +41,7 @@ def test_the_harder_the_soil_the_higher_the_mean_torque() -> None:
 
 def test_the_wheel_turns_in_the_air_until_5_s_and_then_digs() -> None:
     sol = sw.scenes.excavator().simulate(T_END, t_eval=3001)
-    air, dug = sol["digging.tau"][sol.t <= T_DIG], sol["digging.tau"][sol.t > T_DIG + 1.0]
+    air, dug = sol["digging.tau"][sol.t < T_DIG], sol["digging.tau"][sol.t > T_DIG + 1.0]
     assert not air.any()
     assert (dug < 0).all()
     assert sol["shaft.tau"][sol.t <= T_DIG].min() < -1000 < 0 < sol["shaft.tau"][sol.t > T_DIG + 1.0].min()

@@ -13,6 +13,7 @@ from shaftwork.codegen.elements import Array
 from shaftwork.components.base import Profile, Signal
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart
 from shaftwork.network.templates import Kind
+from shaftwork.reduction.readings import Quantity
 
 
 class History:
@@ -84,6 +85,17 @@ class History:
         mask = np.ones(len(self.form.graph.branches), dtype=bool)
         mask[list(self.form.tree.loops)] = False
         return mask
+
+    def quantity(self, wanted: Quantity) -> Array:
+        """(k,) what a guard reads."""
+        match wanted.kind:
+            case "across":
+                return np.asarray(self.potentials[wanted.number])
+            case "into":
+                return self._through_port(self.form.graph.parts[wanted.number], str(wanted.port))
+            case "through":
+                return np.asarray(self.through[wanted.number])
+        return np.asarray(self.x[wanted.number])
 
     def stored(self, part: GraphPart) -> Array:
         """(k,) energy in the stores of a part, J."""

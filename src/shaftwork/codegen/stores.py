@@ -49,11 +49,12 @@ class Stores:
 
     @cached_property
     def by_loops(self) -> bool:
-        """Whether all stores follow from the states by loops alone, whatever the laws are."""
-        missing = [self._branches[name] for name, column in zip(self.names, self._columns, strict=True) if column < 0]
-        sources = {*self._form.across_inputs, *self._form.tree_conductances}  # only asked for membership
-        across = set(self._form.dependent_across)
-        return all(k in across and sources.isdisjoint(self._form.tree.loops[k]) for k in missing)
+        """Whether all stores follow from the states by loops and cutsets alone, whatever the laws are."""
+        form, loops = self._form, self._form.tree.loops
+        sources = {*form.across_inputs, *form.tree_conductances}  # only asked for membership
+        driven = {tree for law in form.laws for tree in loops[law]}
+        across = all(sources.isdisjoint(loops[k]) for k in form.dependent_across)
+        return across and driven.isdisjoint(form.dependent_through)
 
     def of(self, bind: Callable[[], BoundArrays], t: Array, x: Array) -> Array:
         """(k, stores) all that is stored, in the order of `names`, at times (k,) and states (k, n).
@@ -71,10 +72,13 @@ class Stores:
             for column, name in enumerate(self.names):
                 if name in self._states:
                     made[self._states.index(name), column] = 1.0
+                    continue
+                branch, across = self._branches[name], len(self._form.across_states)
+                if branch in self._form.tree.loops:
+                    made[:across, column] = dense[list(self._form.across_states), branch]
                 else:
-                    made[: len(self._form.across_states), column] = dense[
-                        list(self._form.across_states), self._branches[name]
-                    ]
+                    through = list(self._form.through_states)
+                    made[across : across + len(through), column] = -dense[branch, through]
             self._map = loops, made
         return self._map[1]
 
@@ -106,7 +110,8 @@ class Stores:
             before[branch] = held[name]
         loops = self._loops(bound.part.loops)
         inputs, laws = bound.program.inputs, len(form.laws)
-        u = inputs.values(t, np.zeros(inputs.outputs), x, bound.p) if inputs.size else np.empty(0)
+        # sources of time alone act on what is stored, and no other law need have a value here
+        u = np.where(inputs.of_time, inputs.values(t, np.zeros(inputs.outputs), x, bound.p), 0.0)
         across, through = list(form.across_states), list(form.through_states)
         if other := list(form.dependent_across):
             F = loops[np.ix_(across, other)]

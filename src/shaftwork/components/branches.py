@@ -121,6 +121,19 @@ class IdealCoupling:
 
 
 @dataclass(frozen=True)
+class LossyCoupling:
+    """The speeds of an `IdealCoupling`, but other ratios of the through variables: a mesh of gears that rub.
+
+    Sum of coefficient * across over the terms is zero; the through variable of a term is its own number of `through`
+    times lambda. What power the terms take in is lost.
+    """
+
+    terms: tuple[tuple[Expr, End, End], ...]
+    through: tuple[Expr, ...]
+    label: str = ""
+
+
+@dataclass(frozen=True)
 class DelayLine:
     """A lossless line between two ends, each against the reference: what leaves the one arrives at the other later.
 
@@ -134,7 +147,7 @@ class DelayLine:
     label: str = "h"
 
 
-Branch = AcrossStore | ThroughStore | ThroughLaw | AcrossLaw | IdealCoupling | DelayLine
+Branch = AcrossStore | ThroughStore | ThroughLaw | AcrossLaw | IdealCoupling | LossyCoupling | DelayLine
 
 
 def rigid(ends: tuple[End, End] | None, label: str = "") -> IdealCoupling:

@@ -40,7 +40,7 @@ def _refuse_mixed(part: Any) -> None:
         raise ParameterError(f"{type(part).__name__} '{part.name}': a damping d needs a stiffness c beside it.")
     if part.c is not None and part.restitution:
         raise ParameterError(
-            f"{type(part).__name__} '{part.name}': restitution is for rigid flanks. Leave out c, or restitution and take d."
+            f"{type(part).__name__} '{part.name}': restitution is for rigid flanks. Leave out c, or take d instead."
         )
 
 
@@ -105,8 +105,8 @@ def _law(upper: Any, lower: Any, p: Any) -> Expr:
     """The torque in a mode; where nothing chooses modes, in all of them."""
     forward, backward = _torques(upper, lower, p)
     if p.form is None:
-        pieces = [(Max(0, forward), INTEGRAL > upper)] if upper is not None else []
-        pieces += [(Min(0, backward), INTEGRAL < lower)] if lower is not None else []
+        pieces = [(Max(0, forward), upper < INTEGRAL)] if upper is not None else []
+        pieces += [(Min(0, backward), lower > INTEGRAL)] if lower is not None else []
         return Piecewise(*pieces, (Integer(0), True))
     one, other = upper if upper is not None else lower, lower if lower is not None else upper
     limit = (one + other) / 2 + p.mode * (one - other) / 2

@@ -5,8 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
-from shaftwork.components.base import Component, Port, Role, component
-from shaftwork.components.branches import ACROSS, AcrossLaw, AcrossStore, Branch, ThroughLaw, ThroughStore
+from sympy import And, Min, Not, false
+
+from shaftwork.components.base import Component, Port, Role, Signal, component
+from shaftwork.components.branches import ACROSS, AcrossLaw, AcrossStore, Branch, ThroughLaw, ThroughStore, rigid
+from shaftwork.components.friction import STUCK, conducting
+from shaftwork.components.laws import t
+from shaftwork.components.modes import ANEW, Leave, Mode, Modes
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.parameters import parameter
 
@@ -74,3 +79,71 @@ class CurrentSource(Component):
 
     def branches(self, p: Any) -> Iterator[Branch]:
         yield ThroughLaw(-p.i)
+
+
+@component
+class Switch(Component):
+    """An ideal switch between two nodes of a circuit.
+
+    Law: u = 0 while closed, i = 0 while open. It closes at t_on, or when `on` rises above zero, and opens at t_off.
+    Modes: open, closed. A current that an inductance drives is cut off at once, with its energy lost in the switch; a
+    diode beside the inductance lets it flow on.
+    """
+
+    t_on: float = parameter("s", "time at which it closes", default=0.0, latex=r"t_{on}")
+    t_off: float | None = parameter("s", "time at which it opens", default=None, latex=r"t_{off}")
+    on: Any = parameter(
+        "1", "closes when this law, in the voltage u across it and t, is above zero", law=True, default=None
+    )
+
+    role: ClassVar[Role] = "coupling"
+    ports: ClassVar = TERMINALS
+
+    def modes(self, p: Any) -> Iterator[Modes]:
+        begins = t - p.t_on if p.on is None else p.on if p.t_on == 0 else Min(t - p.t_on, p.on)
+        past = false if p.t_off is None else t >= p.t_off
+        on = And(begins >= 0 if p.on is None else begins > 0, Not(past))
+        over = () if p.t_off is None else (Leave(t - p.t_off, "over"),)
+        yield Modes(
+            (
+                Mode("open", (Leave(begins, ANEW),), starts=And(Not(on), Not(past))),
+                Mode("closed", over, 1.0, STUCK, starts=on),
+                Mode("over", starts=past, says="open"),
+            )
+        )
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        if p.form == STUCK:
+            yield rigid(("p", "n"))
+
+    def signals(self) -> dict[str, Signal]:
+        """Current from p to n, voltage from p to n."""
+        return _current_and_voltage()
+
+
+@component
+class Diode(Component):
+    """An ideal diode from p to n.
+
+    Law: u = 0 and i >= 0 while it conducts, i = 0 and u <= 0 while it blocks. Modes: blocking, conducting.
+    Mechanical analogue: a freewheel.
+    """
+
+    role: ClassVar[Role] = "coupling"
+    ports: ClassVar = TERMINALS
+
+    def modes(self, p: Any) -> Iterator[Modes]:  # noqa: ARG002
+        yield conducting("blocking", "conducting")
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        if p.form == STUCK:
+            yield rigid(("p", "n"))
+
+    def signals(self) -> dict[str, Signal]:
+        """Current from p to n, voltage from p to n."""
+        return _current_and_voltage()
+
+
+def _current_and_voltage() -> dict[str, Signal]:
+    pair = ("p", "n")
+    return {"i": Signal("through", pair, ELECTRICAL), "u": Signal("across", pair, ELECTRICAL)}

@@ -108,8 +108,8 @@ class Brake(Component):
     def __post_init__(self) -> None:
         if self.on is not None and (self.t_rise or self.t_lag):
             raise ParameterError(
-                f"{type(self).__name__} '{self.name}': a rise over t_rise or t_lag starts at t_on, and the time at which "
-                "`on` comes true is not known before. Leave one of them out."
+                f"{type(self).__name__} '{self.name}': a rise over t_rise or t_lag starts at t_on, and when `on` comes "
+                "true is not known before. Leave one of them out."
             )
         if self.t_rise and self.t_lag:
             raise ParameterError(f"{type(self).__name__} '{self.name}': give t_rise or t_lag, not both.")

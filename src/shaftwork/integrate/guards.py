@@ -1,4 +1,4 @@
-"""Guards of a phase: whether a step meets one, and when. The step is then cut off there, for the phase is smooth beyond."""
+"""Guards of a phase: whether a step meets one, and when. It is then cut off there, for the phase is smooth beyond."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ Dense = Callable[[Array], Array]
 
 # No step is shorter than so many rounding units of the time.
 CLEARANCE = 8
+# Parts of the first stretch of a step at which it is looked at where a guard starts at its limit.
+NEARER = 0.5 ** np.arange(1, 41)
 
 
 class GuardWatch:
@@ -48,8 +50,12 @@ class GuardWatch:
         if look.is_far() and (look.values[0] < 0).all():
             return None
         look.add(start + LOOKS * (end - start))
+        if (look.values[0] >= 0).any():  # what is above zero by rounding may fall and rise again ere the first look
+            look.add(start + NEARER * (look.times[1] - start))
         look.follow()
-        found = [(self._time(look, column), column) for column in np.flatnonzero((look.values > 0).any(axis=0))]
+        found = [
+            (self._time(look, column), column) for column in np.flatnonzero((look.values > 0).any(axis=0)).tolist()
+        ]
         known = [(time, int(self._columns[column])) for time, column in found if time is not None]
         if not known:
             return None
@@ -57,6 +63,7 @@ class GuardWatch:
         return min(max(time, start + CLEARANCE * float(np.spacing(abs(end)))), end)
 
     def _values(self, times: Array, states: Array) -> Array:
+        assert self._guards is not None  # noqa: S101 (asked only then)
         values = self._guards.values(np.clip(times, self._low, self._high), states)
         return np.asarray((values * self._guards.sides - self._guards.offsets)[:, self._columns])
 

@@ -109,7 +109,7 @@ class _Run:
                 if watch.leaves:
                     settle(self.program, integrator, piece.end - piece.start)
                 continue
-            # a switch may be at zero where a guard is met, and settling it takes a step: this guard is not passed at once
+            # a switch may be at zero where a guard is met, and settling it takes a step: it is not passed at once
             if self.met is not None and watch is not None and self._reacts(self.met):
                 self.met = None
                 integrator.reset_cooldowns()

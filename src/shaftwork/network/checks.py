@@ -241,7 +241,7 @@ def _law_faults(part: Component, values: Mapping[str, Any]) -> Iterator[_Fault]:
     templates = make_template(part, sound).branches
     _check_ends(part, templates)
     check_readings(part, templates)
-    for template in {(made.kind, made.law, made.terms): made for made in templates}.values():
+    for template in {(made.kind, made.law, made.terms, made.through): made for made in templates}.values():
         if unreadable := _unreadable("", template.law):
             yield unreadable._replace(what=f"a branch law {unreadable.what}")
         elif not (strange := _strange_symbols(template)):
@@ -290,7 +290,8 @@ def _unreadable(name: str, law: sympy.Expr) -> _Fault | None:
 
 
 def _strange_symbols(template: BranchTemplate) -> set[sympy.Symbol]:
-    found = template.law.free_symbols.union(*(coefficient.free_symbols for coefficient, _, _ in template.terms))
+    factors = (*(coefficient for coefficient, _, _ in template.terms), *template.through)
+    found = template.law.free_symbols.union(*(factor.free_symbols for factor in factors))
     found -= {HISTORY} if template.is_history else set()
     found -= {*template.reads} if template.kind in (Kind.LAW, Kind.ACROSS_SOURCE) else set()
     return set(found - {*template.symbols} - _READS.get(template.kind, frozenset()))

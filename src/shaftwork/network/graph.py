@@ -16,7 +16,7 @@ from shaftwork.components.laws import Table, as_expression
 from shaftwork.components.modes import Modes
 from shaftwork.core.domains import ROTATION, Domain
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
-from shaftwork.network.templates import BranchTemplate, Kind, Template, make_template
+from shaftwork.network.templates import BranchTemplate, Kind, Template, make_template, with_factors
 
 GROUND = -1
 """Node number of the reference."""
@@ -41,6 +41,11 @@ class GraphBranch:
     plus: int
     minus: int
     terms: tuple[tuple[Expr, int, int], ...]
+
+    @property
+    def balances(self) -> tuple[tuple[Expr, int, int], ...]:
+        """Of a coupling, (factor of its through variable, first node, second node); else empty."""
+        return with_factors(self.terms, self.template.through)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

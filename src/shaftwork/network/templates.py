@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
-from typing import Any, get_args
+from typing import Any, TypeVar, get_args
 
 from sympy import Expr, I, Integer, Symbol, nan, oo, sympify, zoo
 
@@ -28,6 +28,7 @@ from shaftwork.components.branches import (
     DelayLine,
     End,
     IdealCoupling,
+    LossyCoupling,
     ThroughLaw,
     ThroughStore,
     readings_in,
@@ -40,6 +41,8 @@ from shaftwork.components.modes import ALL_IN_ONE, Choice, Modes, has_mode, mode
 from shaftwork.components.slopes import jumps, slope
 from shaftwork.core.domains import DOMAINS
 from shaftwork.core.errors import ParameterError, ShaftworkError
+
+T = TypeVar("T")
 
 
 class Kind(IntEnum):
@@ -68,6 +71,7 @@ class BranchTemplate:
         printed: the law as equations print it, in letters of derived quantities.
         line: at an end of a line, its impedance and delay: of the conductance and of the history, whose law is
             `HISTORY`; the next two branches of a line are its other end.
+        through: of a coupling that loses power, the factors of its through variable, one for each term; else empty.
     """
 
     kind: Kind
@@ -78,6 +82,12 @@ class BranchTemplate:
     symbols: tuple[Symbol, ...]
     printed: Expr
     line: tuple[Expr, Expr] | None = None
+    through: tuple[Expr, ...] = ()
+
+    @property
+    def balances(self) -> tuple[tuple[Expr, End, End], ...]:
+        """Of a coupling, (factor of its through variable, first end, second end); else empty."""
+        return with_factors(self.terms, self.through)
 
     @property
     def has_integral(self) -> bool:
@@ -93,6 +103,13 @@ class BranchTemplate:
     def is_history(self) -> bool:
         """Whether it is what has come from the other end of a line."""
         return bool(self.law == HISTORY)
+
+
+def with_factors(terms: tuple[tuple[Expr, T, T], ...], factors: tuple[Expr, ...]) -> tuple[tuple[Expr, T, T], ...]:
+    """The terms of a coupling with other factors; as they are where there are none."""
+    if not factors:
+        return terms
+    return tuple((factor, plus, minus) for factor, (_, plus, minus) in zip(factors, terms, strict=True))
 
 
 _Resolved = tuple[Kind, Expr]
@@ -232,6 +249,10 @@ class _Resolver:
             case IdealCoupling(terms, label):
                 exact = tuple((_law(factor, branch, number), plus, minus) for factor, plus, minus in terms)
                 yield self._template(Kind.COUPLING, Integer(0), (None, None), exact, label)
+            case LossyCoupling(terms, through, label):
+                exact = tuple((_law(factor, branch, number), plus, minus) for factor, plus, minus in terms)
+                factors = tuple(_law(factor, branch, number) for factor in through)
+                yield self._template(Kind.COUPLING, Integer(0), (None, None), exact, label, factors)
             case AcrossStore(law, ends, label) | ThroughStore(law, ends, label) | ThroughLaw(law, ends, label):
                 for kind, found in self._resolved(branch, law, number):
                     joint = rigid(ends or self._default).terms if kind is Kind.COUPLING else ()
@@ -265,11 +286,17 @@ class _Resolver:
         return made
 
     def _template(
-        self, kind: Kind, law: Expr, ends: tuple[End, End], terms: tuple[tuple[Expr, End, End], ...], label: str
+        self,
+        kind: Kind,
+        law: Expr,
+        ends: tuple[End, End],
+        terms: tuple[tuple[Expr, End, End], ...],
+        label: str,
+        through: tuple[Expr, ...] = (),
     ) -> BranchTemplate:
-        (known, *factors), symbols = self._in_parameters(law, *(coefficient for coefficient, _, _ in terms))
-        placed = tuple((factor, plus, minus) for factor, (_, plus, minus) in zip(factors, terms, strict=True))
-        return BranchTemplate(kind, known, ends, placed, label, symbols, law)
+        (known, *factors), symbols = self._in_parameters(law, *(coefficient for coefficient, _, _ in terms), *through)
+        placed, others = with_factors(terms, tuple(factors[: len(terms)])), tuple(factors[len(terms) :])
+        return BranchTemplate(kind, known, ends, placed, label, symbols, law, through=others)
 
     def _in_parameters(self, *laws: Expr) -> tuple[tuple[Expr, ...], tuple[Symbol, ...]]:
         """Laws without derived quantities, and the symbols in them."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from itertools import count
@@ -16,19 +16,19 @@ from sympy import Expr, Integer, Piecewise, Symbol, sympify
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.code import scalar, vectorised_list
 from shaftwork.codegen.elements import Array
+from shaftwork.codegen.recovery import History
 from shaftwork.codegen.stores import Stores
 from shaftwork.codegen.timeline import Timeline
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.laws import pieces_degree
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Leave, Mode, Modes
-from shaftwork.core.errors import CompileError, SimulationError
+from shaftwork.core.errors import CompileError
 from shaftwork.integrate.choice import available
 from shaftwork.integrate.problem import Guards, Problem
 from shaftwork.network.graph import GraphPart
 from shaftwork.pipeline.prepared import Prepared
-from shaftwork.reduction.readings import Readings
-from shaftwork.reduction.rows import Rows
+from shaftwork.reduction.readings import NamedReadings, Readings
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.model import Model
@@ -96,12 +96,9 @@ class Assembly:
         self._places = {name: k for k, name in enumerate(model.parameters)}
         self._expressions: list[Expr] = []
         self._watched: dict[tuple[int, str], tuple[Watched, ...]] = {}
-        if model.rows is None:
-            raise SimulationError(
-                f"'{model.name}' has parts that change their mode, and more than 64 states or too closely coupled ones."
-                " Take coarser shafts."
-            )
-        self._readings = readings = Readings(model.form, model.rows)
+        rows = model.rows
+        self._readings = readings = NamedReadings(model.form) if rows is None else Readings(model.form, rows)
+        self._parameters = tuple(Symbol(name, real=True) for name in model.parameters)
         self._parts = {part.name: part for part in model.form.graph.parts}
         for number, (element, form) in enumerate(zip(elements, forms, strict=True)):
             part = self._parts[element.part.name]
@@ -109,7 +106,6 @@ class Assembly:
                 if mode.form == form:
                     self._watched[number, mode.name] = tuple(self._leaves(readings, part, element.modes, mode))
         self._prepared: dict[bytes, Prepared] = {}
-        self._across: dict[int, Callable[..., Any]] = {}
         self._sides: dict[ModeNames, Array] = {}
         self._ends: dict[ModeNames, tuple[tuple[int, Watched], ...]] = {}
         self._numbers = [self._places[element.number] for element in elements if element.number in self._places]
@@ -164,25 +160,43 @@ class Assembly:
 
     def guards(self, p: Array) -> Callable[[Array, Array], Array]:
         """All guards as a function of times (k,) and states (k, n) to (k, guards)."""
-        function, parameters, size = self._function, tuple(p.tolist()), len(self._expressions)
+        function, read, parameters, size = self._function, self._read(p), tuple(p.tolist()), len(self._expressions)
 
         def values(times: Array, states: Array) -> Array:
             made = np.empty((times.size, size))
             with np.errstate(all="ignore"):
-                for column, value in enumerate(function(times, *states.T, *parameters)):
+                for column, value in enumerate(function(times, *read(times, states), *parameters)):
                     made[:, column] = value
             return made
 
         return values
 
+    def _read(self, p: Array) -> Callable[[Array, Array], Iterable[Array]]:
+        """What guards are made of at times (k,) and states (k, n): the states, or quantities that follow from them."""
+        if not isinstance(self._readings, NamedReadings):
+            return lambda _, states: states.T
+        quantities, bound = tuple(self._readings.quantities), self.bound(p)
+
+        def read(times: Array, states: Array) -> list[Array]:
+            history = History(bound, times, states)
+            return [history.quantity(wanted) for wanted in quantities]
+
+        return read
+
+    def _shown_at(self, t: float, x: Array, p: Array) -> Sequence[Any]:
+        """What elements show at one instant: speed across, twist and parameters of each."""
+        shown = self._shown
+        values = (np.ravel(value)[0] for value in self._read(p)(np.array([t]), x[None, :]))
+        return shown(t, *map(float, values), *p.tolist())  # type: ignore[no-any-return]
+
     def first_modes(self, t: float, x: Array, p: Array) -> ModeNames:
         """The mode of each element in which a motion starts, in the equations in which nothing is joined by a mode."""
-        shown = self._shown(t, *x.tolist(), *p.tolist())
+        shown = self._shown_at(t, x, p)
         return tuple(self._start(number, "", t, shown) for number in range(len(self.elements)))
 
     def start_of(self, number: int, besides: str, t: float, x: Array, p: Array) -> str:
         """The mode of an element in which a motion would start, besides one."""
-        return self._start(number, besides, t, self._shown(t, *x.tolist(), *p.tolist()))
+        return self._start(number, besides, t, self._shown_at(t, x, p))
 
     def _start(self, number: int, besides: str, t: float, shown: Sequence[Any]) -> str:
         modes = self.elements[number].modes
@@ -204,20 +218,12 @@ class Assembly:
             for symbol in (ACROSS, INTEGRAL, *self._symbols(number)):
                 known = symbol != INTEGRAL or reads
                 shown.append(self._readings.guard(part, element.modes, symbol) if known else Integer(0))
-        return vectorised_list((TIME, *self._rows.states, *self._rows.parameters), shown)
-
-    @property
-    def _rows(self) -> Rows:
-        assert self.model.rows is not None  # noqa: S101 (refused at the start)
-        return self.model.rows
+        return vectorised_list((TIME, *self._readings.symbols, *self._parameters), shown)
 
     def across(self, number: int, t: float, x: Array, p: Array) -> float:
         """The speed across an element."""
-        if number not in self._across:
-            element, rows = self.elements[number], self._rows
-            made = self._readings.guard(self._parts[element.part.name], element.modes, ACROSS)
-            self._across[number] = vectorised_list((TIME, *rows.states, *rows.parameters), [made])
-        return float(np.ravel(self._across[number](t, *x.tolist(), *p.tolist())[0])[0])
+        first = sum(2 + len(self._symbols(k)) for k in range(number))
+        return float(self._shown_at(t, x, p)[first])
 
     def constant(self, number: int, expression: Expr | None, p: Array) -> float:
         """A number that is made of an element's parameters."""
@@ -271,7 +277,8 @@ class Assembly:
     def _rates(self, p: Array) -> Callable[[float, Array], Array]:
         """The right-hand side; an engine that asks for it often gets code of its own."""
         motion, asked, scalar_program = self.motion(p), count(), self.model.scalar
-        assert scalar_program is not None  # noqa: S101 (there are rows)
+        if scalar_program is None:
+            return self.bound(p).rhs
         own = cache(lambda: scalar_program.bind(p))
 
         def rates(t: float, x: Array) -> Array:
@@ -289,8 +296,7 @@ class Assembly:
 
     @cached_property
     def _function(self) -> Callable[..., Any]:
-        rows = self._rows
-        return vectorised_list((TIME, *rows.states, *rows.parameters), self._expressions)
+        return vectorised_list((TIME, *self._readings.symbols, *self._parameters), self._expressions)
 
     def sides(self, modes: ModeNames) -> Array:
         """(guards,) the side of each guard that ends one of the modes."""
@@ -303,7 +309,15 @@ class Assembly:
 
     def motion(self, p: Array) -> Motion:
         """Rates and guards together, from a time in s and a list of states: in plain floats, for a single instant."""
-        function, values, sizes = self._scalar, p.tolist(), (len(self._rows.states), len(self._expressions))
+        if self.model.rows is None:
+            bound, guards = self.bound(p), self.guards(p)
+
+            def recovered(t: float, x: list[float]) -> tuple[list[float], list[float]]:
+                state = np.array(x)
+                return bound.rhs(t, state).tolist(), guards(np.array([t]), state[None, :])[0].tolist()
+
+            return recovered
+        function, values, sizes = self._scalar, p.tolist(), (len(self.model.states), len(self._expressions))
 
         def made(t: float, x: list[float]) -> tuple[list[float], list[float]]:
             try:
@@ -316,7 +330,8 @@ class Assembly:
 
     @cached_property
     def _scalar(self) -> Callable[..., list[float]]:
-        rows = self._rows
+        rows = self.model.rows
+        assert rows is not None  # noqa: S101 (asked only then)
         symbols = {symbol: Symbol(f"x{k}", real=True) for k, symbol in enumerate(rows.states)}
         symbols |= {symbol: Symbol(f"p{k}", real=True) for k, symbol in enumerate(rows.parameters)}
         made = [expression.xreplace(symbols) for expression in (*rows.rates, *self._expressions)]
@@ -329,8 +344,8 @@ class Assembly:
     @cached_property
     def program(self) -> Any:
         """The heyoka program with the guards as its events, or None where there can be none."""
-        rows = self._rows
-        if not (rows.states or self.clocks) or not available("heyoka"):
+        rows = self.model.rows
+        if rows is None or not (rows.states or self.clocks) or not available("heyoka"):
             return None
         from shaftwork.codegen.heyoka import build
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -31,13 +31,17 @@ NO_IMPACT = 1e-8
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """A change of mode: when in s, of which element, from which mode to which; or a rebound, back to the one before."""
+    """A change of mode: when in s, of which element, from which mode to which; or a rebound, back to the one before.
+
+    With an impact speeds jump.
+    """
 
     time: float
     element: Element
     before: str
     after: str
     rebound: bool = False
+    impact: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +178,9 @@ class Settling:
         while found is not None:
             moment, made = self._follow(t, after, moment, *found)
             changes += made
-            if moment.regime.modes in seen and not made[0].rebound:
+            if made and made[0].impact:
+                seen.clear()
+            elif made and moment.regime.modes in seen:
                 raise self._endless(t, changes)
             seen[moment.regime.modes] = None
             moment, found = self._violated(moment, after, ended)
@@ -247,11 +253,13 @@ class Settling:
         to = leave.to or regime.assembly.start_of(number, before, after, moment.x, regime.p)
         speed = self._meets(moment, after, element.modes[to], number)
         slips = next((name for side, name in element.modes[to].gives_way if side * speed > 0), "")
+        if slips == before:  # it was met by rounding alone: it is moving away
+            return moment, []
         if slips:  # its torque is limited, so it takes no speed away at once
             to, speed = slips, 0.0
         try:
             if speed or (leave.rebound is not None and not slips):
-                return self._hit(t, after, moment, number, leave)
+                return self._hit(t, after, moment, number, replace(leave, to=to))
             return self._changed(moment, after, _with(regime.modes, {number: to})), [Change(t, element, before, to)]
         except NetworkError:
             return self._around(t, after, moment, number, to)
@@ -275,7 +283,7 @@ class Settling:
         joined = self._joined(moment, after, number, leave.to, speed)
         share = regime.assembly.constant(number, leave.rebound, regime.p)
         rebound = leave.rebound is not None and share * speed > regime.assembly.constant(number, leave.rest, regime.p)
-        changes = [Change(t, elements[number], regime.modes[number], leave.to, rebound)]
+        changes = [Change(t, elements[number], regime.modes[number], leave.to, rebound, impact=True)]
         for k, (before, name) in enumerate(zip(regime.modes, joined.regime.modes, strict=True)):
             if k != number and name != before:
                 changes.append(Change(t, elements[k], before, name))
@@ -287,7 +295,7 @@ class Settling:
         return Moment(new, new.assembly.stores.states(new.assembly.bound(new.p), after, thrown)), changes
 
     def _joined(self, moment: Moment, t: float, number: int, to: str, speed: float) -> Moment:
-        """After an inelastic impact. What holds by a limited torque gives way in it; a contact is pressed, not pulled."""
+        """After an inelastic impact. What holds by a limited torque slips in it; contacts are pressed, not pulled."""
         before, elements, least = moment.regime.modes, self._phases.elements, NO_IMPACT * speed
         gives = {k: elements[k].modes[name].gives_way for k, name in enumerate(before) if k != number}
         gives = {k: ways for k, ways in gives.items() if ways}

@@ -8,7 +8,9 @@ cutset, in which an inertia that follows others takes its torque from their rate
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 from sympy import Add, Expr, Integer, Symbol
 
@@ -36,6 +38,11 @@ class Readings:
         branches = [state.branch for state in form.states]
         self._rates = dict(zip(branches, rows.rates, strict=True)) if branches else {}
         self._through: dict[int, Expr] = {}
+
+    @property
+    def symbols(self) -> tuple[Symbol, ...]:
+        """What the expressions are made of, besides time and parameters."""
+        return self.rows.states
 
     def guard(self, part: GraphPart, element: Modes, expression: Expr) -> Expr:
         """An expression of a guard, in the symbols of its component, in states, the network's parameters and time."""
@@ -143,3 +150,55 @@ class Readings:
     def _law(self, branch: int) -> Expr:
         made = self.graph.branches[branch]
         return self.graph.in_network_symbols(made.template.law, made)
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What a symbol stands for: "across" of a node, "into" a part at a port, "through" a branch, "state" by number.
+
+    Args:
+        kind: as above.
+        number: of the node, the part, the branch or the state.
+        port: of "into".
+    """
+
+    kind: Literal["across", "into", "through", "state"]
+    number: int
+    port: End = None
+
+
+class NamedReadings(Readings):
+    """Symbols in place of expressions, for networks that have no rows: each is recovered from the states.
+
+    Args:
+        form: the state form.
+    """
+
+    def __init__(self, form: StateForm) -> None:
+        self.form, self.graph = form, form.graph
+        self.quantities: dict[Quantity, Symbol] = {}
+
+    @property
+    def symbols(self) -> tuple[Symbol, ...]:
+        """One for each of `quantities`, in their order."""
+        return tuple(self.quantities.values())
+
+    def _symbol(self, quantity: Quantity) -> Symbol:
+        return self.quantities.setdefault(quantity, Symbol(f"quantity {len(self.quantities)}", real=True))
+
+    def across(self, part: GraphPart, port: End) -> Expr:
+        """The across variable of a port against the reference."""
+        node = GROUND if port is None else part.nodes[port]
+        return Integer(0) if node == GROUND else self._symbol(Quantity("across", node))
+
+    def into(self, part: GraphPart, port: End) -> Expr:
+        """What the node at a port gives to the part."""
+        return self._symbol(Quantity("into", self.graph.parts.index(part), port))
+
+    def through(self, branch: int) -> Expr:
+        """The through variable of a branch."""
+        return self._symbol(Quantity("through", branch))
+
+    def _integral(self, part: GraphPart, label: str) -> Expr:
+        state = super()._integral(part, label)
+        return self._symbol(Quantity("state", [made.name for made in self.form.states].index(state.name)))

@@ -85,7 +85,8 @@ def energy_balance(observer: Observer, dense: Dense, steps: Array) -> EnergyBala
 
 def _impulses(observer: Observer, steps: Array, jumps: Array) -> tuple[Array, list[tuple[str, Array]]]:
     """(s,) energy that sources give at once, and by part the (s,) that is lost at once, in an impact."""
-    given, lost = jumps.copy(), {}
+    given = jumps.copy()
+    lost: dict[str, Array] = {}
     for time, part in observer.impacts:
         places = np.flatnonzero(steps == time)
         energy = lost.setdefault(part, np.zeros(len(steps)))

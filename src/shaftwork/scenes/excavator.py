@@ -64,7 +64,7 @@ def excavator(
 
 def _motor(pull_up_speed: float) -> CageMotor:
     with warnings.catch_warnings():
-        # the quartic first rises to 5.8 kN m at 105 1/min: the price of the extremes of figure 13
+        # the quartic first rises to 5.8 kN m at 110 1/min: the price of the extremes of figure 13
         warnings.simplefilter("ignore", NetworkWarning)
         return motors["excavator 250 kW"].cage("motor", n_s=pull_up_speed, symbol="M")
 
@@ -79,7 +79,7 @@ EXCAVATOR = enter(
         signals=("shaft.tau", "motor.tau", "J1.omega", "J2.omega"),
         chosen=(
             "speed at pull-up 537 1/min, with which the start has both T_max and T_min of figure 13; the quartic then "
-            "first rises to 5.8 kN m at 105 1/min; synchronous speed 1000 1/min",
+            "first rises to 5.8 kN m at 110 1/min; synchronous speed 1000 1/min",
             "grey clay: the source does not say in which of its three soils figure 13 digs",
             "gear ratio 120 and edges at a radius of 3 m, which cut at 2.6 m/s; their mean length of 0.6 m in the soil "
             "gives T_mean of figure 13; a bucket leaves the soil after 2 rad; losses of the reducer are left out",
