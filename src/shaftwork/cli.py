@@ -246,16 +246,17 @@ def _phases(solution: Solution) -> None:
 def _write(solution: Solution, signals: Sequence[str], folder: Path) -> None:
     import numpy as np
 
-    written = [folder / "signals.csv", folder / "signals.png"]
+    written = [folder / "signals.csv"]
     columns = np.column_stack([solution.t, *(solution[name] for name in signals)])
     header = ",".join(["t [s]", *(f"{name} [{solution.observer.units[name]}]" for name in signals)])
     np.savetxt(written[0], columns, delimiter=",", header=header, comments="", fmt="%.12g")
-    solution.plot(*signals).savefig(written[1], dpi=150)
     if solution.phases:
         parts = solution.phases[0].modes
         phases = ((row.start, row.end, *row.modes.values()) for row in solution.phases)
         written.append(_rows(folder / "phases.csv", ("start [s]", "end [s]", *parts), phases))
         written.append(_rows(folder / "events.csv", ("t [s]", "part", "from", "to"), solution.events))
+    written.append(folder / "signals.png")
+    solution.plot(*signals).savefig(written[-1], dpi=150)
     print(f"\nwritten: {', '.join(str(path) for path in written)}")
 
 

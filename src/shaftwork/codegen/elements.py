@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,7 @@ from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.templates import BranchTemplate, Kind
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.gains import Gain, Number, any_sum_vanishes, coefficients_in, fold, value_of
+from shaftwork.reduction.tree import Row
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -112,8 +113,17 @@ class GainMatrix:
 
 def loop_matrix(form: StateForm) -> GainMatrix:
     """F, (branches, branches): entry (tree branch, link) is the factor of the tree branch in the loop of the link."""
+    return _of_links(form, form.tree.loops)
+
+
+def cutset_matrix(form: StateForm) -> GainMatrix:
+    """Q, (branches, branches): entry (tree branch, link) is the factor of the link in the cutset of the tree branch."""
+    return _of_links(form, form.tree.cutsets)
+
+
+def _of_links(form: StateForm, rows: Mapping[int, Row]) -> GainMatrix:
     size = len(form.graph.branches)
-    entries = [(tree, link, gain) for link, row in form.tree.loops.items() for tree, gain in row.items()]
+    entries = [(tree, link, gain) for link, row in rows.items() for tree, gain in row.items()]
     return GainMatrix(form.graph, entries, (size, size))
 
 

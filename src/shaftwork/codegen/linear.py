@@ -95,13 +95,17 @@ def _places(graph: CircuitGraph, names: Sequence[str]) -> tuple[_Place, ...]:
 def _with_inputs(form: StateForm, places: Sequence[_Place]) -> tuple[StateForm, tuple[int, ...]]:
     """The form with a branch for every torque that is an input, and the branches of all inputs."""
     graph, tree = form.graph, form.tree
-    branches, parts, loops, members = list(graph.branches), list(graph.parts), dict(tree.loops), []
+    branches, parts, members = list(graph.branches), list(graph.parts), list[int]()
+    loops = dict(tree.loops)
+    cutsets = loops if tree.cutsets is tree.loops else dict(tree.cutsets)
     for place in places:
         if place.branch >= 0:
             members.append(place.branch)
             continue
         index, part, ends = len(branches), parts[place.part], place.signal.ends
-        loops[index] = _loop(form, part, place.signal)
+        loops[index] = _row(form, part, place.signal, tree.loops, tree.potentials)
+        if cutsets is not loops:
+            cutsets[index] = _row(form, part, place.signal, tree.cutsets, tree.shares)
         plus, minus = (GROUND if end is None else part.nodes[end] for end in ends)
         template = BranchTemplate(Kind.THROUGH_SOURCE, Integer(0), ends, (), "", (), Integer(0))
         branches.append(GraphBranch(index, place.part, template, plus, minus, ()))
@@ -113,17 +117,20 @@ def _with_inputs(form: StateForm, places: Sequence[_Place]) -> tuple[StateForm, 
     links = {**tree.links, Kind.THROUGH_SOURCE: (*tree.links[Kind.THROUGH_SOURCE], *added)}
     return StateForm(
         dataclasses.replace(graph, parts=tuple(parts), branches=tuple(branches)),
-        dataclasses.replace(tree, links=links, loops=loops),
+        dataclasses.replace(tree, links=links, loops=loops, cutsets=cutsets),
         form.angles,
     ), tuple(members)
 
 
-def _loop(form: StateForm, part: GraphPart, signal: Signal) -> Row:
-    """The loop of a branch between the ends of a signal."""
+def _row(
+    form: StateForm, part: GraphPart, signal: Signal, links: Mapping[int, Row], nodes: Sequence[Row | None]
+) -> Row:
+    """The loop or cutset of a branch between the ends of a signal, from those of the links and nodes."""
     for index in part.branches:
-        if index in form.tree.loops and form.graph.branches[index].template.ends == signal.ends:
-            return form.tree.loops[index]
-    rows = [{} if end is None or part.nodes[end] == GROUND else _potential(form, part, end) for end in signal.ends]
+        if index in links and form.graph.branches[index].template.ends == signal.ends:
+            return links[index]
+    ends = [GROUND if end is None else part.nodes[end] for end in signal.ends]
+    rows = [{} if end == GROUND else _of_node(form, part, end, nodes) for end in ends]
     loop = dict(rows[0])
     for key, factor in rows[1].items():
         total = add(loop.pop(key, 0), -factor, [])
@@ -132,12 +139,12 @@ def _loop(form: StateForm, part: GraphPart, signal: Signal) -> Row:
     return loop
 
 
-def _potential(form: StateForm, part: GraphPart, port: str) -> Row:
-    row = form.tree.potentials[part.nodes[port]]
+def _of_node(form: StateForm, part: GraphPart, node: int, rows: Sequence[Row | None]) -> Row:
+    row = rows[node]
     if row is None:
-        node = form.graph.node_name(part.nodes[port])
+        name = form.graph.node_name(node)
         raise SignalError(
-            f"'{part.name}' is no input: nothing ties its node '{node}' to the reference. Join it to a Ground."
+            f"'{part.name}' is no input: nothing ties its node '{name}' to the reference. Join it to a Ground."
         )
     return row
 
@@ -307,7 +314,7 @@ class _Deviations(History):
     def absorbed(self, part: GraphPart) -> Array:
         about, power = self._nominal, np.zeros(len(self.t))
         for k in part.branches:
-            power += about.across[k] * self.through[k] + about.through[k] * self.across[k]
+            power += about.acted_on(part, k) * self.through[k] + about.through[k] * self.acted_on(part, k)
         return power
 
 

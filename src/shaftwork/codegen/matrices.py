@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from shaftwork.codegen.elements import Coefficients, loop_matrix, potential_matrix
+from shaftwork.codegen.elements import Coefficients, cutset_matrix, loop_matrix, potential_matrix
 from shaftwork.core.errors import CompileError
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
@@ -40,6 +40,7 @@ class LinearPart:
         tree_law_x: (tree laws, n) what the cutsets of the laws in the tree leave for their through variables.
         tree_law_u: (tree laws, m) the same from the inputs.
         loops: F (branches, branches).
+        cutsets: Q (branches, branches); F itself where no coupling loses power.
         coefficients: (branches,) capacities, stiffnesses and conductances.
     """
 
@@ -53,6 +54,7 @@ class LinearPart:
     tree_law_x: Any
     tree_law_u: Any
     loops: Any
+    cutsets: Any
     coefficients: Array
 
 
@@ -69,8 +71,13 @@ class MatrixAssembly:
         self.outputs = np.array(outputs, dtype=np.intp)
         self.coefficients = Coefficients(form.graph)
         self.loops = loop_matrix(form)
+        self.cutsets = self.loops if form.tree.cutsets is form.tree.loops else cutset_matrix(form)
         self.potentials = potential_matrix(form) if form.readings else None
         self.inputs = np.array([*form.laws, *form.across_inputs], dtype=np.intp)
+
+    def degenerates(self, p: Array) -> bool:
+        """Whether ratios meet at p that differ in the network, so that other equations hold there."""
+        return self.loops.degenerates(p) or (self.cutsets is not self.loops and self.cutsets.degenerates(p))
 
     def __call__(self, p: Array) -> LinearPart:
         """Assemble for the parameter vector p.
@@ -79,32 +86,33 @@ class MatrixAssembly:
             CompileError: a block of the algebraic equations is singular for these values; names its branches.
         """
         form, F, k = self.form, self.loops(p), self.coefficients(p)
-        blocks = _Blocks(form, F, len(self.inputs))
+        Q = F if self.cutsets is self.loops else self.cutsets(p)
+        blocks = _Blocks(form, F, Q, len(self.inputs))
         solve_conductances = self._inverse_of_conductances(blocks, k)
         link_g = sparse.diags_array(k[blocks.R])
         # across variables of the tree conductances from states and inputs
-        drive_x = blocks.F("G", "R") @ link_g @ blocks.across_x("R") + blocks.F("G", "L") @ blocks.pick("L")
-        drive_u = blocks.F("G", "R") @ link_g @ blocks.across_u("R") + blocks.F("G", "W") @ blocks.input("W")
+        drive_x = blocks.Q("G", "R") @ link_g @ blocks.across_x("R") + blocks.Q("G", "L") @ blocks.pick("L")
+        drive_u = blocks.Q("G", "R") @ link_g @ blocks.across_u("R") + blocks.Q("G", "W") @ blocks.input("W")
         g_x, g_u = -solve_conductances @ drive_x, -solve_conductances @ drive_u
         r_x = link_g @ (blocks.across_x("R") + blocks.F("G", "R").T @ g_x)
         r_u = link_g @ (blocks.across_u("R") + blocks.F("G", "R").T @ g_u)
         # torque balance of the tree capacities
         K = sparse.diags_array(k[blocks.K])
-        mass = sparse.diags_array(k[blocks.C]) + blocks.F("C", "K") @ K @ blocks.F("C", "K").T
+        mass = sparse.diags_array(k[blocks.C]) + blocks.Q("C", "K") @ K @ blocks.F("C", "K").T
         to_speed = self._inverse(mass, blocks.C, "inertia")
-        c_x = -to_speed @ (blocks.F("C", "R") @ r_x + blocks.F("C", "L") @ blocks.pick("L"))
-        c_u = -to_speed @ (blocks.F("C", "R") @ r_u + blocks.F("C", "W") @ blocks.input("W"))
-        c_du = -to_speed @ blocks.F("C", "K") @ K @ blocks.F("E", "K").T @ blocks.input("E")
+        c_x = -to_speed @ (blocks.Q("C", "R") @ r_x + blocks.Q("C", "L") @ blocks.pick("L"))
+        c_u = -to_speed @ (blocks.Q("C", "R") @ r_u + blocks.Q("C", "W") @ blocks.input("W"))
+        c_du = -to_speed @ blocks.Q("C", "K") @ K @ blocks.F("E", "K").T @ blocks.input("E")
         # speed balance of the loops with compliances
         S = sparse.diags_array(1 / k[blocks.S])
-        compliance = sparse.diags_array(1 / k[blocks.L]) + blocks.F("S", "L").T @ S @ blocks.F("S", "L")
+        compliance = sparse.diags_array(1 / k[blocks.L]) + blocks.F("S", "L").T @ S @ blocks.Q("S", "L")
         to_torque = self._inverse(compliance, blocks.L, "compliance")
         l_x = to_torque @ (blocks.across_x("L") + blocks.F("G", "L").T @ g_x)
         l_u = to_torque @ (blocks.across_u("L") + blocks.F("G", "L").T @ g_u)
-        l_du = -to_torque @ blocks.F("S", "L").T @ S @ blocks.F("S", "W") @ blocks.input("W")
+        l_du = -to_torque @ blocks.F("S", "L").T @ S @ blocks.Q("S", "W") @ blocks.input("W")
         # through variables that the cutsets of tree laws ask of them
-        t_x = -(blocks.F("T", "R") @ r_x + blocks.F("T", "L") @ blocks.pick("L"))
-        t_u = -(blocks.F("T", "R") @ r_u + blocks.F("T", "W") @ blocks.input("W"))
+        t_x = -(blocks.Q("T", "R") @ r_x + blocks.Q("T", "L") @ blocks.pick("L"))
+        t_u = -(blocks.Q("T", "R") @ r_u + blocks.Q("T", "W") @ blocks.input("W"))
         C, D = blocks.output_rows(self.outputs, g_x, g_u)
         z_x, z_u = blocks.integral_rows(self.outputs, C, D)
         if self.potentials is not None:
@@ -120,12 +128,13 @@ class MatrixAssembly:
             tree_law_x=sparse.csr_array(t_x),
             tree_law_u=sparse.csr_array(t_u),
             loops=F,
+            cutsets=Q,
             coefficients=k,
         )
 
     def _inverse_of_conductances(self, blocks: _Blocks, k: Array) -> Any:
-        F_GR = blocks.F("G", "R")
-        matrix = sparse.diags_array(k[blocks.G]) + F_GR @ sparse.diags_array(k[blocks.R]) @ F_GR.T
+        links = sparse.diags_array(k[blocks.R])
+        matrix = sparse.diags_array(k[blocks.G]) + blocks.Q("G", "R") @ links @ blocks.F("G", "R").T
         return self._inverse(matrix, blocks.G, "conductance")
 
     def _inverse(self, matrix: Any, branches: NDArray[np.intp], what: str) -> Any:
@@ -164,9 +173,9 @@ class MatrixAssembly:
 
 
 class _Blocks:
-    """The blocks of F by group, and the rows that pick states and inputs."""
+    """The blocks of F and Q by group, and the rows that pick states and inputs."""
 
-    def __init__(self, form: StateForm, loops: Any, inputs: int) -> None:
+    def __init__(self, form: StateForm, loops: Any, cutsets: Any, inputs: int) -> None:
         groups = {
             "C": form.across_states,
             "L": form.through_states,
@@ -179,8 +188,8 @@ class _Blocks:
             "W": form.laws,
         }
         self._groups = {name: np.array(members, dtype=np.intp) for name, members in groups.items()}
-        self._loops = loops
-        self._cache: dict[tuple[str, str], Any] = {}
+        self._loops, self._cutsets = loops, cutsets
+        self._cache: dict[tuple[bool, str, str], Any] = {}
         self._integrals, self._readings = form.integrals, form.readings
         self._states, self._inputs = len(form.states), inputs
 
@@ -189,9 +198,17 @@ class _Blocks:
 
     def F(self, tree: str, link: str) -> Any:
         """The block of the loop matrix between two groups."""
-        if (tree, link) not in self._cache:
-            self._cache[tree, link] = self._loops[self._groups[tree]][:, self._groups[link]]
-        return self._cache[tree, link]
+        return self._block(self._loops, tree, link)
+
+    def Q(self, tree: str, link: str) -> Any:
+        """The block of the cutset matrix between two groups."""
+        return self._block(self._cutsets, tree, link)
+
+    def _block(self, matrix: Any, tree: str, link: str) -> Any:
+        key = (matrix is self._loops, tree, link)
+        if key not in self._cache:
+            self._cache[key] = matrix[self._groups[tree]][:, self._groups[link]]
+        return self._cache[key]
 
     def pick(self, group: str) -> Any:
         """(group, n) rows that pick the states of C or L."""
@@ -233,7 +250,7 @@ class _Blocks:
             for kind in ("across", "through", "integral")
         )
         across_x, across_u = self._of_tree(potentials[nodes], g_x, g_u)
-        carried = sparse.csr_array(_selection(stores, self._loops.shape[0]) - self._loops[stores])  # -F where in a tree
+        carried = sparse.csr_array(_selection(stores, self._loops.shape[0]) - self._cutsets[stores])  # -Q in a tree
         through_x, through_u = carried[:, self.L] @ self.pick("L"), carried[:, self.W] @ self.input("W")
         place = {branch: len(self.C) + len(self.L) + k for k, branch in enumerate(self._integrals)}
         own = _selection(np.array([place[int(branch)] for branch in integrals], dtype=np.intp), self._states)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -52,7 +52,7 @@ class History:
             rates = np.zeros_like(tree)
             rates[list(form.through_states)] = rate[first:last]
             rates[list(form.laws)] = slopes[:laws]
-            tree[series] = -(part.loops[series] @ rates) / part.coefficients[series][:, None]
+            tree[series] = -(part.cutsets[series] @ rates) / part.coefficients[series][:, None]
         return np.asarray(tree + part.loops.T @ tree)
 
     @cached_property
@@ -72,7 +72,7 @@ class History:
             rates[list(form.across_states)] = rate[:first]
             rates[list(form.across_inputs)] = slopes[laws:]
             links[dependent] = part.coefficients[dependent][:, None] * (part.loops.T @ rates)[dependent]
-        return np.asarray(links - part.loops @ links)
+        return np.asarray(links - part.cutsets @ links)
 
     @cached_property
     def potentials(self) -> Array:
@@ -111,14 +111,28 @@ class History:
 
     def absorbed(self, part: GraphPart) -> Array:
         """(k,) power that goes into a part at its ports, W."""
-        return np.asarray(sum((self.across[k] * self.through[k] for k in part.branches), start=np.zeros(len(self.t))))
+        return self._power(part, part.branches)
 
     def lost(self, part: GraphPart) -> Array:
         """(k,) power that a part takes in without storing it, W; negative where it supplies."""
         kinds = (Kind.CONDUCTANCE, Kind.LAW, Kind.THROUGH_SOURCE, Kind.ACROSS_SOURCE)
         branches = self.form.graph.branches
-        members = (k for k in part.branches if branches[k].template.kind in kinds and not branches[k].template.line)
-        return np.asarray(sum((self.across[k] * self.through[k] for k in members), start=np.zeros(len(self.t))))
+        templates = ((k, branches[k].template) for k in part.branches)
+        return self._power(part, (k for k, t in templates if t.through or (t.kind in kinds and not t.line)))
+
+    def _power(self, part: GraphPart, branches: Iterable[int]) -> Array:
+        powers = (self.acted_on(part, k) * self.through[k] for k in branches)
+        return np.asarray(sum(powers, start=np.zeros(len(self.t))))
+
+    def acted_on(self, part: GraphPart, index: int) -> Array:
+        """(k,) what a branch's through variable acts on: their product is the power that the branch takes in."""
+        template = self.form.graph.branches[index].template
+        if not template.through:
+            return np.asarray(self.across[index])
+        ends = dict.fromkeys(end for _, *pair in template.terms for end in pair if end is not None)
+        factors = ((factor, end) for end in ends for factor in self._factors(part, index, end))
+        speeds = (factor * self.potentials[part.nodes[end]] for factor, end in factors)
+        return np.asarray(sum(speeds, start=np.zeros(len(self.t))))
 
     def signal(self, part: GraphPart, signal: Signal) -> Array:
         """(k,) one of the part's signals."""
@@ -166,7 +180,7 @@ class History:
     def _factors(self, part: GraphPart, index: int, port: str) -> Iterator[float]:
         template = self.form.graph.branches[index].template
         values = {s: float(self.bound.p[part.parameters[s.name]]) for s in template.symbols}
-        for coefficient, plus, minus in template.terms:
+        for coefficient, plus, minus in template.balances:
             for sign in _ends((plus, minus), port):
                 yield sign * float(coefficient.xreplace(values))
 

@@ -3,8 +3,8 @@
 Where two inertias become joined or let go, the states are other ones. What goes over is the speed of every inertia, the
 torque of every spring, every angle. New equations take it up with the least change that they admit, x such that
 
-    (C + F_CK K F_CK') x_C = C v_C + F_CK K (v_K - F_EK' e),
-    (1/L + F_SL' F_SL / S) x_L = i_L / L - F_SL' (i_S + F_SW w) / S,
+    (C + Q_CK K F_CK') x_C = C v_C + Q_CK K (v_K - F_EK' e),
+    (1/L + F_SL' Q_SL / S) x_L = i_L / L - F_SL' (i_S + Q_SW w) / S,
 
 which is an inelastic impact: it keeps every momentum that nothing outside takes away.
 """
@@ -13,12 +13,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
+from shaftwork.codegen.matrices import LinearPart
 from shaftwork.codegen.recovery import History
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm, store_name
@@ -40,8 +40,8 @@ class Stores:
         self.names = (*made, *angles)
         """Every store and angle, named as a state whether it is one or not."""
         self._states = [state.name for state in form.states]
-        self._map: tuple[Any, Array] | None = None
-        self._dense: tuple[Any, Array] | None = None
+        self._map: tuple[LinearPart, Array] | None = None
+        self._dense: tuple[LinearPart, Array, Array] | None = None
 
     @cached_property
     def _columns(self) -> list[int]:
@@ -52,7 +52,7 @@ class Stores:
         """Whether all stores follow from the states by loops and cutsets alone, whatever the laws are."""
         form, loops = self._form, self._form.tree.loops
         sources = {*form.across_inputs, *form.tree_conductances}  # only asked for membership
-        driven = {tree for law in form.laws for tree in loops[law]}
+        driven = {tree for law in form.laws for tree in form.tree.cutsets[law]}
         across = all(sources.isdisjoint(loops[k]) for k in form.dependent_across)
         return across and driven.isdisjoint(form.dependent_through)
 
@@ -63,23 +63,24 @@ class Stores:
         """
         if -1 not in self._columns:
             return x[:, self._columns]
-        return x @ self._loop_map(bind().part.loops) if self.by_loops else self._recovered(bind(), t, x)
+        return x @ self._loop_map(bind().part) if self.by_loops else self._recovered(bind(), t, x)
 
-    def _loop_map(self, loops: Any) -> Array:
+    def _loop_map(self, part: LinearPart) -> Array:
         """(n, stores) what the states are multiplied by; the last one is kept."""
-        if self._map is None or self._map[0] is not loops:
-            dense, made = loops.toarray(), np.zeros((len(self._states), len(self.names)))
+        if self._map is None or self._map[0] is not part:
+            loops, cutsets = self._matrices(part)
+            made = np.zeros((len(self._states), len(self.names)))
             for column, name in enumerate(self.names):
                 if name in self._states:
                     made[self._states.index(name), column] = 1.0
                     continue
                 branch, across = self._branches[name], len(self._form.across_states)
                 if branch in self._form.tree.loops:
-                    made[:across, column] = dense[list(self._form.across_states), branch]
+                    made[:across, column] = loops[list(self._form.across_states), branch]
                 else:
                     through = list(self._form.through_states)
-                    made[across : across + len(through), column] = -dense[branch, through]
-            self._map = loops, made
+                    made[across : across + len(through), column] = -cutsets[branch, through]
+            self._map = part, made
         return self._map[1]
 
     def _recovered(self, bound: BoundArrays, t: Array, x: Array) -> Array:
@@ -108,27 +109,28 @@ class Stores:
         before = np.zeros(len(form.graph.branches))
         for name, branch in self._branches.items():
             before[branch] = held[name]
-        loops = self._loops(bound.part.loops)
+        loops, cutsets = self._matrices(bound.part)
         inputs, laws = bound.program.inputs, len(form.laws)
         # sources of time alone act on what is stored, and no other law need have a value here
         u = np.where(inputs.of_time, inputs.values(t, np.zeros(inputs.outputs), x, bound.p), 0.0)
         across, through = list(form.across_states), list(form.through_states)
         if other := list(form.dependent_across):
-            F = loops[np.ix_(across, other)]
+            F, Q = (matrix[np.ix_(across, other)] for matrix in (loops, cutsets))
             prescribed = loops[np.ix_(list(form.across_inputs), other)].T @ u[laws:]
-            momentum = k[across] * before[across] + F @ (k[other] * (before[other] - prescribed))
-            x[: len(across)] = np.linalg.solve(np.diag(k[across]) + F * k[other] @ F.T, momentum)
+            momentum = k[across] * before[across] + Q @ (k[other] * (before[other] - prescribed))
+            x[: len(across)] = np.linalg.solve(np.diag(k[across]) + Q * k[other] @ F.T, momentum)
         if other := list(form.dependent_through):
-            F = loops[np.ix_(other, through)]
-            driven = loops[np.ix_(other, list(form.laws))] @ u[:laws]
+            F, Q = (matrix[np.ix_(other, through)] for matrix in (loops, cutsets))
+            driven = cutsets[np.ix_(other, list(form.laws))] @ u[:laws]
             twist = before[through] / k[through] - F.T @ ((before[other] + driven) / k[other])
             x[len(across) : len(across) + len(through)] = np.linalg.solve(
-                np.diag(1 / k[through]) + F.T / k[other] @ F, twist
+                np.diag(1 / k[through]) + F.T / k[other] @ Q, twist
             )
         return x
 
-    def _loops(self, loops: Any) -> Array:
-        """The loop matrix in full; the last one is kept."""
-        if self._dense is None or self._dense[0] is not loops:
-            self._dense = loops, loops.toarray()
-        return self._dense[1]
+    def _matrices(self, part: LinearPart) -> tuple[Array, Array]:
+        """The matrices of loops and cutsets in full; the last ones are kept."""
+        if self._dense is None or self._dense[0] is not part:
+            loops = part.loops.toarray()
+            self._dense = part, loops, loops if part.cutsets is part.loops else part.cutsets.toarray()
+        return self._dense[1:]

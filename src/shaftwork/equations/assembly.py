@@ -117,7 +117,7 @@ class Assembly:
     def incidence(self, branch: int, node: int) -> Iterator[Expr]:
         """Factors with which a branch takes its through variable from a node."""
         made = self.form.graph.branches[branch]
-        for coefficient, plus, minus in made.terms or ((Integer(1), made.plus, made.minus),):
+        for coefficient, plus, minus in made.balances or ((Integer(1), made.plus, made.minus),):
             for end, sign in ((plus, 1), (minus, -1)):
                 if end == node:
                     yield sign * self.form.graph.in_network_symbols(coefficient, made)
@@ -141,6 +141,10 @@ class Assembly:
     def factors(self, link: int) -> tuple[tuple[int, Expr], ...]:
         """The tree branches of a link's loop with their factors, without couplings, which have nothing across."""
         return self.referred(self.form.tree.loops[link])
+
+    def balanced(self, link: int) -> tuple[tuple[int, Expr], ...]:
+        """The tree branches that balance a link's through variable with their factors, without couplings."""
+        return self.referred(self.form.tree.cutsets[link])
 
     def referred(self, row: Mapping[int, Number]) -> tuple[tuple[int, Expr], ...]:
         """A sum of tree branches as pairs of branch and factor, without couplings."""
@@ -206,8 +210,8 @@ class Assembly:
     def cutsets(self) -> dict[int, tuple[tuple[int, Expr], ...]]:
         """For each tree branch the links of its cutset with their factors, in the order of the branch table."""
         found: dict[int, list[tuple[int, Expr]]] = {}
-        for link in sorted(self.form.tree.loops):
-            for tree, gain in self.form.tree.loops[link].items():
+        for link in sorted(self.form.tree.cutsets):
+            for tree, gain in self.form.tree.cutsets[link].items():
                 found.setdefault(tree, []).append((link, simplified(gain)))
         return {tree: tuple(members) for tree, members in found.items()}
 

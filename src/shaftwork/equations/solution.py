@@ -105,8 +105,9 @@ class SolvedForm:
             (link, link): 1 / assembly.quantities.law(link) for link in form.through_states
         }
         for tree in form.dependent_through:
+            around = [(k, gain) for k in form.through_states for t, gain in assembly.factors(k) if t == tree]
             members = [(link, gain) for link, gain in assembly.cutsets.get(tree, ()) if (link, link) in matrix]
-            _add_products(matrix, members, 1 / assembly.quantities.law(tree))
+            _add_products(matrix, around, members, 1 / assembly.quantities.law(tree))
 
         def right(link: int) -> Terms:
             return (*assembly.around(link, without=Kind.THROUGH_STORE), *self._forced_twist(link))
@@ -140,8 +141,11 @@ class SolvedForm:
         quantities = self.assembly.quantities
         matrix: dict[tuple[int, int], Expr] = {(tree, tree): quantities.law(tree) for tree in unknowns}
         for link in links:
-            loop = self.assembly.factors(link)
-            _add_products(matrix, [(tree, gain) for tree, gain in loop if (tree, tree) in matrix], quantities.law(link))
+            balance, loop = self.assembly.balanced(link), self.assembly.factors(link)
+            rows, columns = (
+                [(tree, gain) for tree, gain in made if (tree, tree) in matrix] for made in (balance, loop)
+            )
+            _add_products(matrix, rows, columns, quantities.law(link))
         return matrix
 
     def _prescribed_inertia(self, tree: int) -> Terms:
@@ -170,7 +174,12 @@ class SolvedForm:
         return tuple(term for term in terms if term != 0)
 
 
-def _add_products(matrix: dict[tuple[int, int], Expr], members: Sequence[tuple[int, Expr]], coefficient: Expr) -> None:
-    for first, gain in members:
-        for second, other in members:
+def _add_products(
+    matrix: dict[tuple[int, int], Expr],
+    rows: Sequence[tuple[int, Expr]],
+    columns: Sequence[tuple[int, Expr]],
+    coefficient: Expr,
+) -> None:
+    for first, gain in rows:
+        for second, other in columns:
             matrix[first, second] = matrix.get((first, second), Integer(0)) + gain * coefficient * other

@@ -344,7 +344,7 @@ class Model(CompiledModel):
         decisive = frozenset((*self.form.graph.zeros, *self.form.tree.frozen))
         if any(name in decisive or value == 0 for name, value in values.items()) or meshes_anew(self.netlist, values):
             return True
-        return self.arrays.assembly.loops.degenerates(self.vector(values))
+        return self.arrays.assembly.degenerates(self.vector(values))
 
     def _checked_all(self, parameters: Mapping[str, float] | None) -> dict[str, float]:
         if parameters is None:

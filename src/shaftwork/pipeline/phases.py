@@ -122,6 +122,8 @@ class Phases:
             return self._engines[assembly, asked]
         if assembly not in self._engines:
             name, why = choice.choose(problem)
+            if name not in FOLLOWING:  # that of long chains
+                name = "sundials" if choice.available("sundials") else "scipy-radau"
             self._engines[assembly] = name, why
         return self._engines[assembly]
 

@@ -86,6 +86,10 @@ def clear_of_limits(now: Sequence[float], bands: Sequence[float]) -> list[float]
     return [8 * band if band < 4 * abs(g) < 16 * band else band or NOTHING for g, band in pairs]
 
 
+Course = tuple[float, list[float], list[float], list[float]]
+"""Time, states, their rates, and guards."""
+
+
 class Settling:
     """Changes modes at an instant.
 
@@ -192,7 +196,7 @@ class Settling:
         rates, now = regime.motion(t, x)
         ulp = ROUNDINGS * math.ulp(t)
         moved = [v * (ABOVE if k % 2 else BELOW) + ulp * rate for k, (v, rate) in enumerate(zip(x, rates, strict=True))]
-        near = regime.motion(t + ulp, moved)[1]
+        others, near = regime.motion(t + ulp, moved)
         bands = [abs(n - g) for n, g in zip(near, now, strict=True)]
         wide = bands
         if ended.bands and ended.regime.assembly is regime.assembly:
@@ -209,7 +213,7 @@ class Settling:
             elif value > largest:
                 worst, largest = pair, value
         if on_limit and worst is None:
-            worst = self._next(regime, t, x, rates, now, on_limit)
+            worst = self._next(regime, (t, x, rates, now), (t + ulp, moved, others, near), on_limit)
         return Moment(regime, moment.x, clear_of_limits(now, bands)), worst
 
     def ahead(self, regime: Regime, rates: list[float]) -> float:
@@ -221,28 +225,27 @@ class Settling:
         return step
 
     def _next(
-        self,
-        regime: Regime,
-        t: float,
-        x: list[float],
-        rates: list[float],
-        now: list[float],
-        on_limit: list[tuple[int, Watched]],
+        self, regime: Regime, here: Course, beside: Course, on_limit: list[tuple[int, Watched]]
     ) -> tuple[int, Watched] | None:
-        """Of guards on their limit the one that is about to go farthest beyond it, as far as rounding tells."""
-        step = self.ahead(regime, rates)
-        ahead = regime.motion(t + step, [v + step * rate for v, rate in zip(x, rates, strict=True)])[1]
-        gains = [(made.side * (ahead[made.guard] - now[made.guard]), (number, made)) for number, made in on_limit]
-        gains = [pair for pair in gains if pair[0] > 0]
-        if not gains:
-            return None
-        moved = [v * (ABOVE if k % 2 else BELOW) for k, v in enumerate(x)]
-        others, near = regime.motion(t, moved)
-        beside = regime.motion(t + step, [v + step * rate for v, rate in zip(moved, others, strict=True)])[1]
-        sure = [
-            (gain, pair) for gain, pair in gains if gain > abs(beside[k := pair[1].guard] - near[k] - ahead[k] + now[k])
+        """Of guards on their limit the one that is about to go farthest beyond it, as far as rounding tells.
+
+        Args:
+            regime: the modes.
+            here: time, states, rates and guards of the moment.
+            beside: the same, rounding away from it.
+            on_limit: elements and guards.
+        """
+        step = self.ahead(regime, here[2])
+        moves = [
+            [later - now for later, now in zip(_later(regime, step, course), course[3], strict=True)]
+            for course in (here, beside)
         ]
-        return max(sure, key=lambda pair: pair[0])[1] if sure else None
+        found, largest = None, 0.0
+        for number, made in on_limit:
+            gain, other = (made.side * made_moves[made.guard] for made_moves in moves)
+            if gain > max(largest, abs(gain - other)):
+                found, largest = (number, made), gain
+        return found
 
     def _follow(
         self, t: float, after: float, moment: Moment, number: int, ended: Watched
@@ -338,3 +341,9 @@ class Settling:
 def _with(modes: ModeNames, changed: Mapping[int, str]) -> ModeNames:
     """A combination of modes with some of them changed."""
     return tuple(changed.get(k, name) for k, name in enumerate(modes))
+
+
+def _later(regime: Regime, step: float, course: Course) -> list[float]:
+    """The guards a step further along a straight line."""
+    t, x, rates, _ = course
+    return regime.motion(t + step, [v + step * rate for v, rate in zip(x, rates, strict=True)])[1]

@@ -4,12 +4,13 @@ With C, L the stores that are states (tree capacities, link compliances), G and 
 through variables of the nonlinear laws and sources, e the prescribed across variables, F the loops:
 
     v_R = F_CR' x_C + F_ER' e + F_GR' v_G                                         loops of the link conductances
-    (G + F_GR R F_GR') v_G = -F_GR R (F_CR' x_C + F_ER' e) - F_GL x_L - F_GW w    cutsets of the tree conductances
-    M x_C' = -F_CR R v_R - F_CL x_L - F_CW w - F_CK K F_EK' e'                    M = C + F_CK K F_CK'
-    N x_L' = F_CL' x_C + F_EL' e + F_GL' v_G - F_SL' S F_SW w'                    N = L + F_SL' S F_SL
+    (G + Q_GR R F_GR') v_G = -Q_GR R (F_CR' x_C + F_ER' e) - Q_GL x_L - Q_GW w    cutsets of the tree conductances
+    M x_C' = -Q_CR R v_R - Q_CL x_L - Q_CW w - Q_CK K F_EK' e'                    M = C + Q_CK K F_CK'
+    N x_L' = F_CL' x_C + F_EL' e + F_GL' v_G - F_SL' S Q_SW w'                    N = L + F_SL' S Q_SL
 
-K are the dependent capacities (rigidly geared inertias), S the dependent compliances (springs in series). It is exact:
-nothing is lost by the elimination, and every eliminated quantity comes back from F.
+K are the dependent capacities (rigidly geared inertias), S the dependent compliances (springs in series), and Q are the
+cutsets: F itself but where a coupling loses power. It is exact: nothing is lost by the elimination, and every
+eliminated quantity comes back from F and Q.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 Reactions are among them, the torque through a stuck brake for instance. That of a tree branch is the sum over its
 cutset, in which an inertia that follows others takes its torque from their rates:
 
-    i_tree = -F i_link,   i_K = K F' dx_C/dt
+    i_tree = -Q i_link,   i_K = K F' dx_C/dt
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ class Readings:
         """What the node at a port gives to the part."""
         total: list[Expr] = []
         for branch in self._of(part):
-            for coefficient, plus, minus in branch.template.terms or ((Integer(1), *branch.template.ends),):
+            for coefficient, plus, minus in branch.template.balances or ((Integer(1), *branch.template.ends),):
                 sign = (plus == port) - (minus == port)
                 if sign:
                     factor = self.graph.in_network_symbols(coefficient, branch)
@@ -131,7 +131,7 @@ class Readings:
 
     @cached_property
     def _cutsets(self) -> dict[int, list[tuple[int, Expr]]]:
-        entries = [(tree, link, gain) for link, row in self.form.tree.loops.items() for tree, gain in row.items()]
+        entries = [(tree, link, gain) for link, row in self.form.tree.cutsets.items() for tree, gain in row.items()]
         found: dict[int, list[tuple[int, Expr]]] = {}
         for (tree, link, _), gain in zip(entries, exact_of(gain for _, _, gain in entries), strict=True):
             found.setdefault(tree, []).append((link, gain))

@@ -20,6 +20,7 @@ from shaftwork.network.graph import GROUND
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.gains import exact_of
+from shaftwork.reduction.tree import Row
 
 LARGEST_BLOCK = 3
 """Coupled unknowns that are solved symbolically; the formulas for more are longer than anyone reads."""
@@ -65,9 +66,10 @@ class _Solution:
         self.states = tuple(Symbol(state.name, real=True) for state in form.states)
         carried = zip(form.states, self.states, strict=True)
         own = {(state.kind, state.branch): symbol for state, symbol in carried}
-        self.loops = _exact_loops(form)
+        self.loops = _exact(form, form.tree.loops)
+        self.balances = self.loops if form.tree.cutsets is form.tree.loops else _exact(form, form.tree.cutsets)
         self.cutsets: dict[int, list[tuple[int, Expr]]] = {}
-        for link, row in self.loops.items():
+        for link, row in self.balances.items():
             for tree, gain in row:
                 self.cutsets.setdefault(tree, []).append((link, gain))
         self.across: dict[int, Expr] = {k: own["across", k] for k in form.across_states}
@@ -141,7 +143,7 @@ class _Solution:
         for link in form.link_conductances:
             g, drive = self.law(link), self.around(link)
             self._add_products(matrix, link, g, frozenset(unknowns))
-            for tree, gain in self.loops[link]:
+            for tree, gain in self.balances[link]:
                 if tree in right:
                     right[tree] -= gain * g * drive
         self.across.update(zip(unknowns, solve_blocks(matrix, unknowns, right), strict=True))
@@ -159,7 +161,7 @@ class _Solution:
                 gain * slope(self.law(tree), TIME) for tree, gain in self.loops[link] if tree in form.across_sources
             )
             prescribed = capacity * Add(*driven)
-            for tree, gain in self.loops[link]:
+            for tree, gain in self.balances[link]:
                 if tree in right:
                     right[tree] -= gain * prescribed
         return solve_blocks(matrix, unknowns, right)
@@ -174,7 +176,7 @@ class _Solution:
             members = self.cutsets.get(tree, [])
             states = [(link, gain) for link, gain in members if link in right]
             source = Add(*(gain * slope(self.through[link], TIME) for link, gain in members if link not in right))
-            for first, gain in states:
+            for first, gain in ((link, gain) for link in unknowns for other, gain in self.loops[link] if other == tree):
                 right[first] -= gain * compliance * source
                 for second, other in states:
                     matrix[first, second] = matrix.get((first, second), Integer(0)) + gain * compliance * other
@@ -183,9 +185,9 @@ class _Solution:
     def _add_products(
         self, matrix: dict[tuple[int, int], Expr], link: int, coefficient: Expr, unknowns: frozenset[int]
     ) -> None:
-        """Add coefficient * f f' for the column f of a link."""
+        """Add coefficient * q f' for the columns q and f of a link in the cutsets and loops."""
         members = [(tree, gain) for tree, gain in self.loops[link] if tree in unknowns]
-        for first, gain in members:
+        for first, gain in ((tree, gain) for tree, gain in self.balances[link] if tree in unknowns):
             for second, other in members:
                 matrix[first, second] = matrix.get((first, second), Integer(0)) + gain * coefficient * other
 
@@ -211,19 +213,19 @@ def _cramer(matrix: Mapping[tuple[int, int], Expr], block: Sequence[int], right:
         yield Add(*(adjugate[i, j] * right[other] for j, other in enumerate(block))) / determinant
 
 
-def _exact_loops(form: StateForm) -> dict[int, tuple[tuple[int, Expr], ...]]:
-    """The loops as expressions, without couplings: their across value is zero."""
+def _exact(form: StateForm, rows: Mapping[int, Row]) -> dict[int, tuple[tuple[int, Expr], ...]]:
+    """Loops or cutsets of the links as expressions, without couplings: their across value is zero."""
     couplings = frozenset(form.tree.tree[Kind.COUPLING])
     entries = [
         (link, tree, gain)
-        for link, row in form.tree.loops.items()
+        for link, row in rows.items()
         for tree, gain in row.items()
         if tree not in couplings and link not in form.tree.redundant
     ]
-    loops: dict[int, list[tuple[int, Expr]]] = {link: [] for link in form.tree.loops}
+    made: dict[int, list[tuple[int, Expr]]] = {link: [] for link in rows}
     for (link, tree, _), exact in zip(entries, exact_of(gain for _, _, gain in entries), strict=True):
-        loops[link].append((tree, exact))
-    return {link: tuple(row) for link, row in loops.items()}
+        made[link].append((tree, exact))
+    return {link: tuple(row) for link, row in made.items()}
 
 
 def solve_blocks(

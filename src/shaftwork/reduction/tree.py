@@ -9,12 +9,15 @@ With v the across and i the through variables, F the matrix of the loops (tree b
 
     v_link = F^T v_tree  (speed around every loop),   i_tree = -F i_link  (torque through every cutset).
 
+A coupling that loses power has other ratios of torques than of speeds. Its cutsets are those of the same tree in the
+network that has the ratios of torques in place of the others; Q stands for their matrix: i_tree = -Q i_link.
+
 Sources: Popenda 2019, (1)-(4) for the equations; the normal tree is that of linear circuit theory (Bryant 1959).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from sympy import Expr
@@ -35,20 +38,28 @@ class NormalTree:
         links: link branches by kind, likewise.
         loops: for each link the across variables that it is the sum of: tree branch to factor. Couplings stand in it
             with their factor too (their across value is zero): it is what their torque is made of.
+        cutsets: for each link the tree branches whose through variables balance its own, with their factors; the loops
+            themselves where no coupling loses power.
         potentials: for each node the sum of tree across variables that its own is; None where nothing fixes it.
+        shares: for each node the tree branches that balance what is put in there, with their factors; the potentials
+            themselves where no coupling loses power.
         locked: nodes that a closed loop of couplings of unequal ratio holds at rest, with the coupling that closed it.
         redundant: couplings that say what others have said already.
         frozen: names of the ratios whose given values make a sum vanish that is not zero for all values: they decide
             the structure.
+        unbalanced: tree branches whose torque no node takes, since a coupling lets none through from there.
     """
 
     tree: Mapping[Kind, tuple[int, ...]]
     links: Mapping[Kind, tuple[int, ...]]
     loops: Mapping[int, Row]
+    cutsets: Mapping[int, Row]
     potentials: tuple[Row | None, ...]
+    shares: tuple[Row | None, ...]
     locked: tuple[tuple[int, tuple[int, ...]], ...]
     redundant: tuple[int, ...]
     frozen: tuple[str, ...]
+    unbalanced: tuple[int, ...] = ()
 
 
 class _Elimination:
@@ -75,6 +86,11 @@ class _Elimination:
                 del target[key]
             else:
                 target[key] = total
+
+    @property
+    def potentials(self) -> tuple[Row | None, ...]:
+        """Each node in terms of tree branches; None where it is still free."""
+        return tuple(None if row is None or max(row, default=-1) >= 0 else _by_branch(row) for row in self.solved)
 
     def solve_for_a_node(self, reduced: Row, branch: int | None) -> int:
         """Fix one free node by `sum of reduced = across of the branch` (zero without one) and return it."""
@@ -106,8 +122,12 @@ class _Elimination:
 
 def column_of(graph: CircuitGraph, branch: GraphBranch) -> Row:
     """The column of the incidence matrix: node to factor (+1 where the branch leaves, -1 where it enters, ratios)."""
+    return _summed(graph, branch, branch.terms)
+
+
+def _summed(graph: CircuitGraph, branch: GraphBranch, terms: Sequence[tuple[Expr, int, int]]) -> Row:
     column: Row = {}
-    for expression, plus, minus in branch.terms or ((None, branch.plus, branch.minus),):
+    for expression, plus, minus in terms or ((None, branch.plus, branch.minus),):
         factor = 1 if expression is None else _gain(graph, branch, expression)
         for node, sign in ((plus, 1), (minus, -1)):
             if node == GROUND:
@@ -145,6 +165,19 @@ def _closes_a_loop(work: _Elimination, column: Row, reduced: Row) -> tuple[int, 
     return moving if len(moving) > 1 and sum(key >= 0 for key in reduced) == 1 else ()
 
 
+def _balanced(graph: CircuitGraph, tree: Sequence[int]) -> tuple[_Elimination, list[int]]:
+    """The elimination of the same tree with the ratios of torques, and the branches for which it leaves no node."""
+    work, unbalanced = _Elimination(len(graph.nodes)), []
+    for index in tree:
+        branch = graph.branches[index]
+        reduced = work.reduce(_summed(graph, branch, branch.balances))
+        if any(key >= 0 for key in reduced):
+            work.solve_for_a_node(reduced, index)
+        else:
+            unbalanced.append(index)
+    return work, unbalanced
+
+
 def normal_tree(graph: CircuitGraph) -> NormalTree:
     """Choose the normal tree and express every link by it."""
     work = _Elimination(len(graph.nodes))
@@ -162,13 +195,24 @@ def normal_tree(graph: CircuitGraph) -> NormalTree:
             locked.append((branch.index, closed))
         tree[kind].append(branch.index)
         work.solve_for_a_node(reduced, branch.index)
-    loops = {index: _by_branch(work.reduce(columns[index])) for kind in Kind for index in links[kind]}
+    others = [index for kind in Kind for index in links[kind]]
+    loops, potentials = {index: _by_branch(work.reduce(columns[index])) for index in others}, work.potentials
+    cutsets, shares, unbalanced = loops, potentials, list[int]()
+    if any(branch.template.through for branch in graph.branches):
+        torques, unbalanced = _balanced(graph, [index for kind in Kind for index in tree[kind]])
+        if not unbalanced:
+            columns = {index: _summed(graph, graph.branches[index], graph.branches[index].balances) for index in others}
+            cutsets, shares = {k: _by_branch(torques.reduce(columns[k])) for k in others}, torques.potentials
+        work.coincidences += torques.coincidences
     return NormalTree(
         {kind: tuple(tree[kind]) for kind in Kind},
         {kind: tuple(links[kind]) for kind in Kind},
         loops,
-        tuple(None if row is None or max(row, default=-1) >= 0 else _by_branch(row) for row in work.solved),
+        cutsets,
+        potentials,
+        shares,
         tuple(locked),
         tuple(links[Kind.COUPLING]),
         _names_in(work.coincidences),
+        tuple(unbalanced),
     )

@@ -51,8 +51,8 @@ class View:
             for branch in wanted.intersection(row or ()):
                 self.moved[branch].append(node)
         self.cutsets: dict[int, list[int]] = {branch: [] for branch in wanted}
-        for link, loop in form.tree.loops.items() if wanted else ():
-            for branch in wanted.intersection(loop):
+        for link, balance in form.tree.cutsets.items() if wanted else ():
+            for branch in wanted.intersection(balance):
                 self.cutsets[branch].append(link)
 
     def kind(self, branch: int) -> Kind:
