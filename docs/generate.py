@@ -39,6 +39,7 @@ OUTPUT = ("text", "toml", "latex")
 """Languages of the blocks that hold what the block before them printed."""
 FAMILIES = (
     "rotation",
+    "lossy_gear",
     "contacts",
     "friction",
     "shafts",

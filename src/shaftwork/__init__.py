@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         AcrossLaw,
         AcrossStore,
         IdealCoupling,
+        LossyCoupling,
         ThroughLaw,
         ThroughStore,
     )
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from shaftwork.components.induction_machine import *
     from shaftwork.components.laws import Ramp, Step, Table, omega, phi, psi, s, t, u, v
     from shaftwork.components.loads import *
+    from shaftwork.components.lossy_gear import *
     from shaftwork.components.machines import *
     from shaftwork.components.motor_catalogue import motors
     from shaftwork.components.motors import *
@@ -67,6 +69,7 @@ _HOME = {
         "AcrossLaw",
         "AcrossStore",
         "IdealCoupling",
+        "LossyCoupling",
         "ThroughLaw",
         "ThroughStore",
     ),

@@ -23,7 +23,12 @@ from shaftwork.network.templates import Kind, make_template
 OWN = [name for name, kind in REGISTRY.items() if kind.__module__.startswith("shaftwork.")]
 
 
-TOGETHER = {"CageMotor": {"tau_a": 3.0, "tau_s": 2.0, "tau_k": 4.0, "n_k": 1.0}, "PullOutDrive": {"s_k": 0.2}}
+TOGETHER = {
+    "CageMotor": {"tau_a": 3.0, "tau_s": 2.0, "tau_k": 4.0, "n_k": 1.0},
+    "HardStop": {"upper": 1.5},
+    "LossyGear": {"efficiency": 0.9},
+    "PullOutDrive": {"s_k": 0.2},
+}
 """Values where those of a part must suit each other."""
 
 

@@ -7,7 +7,7 @@ import sympy
 from sympy import Abs, Derivative, DiracDelta, Heaviside, Max, Piecewise, sign, sqrt
 
 from shaftwork.components.laws import Table, omega, phi, t
-from shaftwork.components.slopes import jumps, slope
+from shaftwork.components.slopes import jumps, slope, wraps
 
 
 @pytest.mark.parametrize(
@@ -43,3 +43,16 @@ def test_what_jumps_is_told_from_what_does_not() -> None:
     assert jumps(Heaviside(phi), omega, phi)
     assert not jumps(Heaviside(t) * omega, omega, phi)
     assert not jumps(omega**2, omega)
+
+
+def test_the_inverse_function_of_what_is_clipped_on_both_sides_begins_no_new_turn() -> None:
+    """A trapezoid over an angle is made so: its corners are those of the clipping, which laws are looked at for."""
+    x = sympy.Symbol("x", real=True)
+    half = sympy.Rational(1, 2)
+    clipped = sympy.asin(sympy.Max(-half, sympy.Min(half, sympy.sin(x))))
+    assert not wraps(clipped)
+    assert wraps(sympy.asin(sympy.sin(x)))
+    assert wraps(sympy.asin(sympy.Max(-half, sympy.sin(x))))
+    found = sympy.lambdify(x, slope(clipped, x), "math")
+    assert found(0.3) == 1.0
+    assert found(1.5) == 0.0

@@ -69,3 +69,8 @@ def test_the_printed_shear_modulus_is_offered() -> None:
 def test_a_chain_needs_two_elements() -> None:
     with pytest.raises(sw.ParameterError, match="2 or more"):
         sw.scenes.shaft_chain(1)
+
+
+def test_the_crane_motor_pulls_out_above_its_rated_torque() -> None:
+    with pytest.raises(sw.ParameterError, match="must be more than the rated"):
+        sw.scenes.crane_start(3.8)

@@ -7,10 +7,9 @@ from typing import Any, ClassVar
 
 from sympy import Expr, Integer, Max, Min, Piecewise, true
 
-from shaftwork.components.base import Component, Port, Role, Signal, component
+from shaftwork.components.base import Component, Port, Role, component
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, Branch, ThroughLaw, rigid
 from shaftwork.components.modes import NEVER, Leave, Mode, Modes
-from shaftwork.core.domains import ROTATION
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter
 
@@ -113,11 +112,6 @@ def _law(upper: Any, lower: Any, p: Any) -> Expr:
     return p.mode**2 * (p.c * (INTEGRAL - limit) + p.d * ACROSS)
 
 
-def _signals(second: str | None) -> dict[str, Signal]:
-    pair = ("a", second)
-    return {"tau": Signal("through", pair, ROTATION), "omega_rel": Signal("across", pair, ROTATION)}
-
-
 @component
 class Backlash(Component):
     """A gap between two nodes, with the stiffness and damping of the flanks that close it: teeth, claws, splines.
@@ -145,10 +139,6 @@ class Backlash(Component):
 
     def branches(self, p: Any) -> Iterator[Branch]:
         yield from _branches(p.gap / 2, -p.gap / 2, p)
-
-    def signals(self) -> dict[str, Signal]:
-        """Torque that node a gives to node b, speed of a against b."""
-        return _signals("b")
 
 
 @component
@@ -182,7 +172,3 @@ class HardStop(Component):
 
     def branches(self, p: Any) -> Iterator[Branch]:
         yield from _branches(p.upper, p.lower, p)
-
-    def signals(self) -> dict[str, Signal]:
-        """Torque that node a gives to node b, speed of a against b."""
-        return _signals("b")

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from sympy import And, Min, Not, false
 
-from shaftwork.components.base import Component, Port, Role, Signal, component
+from shaftwork.components.base import Component, Port, Role, component
 from shaftwork.components.branches import ACROSS, AcrossLaw, AcrossStore, Branch, ThroughLaw, ThroughStore, rigid
 from shaftwork.components.friction import STUCK, conducting
 from shaftwork.components.laws import t
@@ -96,7 +96,7 @@ class Switch(Component):
         "1", "closes when this law, in the voltage u across it and t, is above zero", law=True, default=None
     )
 
-    role: ClassVar[Role] = "coupling"
+    role: ClassVar[Role] = "loss"
     ports: ClassVar = TERMINALS
 
     def modes(self, p: Any) -> Iterator[Modes]:
@@ -116,10 +116,6 @@ class Switch(Component):
         if p.form == STUCK:
             yield rigid(("p", "n"))
 
-    def signals(self) -> dict[str, Signal]:
-        """Current from p to n, voltage from p to n."""
-        return _current_and_voltage()
-
 
 @component
 class Diode(Component):
@@ -129,7 +125,7 @@ class Diode(Component):
     Mechanical analogue: a freewheel.
     """
 
-    role: ClassVar[Role] = "coupling"
+    role: ClassVar[Role] = "loss"
     ports: ClassVar = TERMINALS
 
     def modes(self, p: Any) -> Iterator[Modes]:  # noqa: ARG002
@@ -138,12 +134,3 @@ class Diode(Component):
     def branches(self, p: Any) -> Iterator[Branch]:
         if p.form == STUCK:
             yield rigid(("p", "n"))
-
-    def signals(self) -> dict[str, Signal]:
-        """Current from p to n, voltage from p to n."""
-        return _current_and_voltage()
-
-
-def _current_and_voltage() -> dict[str, Signal]:
-    pair = ("p", "n")
-    return {"i": Signal("through", pair, ELECTRICAL), "u": Signal("across", pair, ELECTRICAL)}

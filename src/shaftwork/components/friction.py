@@ -8,11 +8,10 @@ from typing import Any, ClassVar
 
 from sympy import And, Expr, Min, Ne, Not, exp, false, tanh
 
-from shaftwork.components.base import Component, Port, Role, Signal, component
+from shaftwork.components.base import Component, Port, Role, component
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, Branch, End, ThroughLaw, rigid
 from shaftwork.components.laws import t
 from shaftwork.components.modes import ANEW, Leave, Mode, Modes
-from shaftwork.core.domains import ROTATION
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter
 
@@ -78,8 +77,8 @@ class DryFriction(Component):
         yield rubbing(p.tau_c if p.tau_s is None else p.tau_s)
 
     def branches(self, p: Any) -> Iterator[Branch]:
-        more = 0 if p.tau_s is None else (p.tau_s - p.tau_c) * exp(-((ACROSS / p.omega_s) ** 2))
-        yield from rubs(p.tau_c + more, p)
+        falls = p.tau_s is not None and p.omega_s != 0
+        yield from rubs(p.tau_c + ((p.tau_s - p.tau_c) * exp(-((ACROSS / p.omega_s) ** 2)) if falls else 0), p)
         if p.form != STUCK:
             yield ThroughLaw(p.d * ACROSS)
 
@@ -161,7 +160,7 @@ class Freewheel(Component):
     Analogue: an ideal diode.
     """
 
-    role: ClassVar[Role] = "coupling"
+    role: ClassVar[Role] = "loss"
     ports: ClassVar = (Port("a"), Port("b", optional=True))
 
     def modes(self, p: Any) -> Iterator[Modes]:  # noqa: ARG002
@@ -170,11 +169,6 @@ class Freewheel(Component):
     def branches(self, p: Any) -> Iterator[Branch]:
         if p.form == STUCK:
             yield rigid(("a", "b"))
-
-    def signals(self) -> dict[str, Signal]:
-        """Torque that node a gives to node b, speed of a against b."""
-        pair = ("a", "b")
-        return {"tau": Signal("through", pair, ROTATION), "omega_rel": Signal("across", pair, ROTATION)}
 
 
 def conducting(apart: str, joined: str) -> Modes:

@@ -70,7 +70,8 @@ class Blocks:
         around = {_to_rounding(row.expression) for row in equations.loops}  # only asked for membership
         said = [(_to_rounding(row.expression), _to_rounding(-row.expression)) for row in equations.couplings]
         couplings = [row for row, both in zip(equations.couplings, said, strict=True) if around.isdisjoint(both)]
-        yield Block("Ideal couplings", tuple(self._lines(couplings)))
+        lossy = any(branch.template.through for branch in equations.form.graph.branches)
+        yield Block("Couplings" if lossy else "Ideal couplings", tuple(self._lines(couplings)))
         yield Block("Laws of the parts", tuple(self._laws()))
 
     def derived(self) -> Block:

@@ -185,7 +185,8 @@ class _Writer:
     def _reactions(self) -> Iterator[Eliminated]:
         for branch in self.form.tree.tree[Kind.COUPLING]:
             make = partial(self._carried, self.assembly.quantities.multiplier, branch)
-            why = f"{self.part(branch)} is ideal: it takes whatever the balance asks"
+            ideal = "" if self.graph.branches[branch].template.through else "is ideal: it "
+            why = f"{self.part(branch)} {ideal}takes whatever the balance asks"
             yield Eliminated(*self._cutset(branch), make, f"reaction of {self.part(branch)}", why, "reaction")
         for branch in self.form.across_sources:
             why = f"{self.part(branch)} supplies whatever its prescribed value takes"

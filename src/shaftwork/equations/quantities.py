@@ -35,12 +35,15 @@ def rate_of(symbol: Symbol) -> Symbol:
 
 
 def refuse_controlled(graph: CircuitGraph) -> None:
-    """Refuse laws that read others of their part, where positions are all that there is.
+    """Refuse laws that read others of their part, and couplings that lose power, where positions are all that there is.
 
     Raises:
         CompileError: there is one.
     """
     for branch in graph.branches:
+        if branch.template.through:
+            part = graph.parts[branch.part].name
+            raise CompileError(f"'{part}' loses a part of the torque that it passes on. Take form='state'.")
         if branch.template.reads:
             part = graph.parts[branch.part].name
             raise CompileError(f"A law of '{part}' reads other quantities than its own speed. Take form='state'.")
@@ -233,7 +236,7 @@ class Quantities:
         for branch in self._defining:
             ends = (branch.plus, branch.minus)
             if branch.minus != GROUND and ends not in found and ends[::-1] not in found:
-                found[ends] = Pair(branch.part, self._defined(branch), "")
+                found[ends] = Pair(branch.part, self._defined(branch), branch.template.label)
         for flow in self.flows:
             ends = (flow.plus, flow.minus)
             if GROUND not in ends and ends not in found and ends[::-1] not in found:

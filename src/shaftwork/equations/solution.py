@@ -104,10 +104,13 @@ class SolvedForm:
         matrix: dict[tuple[int, int], Expr] = {
             (link, link): 1 / assembly.quantities.law(link) for link in form.through_states
         }
+        loops: dict[int, list[tuple[int, Expr]]] = {}
+        for link in form.through_states if form.dependent_through else ():
+            for tree, gain in assembly.factors(link):
+                loops.setdefault(tree, []).append((link, gain))
         for tree in form.dependent_through:
-            around = [(k, gain) for k in form.through_states for t, gain in assembly.factors(k) if t == tree]
             members = [(link, gain) for link, gain in assembly.cutsets.get(tree, ()) if (link, link) in matrix]
-            _add_products(matrix, around, members, 1 / assembly.quantities.law(tree))
+            _add_products(matrix, loops.get(tree, []), members, 1 / assembly.quantities.law(tree))
 
         def right(link: int) -> Terms:
             return (*assembly.around(link, without=Kind.THROUGH_STORE), *self._forced_twist(link))
@@ -141,10 +144,8 @@ class SolvedForm:
         quantities = self.assembly.quantities
         matrix: dict[tuple[int, int], Expr] = {(tree, tree): quantities.law(tree) for tree in unknowns}
         for link in links:
-            balance, loop = self.assembly.balanced(link), self.assembly.factors(link)
-            rows, columns = (
-                [(tree, gain) for tree, gain in made if (tree, tree) in matrix] for made in (balance, loop)
-            )
+            columns = [pair for pair in self.assembly.factors(link) if (pair[0], pair[0]) in matrix]
+            rows = [pair for pair in self.assembly.balanced(link) if (pair[0], pair[0]) in matrix]
             _add_products(matrix, rows, columns, quantities.law(link))
         return matrix
 

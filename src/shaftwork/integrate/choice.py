@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from shaftwork.core.errors import AccuracyWarning, MissingExtraError, ParameterError
 from shaftwork.integrate.problem import Engine, Problem, Trajectory
@@ -48,18 +48,14 @@ ENGINES: dict[str, EngineEntry] = {
     "sundials": EngineEntry(
         "shaftwork.integrate.sundials:solve", "stiff systems", "sksundae", "scikit-sundae", "stiff"
     ),
-    "sundials-adams": EngineEntry(
-        "shaftwork.integrate.sundials:solve",
-        "smooth motion that is not stiff",
-        "sksundae",
-        "scikit-sundae",
-        "stiff",
-        (("method", "Adams"),),
-    ),
     "scipy": EngineEntry("shaftwork.integrate.scipy_ivp:solve", "everything that is not stiff"),
     "scipy-radau": EngineEntry("shaftwork.integrate.scipy_ivp:solve", "stiff systems", options=(("method", "Radau"),)),
     "banded": EngineEntry("shaftwork.integrate.banded:solve", "long chains, linear or stiff"),
 }
+
+# Another method of an engine, which a run chooses by itself.
+ADAMS = "sundials-adams"
+_INNER = {ADAMS: replace(ENGINES["sundials"], options=(("method", "Adams"),))}
 
 # The exact engine is taken up to this estimate of its time; an adaptive one may then be the faster. On a damped chain
 # the banded engine is: 0.3 s at 1400 states and rtol 1e-8, where the exact one takes 4 s.
@@ -77,7 +73,7 @@ STABLE, TRANSIENT_STEPS, STEPS_PER_RADIAN = 5.0, 300.0, 20.0
 
 
 # Of these no run is so long that the rounding of speeds spoils torques: the stiffness bounds their steps.
-EXPLICIT = ("heyoka", "scipy", "sundials-adams")
+EXPLICIT = ("heyoka", "scipy", ADAMS)
 
 
 def choose(problem: Problem) -> tuple[str, str]:
@@ -180,8 +176,9 @@ def load(name: str) -> Engine:
         ParameterError: no engine has this name.
         MissingExtraError: the engine's library is not installed.
     """
-    check(name)
-    entry = ENGINES[name]
+    if name not in _INNER:
+        check(name)
+    entry = _INNER.get(name) or ENGINES[name]
     if not entry.installed:
         raise MissingExtraError(entry.distribution, entry.extra, f"engine={name!r}")
     module, function = entry.function.split(":")

@@ -13,8 +13,9 @@ from shaftwork.integrate.problem import Array, DaeProblem, Problem
 
 Dense = Callable[[Array], Array]
 
-# Where in a step the switches are looked at, beside its ends: at no regular places, which a motion might share.
-FIRST, LOOKS = np.array([0.47]), np.array([0.07, 0.19, 0.31, 0.42, 0.53, 0.61, 0.74, 0.83, 0.91])
+# Where in a step the switches are looked at, beside its ends: at no regular places, which a motion might share. The
+# outermost tell where a switch goes from the ends.
+FIRST, LOOKS = np.array([0.47]), np.array([0.004, 0.07, 0.19, 0.31, 0.42, 0.53, 0.61, 0.74, 0.83, 0.91, 0.996])
 # More than the first look is not needed where all switches are so many times as far from zero as they move in a step.
 FAR = 2.0
 # A switch that comes near to zero between the looks is followed to its least value so many times.
@@ -167,29 +168,30 @@ class Look:
         low, high = self.values.min(axis=0), self.values.max(axis=0)
         return bool((np.minimum(np.abs(low), np.abs(high)) > FAR * (high - low)).all())
 
-    def follow(self) -> bool:
-        """Whether a switch leaves its side; where one comes near to zero between the times, they are made denser."""
+    def follow(self, *, every: bool = False) -> bool:
+        """Whether a switch leaves its side; where one comes near to zero between the times, they are made denser.
+
+        Args:
+            every: follow the others too where one has left: they may have left before.
+        """
         for _ in range(FOLLOWED):
-            if self._left().any():
+            if self._left().any() and not every:
                 return True
             if not self._denser():
-                return False
+                break
         return bool(self._left().any())
 
     def _left(self) -> NDArray[np.bool_]:
         return np.asarray((self.values * self._sides < 0) | ((self._sides == 0) & (np.abs(self.values) > 0)))
 
     def _denser(self) -> bool:
-        """Add the vertex of the parabola through the lowest three points of each switch that may reach zero there."""
+        """Add the vertices of parabolas through three points of each switch that may reach zero there."""
         height = self.values * self._sides
-        low = np.argmin(height, axis=0)
-        columns = np.flatnonzero((low > 0) & (low < self.times.size - 1))
-        middle = low[columns]
+        inner = height[1:-1]
+        middle, columns = np.nonzero((inner > 0) & (inner <= height[:-2]) & (inner <= height[2:]))
         (ta, tb, tc), (a, b, c) = (
-            (part[middle - 1], part[middle], part[middle + 1])
-            if part.ndim == 1
-            else (part[middle - 1, columns], part[middle, columns], part[middle + 1, columns])
-            for part in (self.times, height)
+            (self.times[middle], self.times[middle + 1], self.times[middle + 2]),
+            (height[middle, columns], height[middle + 1, columns], height[middle + 2, columns]),
         )
         with np.errstate(all="ignore"):
             before, after = (b - a) / (tb - ta), (c - b) / (tc - tb)

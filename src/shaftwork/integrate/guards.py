@@ -30,6 +30,7 @@ class GuardWatch:
     def __init__(self, problem: Problem | DaeProblem, low: float, high: float) -> None:
         guards = problem.guards
         self._columns = np.zeros(0, dtype=np.intp) if guards is None else np.flatnonzero(guards.sides)
+        self._offsets = np.zeros(0) if guards is None else guards.offsets[self._columns]
         self._guards, self._low, self._high = guards, low, high
         self.met: int | None = None
 
@@ -52,10 +53,11 @@ class GuardWatch:
         look.add(start + LOOKS * (end - start))
         if (look.values[0] >= 0).any():  # what is above zero by rounding may fall and rise again ere the first look
             look.add(start + NEARER * (look.times[1] - start))
-        look.follow()
-        found = [
-            (self._time(look, column), column) for column in np.flatnonzero((look.values > 0).any(axis=0)).tolist()
-        ]
+        noise = np.maximum(look.values[0], 0.0) + self._offsets
+        look.values[0] = np.minimum(look.values[0], 0.0)
+        look.follow(every=True)
+        risen = np.flatnonzero((look.values > 0).any(axis=0)).tolist()
+        found = [(self._time(look, column, 2 * float(noise[column])), column) for column in risen]
         known = [(time, int(self._columns[column])) for time, column in found if time is not None]
         if not known:
             return None
@@ -67,12 +69,14 @@ class GuardWatch:
         values = self._guards.values(np.clip(times, self._low, self._high), states)
         return np.asarray((values * self._guards.sides - self._guards.offsets)[:, self._columns])
 
-    def _time(self, look: Look, column: int) -> float | None:
-        """When a guard rises through zero; one that is above it from the start, by rounding, has to fall first."""
+    def _time(self, look: Look, column: int, noise: float) -> float | None:
+        """When a guard rises through zero; one that is above it from the start, by noise, has to fall first."""
         values = look.values[:, column]
         below = np.flatnonzero(values < 0)
         if not below.size:
             return float(look.times[0]) if values[-1] > values[0] else None
+        if values[: below[0]].max(initial=0.0) > noise:
+            return float(look.times[0])
         above = np.flatnonzero(values[below[0] :] > 0)
         if not above.size:
             return None

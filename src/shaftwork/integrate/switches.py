@@ -37,6 +37,9 @@ def settle(program: Any, integrator: Any, horizon: float) -> None:
     parameters, signs = integrator.pars[:first], integrator.pars[first : first + len(program.switches)]
     timed = signs * program.timed
     middle = program.switch_signs(integrator.time + horizon / 2, integrator.state, parameters, timed)
+    if program.timed.all():
+        signs[:] = middle
+        return
     signs[:] = program.switch_signs(integrator.time, integrator.state, parameters, middle * program.timed)
     if (near := _within_rounding(program, integrator) & ~program.timed).any():
         kept = signs.copy()

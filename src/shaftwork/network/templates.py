@@ -14,7 +14,7 @@ from enum import IntEnum
 from functools import cached_property
 from typing import Any, TypeVar, get_args
 
-from sympy import Expr, I, Integer, Symbol, nan, oo, sympify, zoo
+from sympy import Expr, Float, I, Integer, Symbol, nan, oo, zoo
 
 from shaftwork.components.base import Component, Derived, symbols_of
 from shaftwork.components.branches import (
@@ -173,7 +173,7 @@ def _choose(p: Any, modes: tuple[Modes, ...], choices: tuple[Choice, ...]) -> di
     ):
         setattr(p, element.form, choice.form)
         if choice.value is not None:
-            setattr(p, element.symbol, sympify(choice.value if choice.value % 1 else int(choice.value)))
+            setattr(p, element.symbol, Float(choice.value) if choice.value % 1 else Integer(int(choice.value)))
         else:
             setattr(p, element.symbol, mode_symbol(element.symbol))
             free[mode_symbol(element.symbol)] = element.symbol

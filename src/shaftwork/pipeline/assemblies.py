@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import sparse
-from sympy import Expr, Integer, Piecewise, Symbol, sympify
+from sympy import Expr, Integer, Piecewise, Symbol
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.code import scalar, vectorised_list
@@ -20,7 +20,7 @@ from shaftwork.codegen.recovery import History
 from shaftwork.codegen.stores import Stores
 from shaftwork.codegen.timeline import Timeline
 from shaftwork.components.branches import ACROSS, INTEGRAL
-from shaftwork.components.laws import pieces_degree
+from shaftwork.components.laws import as_expression, pieces_degree
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Leave, Mode, Modes
 from shaftwork.core.errors import CompileError
@@ -95,6 +95,7 @@ class Assembly:
         self.stores = Stores(model.form)
         self._places = {name: k for k, name in enumerate(model.parameters)}
         self._expressions: list[Expr] = []
+        self._known: dict[tuple[int, Expr], int] = {}
         self._watched: dict[tuple[int, str], tuple[Watched, ...]] = {}
         rows = model.rows
         self._readings = readings = NamedReadings(model.form) if rows is None else Readings(model.form, rows)
@@ -104,22 +105,30 @@ class Assembly:
             part = self._parts[element.part.name]
             for mode in element.modes.options:
                 if mode.form == form:
-                    self._watched[number, mode.name] = tuple(self._leaves(readings, part, element.modes, mode))
+                    self._watched[number, mode.name] = tuple(self._leaves(number, readings, part, mode))
+        if rows is None:
+            _ = self._shown  # so that all quantities are known before any function of them is made
         self._prepared: dict[bytes, Prepared] = {}
         self._sides: dict[ModeNames, Array] = {}
         self._ends: dict[ModeNames, tuple[tuple[int, Watched], ...]] = {}
         self._numbers = [self._places[element.number] for element in elements if element.number in self._places]
 
-    def _leaves(self, readings: Readings, part: GraphPart, modes: Modes, mode: Mode) -> Iterator[Watched]:
+    def _leaves(self, number: int, readings: Readings, part: GraphPart, mode: Mode) -> Iterator[Watched]:
+        """The guards of a mode; what another mode of the element has is shared, with the other sign as well."""
+        taken: list[int] = []
         for leave in mode.leaves:
-            when = readings.guard(part, modes, leave.when)
+            when = readings.guard(part, self.elements[number].modes, leave.when)
             for side, made in ((1.0, when), (-1.0, -when)):
-                if made in self._expressions:
-                    yield Watched(self._expressions.index(made), side, leave)
+                known = self._known.get((number, made))
+                if known is not None and known not in taken:
+                    found = Watched(known, side, leave)
                     break
             else:
                 self._expressions.append(when)
-                yield Watched(len(self._expressions) - 1, 1.0, leave)
+                found = Watched(len(self._expressions) - 1, 1.0, leave)
+                self._known.setdefault((number, when), found.guard)
+            taken.append(found.guard)
+            yield found
 
     def watched(self, modes: ModeNames) -> tuple[tuple[int, Watched], ...]:
         """Element and guard of everything that may end one of the modes."""
@@ -225,12 +234,20 @@ class Assembly:
         first = sum(2 + len(self._symbols(k)) for k in range(number))
         return float(self._shown_at(t, x, p)[first])
 
+    def twist(self, number: int) -> int | None:
+        """The state that is the twist of an element, or None where none is."""
+        form, owner = self.model.form, self.elements[number].part.name
+        own = (
+            k for k, s in enumerate(form.states) if s.kind == "integral" and form.graph.part_of(s.branch).name == owner
+        )
+        return next(own, None)
+
     def constant(self, number: int, expression: Expr | None, p: Array) -> float:
         """A number that is made of an element's parameters."""
         if expression is None:
             return 0.0
         element = self.elements[number]
-        made = self._readings.guard(self._parts[element.part.name], element.modes, sympify(expression))
+        made = self._readings.guard(self._parts[element.part.name], element.modes, as_expression(expression))
         return float(made.xreplace({s: p[self._places[s.name]] for s in made.free_symbols}))
 
     def problem(

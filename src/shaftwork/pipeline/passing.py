@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -11,7 +10,7 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.integrate.problem import Reaction
 from shaftwork.pipeline.assemblies import ModeNames
-from shaftwork.pipeline.settling import ABOVE, BELOW, ROUNDINGS, Change, Moment, Regime, Settling, clear_of_limits
+from shaftwork.pipeline.settling import Change, Moment, Regime, Settling, clear_of_limits
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +70,8 @@ class Passing:
     def __call__(self, number: int, met: int, t: float, x: Array) -> Reaction | None:
         if number < len(self._reactions):  # the run is made once more, for its dense output
             return self._reactions[number]
+        if self.beyond is not None:
+            return None
         found = self._direct(met, t, x) or self._settled(met, t, x)
         if found is None:
             return None
@@ -96,17 +97,16 @@ class Passing:
             return None
         motion, states = way.to.motion, x[: self._size].tolist()
         rates, now = motion(t, states)
-        ulp = ROUNDINGS * math.ulp(t)
-        signs = zip(states, rates, strict=True)
-        moved = [v * (ABOVE if k % 2 else BELOW) + ulp * rate for k, (v, rate) in enumerate(signs)]
-        bands = [abs(n - g) for n, g in zip(motion(t + ulp, moved)[1], now, strict=True)]
+        tick = self._settling.tick
+        near = motion(t + tick, way.to.rounded(states, rates, tick))[1]
+        bands = [abs(n - g) for n, g in zip(near, now, strict=True)]
         wide = list(map(max, bands, self.moment.bands))
         for guard, side in way.watched:
             if side * now[guard] >= -wide[guard] and (guard != met or side == way.side):
                 return None
         if way.side * now[met] < 0 or not self._goes_on(way, met, t, states, rates, now):
             return None
-        return Moment(way.to, x, clear_of_limits(now, bands)), [way.change(t)]
+        return Moment(way.to, x, clear_of_limits(way.to, now, bands)), [way.change(t)]
 
     def _goes_on(
         self, way: _Way, met: int, t: float, states: list[float], rates: list[float], now: list[float]

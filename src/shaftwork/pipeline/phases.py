@@ -37,9 +37,10 @@ FOLLOWING = {
     "scipy": (1 / 30, 1e-7),
     "scipy-radau": (1 / 30, 1e-7),
     "sundials": (1 / 300, 1e-8),
-    "sundials-adams": (1 / 100, 1e-8),
+    choice.ADAMS: (1 / 100, 1e-8),
 }
 TIGHTEST_RTOL = 1e-14
+_ENGINES = ", ".join(name for name in FOLLOWING if name != choice.ADAMS)
 STILL = "Nothing moves, and what holds is known at every time."
 
 
@@ -112,12 +113,12 @@ class Phases:
             if asked not in FOLLOWING:
                 raise ParameterError(
                     f"The engine '{asked}' follows no parts that change their mode "
-                    f"({', '.join(element.name for element in self.elements)}). Take one of: {', '.join(FOLLOWING)}."
+                    f"({', '.join(element.name for element in self.elements)}). Take one of: {_ENGINES}."
                 )
             if asked != "sundials":
                 return asked, "asked for"
             if (assembly, asked) not in self._engines:
-                adams = "sundials-adams", "asked for; the motion is not stiff, so Adams' formulas are taken."
+                adams = choice.ADAMS, "asked for; the motion is not stiff, so Adams' formulas are taken."
                 self._engines[assembly, asked] = (asked, "asked for") if choice.is_stiff(problem) else adams
             return self._engines[assembly, asked]
         if assembly not in self._engines:
@@ -260,5 +261,5 @@ class Run:
         problem = replace(problem, rtol=tight, atol=problem.atol * (tight / problem.rtol))
         trajectory, name, why = choice.solve(problem, name, why, fallback=self.demand.engine == "auto")
         if not self.engine:
-            self.engine, self.why = name, why
+            self.engine, self.why = name.removesuffix("-adams"), why
         return trajectory

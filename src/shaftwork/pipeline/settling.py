@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -13,15 +14,19 @@ from shaftwork.codegen.elements import Array
 from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.pipeline.assemblies import Assembly, Element, ModeNames, Motion, Watched
+from shaftwork.pipeline.prepared import NOMINAL
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.phases import Phases
 
 # A guard within so many rounding units of zero is on its limit, and only its further course tells its side.
 ROUNDINGS = 64.0
+# A phase that starts beyond a limit meets it again where it is farther beyond by so many bands.
+CLEAR = 8
 # What is as good as zero, and is not.
 NOTHING = 1e-200
-ABOVE, BELOW = 1 + ROUNDINGS * float(np.finfo(float).eps), 1 - ROUNDINGS * float(np.finfo(float).eps)
+EPS = float(np.finfo(float).eps)
+GOLDEN = (5**0.5 - 1) / 2
 # How far ahead that course is looked at: parts of the time in which a state moves by its nominal size, and of the run.
 AHEAD, AHEAD_OF_RUN = 1e-3, 1e-7
 
@@ -68,6 +73,17 @@ class Regime:
     watched: tuple[tuple[int, Watched], ...]
     ways: dict[int, Any] = field(default_factory=dict)
 
+    @cached_property
+    def _rounding(self) -> list[tuple[float, float]]:
+        """Of each state, a part of it and the least that rounding moves it: to both sides and not alike."""
+        parts = [(-1) ** k * (0.5 + k * GOLDEN % 1) * ROUNDINGS * EPS for k in range(len(self.sizes))]
+        return [(part, part * size / NOMINAL) for part, size in zip(parts, self.sizes, strict=True)]
+
+    def rounded(self, x: list[float], rates: list[float], tick: float) -> list[float]:
+        """The states so far away as rounding may move them, and the time by a tick in s."""
+        changes = zip(x, rates, self._rounding, strict=True)
+        return [v + part * abs(v) + least + tick * rate for v, rate, (part, least) in changes]
+
 
 class Moment(NamedTuple):
     """A combination of modes, the states (n,), and how far rounding moves each guard."""
@@ -77,13 +93,17 @@ class Moment(NamedTuple):
     bands: Sequence[float] = ()
 
 
-def clear_of_limits(now: Sequence[float], bands: Sequence[float]) -> list[float]:
-    """The bands, wider where a guard is right at its own: a phase that starts there would be taken to have met it.
+def clear_of_limits(regime: Regime, now: Sequence[float], bands: Sequence[float]) -> list[float]:
+    """The bands, wider where a guard is at its own or beyond: a phase that starts there has not met it.
 
     None is zero: where a value is exactly zero at the start of a step, heyoka finds none of its later zeros in it.
     """
-    pairs = zip(now, bands, strict=True)
-    return [8 * band if band < 4 * abs(g) < 16 * band else band or NOTHING for g, band in pairs]
+    made = [band or NOTHING for band in bands]
+    for _, watched in regime.watched:
+        k, value = watched.guard, watched.side * now[watched.guard]
+        if 4 * value > bands[k]:
+            made[k] = value + CLEAR * bands[k]
+    return made
 
 
 Course = tuple[float, list[float], list[float], list[float]]
@@ -103,6 +123,8 @@ class Settling:
         self._phases, self._values = phases, dict(values)
         self.elements = phases.elements
         self._ahead = AHEAD_OF_RUN * (span[1] - span[0])
+        self.tick = ROUNDINGS * math.ulp(max(map(abs, span)))
+        """How far in s rounding moves the time."""
         self._regimes: dict[ModeNames, Regime] = {}
 
     def regime(self, modes: ModeNames) -> Regime:
@@ -194,9 +216,8 @@ class Settling:
         """The guard that is farthest beyond its limit, or on it and about to go beyond; the moment with its bands."""
         regime, x = moment.regime, moment.x.tolist()
         rates, now = regime.motion(t, x)
-        ulp = ROUNDINGS * math.ulp(t)
-        moved = [v * (ABOVE if k % 2 else BELOW) + ulp * rate for k, (v, rate) in enumerate(zip(x, rates, strict=True))]
-        others, near = regime.motion(t + ulp, moved)
+        moved = regime.rounded(x, rates, self.tick)
+        others, near = regime.motion(t + self.tick, moved)
         bands = [abs(n - g) for n, g in zip(near, now, strict=True)]
         wide = bands
         if ended.bands and ended.regime.assembly is regime.assembly:
@@ -213,8 +234,8 @@ class Settling:
             elif value > largest:
                 worst, largest = pair, value
         if on_limit and worst is None:
-            worst = self._next(regime, (t, x, rates, now), (t + ulp, moved, others, near), on_limit)
-        return Moment(regime, moment.x, clear_of_limits(now, bands)), worst
+            worst = self._next(regime, (t, x, rates, now), (t + self.tick, moved, others, near), on_limit)
+        return Moment(regime, moment.x, clear_of_limits(regime, now, bands)), worst
 
     def ahead(self, regime: Regime, rates: list[float]) -> float:
         """How far in s the further course is looked at."""
@@ -236,16 +257,18 @@ class Settling:
             on_limit: elements and guards.
         """
         step = self.ahead(regime, here[2])
-        moves = [
-            [later - now for later, now in zip(_later(regime, step, course), course[3], strict=True)]
-            for course in (here, beside)
-        ]
-        found, largest = None, 0.0
-        for number, made in on_limit:
-            gain, other = (made.side * made_moves[made.guard] for made_moves in moves)
-            if gain > max(largest, abs(gain - other)):
-                found, largest = (number, made), gain
-        return found
+        ways = here, beside
+        for _ in range(2):  # where nothing moves yet, its acceleration tells
+            ways = _later(regime, step, ways[0]), _later(regime, step, ways[1])
+            found, largest = None, 0.0
+            for number, made in on_limit:
+                k = made.guard
+                gain, other = made.side * (ways[0][3][k] - here[3][k]), made.side * (ways[1][3][k] - beside[3][k])
+                if gain > max(largest, abs(gain - other)):
+                    found, largest = (number, made), gain
+            if found is not None:
+                return found
+        return None
 
     def _follow(
         self, t: float, after: float, moment: Moment, number: int, ended: Watched
@@ -262,7 +285,8 @@ class Settling:
             to, speed = slips, 0.0
         try:
             if speed or (leave.rebound is not None and not slips):
-                return self._hit(t, after, moment, number, replace(leave, to=to))
+                new, changes = self._hit(t, after, moment, number, replace(leave, to=to))
+                return (self._at_limit(new, after, number, ended) if changes[0].rebound else new), changes
             return self._changed(moment, after, _with(regime.modes, {number: to})), [Change(t, element, before, to)]
         except NetworkError:
             return self._around(t, after, moment, number, to)
@@ -296,6 +320,18 @@ class Settling:
         thrown = {name: plastic[name] + share * (plastic[name] - value) for name, value in held.items()}
         new = self.regime(_with(joined.regime.modes, {number: regime.modes[number]}))
         return Moment(new, new.assembly.stores.states(new.assembly.bound(new.p), after, thrown)), changes
+
+    def _at_limit(self, moment: Moment, t: float, number: int, ended: Watched) -> Moment:
+        """What was thrown back, with its twist right at the limit: the little beyond would add up over many rebounds."""
+        regime, x = moment.regime, moment.x.copy()
+        state = regime.assembly.twist(number)
+        if state is None:
+            return moment
+        beyond = regime.motion(t, x.tolist())[1][ended.guard]
+        x[state] += 1.0
+        slope = regime.motion(t, x.tolist())[1][ended.guard] - beyond
+        x[state] = moment.x[state] - (beyond / slope if slope else 0.0)
+        return Moment(regime, x)
 
     def _joined(self, moment: Moment, t: float, number: int, to: str, speed: float) -> Moment:
         """After an inelastic impact. What holds by a limited torque slips in it; contacts are pressed, not pulled."""
@@ -343,7 +379,8 @@ def _with(modes: ModeNames, changed: Mapping[int, str]) -> ModeNames:
     return tuple(changed.get(k, name) for k, name in enumerate(modes))
 
 
-def _later(regime: Regime, step: float, course: Course) -> list[float]:
-    """The guards a step further along a straight line."""
+def _later(regime: Regime, step: float, course: Course) -> Course:
+    """A step further along a straight line."""
     t, x, rates, _ = course
-    return regime.motion(t + step, [v + step * rate for v, rate in zip(x, rates, strict=True)])[1]
+    later = [v + step * rate for v, rate in zip(x, rates, strict=True)]
+    return t + step, later, *regime.motion(t + step, later)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import networkx as nx
@@ -11,10 +11,11 @@ import numpy as np
 import sympy
 
 from shaftwork.core.errors import Problem
-from shaftwork.network.graph import CircuitGraph
+from shaftwork.network.graph import CircuitGraph, GraphBranch
 from shaftwork.network.wording import at_nodes, listed
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.gains import Gain, value_of
+from shaftwork.reduction.tree import Row, balance_of, column_of
 from shaftwork.reduction.view import View
 
 SINGULAR = 1e-13
@@ -23,12 +24,63 @@ SINGULAR = 1e-13
 
 def numeric_problems(form: StateForm) -> tuple[Problem, ...]:
     """Values that cancel each other or lie outside what a computer can represent, although the structure is sound."""
-    graph, loops = form.graph, form.tree.loops
-    gains = ((link, entry) for link, loop in loops.items() for entry in loop.values() if isinstance(entry, Gain))
+    graph, loops, cutsets = form.graph, form.tree.loops, form.tree.cutsets
+    rows = (*loops.items(), *(cutsets.items() if cutsets is not loops else ()))
+    gains = ((link, entry) for link, row in rows for entry in row.values() if isinstance(entry, Gain))
     if wild := sorted({link for link, gain in gains if not (math.isfinite(gain.value) and gain.value)}):
         return (extreme_ratios(graph, (branch for link in wild for branch in (link, *loops[link]))),)
     groups = ((form.tree_conductances, form.link_conductances), (form.across_states, form.dependent_across))
-    return tuple(problem for own, beside in groups for problem in _cancelling(form, own, beside))
+    found = (problem for own, beside in groups for problem in _cancelling(form, own, beside))
+    return (*found, *(_jamming(form) if cutsets is not loops else ()))
+
+
+def _jamming(form: StateForm) -> Iterator[Problem]:
+    """A coupling that brakes by more than the inertia (or damping, or compliance) in its way can answer: it jams.
+
+    The rates follow from the matrices of `form` and from the tree's own columns in speeds and torques. The product of
+    all determinants is positive without losses; a loss that grows takes it through zero, where the rates are infinite.
+    """
+    groups = (
+        (form.tree_conductances, form.link_conductances),
+        (form.across_states, form.dependent_across),
+        (form.dependent_through, form.through_states),
+    )
+    sign = _sign_of_tree(form, column_of) * _sign_of_tree(form, balance_of)
+    for trees, links in groups:
+        values = _coefficients(form.graph, (*trees, *links))
+        if min(values.values(), default=1.0) <= 0:
+            return  # negative values need no coupling to cancel
+        F, Q = (_block(rows, trees, links) for rows in (form.tree.loops, form.tree.cutsets))
+        own, others = (np.array([values[branch] for branch in group]) for group in (trees, links))
+        sign *= np.linalg.slogdet(np.diag(own) + Q * others @ F.T).sign
+    if sign <= 0:
+        yield _jammed(View(form), tuple(branch.index for branch in form.graph.branches if branch.template.through))
+
+
+def _sign_of_tree(form: StateForm, column: Callable[[CircuitGraph, GraphBranch], Row]) -> float:
+    """The sign of the determinant of the tree's columns."""
+    branches = [branch for branch in form.graph.branches if branch.index not in form.tree.loops]
+    matrix = np.zeros((len(form.graph.nodes), len(branches)))
+    for k, branch in enumerate(branches):
+        for node, entry in column(form.graph, branch).items():
+            matrix[node, k] = value_of(entry)
+    return float(np.linalg.slogdet(matrix).sign) if len(branches) == len(matrix) else 1.0
+
+
+def _block(rows: Mapping[int, Row], trees: Sequence[int], links: Sequence[int]) -> Any:
+    """(trees, links) the factors of tree branches and links in loops or cutsets."""
+    factors = [[value_of(rows[link].get(tree, 0)) for link in links] for tree in trees]
+    return np.array(factors, dtype=float).reshape(len(trees), len(links))
+
+
+def _jammed(view: View, lossy: Sequence[int]) -> Problem:
+    words = view.words(lossy[0])
+    message = (
+        f"{view.titles(lossy)} would brake by more than the {words.store} on the side of node a can answer: a motion "
+        "in which node b drives is not possible, it jams at once."
+    )
+    hint = f"Give node a more {words.store}, or an efficiency_back nearer to zero."
+    return Problem("jammed coupling", message, hint, view.parts(lossy), view.ends(lossy))
 
 
 def extreme_ratios(graph: CircuitGraph, branches: Iterable[int]) -> Problem:
@@ -49,9 +101,8 @@ def _cancelling(form: StateForm, own: Sequence[int], beside: Sequence[int]) -> I
     blocks.add_edges_from((tree, link) for link in beside for tree in form.tree.loops[link] if tree in members)
     for found in nx.connected_components(blocks):
         trees, links = sorted(found & members), sorted(found - members)
-        loops = [[value_of(form.tree.loops[link].get(tree, 0)) for link in links] for tree in trees]
-        F = np.array(loops, dtype=float).reshape(len(trees), len(links))
-        matrix = np.diag([values[tree] for tree in trees]) + F * [values[link] for link in links] @ F.T
+        F, Q = (_block(rows, trees, links) for rows in (form.tree.loops, form.tree.cutsets))
+        matrix = np.diag([values[tree] for tree in trees]) + Q * [values[link] for link in links] @ F.T
         if min(values[branch] for branch in found) <= 0 and _is_singular(matrix):
             yield _cancelling_block(View(form), (*trees, *links))
 

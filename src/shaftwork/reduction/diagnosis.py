@@ -77,9 +77,7 @@ def structural_problems(form: StateForm) -> tuple[Problem, ...]:
     return (
         *view.prescribed_twice(),
         *controlled_problems(view),
-        *view.massless(),
-        *view.implicit(),
-        *view.undetermined(),
+        *(view.unbalanced() if form.tree.unbalanced else (*view.massless(), *view.implicit(), *view.undetermined())),
         *view.locked(),
         *view.jumping(),
         *view.redundant(),
@@ -231,6 +229,17 @@ class _Structure(View):
                 hint = "The impulse is computed exactly; use a Ramp if the change takes time in the machine."
                 parts = self.parts([source, *stores])
                 yield Problem("jumping source", message, hint, parts, self.ends([source]), "warning")
+
+    def unbalanced(self) -> Iterator[Problem]:
+        """Couplings that lose power and let no torque through from where everything that could balance it is."""
+        branches, words = self.tree.unbalanced, self.words(self.tree.unbalanced[0])
+        lossy = [branch.index for branch in self.graph.branches if branch.template.through]
+        message = (
+            f"{self.titles(lossy)} {'let' if len(lossy) > 1 else 'lets'} no {words.through} through to "
+            f"{self.titles(branches)}, so that nothing balances the {words.through} on the other side."
+        )
+        hint = f"Give the other side {words.remedy}."
+        yield Problem("unbalanced coupling", message, hint, self.parts([*branches, *lossy]), self.ends(lossy))
 
     def redundant(self) -> Iterator[Problem]:
         """Couplings that repeat what others say."""

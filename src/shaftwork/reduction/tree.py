@@ -17,7 +17,7 @@ Sources: Popenda 2019, (1)-(4) for the equations; the normal tree is that of lin
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from sympy import Expr
@@ -47,7 +47,7 @@ class NormalTree:
         redundant: couplings that say what others have said already.
         frozen: names of the ratios whose given values make a sum vanish that is not zero for all values: they decide
             the structure.
-        unbalanced: tree branches whose torque no node takes, since a coupling lets none through from there.
+        unbalanced: links that are missing in the tree, as a coupling that loses power lets no torque through to them.
     """
 
     tree: Mapping[Kind, tuple[int, ...]]
@@ -125,6 +125,11 @@ def column_of(graph: CircuitGraph, branch: GraphBranch) -> Row:
     return _summed(graph, branch, branch.terms)
 
 
+def balance_of(graph: CircuitGraph, branch: GraphBranch) -> Row:
+    """Node to factor with which a branch takes its through variable from it: the column, but where power is lost."""
+    return _summed(graph, branch, branch.balances)
+
+
 def _summed(graph: CircuitGraph, branch: GraphBranch, terms: Sequence[tuple[Expr, int, int]]) -> Row:
     column: Row = {}
     for expression, plus, minus in terms or ((None, branch.plus, branch.minus),):
@@ -165,54 +170,59 @@ def _closes_a_loop(work: _Elimination, column: Row, reduced: Row) -> tuple[int, 
     return moving if len(moving) > 1 and sum(key >= 0 for key in reduced) == 1 else ()
 
 
-def _balanced(graph: CircuitGraph, tree: Sequence[int]) -> tuple[_Elimination, list[int]]:
-    """The elimination of the same tree with the ratios of torques, and the branches for which it leaves no node."""
-    work, unbalanced = _Elimination(len(graph.nodes)), []
-    for index in tree:
-        branch = graph.branches[index]
-        reduced = work.reduce(_summed(graph, branch, branch.balances))
-        if any(key >= 0 for key in reduced):
-            work.solve_for_a_node(reduced, index)
-        else:
-            unbalanced.append(index)
-    return work, unbalanced
-
-
 def normal_tree(graph: CircuitGraph) -> NormalTree:
     """Choose the normal tree and express every link by it."""
-    work = _Elimination(len(graph.nodes))
+    work, lossy = _Elimination(len(graph.nodes)), any(branch.template.through for branch in graph.branches)
+    torques = _Elimination(len(graph.nodes)) if lossy else work
     tree: dict[Kind, list[int]] = {kind: [] for kind in Kind}
     links: dict[Kind, list[int]] = {kind: [] for kind in Kind}
     locked: list[tuple[int, tuple[int, ...]]] = []
     columns = {branch.index: column_of(graph, branch) for branch in graph.branches}
+    balances = {branch.index: balance_of(graph, branch) for branch in graph.branches} if lossy else columns
     for branch in sorted(graph.branches, key=lambda item: item.template.kind):  # stable: keeps the order of the table
-        kind = branch.template.kind
-        reduced = work.reduce(columns[branch.index])
-        if not any(key >= 0 for key in reduced):
-            links[kind].append(branch.index)
+        kind, index = branch.template.kind, branch.index
+        reduced = work.reduce(columns[index])
+        opposed = torques.reduce(balances[index]) if lossy else reduced
+        if not (_is_free(reduced) and _is_free(opposed)):
+            links[kind].append(index)
             continue
-        if kind is Kind.COUPLING and (closed := _closes_a_loop(work, columns[branch.index], reduced)):
-            locked.append((branch.index, closed))
-        tree[kind].append(branch.index)
-        work.solve_for_a_node(reduced, branch.index)
+        if kind is Kind.COUPLING and (closed := _closes_a_loop(work, columns[index], reduced)):
+            locked.append((index, closed))
+        tree[kind].append(index)
+        work.solve_for_a_node(reduced, index)
+        if lossy:
+            torques.solve_for_a_node(opposed, index)
     others = [index for kind in Kind for index in links[kind]]
-    loops, potentials = {index: _by_branch(work.reduce(columns[index])) for index in others}, work.potentials
-    cutsets, shares, unbalanced = loops, potentials, list[int]()
-    if any(branch.template.through for branch in graph.branches):
-        torques, unbalanced = _balanced(graph, [index for kind in Kind for index in tree[kind]])
-        if not unbalanced:
-            columns = {index: _summed(graph, graph.branches[index], graph.branches[index].balances) for index in others}
-            cutsets, shares = {k: _by_branch(torques.reduce(columns[k])) for k in others}, torques.potentials
-        work.coincidences += torques.coincidences
+    around = {index: work.reduce(columns[index]) for index in others}
+    balanced = {index: torques.reduce(balances[index]) for index in others} if lossy else around
+    unbalanced = tuple(_outranked(graph, around, balanced)) if lossy else ()
+    loops, potentials = {index: _by_branch(row) for index, row in around.items()}, work.potentials
     return NormalTree(
         {kind: tuple(tree[kind]) for kind in Kind},
         {kind: tuple(links[kind]) for kind in Kind},
         loops,
-        cutsets,
+        {index: _by_branch(row) for index, row in balanced.items()} if lossy and not unbalanced else loops,
         potentials,
-        shares,
+        torques.potentials if lossy else potentials,
         tuple(locked),
         tuple(links[Kind.COUPLING]),
-        _names_in(work.coincidences),
-        tuple(unbalanced),
+        _names_in([*work.coincidences, *(torques.coincidences if lossy else ())]),
+        unbalanced,
     )
+
+
+def _is_free(reduced: Row) -> bool:
+    """Whether nodes that nothing fixes yet are in a row."""
+    return any(key >= 0 for key in reduced)
+
+
+def _outranked(graph: CircuitGraph, loops: Mapping[int, Row], cutsets: Mapping[int, Row]) -> Iterator[int]:
+    """Links that had to leave their place in the tree to branches of a later kind, or to none.
+
+    Without losses there are none. A redundant coupling carries nothing, whatever its cutset is.
+    """
+    for index, loop in loops.items():
+        kind = graph.branches[index].template.kind
+        row = (*loop, *(cutsets[index] if kind is not Kind.COUPLING else ()))
+        if any(key >= 0 or graph.branches[~key].template.kind > kind for key in row):
+            yield index

@@ -68,7 +68,14 @@ def crane_start(pull_out_torque: float = MOTOR.tau_k) -> Network:
 
     Args:
         pull_out_torque: of the motor, N m; more than the rated 3.8 N m.
+
+    Raises:
+        ParameterError: it is not more.
     """
+    if not pull_out_torque > MOTOR.tau_n:
+        raise ParameterError(
+            f"crane_start: pull_out_torque = {pull_out_torque} N m must be more than the rated {MOTOR.tau_n} N m."
+        )
     net = Network("crane start")
     net.add(replace(MOTOR, tau_k=pull_out_torque).kloss("motor", symbol="M", **GEAR), "rotor")
     net.add(Inertia("J1", J=27.35, symbol="1"), "rotor")
