@@ -305,6 +305,22 @@ def test_a_coupling_that_lets_no_torque_through_is_named() -> None:
         net.compile()
 
 
+@pytest.mark.parametrize(("share", "jams"), [(-0.4, False), (-0.6, True)])
+@pytest.mark.parametrize("first", ["rotor", "drum"])
+def test_a_coupling_that_brakes_more_than_the_inertia_before_it_is_named(first: str, share: float, jams: bool) -> None:  # noqa: FBT001
+    """At J_b + ratio^2 share J_a = 0, whichever of the inertias is the state."""
+    net = sw.Network("jams")
+    inertias = {"rotor": 0.1, "drum": 5.0}
+    for node in sorted(inertias, key=lambda node: node != first):
+        net.add(sw.Inertia(f"J {node}", J=inertias[node]), node)
+    net.add(Mesh("gear", ratio=RATIO, share=share), "rotor", "drum")
+    if jams:
+        with pytest.raises(NetworkError, match="it jams"):
+            net.compile()
+    else:
+        net.compile()
+
+
 @sw.component
 class Blind(sw.Component):
     """A coupling of speeds that gives no torque to a. Law: tau_a = 0."""

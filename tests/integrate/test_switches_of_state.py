@@ -137,6 +137,10 @@ def test_every_engine_follows_a_motion_through_its_switches(motion: str, engine:
     """The gap is closed at 2.52 s for 8 ms in the midst of a free flight, where every method takes longer steps."""
     if not choice.available(engine):
         pytest.skip(f"{engine} is not installed")
+    if (motion, engine) == ("gap", "banded"):  # a part with modes, which this engine does not follow, and says so
+        with pytest.raises(sw.ParameterError, match="gap"):
+            gap_network().simulate(4.0, engine=engine)
+        return
     network, t_end, initial, signal, reference, largest = MOTIONS[motion]
     model, expected = network.compile(), reference()
     for rtol in RTOLS:
@@ -209,7 +213,7 @@ def test_a_network_without_such_laws_is_not_looked_at() -> None:
     assert untouched.cut(0.0, problem.x0, 1.0, problem.x0, dense) is None
     time_alone = body(sw.Step(1.0, start=0.5) - sw.omega**3).compile()
     assert not time_alone.arrays.inputs.switching
-    assert gap_network().compile().arrays.inputs.switching
+    assert body(BENT).compile().arrays.inputs.switching
 
 
 def test_a_measured_curve_is_followed_from_point_to_point() -> None:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import cache
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pytest
 
 import shaftwork as sw
-from shaftwork.components.friction import rubbing, rubs
 from tests.reference import friction
 from tests.reference.hybrid_crane import Crane, Load, Motion, motion, stored
 
@@ -128,29 +125,12 @@ def test_dry_friction_gives_way_when_a_ramp_reaches_it(engine: str) -> None:
     np.testing.assert_allclose(sol["shoe.tau"], [held.reaction(t) for t in sol.t.tolist()], atol=1e-8)
 
 
-@sw.component
-class TwoLevelFriction(sw.Component):
-    """Dry friction of the closed forms: it falls from tau_s to tau_c as soon as it slips."""
-
-    tau_c: float = sw.parameter("N*m", "torque while slipping", at_least=0)
-    tau_s: float = sw.parameter("N*m", "torque up to which it holds", at_least=0)
-
-    role = "loss"
-    ports = (sw.Port("a"), sw.Port("b", optional=True))
-
-    def modes(self, p: Any) -> Iterator[Any]:
-        yield rubbing(p.tau_s)
-
-    def branches(self, p: Any) -> Iterator[Any]:
-        yield from rubs(p.tau_c, p)
-
-
 @pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials"])
 def test_a_block_on_a_belt_sticks_and_slips_with_the_period_of_its_limit_cycle(engine: str) -> None:
     block = friction.StickSlip(J=0.3, c=40.0, tau_c=2.0, tau_s=3.5, belt=0.4)
     net = sw.Network("belt")
     net.add(sw.SpeedSource("drive", omega=block.belt), "belt")
-    net.add(TwoLevelFriction("shoe", tau_c=block.tau_c, tau_s=block.tau_s), "belt", "block")
+    net.add(sw.DryFriction("shoe", tau_c=block.tau_c, tau_s=block.tau_s, omega_s=0.0), "belt", "block")
     net.add(sw.Inertia("J", J=block.J), "block")
     net.add(sw.Spring("spring", c=block.c), "block", "ground")
     sol = net.simulate(t_end=8.0, engine=engine, rtol=1e-10, initial={"J.omega": block.belt})

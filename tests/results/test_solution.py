@@ -118,4 +118,5 @@ def test_a_missing_library_is_named_with_the_extra_that_brings_it(
 def test_a_solution_says_what_it_is(sol: sw.Solution) -> None:
     assert "crane start" in repr(sol)
     assert sol.engine in repr(sol)
-    assert sol.events == ()
+    assert sol.events == ((pytest.approx(0.0139, abs=1e-4), "load", "stuck", "slipping forward"),)
+    assert [row.name for row in sol.phases] == ["load stuck", "load slipping forward"]

@@ -39,6 +39,9 @@ class Stores:
         angles = tuple(state.name for state in form.states if state.kind == "integral")
         self.names = (*made, *angles)
         """Every store and angle, named as a state whether it is one or not."""
+        kind = Kind.THROUGH_STORE
+        self.through = tuple(name for name, k in made.items() if form.graph.branches[k].template.kind is kind)
+        """Those of the names that are torques of springs or currents of inductors."""
         self._states = [state.name for state in form.states]
         self._map: tuple[LinearPart, Array] | None = None
         self._dense: tuple[LinearPart, Array, Array] | None = None

@@ -6,11 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import combinations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from shaftwork.codegen.elements import Array
+from shaftwork.components.branches import ACROSS
 from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.pipeline.assemblies import Assembly, Element, ModeNames, Motion, Watched
@@ -287,9 +289,42 @@ class Settling:
             if speed or (leave.rebound is not None and not slips):
                 new, changes = self._hit(t, after, moment, number, replace(leave, to=to))
                 return (self._at_limit(new, after, number, ended) if changes[0].rebound else new), changes
-            return self._changed(moment, after, _with(regime.modes, {number: to})), [Change(t, element, before, to)]
+            modes = _with(regime.modes, {number: to})
+            new, conducting = self._commutated(moment, after, modes, self._changed(moment, after, modes))
+            others = [Change(t, self._phases.elements[k], regime.modes[k], name) for k, name in conducting.items()]
+            return new, [Change(t, element, before, to), *others]
         except NetworkError:
             return self._around(t, after, moment, number, to)
+
+    def _commutated(self, moment: Moment, t: float, modes: ModeNames, plain: Moment) -> tuple[Moment, dict[int, str]]:
+        """What takes over a torque or current that a change would cut off from its store: a diode, a freewheel.
+
+        Without one it is cut off, with the energy of the store.
+        """
+        names = plain.regime.assembly.stores.through
+        if plain.x is moment.x or not names:
+            return plain, {}
+        held = self.held(moment, t)
+
+        def lost(other: Moment) -> float:
+            kept = self.held(other, t)
+            return sum(abs(kept[name] - held[name]) for name in names)
+
+        least = NO_IMPACT * sum(abs(held[name]) for name in names)
+        if lost(plain) <= least:
+            return plain, {}
+        ways = [
+            (k, leave.to)
+            for k, name in enumerate(modes)
+            for leave in self._phases.elements[k].modes[name].leaves
+            if leave.when == ACROSS and leave.to
+        ]
+        for count in (1, 2):
+            for chosen in combinations(ways, count):
+                other = self._changed(moment, t, _with(modes, dict(chosen)))
+                if lost(other) <= least and not self._violated(other, t, other)[1]:
+                    return other, dict(chosen)
+        return plain, {}
 
     def _meets(self, moment: Moment, t: float, to: Mode, number: int) -> float:
         """The speed across an element that is joined from now on; zero where it is no more than an error of the run."""
@@ -298,7 +333,16 @@ class Settling:
             return 0.0
         speed = regime.assembly.across(number, t, moment.x, regime.p)
         speeds = moment.x[: len(regime.assembly.model.form.across_states)]
-        return speed if abs(speed) > NO_IMPACT * np.abs(speeds).max(initial=1.0) else 0.0
+        least = NO_IMPACT * np.abs(speeds).max(initial=1.0)
+        if abs(speed) <= least:
+            return 0.0
+        try:
+            joined = self._changed(moment, t, _with(regime.modes, {number: to.name}))
+        except NetworkError:
+            return speed
+        held, after = self.held(moment, t), self.held(joined, t)
+        # between dampers alone a speed is whatever their torques make it: joining them stops no inertia
+        return speed if any(abs(after[name] - value) > least for name, value in held.items()) else 0.0
 
     def _hit(self, t: float, after: float, moment: Moment, number: int, leave: Leave) -> tuple[Moment, list[Change]]:
         """An impact: the element is joined for an instant, and for good where nothing throws it back.
@@ -322,7 +366,7 @@ class Settling:
         return Moment(new, new.assembly.stores.states(new.assembly.bound(new.p), after, thrown)), changes
 
     def _at_limit(self, moment: Moment, t: float, number: int, ended: Watched) -> Moment:
-        """What was thrown back, with its twist right at the limit: the little beyond would add up over many rebounds."""
+        """What was thrown back, its twist right at the limit: the little beyond it would add up over many rebounds."""
         regime, x = moment.regime, moment.x.copy()
         state = regime.assembly.twist(number)
         if state is None:

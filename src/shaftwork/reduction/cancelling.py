@@ -76,10 +76,10 @@ def _block(rows: Mapping[int, Row], trees: Sequence[int], links: Sequence[int]) 
 def _jammed(view: View, lossy: Sequence[int]) -> Problem:
     words = view.words(lossy[0])
     message = (
-        f"{view.titles(lossy)} would brake by more than the {words.store} on the side of node a can answer: a motion "
-        "in which node b drives is not possible, it jams at once."
+        f"{view.titles(lossy)} would brake by more than the {words.store} before it can answer: "
+        f"no rates of {words.across} satisfy its law, it jams."
     )
-    hint = f"Give node a more {words.store}, or an efficiency_back nearer to zero."
+    hint = f"Give the side that brakes more {words.store}, or let the coupling lose less."
     return Problem("jammed coupling", message, hint, view.parts(lossy), view.ends(lossy))
 
 
