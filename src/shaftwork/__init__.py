@@ -15,12 +15,17 @@ if TYPE_CHECKING:
     from shaftwork.components.branches import (
         ACROSS,
         INTEGRAL,
+        THROUGH,
         AcrossLaw,
         AcrossStore,
         IdealCoupling,
         LossyCoupling,
         ThroughLaw,
         ThroughStore,
+        across_of,
+        integral_of,
+        rigid,
+        through_of,
     )
     from shaftwork.components.bucket_wheel import *
     from shaftwork.components.contacts import *
@@ -33,6 +38,7 @@ if TYPE_CHECKING:
     from shaftwork.components.loads import *
     from shaftwork.components.lossy_gear import *
     from shaftwork.components.machines import *
+    from shaftwork.components.modes import Leave, Mode, Modes
     from shaftwork.components.motor_catalogue import motors
     from shaftwork.components.motors import *
     from shaftwork.components.noise import HeldNoise, SmoothNoise
@@ -66,13 +72,19 @@ _HOME = {
     "shaftwork.components.branches": (
         "ACROSS",
         "INTEGRAL",
+        "THROUGH",
         "AcrossLaw",
         "AcrossStore",
         "IdealCoupling",
         "LossyCoupling",
         "ThroughLaw",
         "ThroughStore",
+        "across_of",
+        "integral_of",
+        "rigid",
+        "through_of",
     ),
+    "shaftwork.components.modes": ("Leave", "Mode", "Modes"),
     "shaftwork.components.shaft_models": (
         "Auto",
         "CentralDifference",

@@ -10,7 +10,8 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.integrate.problem import Reaction
 from shaftwork.pipeline.assemblies import ModeNames
-from shaftwork.pipeline.settling import Change, Moment, Regime, Settling, clear_of_limits
+from shaftwork.pipeline.moments import Change, Moment, Regime, clear_of_limits
+from shaftwork.pipeline.settling import Settling
 
 
 @dataclass(frozen=True, eq=False)

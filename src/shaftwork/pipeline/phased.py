@@ -14,9 +14,10 @@ from shaftwork.core.errors import SimulationError
 from shaftwork.pipeline.analysis import Given, Names, Point, Time, input_names, operating_point
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.model import Model
+from shaftwork.pipeline.moments import Moment
 from shaftwork.pipeline.phase_solution import solution
 from shaftwork.pipeline.phases import Phases, Run
-from shaftwork.pipeline.settling import Moment, Settling
+from shaftwork.pipeline.settling import Settling
 from shaftwork.results.linear import LinearModel, linear_model
 from shaftwork.results.solution import Solution
 

@@ -22,8 +22,9 @@ from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import Demand, absolute_tolerances, watched_by
 from shaftwork.pipeline.assemblies import Assembly, ModeNames, elements_of
 from shaftwork.pipeline.implicit import at_rest
+from shaftwork.pipeline.moments import Change, Moment
 from shaftwork.pipeline.passing import Passing, Phase
-from shaftwork.pipeline.settling import Change, Moment, Settling
+from shaftwork.pipeline.settling import Settling
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.model import Model

@@ -1,0 +1,99 @@
+"""A moment of a motion through phases: modes, states, and how far rounding moves what ends the modes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from shaftwork.codegen.elements import Array
+from shaftwork.pipeline.assemblies import Assembly, Element, ModeNames, Motion, Watched
+from shaftwork.pipeline.prepared import NOMINAL
+
+# A guard within so many rounding units of zero is on its limit, and only its further course tells its side.
+ROUNDINGS = 64.0
+# A phase that starts beyond a limit meets it again where it is farther beyond by so many bands.
+CLEAR = 8
+# What is as good as zero, and is not.
+NOTHING = 1e-200
+EPS = float(np.finfo(float).eps)
+GOLDEN = (5**0.5 - 1) / 2
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """A change of mode: when in s, of which element, from which mode to which; or a rebound, back to the one before.
+
+    With an impact speeds jump.
+    """
+
+    time: float
+    element: Element
+    before: str
+    after: str
+    rebound: bool = False
+    impact: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Regime:
+    """A combination of modes with everything that it takes to go on in it; made once for a run.
+
+    Args:
+        modes: of every element.
+        assembly: the equations.
+        p: their parameters, numbers of modes among them.
+        motion: rates and guards at an instant.
+        sides: (guards,) on which each is met.
+        sizes: nominal size of each state.
+        watched: element and guard of everything that may end one of the modes.
+        ways: by guard, where it leads; found when it is first met.
+    """
+
+    modes: ModeNames
+    assembly: Assembly
+    p: Array
+    motion: Motion
+    sides: Array
+    sizes: list[float]
+    watched: tuple[tuple[int, Watched], ...]
+    ways: dict[int, Any] = field(default_factory=dict)
+
+    @cached_property
+    def _rounding(self) -> list[tuple[float, float]]:
+        """Of each state, a part of it and the least that rounding moves it: to both sides and not alike."""
+        parts = [(-1) ** k * (0.5 + k * GOLDEN % 1) * ROUNDINGS * EPS for k in range(len(self.sizes))]
+        return [(part, part * size / NOMINAL) for part, size in zip(parts, self.sizes, strict=True)]
+
+    def rounded(self, x: list[float], rates: list[float], tick: float) -> list[float]:
+        """The states so far away as rounding may move them, and the time by a tick in s."""
+        changes = zip(x, rates, self._rounding, strict=True)
+        return [v + part * abs(v) + least + tick * rate for v, rate, (part, least) in changes]
+
+
+class Moment(NamedTuple):
+    """A combination of modes, the states (n,), and how far rounding moves each guard."""
+
+    regime: Regime
+    x: Array
+    bands: Sequence[float] = ()
+
+
+def clear_of_limits(regime: Regime, now: Sequence[float], bands: Sequence[float]) -> list[float]:
+    """The bands, wider where a guard is at its own or beyond: a phase that starts there has not met it.
+
+    None is zero: where a value is exactly zero at the start of a step, heyoka finds none of its later zeros in it.
+    """
+    made = [band or NOTHING for band in bands]
+    for _, watched in regime.watched:
+        k, value = watched.guard, watched.side * now[watched.guard]
+        if 4 * value > bands[k]:
+            made[k] = value + CLEAR * bands[k]
+    return made
+
+
+Course = tuple[float, list[float], list[float], list[float]]
+"""Time, states, their rates, and guards."""
