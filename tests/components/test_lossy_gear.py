@@ -11,6 +11,7 @@ import sympy
 from scipy.integrate import solve_ivp
 
 import shaftwork as sw
+from shaftwork.components import REGISTRY
 from shaftwork.core.errors import CompileError, NetworkError, ParameterError
 
 J_A, J_B, RATIO, ETA, ETA_BACK = 0.1, 5.0, 10.0, 0.8, 0.7
@@ -138,6 +139,14 @@ def test_a_gear_that_locks_itself_holds_any_load_and_is_driven_down_by_a(back: f
     assert lowered.energy_residual < 1e-10
 
 
+def test_a_load_that_changes_its_sign_leaves_a_self_locking_gear_at_rest() -> None:
+    load = sympy.Piecewise((-20.0, sw.t < 1), (20.0, sw.t < 2), (-sw.t, True))
+    sol = train(0.0, load, efficiency_back=-0.2).simulate(3.0)
+    assert set(modes(sol)) == {"stuck"}
+    assert np.all(sol["J_b.omega"] == 0)
+    np.testing.assert_allclose(sol["gear.tau_b"], sol["load.tau"], rtol=1e-15)
+
+
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_self_locking_gear_stops_its_load_in_the_time_that_the_loss_allows(engine: Any) -> None:
     back, omega = -0.2, -10.0
@@ -204,18 +213,30 @@ def test_two_stages_with_a_spring_between_move_as_by_hand() -> None:
         assert sol.energy_residual < 1e-10
 
 
-@sw.component
-class Mesh(sw.Component):
-    """A mesh with losses in one direction, without modes. Law: tau_b = -ratio share tau_a."""
+def mesh_of(*through: Callable[[Any], Any], **values: Any) -> sw.Component:
+    """A coupling with losses that knows no modes, whose through variables have the given factors."""
 
-    ratio: float = sw.parameter("1", "ratio")
-    share: float = sw.parameter("1", "of the torque that arrives")
+    @sw.component
+    class Mesh(sw.Component):
+        """Law: omega_a = ratio omega_b, torques as given."""
 
-    role = "coupling"
+        ratio: float = sw.parameter("1", "ratio")
+        share: float = sw.parameter("1", "of the torque that arrives", default=1.0)
 
-    def branches(self, p: Any) -> Iterator[Any]:
-        terms = ((sympy.Integer(1), "a", None), (-p.ratio, "b", None))
-        yield sw.LossyCoupling(terms, (sympy.Integer(1), -p.ratio * p.share))
+        role = "coupling"
+
+        def branches(self, p: Any) -> Iterator[Any]:
+            terms = ((sympy.Integer(1), "a", None), (-p.ratio, "b", None))
+            yield sw.LossyCoupling(terms, tuple(factor(p) for factor in through))
+
+    del REGISTRY["Mesh"]  # no public component
+    name = values.pop("name", "gear")
+    return Mesh(name, **values)
+
+
+def one_way(name: str, *, ratio: float, share: float) -> sw.Component:
+    """Law: tau_b = -ratio share tau_a, whichever side drives."""
+    return mesh_of(lambda _: sympy.Integer(1), lambda p: -p.ratio * p.share, name=name, ratio=ratio, share=share)
 
 
 def massless() -> sw.Network:
@@ -224,13 +245,13 @@ def massless() -> sw.Network:
     net.add(sw.Inertia("J1", J=0.4), "1")
     net.add(sw.TorqueSource("T", tau=2.0 * sympy.cos(sw.t)), "1")
     net.add(sw.Spring("c1", c=30.0), "1", "2")
-    net.add(Mesh("m1", ratio=2.0, share=0.8), "2", "3")
+    net.add(one_way("m1", ratio=2.0, share=0.8), "2", "3")
     net.add(sw.Spring("c2", c=50.0), "3", "4")
     net.add(sw.Inertia("J2", J=3.0), "4")
-    net.add(Mesh("m2", ratio=-3.0, share=0.7), "4", "5")
+    net.add(one_way("m2", ratio=-3.0, share=0.7), "4", "5")
     net.add(sw.Inertia("J3", J=9.0), "5")
     net.add(sw.Damper("d1", d=2.0), "5", "6")
-    net.add(Mesh("m3", ratio=1.5, share=0.6), "6", "7")
+    net.add(one_way("m3", ratio=1.5, share=0.6), "6", "7")
     net.add(sw.Damper("d2", d=4.0), "7")
     return net
 
@@ -277,7 +298,7 @@ def test_losses_of_meshes_balance_the_energy_and_every_node_its_torques() -> Non
 
 def test_small_motions_see_the_torque_ratios() -> None:
     """The response to a torque at a node without an inertia of its own, against the same by hand."""
-    net = train(0.0, 0.0, gear=Mesh("gear", ratio=RATIO, share=ETA))
+    net = train(0.0, 0.0, gear=one_way("gear", ratio=RATIO, share=ETA))
     net.add(sw.Damper("bearing", d=1.0), "drum")
     frequency = 0.3
     found = net.frequency_response("motor.tau", "J_b.omega", [frequency])
@@ -299,7 +320,7 @@ def test_equations_print_the_torques_with_their_efficiency_in_each_mode() -> Non
 def test_a_coupling_that_lets_no_torque_through_is_named() -> None:
     net = sw.Network("nothing balances")
     net.add(sw.TorqueSource("motor", tau=1.0), "rotor")
-    net.add(Blind("gear", ratio=3.0), "rotor", "drum")
+    net.add(mesh_of(lambda _: sympy.Integer(0), lambda p: -p.ratio, ratio=3.0), "rotor", "drum")
     net.add(sw.Inertia("J", J=1.0), "drum")
     with pytest.raises(NetworkError, match="lets no torque through"):
         net.compile()
@@ -313,25 +334,12 @@ def test_a_coupling_that_brakes_more_than_the_inertia_before_it_is_named(first: 
     inertias = {"rotor": 0.1, "drum": 5.0}
     for node in sorted(inertias, key=lambda node: node != first):
         net.add(sw.Inertia(f"J {node}", J=inertias[node]), node)
-    net.add(Mesh("gear", ratio=RATIO, share=share), "rotor", "drum")
+    net.add(one_way("gear", ratio=RATIO, share=share), "rotor", "drum")
     if jams:
         with pytest.raises(NetworkError, match="it jams"):
             net.compile()
     else:
         net.compile()
-
-
-@sw.component
-class Blind(sw.Component):
-    """A coupling of speeds that gives no torque to a. Law: tau_a = 0."""
-
-    ratio: float = sw.parameter("1", "ratio")
-
-    role = "coupling"
-
-    def branches(self, p: Any) -> Iterator[Any]:
-        terms = ((sympy.Integer(1), "a", None), (-p.ratio, "b", None))
-        yield sw.LossyCoupling(terms, (sympy.Integer(0), -p.ratio))
 
 
 def test_an_impact_keeps_the_momentum_that_the_mesh_lets_through() -> None:

@@ -29,8 +29,9 @@ class LossyGear(Component):
     or backward), stuck.
 
     A self-locking gear that would have to brake more inertia than there is on the side of a has no motion with b
-    driving: it stops at once. An impact passes with the torques of the mode that it meets, and a gear at rest holds it.
-    Shafts of travelling waves know no modes, so it cannot stand beside them.
+    driving: it stops at once. Behind a bare spring, with no inertia at node a, it would stop and start without end;
+    a run refuses that. An impact passes with the torques of the mode that it meets, and a gear at rest holds it. Shafts
+    of travelling waves know no modes, so it cannot stand beside them.
     Analogue: a transformer with different ratios of voltages and currents. Source: Pelchen, Schweiger and Otter 2002.
     """
 
@@ -90,7 +91,14 @@ def _flank(side: int) -> str:
 
 
 def _held(ahead: Any, back: Any) -> Iterator[Mode]:
-    """At rest, with the flank that carries the load: from there it can only turn on, driven or driving."""
+    """At rest, with the flank that carries the load: from there it turns on, gives way, or the load changes sides.
+
+    The last is beyond both other limits, by more than either.
+    """
     for side, (on, off) in ((1, ("forward", "backward")), (-1, ("backward", "forward"))):
-        leaves = (Leave(side * ahead, f"{DRIVING} {on}"), Leave(-side * back, f"{DRIVEN} {off}"))
+        leaves = (
+            Leave(side * ahead, f"{DRIVING} {on}"),
+            Leave(-side * back, f"{DRIVEN} {off}"),
+            Leave(side * (ahead - back), _flank(-side)),
+        )
         yield Mode(_flank(side), leaves, float(side), STUCK, says="stuck")

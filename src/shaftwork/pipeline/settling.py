@@ -266,9 +266,10 @@ class Settling:
         """
         elements, regime = self._phases.elements, moment.regime
         speed = abs(regime.assembly.across(number, after, moment.x, regime.p))
-        joined = self._joined(moment, after, number, leave.to, speed)
-        share = regime.assembly.constant(number, leave.rebound, regime.p)
-        rebound = leave.rebound is not None and share * speed > regime.assembly.constant(number, leave.rest, regime.p)
+        share, rest = (regime.assembly.constant(number, given, regime.p) for given in (leave.rebound, leave.rest))
+        # what moves more slowly than the rest of an impact stays as it is: two contacts would part and meet for ever
+        joined = self._joined(moment, after, number, leave.to, max(rest, NO_IMPACT * speed))
+        rebound = leave.rebound is not None and share * speed > rest
         changes = [Change(t, elements[number], regime.modes[number], leave.to, rebound, impact=True)]
         for k, (before, name) in enumerate(zip(regime.modes, joined.regime.modes, strict=True)):
             if k != number and name != before:
@@ -292,9 +293,9 @@ class Settling:
         x[state] = moment.x[state] - (beyond / slope if slope else 0.0)
         return Moment(regime, x)
 
-    def _joined(self, moment: Moment, t: float, number: int, to: str, speed: float) -> Moment:
+    def _joined(self, moment: Moment, t: float, number: int, to: str, least: float) -> Moment:
         """After an inelastic impact. What holds by a limited torque slips in it; contacts are pressed, not pulled."""
-        before, elements, least = moment.regime.modes, self._phases.elements, NO_IMPACT * speed
+        before, elements = moment.regime.modes, self._phases.elements
         gives = {k: elements[k].modes[name].gives_way for k, name in enumerate(before) if k != number}
         gives = {k: ways for k, ways in gives.items() if ways}
         made = {number: to, **{k: ways[0][1] for k, ways in gives.items()}}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from shaftwork.scenes.bldc_shaft import bldc_shaft
 from shaftwork.scenes.catalog import SCENES, Scene
 from shaftwork.scenes.crane import crane, crane_start, six_phases
 from shaftwork.scenes.excavator import excavator
@@ -12,6 +13,7 @@ from shaftwork.scenes.ship_line import ship_line
 __all__ = [
     "SCENES",
     "Scene",
+    "bldc_shaft",
     "crane",
     "crane_start",
     "excavator",

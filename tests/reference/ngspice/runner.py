@@ -12,9 +12,12 @@ from numpy.typing import NDArray
 from tests.reference.ngspice.cases import Case
 
 Array = NDArray[np.float64]
+OPTIONS = "reltol=1e-6 abstol=1e-12 vntol=1e-9 chgtol=1e-18 method=trap"
 
 
-def run_ngspice(netlist: str, expressions: tuple[str, ...], t_end: float, step: float) -> tuple[Array, Array]:
+def run_ngspice(
+    netlist: str, expressions: tuple[str, ...], t_end: float, step: float, options: str = OPTIONS
+) -> tuple[Array, Array]:
     """A transient analysis from rest with at most `step` s between its points.
 
     Returns:
@@ -27,7 +30,7 @@ def run_ngspice(netlist: str, expressions: tuple[str, ...], t_end: float, step: 
     deck = [
         "* equivalent circuit of a drive train",
         netlist.strip(),
-        ".options reltol=1e-6 abstol=1e-12 vntol=1e-9 chgtol=1e-18 method=trap",
+        f".options {options}",
         f".tran {step!r} {t_end!r} 0 {step!r} uic",
         ".control",
         "set numdgt=14",
