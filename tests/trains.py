@@ -62,6 +62,7 @@ class _Builder:
     def __init__(self, choose: Choose, *, rigid: bool) -> None:
         self.choose, self.rigid = choose, rigid
         self.parts: list[Part] = []
+        self.speeds: dict[str, float] = {}
         self._count: dict[str, int] = {}
 
     def add(self, kind: str, *nodes: str, **values: Any) -> None:
@@ -101,7 +102,7 @@ class _Builder:
 
     def freewheel(self, a: str, b: str) -> None:
         if not self.rigid:
-            return self.spring(a, b)
+            return self.friction(a, b) if b != GROUND else self.friction(a)
         if self.choose(1, 0):
             a, b = b, a
         return self.add("Freewheel", a, b)
@@ -109,6 +110,7 @@ class _Builder:
     def gear(self, a: str, b: str) -> None:
         ratio = self.choose(2.0, 3.0, -0.5, 0.3)
         if self.choose(1, 0):
+            self.speeds[b] = self.speeds[a] / ratio
             return self.add("Gear", a, b, ratio=ratio)
         self.add("Gear", a, f"{a} geared", ratio=ratio)
         return self.spring(f"{a} geared", b)
@@ -123,9 +125,8 @@ class _Builder:
             self.add("TorqueSource", a, tau=law)
 
     def joint(self, a: str, b: str) -> None:
-        made = self.choose(
-            self.spring, self.gap, self.friction, self.brake, self.gear, self.gap, self.rigid_gap, self.freewheel
-        )
+        plain = (self.spring, self.gear) if self.parts[-1].type != "Inertia" else ()
+        made = self.choose(self.gap, self.friction, self.brake, *plain, self.gap, self.rigid_gap, self.freewheel)
         made(a, b)
         if made in (self.friction, self.brake, self.freewheel) and self.choose(1, 0):
             self.spring(a, b)
@@ -154,14 +155,14 @@ def trains(draw: st.DrawFn, most: int = 8, *, rigid: bool = True) -> Train:
 
     made = _Builder(choose, rigid=rigid)
     nodes = [f"r{k}" for k in range(draw(st.integers(2, most)))]
-    initial = {}
-    for k, node in enumerate(nodes, start=1):
+    for node in nodes:
         made.add("Inertia", node, J=choose(1.0, 0.5, 0.1, 2.0))
-        initial[f"inertia{k}.omega"] = choose(0.0, 1.0, -1.0, 5.0, -3.3, 20.0)
+        made.speeds[node] = choose(0.0, 1.0, -1.0, 5.0, -3.3, 20.0)
     for a, b in pairwise(nodes):
         made.joint(a, b)
     made.torque(choose(*nodes))
     for _ in range(draw(st.integers(0, 4))):
         a, b = draw(st.permutations(nodes))[:2]
         made.addition(a, b)
+    initial = {f"inertia{k}.omega": made.speeds[node] for k, node in enumerate(nodes, start=1)}
     return Train(tuple(made.parts), initial, choose(0.5, 1.0))

@@ -66,7 +66,11 @@ class DryFriction(Component):
         "N*m", "torque up to which it holds, by default tau_c", at_least=0, default=None, latex=r"\tau_s"
     )
     omega_s: float = parameter(
-        "rad/s", "speed of the fall from tau_s to tau_c", above=0, default=0.1, latex=r"\omega_s"
+        "rad/s",
+        "speed of the fall from tau_s to tau_c; zero: at once",
+        at_least=0,
+        default=0.1,
+        latex=r"\omega_s",
     )
     d: float = parameter("N*m*s/rad", "viscous friction", at_least=0, default=0.0)
 

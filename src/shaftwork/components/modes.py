@@ -40,6 +40,11 @@ class Leave:
     rebound: Expr | None = None
     rest: Expr | None = None
 
+    @cached_property
+    def by_torque(self) -> bool:
+        """Whether a torque ends the mode, and not speeds, twists and the time alone."""
+        return bool(self.when.has(THROUGH))
+
 
 @dataclass(frozen=True)
 class Mode:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -15,7 +16,7 @@ from shaftwork.pipeline.prepared import NOMINAL
 
 # A guard within so many rounding units of zero is on its limit, and only its further course tells its side.
 ROUNDINGS = 64.0
-# A phase that starts beyond a limit meets it again where it is farther beyond by so many bands.
+# A phase that starts at a limit or beyond meets it again where it is farther beyond by so many bands.
 CLEAR = 8
 # What is as good as zero, and is not.
 NOTHING = 1e-200
@@ -71,7 +72,8 @@ class Regime:
     def rounded(self, x: list[float], rates: list[float], tick: float) -> list[float]:
         """The states so far away as rounding may move them, and the time by a tick in s."""
         changes = zip(x, rates, self._rounding, strict=True)
-        return [v + part * abs(v) + least + tick * rate for v, rate, (part, least) in changes]
+        # all of it to the same side: what a tick moves must not make up for the rest
+        return [v + part * abs(v) + least + math.copysign(tick * rate, part) for v, rate, (part, least) in changes]
 
 
 class Moment(NamedTuple):
@@ -83,15 +85,15 @@ class Moment(NamedTuple):
 
 
 def clear_of_limits(regime: Regime, now: Sequence[float], bands: Sequence[float]) -> list[float]:
-    """The bands, wider where a guard is at its own or beyond: a phase that starts there has not met it.
+    """The bands, wider where a guard is near its own or beyond: a phase that starts there has not met it.
 
     None is zero: where a value is exactly zero at the start of a step, heyoka finds none of its later zeros in it.
     """
     made = [band or NOTHING for band in bands]
     for _, watched in regime.watched:
         k, value = watched.guard, watched.side * now[watched.guard]
-        if 4 * value > bands[k]:
-            made[k] = value + CLEAR * bands[k]
+        if 2 * value > -CLEAR * bands[k]:
+            made[k] = max(value, 0.0) + CLEAR * bands[k] or NOTHING
     return made
 
 

@@ -112,6 +112,7 @@ class Settling:
         """
         changes: list[Change] = []
         seen: dict[ModeNames, None] = {}
+        in_order = False
         # a guard is met where it is beyond zero by its band, which then still is the band of what is the same after it
         ended = moment
         if met is None:
@@ -124,13 +125,26 @@ class Settling:
             if made and made[0].impact:
                 seen.clear()
             elif made and moment.regime.modes in seen:
-                raise self._endless(t, changes)
+                if in_order:
+                    raise self._endless(t, changes)
+                in_order = True
+                seen.clear()
             seen[moment.regime.modes] = None
-            moment, found = self._violated(moment, after, ended)
+            moment, found = self._violated(moment, after, ended, in_order=in_order)
         return moment, changes
 
-    def _violated(self, moment: Moment, t: float, ended: Moment) -> tuple[Moment, tuple[int, Watched] | None]:
-        """The guard that is farthest beyond its limit, or on it and about to go beyond; the moment with its bands."""
+    def _violated(
+        self, moment: Moment, t: float, ended: Moment, *, in_order: bool = False
+    ) -> tuple[Moment, tuple[int, Watched] | None]:
+        """The guard that is farthest beyond its limit, or on it and about to go beyond; the moment with its bands.
+
+        Args:
+            moment: modes and states.
+            t: s.
+            ended: the moment before any change.
+            in_order: take the first one instead. The worst leads faster to modes that are consistent, as a rule; but
+                this always does where parts hold each other (Murty, Linear Complementarity, 1988, section 4.1).
+        """
         regime, x = moment.regime, moment.x.tolist()
         rates, now = regime.motion(t, x)
         moved = regime.rounded(x, rates, self.tick)
@@ -139,8 +153,7 @@ class Settling:
         wide = bands
         if ended.bands and ended.regime.assembly is regime.assembly:
             wide = list(map(max, bands, ended.bands))
-        worst, largest = None, 0.0
-        on_limit = []
+        beyond, on_limit = [], []
         for pair in regime.watched:
             k = pair[1].guard
             value = pair[1].side * now[k]
@@ -148,11 +161,16 @@ class Settling:
                 continue
             if value <= wide[k] or pair[1].leave.rebound is not None:  # only what comes nearer is thrown back
                 on_limit.append(pair)
-            elif value > largest:
-                worst, largest = pair, value
-        if on_limit and worst is None:
-            worst = self._next(regime, (t, x, rates, now), (t + self.tick, moved, others, near), on_limit)
-        return Moment(regime, moment.x, clear_of_limits(regime, now, bands)), worst
+            elif value > 0:
+                beyond.append((value, pair))
+        # impacts come first: torques are those of the motion after them
+        hits = [found for found in beyond if not found[1][1].leave.by_torque]
+        if on_limit and not hits:
+            leaving = self._leaving(regime, (t, x, rates, now), (t + self.tick, moved, others, near), on_limit)
+            hits = [found for found in leaving if found[1][1].leave.rebound is not None]
+            beyond = beyond + leaving if in_order else beyond or leaving
+        chosen = _chosen(hits or beyond, in_order=in_order)
+        return Moment(regime, moment.x, clear_of_limits(regime, now, bands)), chosen
 
     def ahead(self, regime: Regime, rates: list[float]) -> float:
         """How far in s the further course is looked at."""
@@ -162,10 +180,10 @@ class Settling:
                 step = AHEAD * size / abs(rate)
         return step
 
-    def _next(
+    def _leaving(
         self, regime: Regime, here: Course, beside: Course, on_limit: list[tuple[int, Watched]]
-    ) -> tuple[int, Watched] | None:
-        """Of guards on their limit the one that is about to go farthest beyond it, as far as rounding tells.
+    ) -> list[tuple[float, tuple[int, Watched]]]:
+        """Of guards on their limit those that are about to go beyond it, and how far, as surely as rounding tells.
 
         Args:
             regime: the modes.
@@ -174,18 +192,17 @@ class Settling:
             on_limit: elements and guards.
         """
         step = self.ahead(regime, here[2])
-        ways = here, beside
+        ways, found = (here, beside), []
         for _ in range(2):  # where nothing moves yet, its acceleration tells
             ways = _later(regime, step, ways[0]), _later(regime, step, ways[1])
-            found, largest = None, 0.0
             for number, made in on_limit:
                 k = made.guard
                 gain, other = made.side * (ways[0][3][k] - here[3][k]), made.side * (ways[1][3][k] - beside[3][k])
-                if gain > max(largest, abs(gain - other)):
-                    found, largest = (number, made), gain
-            if found is not None:
-                return found
-        return None
+                if gain > max(0.0, abs(gain - other)):
+                    found.append((gain, (number, made)))
+            if found:
+                break
+        return found
 
     def _follow(
         self, t: float, after: float, moment: Moment, number: int, ended: Watched
@@ -337,6 +354,13 @@ class Settling:
 def _with(modes: ModeNames, changed: Mapping[int, str]) -> ModeNames:
     """A combination of modes with some of them changed."""
     return tuple(changed.get(k, name) for k, name in enumerate(modes))
+
+
+def _chosen(found: list[tuple[float, tuple[int, Watched]]], *, in_order: bool) -> tuple[int, Watched] | None:
+    """Of elements and guards the first one, or else the one that is farthest beyond."""
+    if not found:
+        return None
+    return (min(found, key=lambda one: one[1][0]) if in_order else max(found, key=lambda one: one[0]))[1]
 
 
 def _later(regime: Regime, step: float, course: Course) -> Course:

@@ -79,7 +79,7 @@ BLDC_SHAFT = enter(
         t_end=0.5,
         signals=("motor.tau", "motor.i_a", "line.tau_a", "line.tau_b", "Je.omega", "Jm.omega"),
         chosen=(
-            "direct voltage 540 V (400 V mains, rectified), two pole pairs, flat tops of 120 degrees; the 212 V are the "
+            "direct voltage 540 V (400 V mains, rectified), two pole pairs, flat tops of 120 degrees; 212 V are the "
             "flat top of a phase at 3000 1/min, and L_mu and L_sigma together are the inductance of a phase",
             "load of 12.7 N m (4 kW at 3000 1/min), against the motion from standstill on",
             "shear modulus 77.5 GPa (steel) instead of the printed 7750 MN/m2",

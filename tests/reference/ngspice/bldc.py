@@ -83,14 +83,14 @@ class Motion:
     Args:
         start: angle of the rotor at first, rad.
         t_end: end, s.
+        steps: time steps of ngspice, s, the second half of the first.
         locked: whether the rotor is held.
-        steps: time steps of ngspice, s, each half of the one before.
     """
 
     start: float
     t_end: float
-    locked: bool
     steps: tuple[float, float]
+    locked: bool = False
 
     @property
     def times(self) -> Array:
@@ -110,8 +110,8 @@ class Motion:
 
 
 MOTIONS = {
-    "locked": Motion(math.pi / 6 + 0.05, 0.1, True, (8e-6, 4e-6)),
-    "running": Motion(0.0, 0.05, False, (5e-7, 2.5e-7)),
+    "locked": Motion(math.pi / 6 + 0.05, 0.1, locked=True, steps=(8e-6, 4e-6)),
+    "running": Motion(0.0, 0.05, locked=False, steps=(5e-7, 2.5e-7)),
 }
 """At the angle of the locked rotor a is high, b is low and c is open."""
 
