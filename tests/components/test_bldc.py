@@ -89,7 +89,7 @@ def test_electrical_power_is_mechanical_power_copper_loss_and_what_is_stored() -
 
 
 def test_a_locked_rotor_takes_the_current_of_two_phases_in_series() -> None:
-    """At theta = 60 degrees a is high and c is low, b open: i = U / 2R (1 - exp(-R t / L)), tau = 2 k i."""
+    """At theta = 66 degrees a is high and b is low, c open: i = U / 2R (1 - exp(-R t / L)), tau = 2 k i."""
     net = sw.Network("locked")
     net.add(sw.BLDCMotor("m", **DATA), "rotor")
     net.add(sw.SpeedSource("lock", omega=0.0), "rotor", "ground")
@@ -99,6 +99,7 @@ def test_a_locked_rotor_takes_the_current_of_two_phases_in_series() -> None:
     np.testing.assert_allclose(np.abs(sol["m.i_b"]), current, rtol=1e-9, atol=1e-9 * current.max())
     np.testing.assert_allclose(sol["m.tau"], 2 * DATA["k"] * current, rtol=1e-9, atol=1e-9)
     assert np.all(sol["m.i_a"] + sol["m.i_b"] + sol["m.i_c"] == 0)
+    assert np.all(sol["m.i_c"] == 0)
 
 
 @pytest.mark.parametrize("pole_pairs", [1.0, 2.0])

@@ -140,3 +140,17 @@ def test_a_wrong_kind_is_answered_with_the_kinds() -> None:
     net = sw.Network("travel")
     net.add(sw.RandomLoad("w", mean=22.4, std=10.0, interval=0.05, kind="white"), "shaft")
     assert any("held, band-limited" in str(problem) for problem in net.check())
+
+
+@pytest.mark.parametrize("kind", ["held", "band-limited"])
+def test_under_a_random_load_there_is_no_steady_operation_but_at_a_named_time(kind: str) -> None:
+    """Held noise has no slope in time, and yet never stops changing."""
+    net = sw.Network("random")
+    net.add(sw.KlossMotor("motor", tau_k=9.6, s_k=0.25, n_sync=3000), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.RandomLoad("load", mean=3.0, std=1.0, interval=0.05, kind=kind), "a")
+    model = net.compile()
+    with pytest.raises(sw.SimulationError, match="load never stops changing, so there is no steady operation"):
+        model.steady_state()
+    assert 290 < model.steady_state(t=1.0)["J.omega"] < 314
+    assert 290 < model.steady_state(parameters={"load.std": 0.0})["J.omega"] < 314

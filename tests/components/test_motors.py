@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
 from collections.abc import Callable
@@ -132,7 +133,7 @@ def test_a_cage_motor_is_continuous_and_finite_at_every_speed(ratio: float) -> N
         ({"tau_s": 6000.0}, "tau_s = 6000 N m must be less than tau_k = 5550 N m"),
         ({"tau_a": 4000.0}, "not more than tau_a = 4000 N m"),
         ({"tau_n": None}, "give the rated point tau_n and n_n, or the pull-out speed n_k"),
-        ({"tau_n": 6000.0}, "the rated point tau_n = 6000 N m"),
+        ({"tau_n": 6000.0}, "the rated torque tau_n = 6000 N m"),
         ({"n_n": 1000.0}, "the synchronous speed n_sync = 1000 1/min"),
         ({"n_n": 700.0}, "the pull-out speed n_k = -313"),
         ({"n_k": 1200.0}, "the pull-out speed n_k = 1200 1/min must lie between 0 and n_sync"),
@@ -302,3 +303,18 @@ def test_the_nameplates_hold_what_the_source_prints_and_say_what_is_chosen() -> 
         for part in (plate.cage("m"), plate.kloss("m"), plate.drive("m", f=plate.f_n)):
             assert curve(part, plate.n_n) == pytest.approx(plate.tau_n, rel=1e-12)
     assert sw.motors["KBF-90 LA 2"].cage("m", ratio=35.5, t_off=6.5).t_off == 6.5
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"tau_k": 3.0}, r"tau_n = 3.8 N m is not less than the pull-out torque tau_k = 3 N m.*times tau_n"),
+        ({"n_n": 3010.0}, r"n_n = 3010 1/min is not less than the synchronous speed n_sync = 3000 1/min.*60 f / pole"),
+    ],
+)
+def test_a_rated_point_that_no_curve_passes_through_is_refused_with_what_to_give(wrong, said: str) -> None:
+    with pytest.raises(sw.ParameterError, match=f"Nameplate 'KBF-90 LA 2': .*{said}"):
+        dataclasses.replace(sw.motors["KBF-90 LA 2"], **wrong)
+    plate = {"tau_a": 7.0, "tau_s": 2.0, "tau_k": 8.0, "tau_n": 3.8, "n_n": 2510.0, "n_sync": 3000.0}
+    with pytest.raises(sw.ParameterError, match=f"CageMotor 'm': .*{said}"):
+        sw.CageMotor("m", **(plate | wrong))

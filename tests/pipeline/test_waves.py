@@ -140,7 +140,7 @@ def test_a_short_wave_beside_a_nonlinear_load_says_how_many_panels_it_takes() ->
     net.add(sw.Shaft("long", length=1.0, diameter=0.02, **STEEL, model=sw.Wave()), "m", "x")
     net.add(sw.Shaft("short", length=1e-3, diameter=0.02, **STEEL, model=sw.Wave()), "x", "l")
     net.add(sw.Inertia("Jm", J=0.1), "l")
-    net.add(sw.CoulombLoad("load", tau=2.0), "l")
+    net.add(sw.CoulombLoad("load", tau=2.0, omega_s=0.01), "l")
     text = r"shaft 'short' in 3\.2e-07 s.*at least 3\.1e\+05 panels.*OneSpring\(\) or Spectral"
     with pytest.warns(sw.NetworkWarning, match=text), pytest.raises(sw.SimulationError, match="5 steps"):
         net.simulate(0.1, max_steps=5)
@@ -257,3 +257,56 @@ def test_waves_that_are_not_resolved_any_more_say_so() -> None:
     net = train(sw.Wave(), drive=sympy.Piecewise((12.7, sw.t < 0.1), (0, True)))
     with pytest.warns(sw.AccuracyWarning, match=r"delays the modes have run out of step.*of the largest wave is not"):
         net.simulate(300.0, t_eval=41, rtol=1e-10)
+
+
+def beside(part: sw.Component, *nodes: str, model: object = None) -> sw.Network:
+    net = train(sw.Wave() if model is None else model)
+    net.add(sw.Inertia("J3", J=0.05), "x")
+    net.add(sw.Spring("s", c=100.0, d=0.1), "l", "x")
+    net.add(part, *nodes)
+    return net
+
+
+def test_friction_beside_a_wave_is_rounded_and_says_so_once() -> None:
+    with pytest.warns(
+        sw.AccuracyWarning, match=r"\('line'\) nothing sticks; the friction of 'load' is rounded"
+    ) as said:
+        modes = beside(sw.CoulombLoad("load", tau=2.0), "l").modes(count=3)
+    assert len(said) == 1
+    # the slope of the rounded law damps whatever rests: its meshes must have the same law
+    damped = beside(sw.Damper("load", d=2.0 / 0.01), "l").modes(count=3)
+    assert modes.rates == pytest.approx(damped.rates, rel=1e-9)
+
+
+def test_a_brake_beside_a_wave_comes_on_at_its_time() -> None:
+    """Rounding over 0.01 rad/s changes a speed of some 10 rad/s by nothing before it is at rest."""
+    brake, times = sw.Brake("brake", tau=5.0, t_on=0.1), [0.05, 0.1, 0.12, 0.15]
+    with pytest.warns(sw.AccuracyWarning, match="'brake'"):
+        wave = beside(brake, "l").simulate(0.15, t_eval=times)
+    mesh = beside(brake, "l", model=sw.Spectral(16)).simulate(0.15, t_eval=times)
+    assert wave["Jm.omega"] == pytest.approx(mesh["Jm.omega"], rel=1e-4)
+    assert wave["brake.tau"][[0, 2]] == pytest.approx([0.0, 5.0])
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        sw.Freewheel("part"),
+        sw.Backlash("part", gap=0.01),
+        sw.Brake("part", tau=1.0, on=sw.omega - 3),
+        sw.BLDCMotor("part", U=50.0, R=1.0, L=1e-3, k=0.1),
+    ],
+    ids=lambda part: type(part).__name__,
+)
+def test_what_has_no_law_of_all_its_modes_is_refused_beside_a_wave(part: sw.Component) -> None:
+    """They were left open for ever without a word."""
+    nodes = ("l", "x") if len(part.ports) > 1 else ("l",)
+    with pytest.raises(sw.ParameterError, match=r"'part'.* which travelling waves do not follow"):
+        beside(part, *nodes).compile()
+
+
+def test_beside_a_wave_there_are_no_phases_to_ask_for() -> None:
+    net = beside(sw.CoulombLoad("load", tau=2.0), "l")
+    assert net.equations().phase == ""
+    with pytest.raises(sw.ParameterError, match=r"beside travelling waves \('line'\)"):
+        net.equations(phase="load stuck")

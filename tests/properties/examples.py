@@ -46,7 +46,7 @@ def processor_time_limit(seconds: float) -> Iterator[None]:
         raise AssertionError(f"still running after {seconds:g} s of processor time")
 
     before = signal.signal(signal.SIGVTALRM, give_up)
-    signal.setitimer(signal.ITIMER_VIRTUAL, seconds)
+    signal.setitimer(signal.ITIMER_VIRTUAL, seconds, 1.0)  # again, should a callback of an engine swallow the first
     try:
         yield
     finally:

@@ -143,7 +143,7 @@ class Witness:
 
 
 @given(trains())
-@share_of_examples(0.15)
+@share_of_examples(0.3)
 def test_every_step_lies_in_the_region_of_its_modes(train: Train) -> None:
     sol = moved(train)
     assert list(Witness(train, sol).objections()) == []
@@ -190,7 +190,7 @@ def assert_alike(train: Train, one: Solution, other: Solution) -> None:
 
 
 @given(trains(most=5))
-@share_of_examples(0.08)
+@share_of_examples(0.12)
 def test_engines_agree_in_the_end_and_in_the_events(train: Train) -> None:
     found = {engine: moved(train, engine) for engine in ENGINES}
     for engine in ENGINES[1:]:
@@ -199,7 +199,7 @@ def test_engines_agree_in_the_end_and_in_the_events(train: Train) -> None:
 
 
 @given(trains(most=5))
-@share_of_examples(0.08)
+@share_of_examples(0.1)
 def test_energy_goes_to_the_parts_that_lose_it_and_none_is_left_over(train: Train) -> None:
     sol = moved(train)
     balance = sol.energy
@@ -222,7 +222,7 @@ def turned(part: Part) -> Part:
 
 
 @given(trains(most=5), st.randoms(use_true_random=False))
-@share_of_examples(0.08)
+@share_of_examples(0.1)
 def test_names_order_and_direction_of_parts_change_nothing(train: Train, random: object) -> None:
     parts = [turned(part) for part in train.parts]
     random.shuffle(parts)  # type: ignore[attr-defined]
@@ -240,12 +240,11 @@ def test_names_order_and_direction_of_parts_change_nothing(train: Train, random:
 
 
 def test_a_train_that_cannot_go_on_ends_in_one_named_error() -> None:
-    """A weight on a rigid stop that throws back all speed, between two of them that come nearer, never rests."""
+    """A wheel between two stops that throw back all its speed, a billionth of a radian apart."""
     train = Train(
         (
             Part("Inertia", "J", ("a",), {"J": 1.0}),
-            Part("TorqueSource", "weight", ("a",), {"tau": 1.0}),
-            Part("HardStop", "stop", ("a",), {"upper": 0.0, "restitution": 0.5, "omega_rest": 1e-30}),
+            Part("HardStop", "stop", ("a",), {"upper": 1e-9, "lower": 0.0, "restitution": 1.0}),
         ),
         {"J.omega": 1.0},
         5.0,

@@ -282,3 +282,17 @@ def test_the_spectral_shaft_has_the_frequencies_of_the_wave_equation() -> None:
     along = modes.shapes["line.omega"]
     assert along.shape[0] == len(modes)
     np.testing.assert_allclose(along[:, [0, -1]].T, [modes.shapes["a.omega"], modes.shapes["b.omega"]], atol=1e-14)
+
+
+def test_at_rest_laws_are_read_at_the_start_and_parts_are_in_the_mode_they_have_there() -> None:
+    """The load sticks and the brake, which comes on after 6.5 s, does not yet; the motor's curve drives at standstill.
+
+    Damping is 4 % of critical, so |rate| is that of the inertias and springs to a part in a hundred.
+    """
+    net = sw.scenes.crane()
+    stuck, moving = net.modes(), net.modes(at={"J1.omega": 8.0, "J2.omega": 8.0}, t=0.0)
+    assert stuck.frequencies == pytest.approx([np.sqrt(24206.0 / 27.35) / (2 * np.pi)], rel=0.01)
+    assert moving.frequencies == pytest.approx([0, np.sqrt(24206.0 * (1 / 27.35 + 1 / 62.5)) / (2 * np.pi)], rel=0.01)
+    assert stuck.title == "crane (brake released, load stuck)"
+    assert moving.title == "crane (brake released, load slipping forward)"
+    assert net.modes(t=8.0).title == "crane (brake locked, load stuck)"

@@ -85,3 +85,11 @@ def test_the_small_mass_is_at_its_steady_speed_within_the_run_and_the_large_one_
     assert 100 * np.pi < steady < 120 * np.pi
     assert 0.95 * steady < motion(0.025)["Jm.omega"][-1] < steady
     assert motion(0.11)["Jm.omega"][-1] < 0.85 * steady
+
+
+def test_a_finer_output_grid_changes_no_commutation() -> None:
+    """Its times cut steps to lengths at which the fast engine sees no event, right beside those of the motor."""
+    found = (compiled(sw.OneSpring()).simulate(T_END, t_eval=5001), motion(0.11, sw.OneSpring()))
+    fine, plain = (sorted(sol.events, key=lambda event: (event[1], event[0])) for sol in found)  # two change at once
+    assert [event[1:] for event in fine] == [event[1:] for event in plain]
+    np.testing.assert_allclose([e[0] for e in fine], [e[0] for e in plain], rtol=0, atol=1e-9)

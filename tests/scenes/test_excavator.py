@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from typing import Any
 
@@ -52,3 +53,22 @@ def test_the_motor_makes_no_warning_that_the_scene_has_answered() -> None:
     sw.scenes.excavator()
     with pytest.warns(sw.NetworkWarning, match="turns once more"):
         sw.motors["excavator 250 kW"].cage("motor", n_s=537.0)
+
+
+@pytest.mark.parametrize("soil", ["fault zone", "transitional zone", "grey clay"])
+def test_a_soil_is_found_by_its_name_from_python_and_from_a_file(soil: str, tmp_path) -> None:
+    net = sw.scenes.excavator(soil)
+    net.save(tmp_path / "excavator.toml")
+    text = (tmp_path / "excavator.toml").read_text(encoding="utf-8")
+    by_name = re.sub(r"soil = .*", f'soil = "{soil}"', text)
+    (tmp_path / "by name.toml").write_text(by_name, encoding="utf-8")
+    with pytest.warns(sw.NetworkWarning, match="quartic"):
+        loaded = sw.Network.load(tmp_path / "by name.toml")
+    assert loaded.parts[-1].soil in (soil, net.parts[-1].soil)
+    assert loaded.parts[-1].mean_torque == net.parts[-1].mean_torque
+
+
+def test_an_unknown_soil_is_one_problem_that_names_those_there_are() -> None:
+    with pytest.raises(sw.NetworkError, match=r"'sand' is no soil\. The soils are: fault zone,.* grey clay") as said:
+        sw.scenes.excavator("sand").compile()
+    assert len(said.value.problems) == 1

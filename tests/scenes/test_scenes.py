@@ -74,3 +74,7 @@ def test_a_chain_needs_two_elements() -> None:
 def test_the_crane_motor_pulls_out_above_its_rated_torque() -> None:
     with pytest.raises(sw.ParameterError, match="must be more than the rated"):
         sw.scenes.crane_start(3.8)
+
+
+def test_the_list_of_scenes_begins_with_the_simplest_crane() -> None:
+    assert list(sw.scenes.SCENES)[:4] == ["crane-start", "crane", "six-phases", "excavator"]

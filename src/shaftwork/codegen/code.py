@@ -3,21 +3,42 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from functools import reduce
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache, reduce
 from typing import Any
 
-from sympy import And, Expr, Float, Or, Pow, S, Symbol, lambdify
+import numpy as np
+from sympy import ITE, And, Basic, Expr, Float, Or, Piecewise, Pow, S, Symbol
 from sympy.printing.numpy import NumPyPrinter
 from sympy.printing.pycode import PythonCodePrinter
 
 from shaftwork.components.laws import NUMERICAL
 
-SETTINGS = {"fully_qualified_modules": False, "inline": True, "allow_unknown_functions": True}
+# Terms are printed as sympy keeps them, the same in every process; to sort them would take longer than the rest.
+SETTINGS = {"fully_qualified_modules": False, "inline": True, "allow_unknown_functions": True, "order": "none"}
+SCALAR = {**vars(math), **NUMERICAL}
+VECTORISED = {**vars(np), "reduce": reduce, **NUMERICAL}
+KEPT = 4096
+"""Functions of single laws that are kept: the same ones come back in every set of equations."""
 
 
 class _Real:
-    """Numbers as the floats that they are, and powers that are real or no number."""
+    """Numbers as the floats that they are, and powers that are real or no number.
+
+    Args:
+        known: names of symbols and of expressions that have been evaluated before.
+    """
+
+    def __init__(self, known: Mapping[Symbol, str]) -> None:
+        super().__init__(SETTINGS)  # type: ignore[call-arg]
+        self.known: dict[Basic, str] = dict(known)
+
+    def doprint(self, expression: Expr) -> str:
+        return self._print(expression)
+
+    def _print(self, node: Any, **options: Any) -> str:
+        name = self.known.get(node) if isinstance(node, Basic) else None
+        return name or str(super()._print(node, **options))  # type: ignore[misc]
 
     def _print_Float(self, number: Float) -> str:
         return repr(float(number))  # sympy prints 15 digits, which is another float
@@ -26,7 +47,7 @@ class _Real:
         if abs(power.exp) == S.Half or power.exp.is_integer:
             return str(super()._print_Pow(power, rational))  # type: ignore[misc]
         # Python's own ** gives a complex number for a negative base.
-        base, exponent = self._print(power.base), self._print(power.exp)  # type: ignore[attr-defined]
+        base, exponent = self._print(power.base), self._print(power.exp)
         return f"{self.power}({base}, {exponent})"  # type: ignore[attr-defined]
 
 
@@ -55,38 +76,105 @@ class _Vectorised(_Real, NumPyPrinter):  # type: ignore[misc]
     def _print_Or(self, condition: Or) -> str:
         return self._joined("logical_or", condition)
 
+    def _print_Piecewise(self, pieces: Piecewise) -> str:
+        # sympy's printer simplifies a condition that holds another one, which takes seconds
+        conditions, values = (", ".join(self._print(piece.args[k]) for piece in pieces.args) for k in (1, 0))
+        return f"select([{conditions}], [{values}], default=nan)"
+
+    def _print_ITE(self, choice: ITE) -> str:
+        return f"where({', '.join(self._print(part) for part in choice.args)})"
+
     def _joined(self, function: str, condition: And | Or) -> str:
         # sympy's printer stacks the conditions, which fails where one is of the time and another of many states
         first, *others = (self._print(part) for part in condition.args)
         return str(reduce(lambda joined, other: f"{function}({joined}, {other})", others, first))
 
 
-def scalar(arguments: Sequence[Any], expressions: Any, *, shared: bool = True) -> Callable[..., Any]:
-    """Expressions as a function of floats.
+def scalar(
+    arguments: Sequence[Symbol] | Mapping[str, Symbol | Sequence[Symbol]], expressions: Sequence[Expr]
+) -> Callable[..., Any]:
+    """Expressions as one function of floats to a list of floats; its code is its `__doc__`.
 
     Args:
-        arguments: symbols or lists of symbols.
-        expressions: one, or a list of them.
-        shared: whether common subexpressions are looked for.
+        arguments: symbols; or, by names for the code, a symbol or those of the floats in a list.
+        expressions: what stands in them more than once is evaluated once.
     """
-    printer, modules = _Scalar(SETTINGS), [NUMERICAL, math]
-    function: Callable[..., Any] = lambdify(arguments, expressions, modules=modules, printer=printer, cse=shared)
-    return function
+    if not isinstance(arguments, Mapping):
+        arguments = {f"v{k}": symbol for k, symbol in enumerate(arguments)}
+    known: dict[Basic, str] = {}
+    lines = []
+    used = set[Basic]().union(*(made.free_symbols for made in expressions))
+    for name, given in arguments.items():
+        if isinstance(given, Symbol):
+            known[given] = name
+            continue
+        taken = {symbol: k for k, symbol in enumerate(given) if symbol in used}
+        lines += [f"{name}{k} = {name}[{k}]" for k in taken.values()]
+        known |= {symbol: f"{name}{k}" for symbol, k in taken.items()}
+    return _function(_Scalar(known), lines, tuple(arguments), expressions, SCALAR)
 
 
 def vectorised(symbols: Sequence[Symbol], expression: Expr) -> Callable[..., Any]:
     """An expression as a function of arrays or floats."""
+    return _vectorised(tuple(symbols), expression)
+
+
+@lru_cache(maxsize=KEPT)
+def _vectorised(symbols: tuple[Symbol, ...], expression: Expr) -> Callable[..., Any]:
     if len(symbols) == 1 and expression == symbols[0]:
         return lambda value: value
-    printer, modules = _Vectorised(SETTINGS), [NUMERICAL, "numpy"]
-    function: Callable[..., Any] = lambdify(list(symbols), expression, modules=modules, printer=printer, cse=True)
-    return function
+    return _array_function(symbols, expression)
 
 
 def vectorised_list(symbols: Sequence[Symbol], expressions: Sequence[Expr]) -> Callable[..., Any]:
     """Several expressions as one function of arrays or floats."""
-    plain = {symbol: Symbol(f"v{k}", real=True) for k, symbol in enumerate(symbols)}
-    renamed = [expression.xreplace(plain) for expression in expressions]
-    printer, modules = _Vectorised(SETTINGS), [NUMERICAL, "numpy"]
-    function: Callable[..., Any] = lambdify(list(plain.values()), renamed, modules=modules, printer=printer, cse=False)
+    return _array_function(symbols, expressions)
+
+
+def _array_function(symbols: Sequence[Symbol], expressions: Expr | Sequence[Expr]) -> Callable[..., Any]:
+    arguments = tuple(f"v{k}" for k in range(len(symbols)))
+    return _function(_Vectorised(dict(zip(symbols, arguments, strict=True))), [], arguments, expressions, VECTORISED)
+
+
+def _function(
+    printer: Any, lines: list[str], arguments: tuple[str, ...], found: Expr | Sequence[Expr], names: dict[str, Any]
+) -> Callable[..., Any]:
+    """A function of its own code that returns what is found: an expression, or a list of them.
+
+    `sympy.lambdify` builds every expression anew to rename its symbols and to share its parts: most of the time in
+    which a network is compiled. A printer that knows the names does without.
+    """
+    for number, shared in enumerate(_repeated([found] if isinstance(found, Expr) else found)):
+        lines.append(f"s{number} = {printer.doprint(shared)}")
+        printer.known[shared] = f"s{number}"
+    results = printer.doprint(found) if isinstance(found, Expr) else f"[{', '.join(map(printer.doprint, found))}]"
+    lines.append(f"return {results}")
+    source = f"def function({', '.join(arguments)}):\n" + "".join(f"    {line}\n" for line in lines)
+    made: dict[str, Any] = {}
+    exec(compile(source, "<equations>", "exec"), names, made)  # noqa: S102 (of our own making, from expressions)
+    function: Callable[..., Any] = made["function"]
+    function.__doc__ = source
     return function
+
+
+def _repeated(expressions: Sequence[Expr]) -> list[Basic]:
+    """What stands in expressions more than once, each after its own parts."""
+    times: dict[Basic, int] = {}
+
+    def count(node: Basic) -> None:
+        if node.args:
+            times[node] = times.get(node, 0) + 1
+            if times[node] == 1:
+                for part in node.args:
+                    count(part)
+                del times[node]  # behind its parts
+                times[node] = 1
+
+    for expression in expressions:
+        count(expression)
+    # a reciprocal is printed as a division
+    return [n for n, found in times.items() if found > 1 and isinstance(n, Expr) and not _is_reciprocal(n)]
+
+
+def _is_reciprocal(node: Basic) -> bool:
+    return isinstance(node, Pow) and bool(node.exp.is_number and node.exp.is_negative)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from sympy import Expr, Symbol
+from sympy import Expr
 
 from shaftwork.codegen.code import scalar, vectorised
 from shaftwork.network.graph import CircuitGraph
@@ -90,10 +90,7 @@ class GainMatrix:
         found = {symbol.name: symbol for made in self._coefficients for symbol in made.free_symbols}
         ordered = sorted(found, key=names.__getitem__)
         self._places = np.array([names[name] for name in ordered], dtype=np.intp)
-        # lambdify renames arguments that are no identifiers one by one in every expression; this is linear
-        plain = {found[name]: Symbol(f"p{k}", real=True) for k, name in enumerate(ordered)}
-        renamed = [made.xreplace(plain) for made in self._coefficients]
-        self._function = scalar([list(plain.values())], renamed, shared=False) if variable else None
+        self._function = scalar({"p": [found[name] for name in ordered]}, self._coefficients) if variable else None
 
     def _values(self, p: Array) -> dict[Expr, float]:
         assert self._function is not None  # noqa: S101 (there are coefficients)

@@ -86,7 +86,9 @@ class HeyokaProgram:
         if name not in self._functions:
             import heyoka
 
-            self._functions[name] = heyoka.cfunc(list(expressions), vars=list(self.variables), compact_mode=True)
+            # asked for a few times in a step at most, which no optimisation is worth
+            options = {"compact_mode": True, "opt_level": 0}
+            self._functions[name] = heyoka.cfunc(list(expressions), vars=list(self.variables), **options)
         compiled = self._functions[name]
         values: Array = compiled(x, pars=parameters[: compiled.nparams], time=t)
         return values
@@ -136,6 +138,10 @@ class HeyokaProgram:
 
         heyoka.set_logger_level_error()  # a failed run says so itself
         options: dict[str, Any] = {}
+        if self.guards:
+            # One of several sets of equations, each for a part of the motion: to optimise such code takes ten times as
+            # long as to make it, and saves a tenth of the run.
+            options["opt_level"] = 0
         if self.switches or self.fading or self.guards:
             options["t_events"] = [
                 *(

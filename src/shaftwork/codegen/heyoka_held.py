@@ -87,7 +87,7 @@ class HeldParameters:
         import heyoka
 
         arguments = [argument for held in self.functions for argument in held.arguments]
-        return heyoka.cfunc(arguments, vars=self._variables, compact_mode=True)
+        return heyoka.cfunc(arguments, vars=self._variables, compact_mode=True, opt_level=0)
 
     def _arguments(self, t: float, x: Array, parameters: Array) -> list[tuple[float, ...]]:
         """The values of the arguments of each."""

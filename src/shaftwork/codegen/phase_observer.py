@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -85,16 +86,21 @@ class PhaseObserver:
     Args:
         names: of all that is stored.
         stretches: makes the phases when a quantity is first read.
-        impacts: times in s at which energy may be lost at once, and the part that loses it.
+        impacts: finds the times in s at which energy may be lost at once, and the part that loses it.
     """
 
     def __init__(
         self,
         names: tuple[str, ...],
         stretches: Callable[[], Stretches],
-        impacts: tuple[tuple[float, str], ...],
+        impacts: Callable[[], tuple[tuple[float, str], ...]],
     ) -> None:
-        self._names, self._make, self.impacts = names, stretches, impacts
+        self._names, self._make, self._find_impacts = names, stretches, impacts
+
+    @cached_property
+    def impacts(self) -> tuple[tuple[float, str], ...]:
+        """Times in s at which energy may be lost at once, and the part that loses it."""
+        return self._find_impacts()
 
     @property
     def _stretches(self) -> Stretches:

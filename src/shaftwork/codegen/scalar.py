@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
-from sympy import Symbol, count_ops, cse
+from sympy import count_ops, cse
 
 from shaftwork.codegen.code import scalar
 from shaftwork.codegen.elements import Array
@@ -22,21 +22,17 @@ class ScalarProgram:
     """
 
     def __init__(self, rows: Rows) -> None:
-        plain = {symbol: Symbol(f"x{k}", real=True) for k, symbol in enumerate(rows.states)}
-        plain |= {symbol: Symbol(f"p{k}", real=True) for k, symbol in enumerate(rows.parameters)}
-        self._rates = tuple(rate.xreplace(plain) for rate in rows.rates)
-        self._states = [plain[symbol] for symbol in rows.states]
-        self._parameters = [plain[symbol] for symbol in rows.parameters]
+        self._rows, self._rates = rows, rows.rates
 
     @cached_property
     def function(self) -> Callable[..., list[float]]:
         """(t, states, parameters) to the list of rates, in Python floats."""
-        return scalar([TIME, self._states, self._parameters], list(self._rates))
+        return scalar({"t": TIME, "x": self._rows.states, "p": self._rows.parameters}, self._rates)
 
     @property
     def source(self) -> str:
         """The generated code."""
-        return str(self.function.__doc__).split("Source code:\n\n")[1].split("\n\nImported")[0]
+        return str(self.function.__doc__)
 
     def bind(self, p: Array) -> Callable[[float, Array], Array]:
         """The right-hand side for one parameter vector; NaN where a law cannot be evaluated."""

@@ -45,6 +45,7 @@ class Stores:
         self._states = [state.name for state in form.states]
         self._map: tuple[LinearPart, Array] | None = None
         self._dense: tuple[LinearPart, Array, Array] | None = None
+        self._maps: tuple[LinearPart, Array, Array] | None = None
 
     @cached_property
     def _columns(self) -> list[int]:
@@ -105,31 +106,45 @@ class Stores:
             t: time in s at which inputs are read.
             held: all that was stored, by name.
         """
-        form, k = self._form, bound.part.coefficients
-        x = np.array([held[name] for name in self._states])
-        if not (form.dependent_across or form.dependent_through):
-            return x
-        before = np.zeros(len(form.graph.branches))
-        for name, branch in self._branches.items():
-            before[branch] = held[name]
-        loops, cutsets = self._matrices(bound.part)
-        inputs, laws = bound.program.inputs, len(form.laws)
-        # sources of time alone act on what is stored, and no other law need have a value here
-        u = np.where(inputs.of_time, inputs.values(t, np.zeros(inputs.outputs), x, bound.p), 0.0)
-        across, through = list(form.across_states), list(form.through_states)
-        if other := list(form.dependent_across):
-            F, Q = (matrix[np.ix_(across, other)] for matrix in (loops, cutsets))
-            prescribed = loops[np.ix_(list(form.across_inputs), other)].T @ u[laws:]
-            momentum = k[across] * before[across] + Q @ (k[other] * (before[other] - prescribed))
-            x[: len(across)] = np.linalg.solve(np.diag(k[across]) + Q * k[other] @ F.T, momentum)
-        if other := list(form.dependent_through):
-            F, Q = (matrix[np.ix_(other, through)] for matrix in (loops, cutsets))
-            driven = cutsets[np.ix_(other, list(form.laws))] @ u[:laws]
-            twist = before[through] / k[through] - F.T @ ((before[other] + driven) / k[other])
-            x[len(across) : len(across) + len(through)] = np.linalg.solve(
-                np.diag(1 / k[through]) + F.T / k[other] @ Q, twist
-            )
-        return x
+        if not (self._form.dependent_across or self._form.dependent_through):
+            return np.array([held[name] for name in self._states])
+        by_stores, by_inputs = self._state_maps(bound.part)
+        x = by_stores @ np.array([held[name] for name in self.names])
+        if by_inputs.any():
+            inputs = bound.program.inputs
+            # sources of time alone act on what is stored, and no other law need have a value here
+            u = inputs.values(t, np.zeros(inputs.outputs), x, bound.p)
+            x += by_inputs @ np.where(inputs.of_time, u, 0.0)
+        return np.asarray(x)
+
+    def _state_maps(self, part: LinearPart) -> tuple[Array, Array]:
+        """What stores and inputs are multiplied by in the states that new equations start with; the last are kept."""
+        if self._maps is None or self._maps[0] is not part:
+            form, k, laws = self._form, part.coefficients, len(self._form.laws)
+            made = np.zeros((len(self._states), len(form.graph.branches)))
+            by_inputs = np.zeros((len(self._states), laws + len(form.across_inputs)))
+            loops, cutsets = self._matrices(part)
+            across, through = list(form.across_states), list(form.through_states)
+            rows, twists = slice(len(across)), slice(len(across), len(across) + len(through))
+            made[rows, across], made[twists, through] = np.eye(len(across)), np.eye(len(through))
+            if other := list(form.dependent_across):
+                F, Q = (matrix[np.ix_(across, other)] for matrix in (loops, cutsets))
+                taken_up = np.linalg.inv(np.diag(k[across]) + Q * k[other] @ F.T)
+                made[rows, across], made[rows, other] = taken_up * k[across], taken_up @ Q * k[other]
+                by_inputs[rows, laws:] = -made[rows, other] @ loops[np.ix_(list(form.across_inputs), other)].T
+            if other := list(form.dependent_through):
+                F, Q = (matrix[np.ix_(other, through)] for matrix in (loops, cutsets))
+                taken_up = np.linalg.inv(np.diag(1 / k[through]) + F.T / k[other] @ Q)
+                made[twists, through], made[twists, other] = taken_up / k[through], -taken_up @ F.T / k[other]
+                by_inputs[twists, :laws] = made[twists, other] @ cutsets[np.ix_(other, list(form.laws))]
+            by_stores = np.zeros((len(self._states), len(self.names)))
+            for column, name in enumerate(self.names):
+                if name in self._branches:
+                    by_stores[:, column] = made[:, self._branches[name]]
+                else:
+                    by_stores[self._states.index(name), column] = 1.0
+            self._maps = part, by_stores, by_inputs
+        return self._maps[1:]
 
     def _matrices(self, part: LinearPart) -> tuple[Array, Array]:
         """The matrices of loops and cutsets in full; the last ones are kept."""

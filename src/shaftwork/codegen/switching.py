@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -51,6 +51,7 @@ class _Switch:
         line: from their values to slope and offset, or None where the argument is not linear in time.
         value: from times (k,) and their values to the argument (k,).
         whole: the line passes a level at every whole number, and these are not in `levels`.
+        acts: it is in the law of a branch, and not in what ends a mode alone.
     """
 
     part: str
@@ -60,6 +61,7 @@ class _Switch:
     line: Callable[..., Sequence[float]] | None
     value: Callable[..., Any]
     whole: bool = False
+    acts: bool = True
 
 
 class Switching:
@@ -82,6 +84,11 @@ class Switching:
         single = (switch for switch in self._switches if switch.line is not None and not switch.whole)
         times = {time for switch in single for time, _ in _on_a_line(switch, switch.levels, p)}
         return tuple(sorted(times))
+
+    def endless(self, p: Array) -> tuple[str, ...]:
+        """The parts whose laws switch at every so many seconds without end, as held noise does."""
+        whole = (switch for switch in self._switches if switch.whole and switch.acts and _straight(switch, p)[0])
+        return tuple(dict.fromkeys(switch.part for switch in whole))
 
     def timeline(self, p: Array, t0: float, t_end: float) -> Timeline:
         """The instants of a run from t0 to t_end in s with a parameter vector.
@@ -114,7 +121,7 @@ def _switches(form: StateForm) -> Iterator[_Switch]:
     """The switches of time alone, each once."""
     found: dict[Expr, tuple[tuple[Expr, Sequence[float]], ...]] = {}
     seen: set[Any] = set()
-    for part, law, parameters in _laws(form):
+    for part, law, parameters, acts in _laws(form):
         if law not in found:
             moving = switches(law) if law.has(TIME) else ()
             found[law] = tuple((argument, levels) for argument, levels in moving if argument.has(TIME))
@@ -124,18 +131,21 @@ def _switches(form: StateForm) -> Iterator[_Switch]:
             key = (argument, tuple(levels), places)
             if argument.free_symbols <= {TIME, *symbols} and key not in seen:
                 seen.add(key)
-                yield _made(part, argument, levels, symbols, places)
+                yield replace(_made(part, argument, levels, symbols, places), acts=acts)
 
 
-def _laws(form: StateForm) -> Iterator[tuple[GraphPart, Expr, tuple[Symbol, ...]]]:
-    """The laws of all branches, and what ends the modes of all parts, with the parameters that may stand in them."""
+def _laws(form: StateForm) -> Iterator[tuple[GraphPart, Expr, tuple[Symbol, ...], bool]]:
+    """The laws of all branches, and what ends the modes of all parts, with the parameters that may stand in them.
+
+    The last tells the ones from the others.
+    """
     for branch in form.graph.branches:
         if branch.template.kind in (Kind.LAW, Kind.THROUGH_SOURCE, Kind.ACROSS_SOURCE):
-            yield form.graph.part_of(branch.index), branch.template.law, branch.template.symbols
+            yield form.graph.part_of(branch.index), branch.template.law, branch.template.symbols, True
     for part in form.graph.parts:
         symbols = tuple(Symbol(name, real=True) for name in part.parameters)
         for mode in (mode for element in part.modes for mode in element.options):
-            yield from ((part, leave.when, symbols) for leave in mode.leaves)
+            yield from ((part, leave.when, symbols, False) for leave in mode.leaves)
 
 
 def _made(
@@ -148,7 +158,7 @@ def _made(
         argument,
         np.array(levels, dtype=float),
         places,
-        None if straight is None else scalar(list(symbols), list(straight)),
+        None if straight is None else scalar(symbols, straight),
         vectorised((TIME, *symbols), argument),
         whole is not None,
     )

@@ -79,7 +79,7 @@ class WaveSystem:
 @lru_cache(maxsize=256)
 def _line(template: BranchTemplate) -> Callable[..., Sequence[float]]:
     """From the values of its symbols to a line's impedance and delay."""
-    return scalar(list(template.symbols), list(template.line or ()))
+    return scalar(template.symbols, template.line or ())
 
 
 def along_lines(bound: BoundArrays, part: GraphPart, profile: Profile, t: Array, dense: Dense) -> Array:

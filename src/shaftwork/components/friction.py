@@ -12,6 +12,7 @@ from shaftwork.components.base import Component, Port, Role, component
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, Branch, End, ThroughLaw, rigid
 from shaftwork.components.laws import t
 from shaftwork.components.modes import ANEW, Leave, Mode, Modes
+from shaftwork.components.switching import while_on
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter
 
@@ -139,9 +140,21 @@ class Brake(Component):
         )
 
     def branches(self, p: Any) -> Iterator[Branch]:
+        if p.form is None:
+            yield from self._without_modes(p)
+            return
         yield from rubs(self._capacity(p), p)
         if isinstance(p.on, Expr) and p.on.has(INTEGRAL):
             yield ThroughLaw(p.mode * (1 - p.mode**2) * INTEGRAL, label="phi")  # no torque: it carries the angle
+
+    def _without_modes(self, p: Any) -> Iterator[Branch]:
+        """The law of all modes in one, where times alone decide between on and off."""
+        if p.on is not None:
+            raise ParameterError(
+                f"{type(self).__name__} '{self.name}' acts from when `on` comes true, which travelling waves do not "
+                "follow. Give t_on, or another model of the shafts: model=sw.Spectral(8) or sw.Lumped(20)."
+            )
+        yield ThroughLaw(while_on(self._capacity(p) * tanh(ACROSS / ROUNDED), p))
 
 
 @component

@@ -17,7 +17,7 @@ from functools import cached_property
 from sympy import Expr, Symbol, false, true
 from sympy.logic.boolalg import Boolean
 
-from shaftwork.components.branches import THROUGH, End
+from shaftwork.components.branches import THROUGH, End, named_in
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Leave:
     @cached_property
     def by_torque(self) -> bool:
         """Whether a torque ends the mode, and not speeds, twists and the time alone."""
-        return bool(self.when.has(THROUGH))
+        return self.when.has(THROUGH) or any(named_in(symbol)[0] == "through" for symbol in self.when.free_symbols)
 
 
 @dataclass(frozen=True)

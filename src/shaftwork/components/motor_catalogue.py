@@ -10,7 +10,7 @@ from typing import Any
 from shaftwork.components.drives import FrequencyDrive
 from shaftwork.components.machines import KlossMotor
 from shaftwork.components.motors import CageMotor
-from shaftwork.components.torque_curves import pull_out_slip
+from shaftwork.components.torque_curves import pull_out_slip, refuse_rated_point
 
 
 @dataclass(frozen=True)
@@ -29,6 +29,9 @@ class Nameplate:
         tau_k: pull-out torque, N m.
         f_n: rated frequency, Hz.
         chosen: the fields above that the source does not print, each with the reason for its value.
+
+    Raises:
+        ParameterError: the rated point does not lie below the pull-out torque and the synchronous speed.
     """
 
     name: str
@@ -42,6 +45,9 @@ class Nameplate:
     tau_k: float
     f_n: float
     chosen: Mapping[str, str]
+
+    def __post_init__(self) -> None:
+        refuse_rated_point(f"Nameplate '{self.name}'", self.tau_k, self.tau_n, self.n_n, self.n_sync)
 
     @property
     def s_k(self) -> float:

@@ -13,7 +13,7 @@ from shaftwork.components.base import Component, Derived, Port, Role, component
 from shaftwork.components.branches import ACROSS, Branch, ThroughLaw
 from shaftwork.components.laws import Interpolation, Table
 from shaftwork.components.switching import number_of, off_time, on_time, refuse_no_time_on, while_on
-from shaftwork.components.torque_curves import bend, kloss, pull_out_slip, pull_up_share
+from shaftwork.components.torque_curves import bend, kloss, pull_out_slip, pull_up_share, refuse_rated_point
 from shaftwork.core.errors import NetworkWarning, ParameterError
 from shaftwork.core.parameters import parameter
 
@@ -160,11 +160,7 @@ def _check_curve(motor: CageMotor) -> None:
     if not n_k:
         if not tau_n or not n_n:
             raise ParameterError(f"{title}: give the rated point tau_n and n_n, or the pull-out speed n_k.")
-        if tau_n >= tau_k or n_n >= n_sync:
-            raise ParameterError(
-                f"{title}: the rated point tau_n = {tau_n:g} N m, n_n = {n_n:g} 1/min must lie below the pull-out "
-                f"torque tau_k = {tau_k:g} N m and the synchronous speed n_sync = {n_sync:g} 1/min."
-            )
+        refuse_rated_point(title, tau_k, tau_n, n_n, n_sync)
         n_k = n_sync * (1 - float(pull_out_slip(tau_k, tau_n, n_n, n_sync)))
     if not 0 < n_k < n_sync:
         raise ParameterError(

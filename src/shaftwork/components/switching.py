@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from sympy import Expr, Piecewise
+from sympy import Expr, Mul, Piecewise
 
 from shaftwork.components.base import Component
 from shaftwork.components.laws import t
@@ -23,11 +23,27 @@ def off_time() -> Any:
 
 
 def while_on(law: Expr, p: Any) -> Expr:
-    """A law from `p.t_on` until `p.t_off`, exactly zero before and after; the law itself where neither is given."""
+    """A law from `p.t_on` until `p.t_off`, exactly zero before and after; the law itself where neither is given.
+
+    The cases of a law that has some follow those of the time: equations print one list of them, not one in another.
+    """
     before = [] if p.t_on is None else [(0, t < p.t_on)]
+    cases = _cases(law)
     if p.t_off is None:
-        return Piecewise(*before, (law, True)) if before else law
+        return Piecewise(*before, *cases) if before else law
+    if len(cases) > 1:
+        return Piecewise(*before, (0, t >= p.t_off), *cases)
     return Piecewise(*before, (law, t < p.t_off), (0, True))
+
+
+def _cases(law: Expr) -> tuple[tuple[Expr, Any], ...]:
+    """The values and conditions of a multiple of a piecewise law; of any other law itself alone."""
+    factors = Mul.make_args(law)
+    pieces = [factor for factor in factors if isinstance(factor, Piecewise)]
+    if len(pieces) != 1:
+        return ((law, True),)
+    others = Mul(*(factor for factor in factors if factor is not pieces[0]))
+    return tuple((others * value, condition) for value, condition in pieces[0].args)
 
 
 def number_of(part: Component, name: str) -> float | None:

@@ -6,6 +6,8 @@ from typing import Any
 
 from sympy import sqrt
 
+from shaftwork.core.errors import ParameterError
+
 
 def pull_out_slip(tau_k: Any, tau_n: Any, n_n: Any, n_sync: Any) -> Any:
     """The slip at the pull-out torque for which Kloss' curve passes through the rated point.
@@ -22,6 +24,25 @@ def pull_out_slip(tau_k: Any, tau_n: Any, n_n: Any, n_sync: Any) -> Any:
     """
     overload = tau_k / tau_n
     return (1 - n_n / n_sync) * (overload + sqrt(overload**2 - 1))
+
+
+def refuse_rated_point(title: str, tau_k: float, tau_n: float, n_n: float, n_sync: float) -> None:
+    """Refuse a rated point that Kloss' curve does not pass through; arguments as for `pull_out_slip`.
+
+    Raises:
+        ParameterError: its torque is not less than the pull-out torque, or its speed not less than the synchronous one.
+    """
+    if tau_n >= tau_k:
+        raise ParameterError(
+            f"{title}: the rated torque tau_n = {tau_n:g} N m is not less than the pull-out torque tau_k = {tau_k:g} "
+            "N m, so that the curve never reaches the rated point. Give tau_k in N m at the motor shaft; a catalogue "
+            "that prints tau_k / tau_n means that many times tau_n."
+        )
+    if n_n >= n_sync:
+        raise ParameterError(
+            f"{title}: the rated speed n_n = {n_n:g} 1/min is not less than the synchronous speed n_sync = {n_sync:g} "
+            "1/min, so that there is no slip. Give n_sync = 60 f / pole pairs, the next of these speeds above n_n."
+        )
 
 
 def pull_up_share(tau_a: Any, tau_s: Any, tau_k: Any) -> Any:

@@ -204,8 +204,10 @@ def _quantity_letters(form: StateForm, quantities: Quantities) -> Iterator[tuple
             yield made.part, _letter(quantities.multiplier(made.index), quantity, label)
     for state in form.states:
         if state.kind == "integral":
-            part = graph.branches[state.branch].part
-            yield part, Letter(state.name, state.latex, "", state.unit, WORDS[state.name.rsplit(".", 1)[1]])
+            made = graph.branches[state.branch]
+            quantity = quantities.domain((made.plus, made.minus)).integral
+            label = state.name.rsplit(".", 1)[1].removeprefix(quantity.name).removeprefix("_")
+            yield made.part, _letter(quantities.integral(made.index), quantity, label)
 
 
 def _node_letters(quantities: Quantities) -> Iterator[tuple[int, Letter]]:

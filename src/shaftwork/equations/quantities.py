@@ -18,7 +18,7 @@ from shaftwork.core.errors import CompileError
 from shaftwork.network.controlled import readings_of
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
 from shaftwork.network.templates import Kind
-from shaftwork.reduction.form import branch_name
+from shaftwork.reduction.form import branch_name, integral_name
 
 Ends = tuple[int, int]
 
@@ -55,7 +55,7 @@ class Flow:
 
     Args:
         part: place of the part in the part table.
-        branches: the branches, all from `plus` to `minus`.
+        branches: the branches, all from `plus` to `minus`; what prescribes an across variable stands alone.
         plus: number of the node that gives.
         minus: number of the node that takes.
         sign: 1 where the symbol is what `plus` gives, -1 where it is what `plus` receives (sources).
@@ -161,8 +161,7 @@ class Quantities:
 
     def integral(self, branch: int) -> Symbol:
         """The integral of what is across a branch: of a law that reads it, or of a prescribed speed."""
-        quantity = self.domain((self.graph.branches[branch].plus, self.graph.branches[branch].minus)).integral
-        return Symbol(f"{self.graph.part_of(branch).name}.{quantity.name}", real=True)
+        return Symbol(integral_name(self.graph, self.graph.branches[branch]), real=True)
 
     def through(self, flow: Flow) -> Symbol:
         """The through variable of a flow: a state, where it is a lone store; a parameter, where that is all its law."""
@@ -264,17 +263,18 @@ class Quantities:
 
     def _flows_of(self, number: int) -> Iterator[Flow]:
         part = self.graph.parts[number]
-        together: dict[Ends, list[int]] = {}
+        together: dict[tuple[int, int, bool], list[int]] = {}
         for index in part.branches:
             branch = self.graph.branches[index]
             if branch.template.kind not in (Kind.COUPLING, Kind.ACROSS_STORE):
-                together.setdefault((branch.plus, branch.minus), []).append(index)
+                prescribes = branch.template.kind is Kind.ACROSS_SOURCE  # takes what the balance leaves, by no law
+                together.setdefault((branch.plus, branch.minus, prescribes), []).append(index)
         labels = [
             self._label(self.graph.branches[branches[0]]) if len(together) > 1 else "" for branches in together.values()
         ]
         numbers = [running_number(label) or label for label in labels]
         alike = len(set(numbers)) < len(numbers)  # springs and dampers in different places: the numbers do not do
-        for ((plus, minus), branches), label, brief in zip(together.items(), labels, numbers, strict=True):
+        for ((plus, minus, _), branches), label, brief in zip(together.items(), labels, numbers, strict=True):
             made = label.removeprefix(f"{self.domain((plus, minus)).through.name}_") if alike else brief
             if alike and len(branches) > 1:  # the label is that of the store, which is only a part of it
                 made = f"total_{brief}"

@@ -181,6 +181,7 @@ class Equations:
         states: rates of the states.
         eliminated: dependent stores, speeds without a store, reactions of couplings and prescribed speeds.
         notes: what was left out or decided by numerical values, in words.
+        phase: the mode of every part that changes its mode, "gap open, load stuck", for which the rows hold.
         in_phase: from the name of a phase to the equations there, where parts change their mode.
     """
 
@@ -193,6 +194,7 @@ class Equations:
     states: tuple[StateEquation, ...]
     eliminated: tuple[Eliminated, ...]
     notes: tuple[str, ...]
+    phase: str = ""
     in_phase: Callable[[str], Equations] | None = None
 
     @cached_property
@@ -249,8 +251,8 @@ class Equations:
         Args:
             form: "kirchhoff" (balances, loops, laws), "state" (rates) or "second-order"; by default the first two.
             values: print the parameters' values instead of their symbols.
-            phase: the equations of this phase of a motion, "gap open, load stuck"; by default those in the first mode
-                of every part.
+            phase: the equations of this phase of a motion, "gap open, load stuck"; by default those of the phase of
+                these equations, which is printed above them.
 
         Raises:
             CompileError: second-order form of a network with electrical nodes.

@@ -33,7 +33,12 @@ BEGIN = r"""\date{}
 def body(equations: Equations, form: Form | None = None, *, values: bool = False) -> str:
     """The blocks of one form, or of Kirchhoff's equations and the state form, each under a paragraph heading."""
     blocks = blocks_of(equations, form, values=values)
-    return "\n".join(("\\allowdisplaybreaks", *map(_paragraph, blocks)))
+    return "\n".join(("\\allowdisplaybreaks", *_phase(equations), *map(_paragraph, blocks)))
+
+
+def _phase(equations: Equations) -> tuple[str, ...]:
+    """The modes for which the equations hold, under a heading; nothing where no part changes its mode."""
+    return (f"\\paragraph{{Phase}}\\mbox{{}}\n{in_text(equations.phase)}",) if equations.phase else ()
 
 
 def _paragraph(block: Block) -> str:
@@ -43,7 +48,9 @@ def _paragraph(block: Block) -> str:
 def notebook(equations: Equations) -> str:
     """The body with headings that a notebook renders."""
     blocks = blocks_of(equations, None, values=False)
-    return "\n".join(f"$\\textbf{{{block.heading}}}$\n{_content(block)}" for block in blocks)
+    phase = (f"$\\textbf{{Phase}}$ {in_text(equations.phase)}\n",) if equations.phase else ()
+    made = (f"$\\textbf{{{block.heading}}}$\n{_content(block)}" for block in blocks)
+    return "\n".join((*phase, *made))
 
 
 def blocks_of(equations: Equations, form: Form | None, *, values: bool) -> tuple[Block, ...]:
@@ -77,6 +84,7 @@ def document(equations: Equations, *, values: bool = False) -> str:
     """A LaTeX document that compiles as it is."""
     blocks = Blocks(equations, values)
     sections = {
+        "Phase": in_text(equations.phase),
         "Kirchhoff's equations": _section((*blocks.kirchhoff(), blocks.derived())),
         "State form": _section(blocks.state(laws=False)),
         "Second-order form": _second_order(blocks),

@@ -10,10 +10,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from sympy import Add, Expr, Symbol
+from sympy import Add, Expr, Integer, Symbol
 
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.laws import t as TIME
+from shaftwork.components.slopes import jumps, slope
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import CompileError
 from shaftwork.equations.quantities import Quantities, rate_of, refuse_controlled
@@ -144,7 +145,7 @@ class _Writer:
     def made(self) -> SecondOrder:
         for branch in self.graph.branches:
             if branch.template.kind in self.matrices:
-                self._add_linear(branch.index)
+                self._add_linear(branch.index, branch.template.kind, self.quantities.law(branch.index))
             elif branch.template.kind in (Kind.LAW, Kind.THROUGH_SOURCE):
                 self._add_force(branch.index)
         mass, damping, stiffness = (
@@ -164,9 +165,8 @@ class _Writer:
         own = {self.place[key]: simplified(gain) for key, gain in sorted(row.items()) if key >= 0}
         return own, {~key: simplified(gain) for key, gain in sorted(row.items()) if key < 0}
 
-    def _add_linear(self, branch: int) -> None:
+    def _add_linear(self, branch: int, kind: Kind, coefficient: Expr) -> None:
         """Add coefficient * f f' for an inertia, a damping or a stiffness; what a prescribed motion asks goes to T."""
-        kind, coefficient = self.graph.branches[branch].template.kind, self.quantities.law(branch)
         own, driven = self._twist(branch)
         for i, gain in own.items():
             for j, other in own.items():
@@ -181,22 +181,39 @@ class _Writer:
         return {Kind.ACROSS_STORE: speed.diff(TIME), Kind.CONDUCTANCE: speed, Kind.THROUGH_STORE: position}
 
     def _add_force(self, branch: int) -> None:
-        """Add the torque of a law or source to the coordinates that it drives: minus its power per speed."""
+        """Add the torque of a law or source to the coordinates that it drives: minus its power per speed.
+
+        A law that is linear in the twist, as that of a gap in contact, is a stiffness, and what is left a torque.
+        """
+        law, whole = self.quantities.law(branch), True
+        if (stiffness := _stiffness(law)) != 0:
+            self._add_linear(branch, Kind.THROUGH_STORE, stiffness)
+            law, whole = law.subs(INTEGRAL, 0), False
+            if law == 0:
+                return
         own, driven = self._twist(branch)
         rates = (gain * rate_of(self.coordinates[k]) for k, gain in own.items())
         across = Add(*rates, *(gain * self._motion(source)[Kind.CONDUCTANCE] for source, gain in driven.items()))
         angles = (gain * self.coordinates[k] for k, gain in own.items())
         twist = Add(*angles, *(gain * self._motion(source)[Kind.THROUGH_STORE] for source, gain in driven.items()))
-        law = self.quantities.law(branch).xreplace({ACROSS: across, INTEGRAL: twist})
+        law = law.xreplace({ACROSS: across, INTEGRAL: twist})
         made, flow = self.graph.branches[branch], self.quantities.flow_of[branch]
         symbol = self.quantities.across((made.plus, made.minus))
         for letter in symbol.free_symbols:  # one at most: the across variable of two nodes has one symbol
             self.across[letter] = across * symbol.coeff(letter)
         self.across[self.quantities.integral(branch)] = twist
-        if len(flow.branches) == 1:
+        if whole and len(flow.branches) == 1:
             symbol = self.quantities.through(flow)
             if symbol != flow.sign * law:
                 self.laws[symbol] = flow.sign * law
             law = flow.sign * symbol
         for i, gain in own.items():
             self.forces[i].append(-gain * law)
+
+
+def _stiffness(law: Expr) -> Expr:
+    """The slope of a law over the twist where it is the same everywhere, else 0."""
+    if not law.has(INTEGRAL) or jumps(law, INTEGRAL):
+        return Integer(0)
+    made = slope(law, INTEGRAL)
+    return Integer(0) if made.has(ACROSS, INTEGRAL, TIME) else made

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -92,7 +92,7 @@ class _Run:
         integrator.pars[:used] = self.parameters[:used]
         integrator.reset_cooldowns() if integrator.with_events else None
         if self.problem.guards is not None:
-            self._guard(np.concatenate([self.problem.guards.sides, self.problem.guards.offsets]))
+            self._guard(integrator.pars, self.problem.guards.sides, self.problem.guards.offsets)
         watch = self._watch(piece)
         self.program.listeners.clear()
         longest = self._first_step(piece)
@@ -122,9 +122,11 @@ class _Run:
         if not np.isfinite(self.state).all():
             raise self._failure(piece, "err_nf_state", watch)
 
-    def _guard(self, guards: Array) -> None:
+    def _guard(self, pars: Array, sides: Array, offsets: Array | Sequence[float]) -> None:
         """Watch the guards from here on, by their sides and offsets."""
-        self.integrator.pars[self.program.parameter_count + len(self.program.switches) :] = guards
+        first = self.program.parameter_count + len(self.program.switches)
+        pars[first : first + len(sides)] = sides
+        pars[first + len(sides) :] = offsets
 
     def _guard_met(self, raw: Any, outcome: str, watch: Watch | None) -> int | None:
         """The guard at which the run has stopped, by its own event or at that of a switch at the very same instant."""
@@ -148,8 +150,9 @@ class _Run:
         if reaction is None:
             return False
         self.reactions += 1
-        integrator.pars[: reaction.p.size] = reaction.p
-        self._guard(reaction.guards)
+        pars = integrator.pars
+        pars[: reaction.p.size] = reaction.p
+        self._guard(pars, reaction.sides, reaction.offsets)
         return True
 
     def _listen(self, met: int, _integrator: Any) -> bool:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,17 +45,18 @@ class Guards:
     offsets: Array
 
 
-@dataclass(frozen=True)
-class Reaction:
+class Reaction(NamedTuple):
     """How a run goes on past a guard in the same equations.
 
     Args:
         p: (p,) parameters from there on.
-        guards: (2 m,) sides and offsets of the guards.
+        sides: (m,) of the guards.
+        offsets: (m,) of the guards.
     """
 
     p: Array
-    guards: Array
+    sides: Array
+    offsets: Sequence[float]
 
 
 @dataclass(frozen=True)

@@ -75,8 +75,8 @@ def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
         times, states = _samples(runs)
         few = slice(None) if problem.guards is None else [0, -1]  # of many short runs, each tells a little
         factor = cancellation(problem, times[few], states[few])
-        if BEARABLE < factor < np.inf:  # it is infinite where nothing has moved yet
-            share = 1 / (EDGE * factor)
+        if BEARABLE < factor < 1 / np.finfo(float).eps:  # it is beyond all bounds where nothing has moved yet
+            share = max(1 / (EDGE * factor), TIGHTEST_RTOL / problem.rtol)
             tight = replace(problem, rtol=share * problem.rtol, atol=share * problem.atol)
             decay = rates(problem).decay
             again = _march(tight, method, longest=STABLE / decay if decay > 0 else np.inf)

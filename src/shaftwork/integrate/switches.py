@@ -134,28 +134,48 @@ class Watch:
         self.last_good: tuple[float, Array] | None = None
         """Time in s and state (n,) at the start of the step that stopped the run or failed."""
         self._largest: Array = size
+        self._signs = slice(program.parameter_count, program.parameter_count + len(program.switches))
+        self._moving: NDArray[np.bool_] = ~program.timed
         counting = () if program.held is None else tuple(program.held.by_switch)
-        self._turns = ~program.timed & ~np.isin(np.arange(size.size), counting)
+        self._turns = self._moving & ~np.isin(np.arange(size.size), counting)
         self.reason: str | None = None
         self.leaves = False
         """Whether a switch that rested at zero has stopped the run."""
 
     def __call__(self, integrator: Any) -> bool:
         values = self._program.switch_values(integrator.time, integrator.state, integrator.pars)
-        signs = integrator.pars[self._program.parameter_count :][: len(self._program.switches)]
+        signs = integrator.pars[self._signs]
         np.maximum(self._largest, np.abs(values), out=self._largest)
+        inside = signs * values
         # What switches by the time alone has its sign for the piece, and nothing can drive it back.
-        wrong = (signs * values < -WRONG_SIDE * self._largest) & ~self._program.timed
-        past = signs * values < 0.0
+        if (self._moving & (inside <= WRONG_SIDE * self._largest)).any():
+            return self._looked_at(integrator, values, signs, inside)
+        self.leaves = False
+        return self._goes_on(integrator, values, np.zeros(0, dtype=bool))
+
+    def _looked_at(self, integrator: Any, values: Array, signs: Array, inside: Array) -> bool:
+        """Whether the run goes on where a switch is at zero, or on the wrong side of it."""
+        wrong = (inside < -WRONG_SIDE * self._largest) & self._moving
+        past = inside < 0.0
         if past.any():
             # Right at its event (heyoka still "cools" it down) a switch may be on the wrong side by rounding.
             past &= [cooling is None for cooling in integrator.te_cooldowns[: past.size]]
-            wrong &= past
+            # In a step too short for heyoka to see an event a switch is past it by that step, and has just turned too.
+            wrong &= past & (integrator.time - self._last >= self._short)
             signs[past & ~wrong & self._turns] *= -1.0  # the step ended at another event, at the very same instant
+        # A switch that rested at zero and now leaves it needs its sign.
+        self.leaves = bool((values[(signs == 0.0) & self._moving] != 0.0).any())
+        # Where a switch turns a guard may be met too, and heyoka would not see it any more.
+        return self._goes_on(integrator, values, wrong) and not (
+            self.leaves or (self._program.guards and self._ended_at_a_switch(integrator))
+        )
+
+    def _goes_on(self, integrator: Any, values: Array, wrong: NDArray[np.bool_]) -> bool:
+        """Whether time goes on and no switch is on the wrong side."""
         self._short_steps = self._short_steps + 1 if integrator.time - self._last < self._short else 0
         before, self._last = self._last, integrator.time
         if wrong.any() or self._short_steps > CHATTER_STEPS:
-            nearest = int(np.argmin(np.where(self._program.timed, np.inf, np.abs(values))))
+            nearest = int(np.argmin(np.where(self._moving, np.abs(values), np.inf)))
             condition = self._program.conditions[int(np.argmax(wrong)) if wrong.any() else nearest]
             self.reason = (
                 f"from t = {before:.9g} s on the motion sticks where the condition {condition} changes, because "
@@ -164,10 +184,7 @@ class Watch:
             )
             return False
         self.last_good = integrator.time, integrator.state.copy()
-        # A switch that rested at zero and now leaves it needs its sign.
-        self.leaves = bool((values[(signs == 0.0) & ~self._program.timed] != 0.0).any())
-        # Where a switch turns a guard may be met too, and heyoka would not see it any more.
-        return not (self.leaves or (self._program.guards and self._ended_at_a_switch(integrator)))
+        return True
 
     def _ended_at_a_switch(self, integrator: Any) -> bool:
         """Whether the last step ended where a switch passed through zero."""

@@ -26,7 +26,7 @@ from shaftwork.network.controlled import check_readings
 from shaftwork.network.grammar import FUNCTION_NAMES, FUNCTIONS
 from shaftwork.network.graph import GROUND, CircuitGraph, resolve
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
-from shaftwork.network.templates import BranchTemplate, Kind, make_template, substitution
+from shaftwork.network.templates import BranchTemplate, Kind, check_stores, make_template, substitution
 from shaftwork.network.textfile import MAXIMUM_NAME, is_name
 from shaftwork.network.wording import Spelling, at_nodes, listed, title
 
@@ -211,9 +211,10 @@ class _Examination:
     def _report_value(self, placed: Placed, name: str, given: Any, objection: str) -> None:
         part, declared = placed.part, placed.part.declared[name]
         kind = "wrong unit" if hasattr(given, "dimensionality") else "parameter"
-        unit = "as a pure number" if declared.unit == "1" else f"in {declared.unit}"
+        unit = " as a pure number" if declared.unit == "1" else f" in {declared.unit}"
+        unit = "" if declared.record is not None else unit
         shown = "" if kind == "wrong unit" else f" = {reprlib.repr(given)}"
-        hint = f"Give the {declared.meaning} {unit}{f', {declared.bounds}' if declared.bounds else ''}."
+        hint = f"Give the {declared.meaning}{unit}{f', {declared.bounds}' if declared.bounds else ''}."
         self.report(kind, f"{title(part)}: {name}{shown} {objection}.", hint, placed)
 
     def _faults_of(self, part: Component, values: Mapping[str, Any]) -> tuple[_Fault, ...]:
@@ -241,6 +242,7 @@ def _law_faults(part: Component, values: Mapping[str, Any]) -> Iterator[_Fault]:
     templates = make_template(part, sound).branches
     _check_ends(part, templates)
     check_readings(part, templates)
+    check_stores(part, templates)
     for template in {(made.kind, made.law, made.terms, made.through): made for made in templates}.values():
         if unreadable := _unreadable("", template.law):
             yield unreadable._replace(what=f"a branch law {unreadable.what}")

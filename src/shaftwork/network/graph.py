@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -11,7 +11,7 @@ import networkx as nx
 from sympy import Expr, Symbol
 
 from shaftwork.components.base import Component, Derived
-from shaftwork.components.branches import End
+from shaftwork.components.branches import End, named_in
 from shaftwork.components.laws import Table, as_expression
 from shaftwork.components.modes import Modes
 from shaftwork.core.domains import ROTATION, Domain
@@ -100,6 +100,18 @@ class CircuitGraph:
                 made.add_edge(self.node_name(plus), self.node_name(minus), key=key, part=self.parts[branch.part].name)
         return made
 
+    @cached_property
+    def integrated(self) -> tuple[tuple[int, ...], ...]:
+        """For each part the branches the integral of whose across variable a law of the part reads."""
+        return tuple(tuple(self._integrated_in(part)) for part in self.parts)
+
+    def _integrated_in(self, part: GraphPart) -> Iterator[int]:
+        own = [(index, self.branches[index].template) for index in part.branches]
+        named = {name for _, made in own for kind, name in map(named_in, made.reads) if kind == "integral"}
+        for index, made in own:
+            if made.has_integral or (made.label in named and made.kind is not Kind.COUPLING):
+                yield index
+
     def node_name(self, number: int) -> str:
         """Name of a node by its number."""
         return REFERENCE if number == GROUND else self.nodes[number]
@@ -136,7 +148,8 @@ class ResolvedPart:
 def resolve(placed: Placed) -> tuple[ResolvedPart, tuple[tuple[str, Any, str], ...]]:
     """The part with its values in SI, and the objections as (parameter, given value, objection).
 
-    A value that cannot be used is replaced by 1, so that the analysis of the network can go on and report everything.
+    A value that cannot be used is replaced by 1, a record by its default, so that the analysis of the network can go on
+    and report everything.
     """
     values: dict[str, Any] = {}
     objections: list[tuple[str, Any, str]] = []
@@ -147,7 +160,7 @@ def resolve(placed: Placed) -> tuple[ResolvedPart, tuple[tuple[str, Any, str], .
             value = as_expression(value) if isinstance(value, Table | Expr) else value  # the checks name the rest
         if objection is not None:
             objections.append((name, given, objection))
-            value = 1.0
+            value = 1.0 if declared.record is None or declared.required else declared.magnitude(declared.default)[0]
         values[name] = value
     return ResolvedPart(placed, values), tuple(objections)
 

@@ -39,7 +39,7 @@ from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import ALL_IN_ONE, Choice, Modes, has_mode, mode_symbol
 from shaftwork.components.slopes import jumps, slope
-from shaftwork.core.domains import DOMAINS
+from shaftwork.core.domains import DOMAINS, ROTATION
 from shaftwork.core.errors import ParameterError, ShaftworkError
 
 T = TypeVar("T")
@@ -162,6 +162,24 @@ def make_template(part: Component, values: Mapping[str, Any], choices: tuple[Cho
     yielded = _without_absent(tuple(part.branches(p)))
     branches = tuple(made for number, branch in enumerate(yielded, 1) for made in resolver.templates(branch, number))
     return Template(branches, tuple(known.values()), _occurring(derived, resolver.printed), modes)
+
+
+def check_stores(part: Component, templates: tuple[BranchTemplate, ...]) -> None:
+    """That no two stores of a part have one name: it is that of a state.
+
+    Raises:
+        ValueError: two have.
+    """
+    domains = {port.name: port.domain for port in (*part.ports, *part.inner_ports())}
+    found: set[str] = set()  # only asked for membership
+    for made in templates:
+        if made.kind not in (Kind.ACROSS_STORE, Kind.THROUGH_STORE):
+            continue
+        domain = next((domains[end] for end in made.ends if end is not None), None) or ROTATION
+        name = made.label or (domain.across if made.kind is Kind.ACROSS_STORE else domain.through).name
+        if name in found:
+            raise ValueError(f"two of its stores have the name {name!r}; give each branch a label of its own")
+        found.add(name)
 
 
 def _choose(p: Any, modes: tuple[Modes, ...], choices: tuple[Choice, ...]) -> dict[Symbol, str]:

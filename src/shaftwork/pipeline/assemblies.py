@@ -349,10 +349,7 @@ class Assembly:
     def _scalar(self) -> Callable[..., list[float]]:
         rows = self.model.rows
         assert rows is not None  # noqa: S101 (asked only then)
-        symbols = {symbol: Symbol(f"x{k}", real=True) for k, symbol in enumerate(rows.states)}
-        symbols |= {symbol: Symbol(f"p{k}", real=True) for k, symbol in enumerate(rows.parameters)}
-        made = [expression.xreplace(symbols) for expression in (*rows.rates, *self._expressions)]
-        return scalar([TIME, [symbols[s] for s in rows.states], [symbols[s] for s in rows.parameters]], made)
+        return scalar({"t": TIME, "x": rows.states, "p": rows.parameters}, (*rows.rates, *self._expressions))
 
     def sizes(self, p: Array) -> list[float]:
         """The nominal size of each state."""
@@ -390,4 +387,4 @@ def conditional(modes: Modes) -> tuple[Symbol, ...]:
 def starts_of(modes: Modes, symbols: tuple[Symbol, ...]) -> Callable[..., list[bool]]:
     """From the time, the speed across, the twist and parameters to whether a motion may start in each mode."""
     conditions = [Piecewise((Integer(1), mode.starts), (Integer(0), True)) for mode in modes.options]
-    return scalar([TIME, ACROSS, INTEGRAL, *symbols], conditions, shared=False)
+    return scalar((TIME, ACROSS, INTEGRAL, *symbols), conditions)

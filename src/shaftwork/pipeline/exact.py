@@ -15,9 +15,10 @@ from shaftwork.codegen.linear import Linearization
 from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.operating import initial_state
 from shaftwork.codegen.recovery import History
+from shaftwork.components.modes import ALL_IN_ONE
 from shaftwork.components.shaft_models import MOST_SPECTRAL, OneSpring, Rigid, Spectral, Wave
 from shaftwork.components.shafts import Shaft
-from shaftwork.core.errors import NetworkWarning, ParameterError
+from shaftwork.core.errors import AccuracyWarning, NetworkWarning, ParameterError
 from shaftwork.network.graph import resolve
 from shaftwork.network.netlist import Netlist, Placed
 from shaftwork.pipeline.analysis import Names, Point, SmallMotions, Time, input_names, operating_point
@@ -87,14 +88,22 @@ class ExactNetwork:
         return self._with({name: dataclasses.replace(shaft, **lossless) for name, shaft in self._shafts.items()})
 
     def _with(self, shafts: Mapping[str, Shaft]) -> Model:
-        """The network with shafts replaced. Its warnings are those of the network itself, already given."""
-        if not shafts:
+        """The network with shafts replaced, and the laws of all modes in one, as beside waves.
+
+        Its warnings are those of the network itself, already given.
+        """
+        modal = any(part.modes for part in self._model.form.graph.parts)
+        if not shafts and not modal:
             return self._model
+        choices = ALL_IN_ONE if modal else ()
         placed = tuple(
-            dataclasses.replace(item, part=shafts.get(item.part.name, item.part)) for item in self._model.netlist.placed
+            dataclasses.replace(item, part=shafts.get(item.part.name, item.part), choices=choices)
+            for item in self._model.netlist.placed
         )
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", NetworkWarning)
+            if self._model.form.waves:
+                warnings.simplefilter("ignore", AccuracyWarning)
             return self._compiled(Netlist(self._model.name, placed))
 
     @cached_property

@@ -35,6 +35,7 @@ from shaftwork.reduction.form import StateForm
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
+    from shaftwork.codegen.arrays import BoundArrays
     from shaftwork.pipeline.analysis import Given, Names, Point, Time
     from shaftwork.pipeline.waves import WaveStart
     from shaftwork.results.linear import LinearModel
@@ -160,12 +161,21 @@ class Model(CompiledModel):
         prepared = self.prepare(self.vector(values) if values else self.defaults)
         when = t if math.isfinite(t) else self.settled(prepared.p)
         start = initial_state(prepared.bound, initial or {}, when)
-        if not math.isfinite(t) and (moving := prepared.bound.moving_sources(when)):
-            raise SimulationError(
-                f"{', '.join(moving)} never stops changing, so there is no steady operation. "
-                f"Name the time at which the sources are to be read: steady_state(t=...)."
-            )
+        if not math.isfinite(t):
+            self.refuse_moving(prepared.bound, when)
         return dict(zip(self.states, steady_state(prepared.bound, start, when).tolist(), strict=True))
+
+    def refuse_moving(self, bound: BoundArrays, t: float) -> None:
+        """Refuse laws that change with time at a time after which none switches any more, or that switch without end.
+
+        Raises:
+            SimulationError: there is one.
+        """
+        if moving := dict.fromkeys((*bound.moving_sources(t), *self.switching.endless(bound.p))):
+            raise SimulationError(
+                f"{', '.join(moving)} never stops changing, so there is no steady operation. Name the time at which "
+                "the sources are to be read, steady_state(t=...), or take the noise out of them (std = 0 for its mean)."
+            )
 
     def linearize(
         self, at: Point = None, *, inputs: Names = None, outputs: Names = None, t: Time = None, parameters: Given = None
@@ -176,7 +186,8 @@ class Model(CompiledModel):
             at: `steady_state()`, speeds, twists and torques by name, or a motion at one time; by default rest.
             inputs: what sources give, "motor.tau", "drive.omega"; by default all of it.
             outputs: any quantities; by default the states.
-            t: time at which laws are read, s; by default that of the motion, or after their last breakpoint.
+            t: time at which laws are read, s; by default that of the motion, or after their last breakpoint; of parts
+                that change their mode, at rest, 0.
             parameters: values that differ from the network's.
 
         Raises:

@@ -24,8 +24,7 @@ EPS = float(np.finfo(float).eps)
 GOLDEN = (5**0.5 - 1) / 2
 
 
-@dataclass(frozen=True, eq=False)
-class Change:
+class Change(NamedTuple):
     """A change of mode: when in s, of which element, from which mode to which; or a rebound, back to the one before.
 
     With an impact speeds jump.
@@ -64,16 +63,17 @@ class Regime:
     ways: dict[int, Any] = field(default_factory=dict)
 
     @cached_property
-    def _rounding(self) -> list[tuple[float, float]]:
-        """Of each state, a part of it and the least that rounding moves it: to both sides and not alike."""
+    def _rounding(self) -> list[tuple[float, float, float]]:
+        """Of each state a part of it and the least that rounding moves it, to both sides and not alike; the side."""
         parts = [(-1) ** k * (0.5 + k * GOLDEN % 1) * ROUNDINGS * EPS for k in range(len(self.sizes))]
-        return [(part, part * size / NOMINAL) for part, size in zip(parts, self.sizes, strict=True)]
+        pairs = zip(parts, self.sizes, strict=True)
+        return [(part, part * size / NOMINAL, math.copysign(1.0, part)) for part, size in pairs]
 
     def rounded(self, x: list[float], rates: list[float], tick: float) -> list[float]:
         """The states so far away as rounding may move them, and the time by a tick in s."""
         changes = zip(x, rates, self._rounding, strict=True)
         # all of it to the same side: what a tick moves must not make up for the rest
-        return [v + part * abs(v) + least + math.copysign(tick * rate, part) for v, rate, (part, least) in changes]
+        return [v + part * abs(v) + least + way * tick * abs(rate) for v, rate, (part, least, way) in changes]
 
 
 class Moment(NamedTuple):

@@ -10,7 +10,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self
 
-from shaftwork.components.modes import ALL_IN_ONE
 from shaftwork.core.errors import NetworkError, NetworkWarning, ParameterError, Problem, SignalError
 from shaftwork.equations.kirchhoff import kirchhoff
 from shaftwork.equations.records import Equations
@@ -18,8 +17,10 @@ from shaftwork.network.builder import NetworkBuilder
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.netlist import Netlist
 from shaftwork.network.storage import read_netlist, write_netlist
+from shaftwork.network.wording import listed
+from shaftwork.pipeline.beside_waves import warn_of_rounding, waving, with_one_law
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.phase_names import in_phase
+from shaftwork.pipeline.phase_names import in_phase, whole_name
 from shaftwork.pipeline.phased import PhasedModel
 from shaftwork.reduction.diagnosis import diagnose
 from shaftwork.reduction.form import StateForm, state_form
@@ -90,13 +91,19 @@ class Network(NetworkBuilder):
             return self.expanded().equations(phase=phase)
         netlist = self.netlist()
         form = _sound(netlist)
-        if not any(part.modes for part in form.graph.parts) and phase is None:
+        if (form.waves or not any(part.modes for part in form.graph.parts)) and phase is None:
             return kirchhoff(form)
+        if form.waves:
+            raise ParameterError(
+                f"phase = {phase!r}: beside travelling waves ({listed(waving(form.graph))}) parts have the laws of "
+                "all their modes in one. Leave phase out, or take another model of the shaft, such as Lumped(20)."
+            )
 
         def chosen(name: str) -> Equations:
-            return kirchhoff(_sound(in_phase(netlist, form.graph, name)))
+            made = kirchhoff(_sound(in_phase(netlist, form.graph, name)) if name else form)
+            return dataclasses.replace(made, phase=whole_name(form.graph, name), in_phase=chosen)
 
-        return dataclasses.replace(kirchhoff(form) if phase is None else chosen(phase), in_phase=chosen)
+        return chosen("" if phase is None else phase)
 
     def compile(
         self,
@@ -150,7 +157,7 @@ class Network(NetworkBuilder):
             count: the modes wanted, those of smallest |rate|; by default all, of exact shafts 10 or all up to f_max.
             f_max: the largest |rate| / 2 pi, Hz; by default there is none.
             exact: every shaft but a rigid one and one spring is taken as it is, without a mesh; a wave always is.
-            t: time at which laws are read, s; by default after their last breakpoint.
+            t: time at which laws are read, s; by default as for `Model.linearize`.
         """
         return self._small_motions(exact=exact)(at, t, ()).modes(count, f_max)
 
@@ -172,7 +179,7 @@ class Network(NetworkBuilder):
             f: (k,) frequencies, Hz.
             at: the point, as for `Model.linearize`.
             exact: every shaft but a rigid one and one spring is taken as it is, without a mesh; a wave always is.
-            t: time at which laws are read, s; by default after their last breakpoint.
+            t: time at which laws are read, s; by default as for `Model.linearize`.
         """
         return self._small_motions(exact=exact)(at, t, input).frequency_response(input, output, f)
 
@@ -236,8 +243,8 @@ def _sound(netlist: Netlist, accepted: str = "") -> StateForm:
     Beside travelling waves parts that change their mode have the laws of all their modes in one.
     """
     _, form, problems = diagnose(netlist)
-    if form is not None and form.waves and (modal := [part.name for part in form.graph.parts if part.modes]):
-        _, form, problems = diagnose(netlist.with_choices(dict.fromkeys(modal, ALL_IN_ONE)))
+    if form is not None and form.waves and any(part.modes for part in form.graph.parts):
+        _, form, problems = diagnose(with_one_law(netlist, form.graph))
     if errors := tuple(found for found in problems if found.severity == "error" and found.kind != accepted):
         raise NetworkError(f"'{netlist.name}' cannot be assembled", errors)
     for problem in problems:
@@ -250,6 +257,8 @@ def _sound(netlist: Netlist, accepted: str = "") -> StateForm:
 def _compiled(netlist: Netlist, angles: tuple[str, ...], accepted: str) -> Model:
     with _without_collection():
         form = _sound(netlist, accepted)
+        if form.waves:
+            warn_of_rounding(form.graph)
         if angles:
             form = state_form(form.graph, tuple(_branch_of(form.graph, name) for name in angles))
         chosen = form.waves or any(item.choices for item in netlist.placed)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-
-import numpy as np
+from typing import NamedTuple
 
 from shaftwork.codegen.elements import Array
 from shaftwork.integrate.problem import Reaction
@@ -14,8 +13,7 @@ from shaftwork.pipeline.moments import Change, Moment, Regime, clear_of_limits
 from shaftwork.pipeline.settling import Settling
 
 
-@dataclass(frozen=True, eq=False)
-class Phase:
+class Phase(NamedTuple):
     """A span of time in which no mode changes.
 
     Args:
@@ -80,8 +78,9 @@ class Passing:
         regime = self.moment.regime
         self._note(t, changes)
         self.phases.append(Phase(t, regime.modes, regime.p))
-        self._reactions.append(Reaction(regime.p, np.concatenate([regime.sides, self.moment.bands])))
-        return self._reactions[-1]
+        reaction = Reaction(regime.p, regime.sides, self.moment.bands)
+        self._reactions.append(reaction)
+        return reaction
 
     def _settled(self, met: int, t: float, x: Array) -> tuple[Moment, list[Change]] | None:
         before = Moment(self.moment.regime, x[: self._size].copy(), self.moment.bands)
@@ -98,12 +97,12 @@ class Passing:
             return None
         motion, states = way.to.motion, x[: self._size].tolist()
         rates, now = motion(t, states)
-        tick = self._settling.tick
+        tick, before = self._settling.tick, self.moment.bands
         near = motion(t + tick, way.to.rounded(states, rates, tick))[1]
         bands = [abs(n - g) for n, g in zip(near, now, strict=True)]
-        wide = list(map(max, bands, self.moment.bands))
         for guard, side in way.watched:
-            if side * now[guard] >= -wide[guard] and (guard != met or side == way.side):
+            beyond = side * now[guard]
+            if (beyond >= -bands[guard] or beyond >= -before[guard]) and (guard != met or side == way.side):
                 return None
         if way.side * now[met] < 0 or not self._goes_on(way, met, t, states, rates, now):
             return None

@@ -21,12 +21,7 @@ def in_phase(netlist: Netlist, graph: CircuitGraph, phase: str) -> Netlist:
     Raises:
         ParameterError: no part or mode has this name.
     """
-    if not isinstance(phase, str):
-        raise ParameterError(f"phase = {phase!r} must be a text such as 'gap open'. {_known(graph)}")
-    found: dict[tuple[str, str], Mode] = {}
-    for words in filter(None, (part.strip() for part in phase.split(","))):
-        part, modes, mode = _named(graph, words)
-        found[part.name, modes.label] = mode
+    found = _modes_in(graph, phase)
     chosen = {
         part.name: tuple(_choice(found.get((part.name, modes.label), modes.options[0])) for modes in part.modes)
         for part in graph.parts
@@ -35,8 +30,30 @@ def in_phase(netlist: Netlist, graph: CircuitGraph, phase: str) -> Netlist:
     return netlist.with_choices(chosen)
 
 
+def whole_name(graph: CircuitGraph, phase: str = "") -> str:
+    """The name of a phase with the mode of every part in it, also of those that are not named: "gap open, load stuck".
+
+    Raises:
+        ParameterError: no part or mode has this name.
+    """
+    found = _modes_in(graph, phase)
+    modes_of = ((name, found.get((part.name, modes.label), modes.options[0])) for name, part, modes in _elements(graph))
+    return ", ".join(f"{name} {mode.words}" for name, mode in modes_of)
+
+
 def _choice(mode: Mode) -> Choice:
     return Choice(mode.form, mode.value)
+
+
+def _modes_in(graph: CircuitGraph, phase: str) -> dict[tuple[str, str], Mode]:
+    """The modes that a phase names, by part and label of the element."""
+    if not isinstance(phase, str):
+        raise ParameterError(f"phase = {phase!r} must be a text such as 'gap open'. {_known(graph)}")
+    found: dict[tuple[str, str], Mode] = {}
+    for words in filter(None, (part.strip() for part in phase.split(","))):
+        part, modes, mode = _named(graph, words)
+        found[part.name, modes.label] = mode
+    return found
 
 
 def _elements(graph: CircuitGraph) -> Iterator[tuple[str, GraphPart, Modes]]:

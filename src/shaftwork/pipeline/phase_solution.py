@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterable, Iterator
 from functools import cached_property, partial
 
 import numpy as np
@@ -30,8 +30,8 @@ def solution(run: Run, name: str) -> Solution:
         why=run.why,
         statistics={"steps": run.steps, "changes": len(run.changes)},
         dense=whole,
-        observer=PhaseObserver(names, lambda: whole.stretches, _impacts(run)),
-        events=tuple(_event(change) for change in run.changes if _is_event(change)),
+        observer=PhaseObserver(names, lambda: whole.stretches, lambda: _impacts(run)),
+        events=tuple(_events(run.changes)),
         phases=_table(run),
     )
 
@@ -100,30 +100,29 @@ def _impacts(run: Run) -> tuple[tuple[float, str], ...]:
     return tuple(found.items())
 
 
-def _is_event(change: Change) -> bool:
-    modes = change.element.modes
-    return change.rebound or modes[change.before].words != modes[change.after].words
-
-
-def _event(change: Change) -> tuple[float, str, str, str]:
-    modes = change.element.modes
-    after = "rebound" if change.rebound else modes[change.after].words
-    return change.time, change.element.name, modes[change.before].words, after
+def _events(changes: Iterable[Change]) -> Iterator[tuple[float, str, str, str]]:
+    """Changes in words: what says the same before and after is none."""
+    for time, element, before, after, rebound, _ in changes:
+        was, now = element.modes[before].words, "rebound" if rebound else element.modes[after].words
+        if was != now:
+            yield time, element.name, was, now
 
 
 def _table(run: Run) -> tuple[PhaseRow, ...]:
     """The phases in words: those that say the same are one."""
-    rows: list[PhaseRow] = []
+    found: list[tuple[float, dict[str, str]]] = []
     phases = [phase for span in run.spans for phase in span.phases]
-    ends = [*(phase.start for phase in phases[1:]), run.demand.span[1]]
+    last = run.demand.span[1]
+    ends = [*(phase.start for phase in phases[1:]), last]
     words: dict[ModeNames, dict[str, str]] = {}
     for phase, end in zip(phases, ends, strict=True):
         if phase.modes not in words:
             pairs = zip(run.phases.elements, phase.modes, strict=True)
             words[phase.modes] = {element.name: element.modes[name].words for element, name in pairs}
         modes = words[phase.modes]
-        if rows and rows[-1].modes == modes:
-            rows[-1] = replace(rows[-1], end=end)
-        elif end > phase.start:
-            rows.append(PhaseRow(phase.start, end, modes))
-    return tuple(rows)
+        if found and found[-1][1] == modes:
+            continue
+        if end > phase.start:
+            found.append((phase.start, modes))
+    starts = [start for start, _ in found]
+    return tuple(PhaseRow(start, end, modes) for (start, modes), end in zip(found, [*starts[1:], last], strict=True))

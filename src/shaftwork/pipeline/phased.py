@@ -52,11 +52,8 @@ class PhasedModel(Model):
         moment = self._moment(settling, when, initial)
         for _ in range(MOST_CHANGES):
             bound = moment.regime.assembly.bound(moment.regime.p)
-            if not math.isfinite(t) and (moving := bound.moving_sources(when)):
-                raise SimulationError(
-                    f"{', '.join(moving)} never stops changing, so there is no steady operation. "
-                    f"Name the time at which the sources are to be read: steady_state(t=...)."
-                )
+            if not math.isfinite(t):
+                moment.regime.assembly.model.refuse_moving(bound, when)
             x = moment.x
             if x.size:
                 x = steady_state(bound, x, when, ends=partial(settling.ends, moment, when))
@@ -77,13 +74,19 @@ class PhasedModel(Model):
             time = time if t is None else t
             moment = settling.started(time, first.stores.states(first.bound(p), time, held))
         else:
-            time, x = operating_point(first.model, p, at, t, first.model.settled(p))
+            usual = 0.0 if at is None else first.model.settled(p)  # what rests has not begun to move
+            time, x = operating_point(first.model, p, at, t, usual)
             moment = settling.started(time, x)
         moment, _ = settling.settle(time, time, moment, None)
         model = moment.regime.assembly.model
         slopes = Linearization(model, moment.regime.p, moment.x, time, input_names(model, inputs))
         named = None if outputs is None else (outputs,) if isinstance(outputs, str) else tuple(outputs)
-        return linear_model(self.name, slopes, named, moment.x, time)
+        return linear_model(f"{self.name} ({self._words(moment)})", slopes, named, moment.x, time)
+
+    def _words(self, moment: Moment) -> str:
+        """The phase of a moment, "gap open, brake locked"."""
+        pairs = zip(self.phases.elements, moment.regime.modes, strict=True)
+        return ", ".join(f"{element.name} {element.modes[name].words}" for element, name in pairs)
 
     @staticmethod
     def _of(motion: Solution) -> tuple[float, dict[str, float]]:

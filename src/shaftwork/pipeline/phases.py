@@ -6,8 +6,9 @@ after another until all of them are consistent with the motion that follows, and
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +16,7 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.timeline import Timeline
 from shaftwork.components.modes import Choice
-from shaftwork.core.errors import NetworkError, ParameterError, SimulationError
+from shaftwork.core.errors import NetworkError, NetworkWarning, ParameterError, SimulationError
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import Problem, Trajectory
 from shaftwork.network.netlist import Netlist
@@ -60,6 +61,21 @@ class Span:
     phases: tuple[Phase, ...]
 
 
+@dataclass(frozen=True, eq=False)
+class Known:
+    """What runs with the same values over the same time share.
+
+    Args:
+        settling: changes modes.
+        timelines: by equations, the instants at which inputs jump or bend.
+        begins: modes and states with which a motion from rest begins, and the changes that lead there.
+    """
+
+    settling: Settling
+    timelines: dict[Assembly, Timeline] = field(default_factory=dict)
+    begins: list[tuple[Moment, list[Change]]] = field(default_factory=list)
+
+
 class Phases:
     """All sets of equations of a network whose parts change their mode; each is made when a motion first needs it.
 
@@ -74,6 +90,7 @@ class Phases:
         self.first: ModeNames = tuple(element.modes.options[0].name for element in self.elements)
         self._assemblies: dict[tuple[str, ...], Assembly | NetworkError] = {}
         self._engines: dict[Any, tuple[str, str]] = {}
+        self._known: tuple[Any, Known] | None = None
 
     def assembly(self, modes: ModeNames) -> Assembly:
         """The equations for a combination of modes.
@@ -84,7 +101,10 @@ class Phases:
         forms = tuple(element.modes[name].form for element, name in zip(self.elements, modes, strict=True))
         if forms not in self._assemblies:
             try:
-                self._assemblies[forms] = Assembly(self._rebuild(self._netlist(forms)), self.elements, forms)
+                with warnings.catch_warnings():  # of the network as it is wired compilation has warned
+                    warnings.simplefilter("ignore", NetworkWarning)
+                    model = self._rebuild(self._netlist(forms))
+                self._assemblies[forms] = Assembly(model, self.elements, forms)
             except NetworkError as error:
                 self._assemblies[forms] = error
         made = self._assemblies[forms]
@@ -102,6 +122,13 @@ class Phases:
         """The number of each element's mode by the name of its parameter."""
         pairs = zip(self.elements, modes, strict=True)
         return {element.number: element.modes[name].value for element, name in pairs}
+
+    def known(self, values: Mapping[str, float], span: tuple[float, float]) -> Known:
+        """What the last run with these values over the same time has found out, or nothing yet."""
+        key = tuple(sorted(values.items())), span
+        if self._known is None or self._known[0] != key:
+            self._known = key, Known(Settling(self, values, span))
+        return self._known[1]
 
     def engine(self, assembly: Assembly, problem: Problem, asked: str) -> tuple[str, str]:
         """The engine for a phase, and why.
@@ -141,32 +168,41 @@ class Run:
 
     def __init__(self, phases: Phases, values: Mapping[str, float], demand: Demand) -> None:
         self.phases, self.demand = phases, demand
-        self.settling = Settling(phases, values, demand.span)
+        self._known = phases.known(values, demand.span)
+        self.settling = self._known.settling
         self.spans: list[Span] = []
         self.changes: list[Change] = []
         self.engine, self.why, self.steps = "", "", 0
         self._soon = 0
-        self._timelines: dict[Assembly, Timeline] = {}
 
     def march(self, initial: Mapping[str, float] | None) -> None:
         """Go through all phases from the start values."""
         t, end = self.demand.span
-        moment = self._settle(t, self._start(initial), None)
+        moment = self._begin(initial)
         while t < end:
             t, moment = self._span(t, moment)
 
-    def _start(self, initial: Mapping[str, float] | None) -> Moment:
-        """The states and modes at the start, before modes have settled."""
-        assembly = self.phases.assembly(self.phases.first)
-        p = self.settling.regime(self.phases.first).p
-        x, _ = assembly.model.start(assembly.prepared(p), initial, self.demand.span)
-        return self.settling.started(self.timeline(assembly, p).sides(self.demand.span[0])[1], x)
+    def _begin(self, initial: Mapping[str, float] | None) -> Moment:
+        """The states and modes at the start."""
+        start, begins = self.demand.span[0], self._known.begins
+        if initial is not None or not begins:
+            assembly = self.phases.assembly(self.phases.first)
+            p = self.settling.regime(self.phases.first).p
+            x, _ = assembly.model.start(assembly.prepared(p), initial, self.demand.span)
+            after = self.timeline(assembly, p).sides(start)[1]
+            found = self.settling.settle(start, after, self.settling.started(after, x), None)
+            if initial is None:
+                begins.append(found)
+        else:
+            found = begins[0]
+        moment, changes = found
+        self.note(start, changes)
+        return moment
 
     def choose(self) -> tuple[str, str]:
         """The engine for the first phase, and why."""
-        start = self.demand.span[0]
-        moment = self._settle(start, self._start(None), None)
-        problem = self._problem(start, moment)
+        moment = self._begin(None)
+        problem = self._problem(self.demand.span[0], moment)
         return (
             self.phases.engine(moment.regime.assembly, problem, self.demand.engine)
             if problem.x0.size
@@ -175,9 +211,10 @@ class Run:
 
     def timeline(self, assembly: Assembly, p: Array) -> Timeline:
         """The instants at which inputs jump or bend."""
-        if assembly not in self._timelines:
-            self._timelines[assembly] = assembly.model.switching.timeline(p, *self.demand.span)
-        return self._timelines[assembly]
+        timelines = self._known.timelines
+        if assembly not in timelines:
+            timelines[assembly] = assembly.model.switching.timeline(p, *self.demand.span)
+        return timelines[assembly]
 
     def _instants(self, moment: Moment) -> Timeline:
         return self.timeline(moment.regime.assembly, moment.regime.p)
@@ -208,7 +245,7 @@ class Run:
                 "Give it damping or its neighbours an inertia, or let it rest."
             )
 
-    def _problem(self, t: float, moment: Moment) -> Problem:
+    def _problem(self, t: float, moment: Moment, passing: Passing | None = None) -> Problem:
         """The motion from a time on, up to the next instant at which an input jumps."""
         demand, regime, times = self.demand, moment.regime, self._instants(moment)
         end = min(next((time for time in times.times if time > t), np.inf), demand.span[1])
@@ -222,6 +259,7 @@ class Run:
             atol=atol,
             t_eval=self._outputs(t, end),
             max_steps=demand.max_steps - self.steps,
+            react=passing,
             rhs=problem.rhs if demand.progress is None else watched_by(problem.rhs, demand.progress),
         )
 
@@ -229,21 +267,26 @@ class Run:
         """One run of the engine, up to a change of equations or the next instant at which an input jumps."""
         passing = Passing(self.settling, moment, t, self.note)
         regime = moment.regime
-        trajectory = self._solve(regime.assembly, replace(self._problem(t, moment), react=passing))
+        trajectory = self._solve(regime.assembly, self._problem(t, moment, passing))
         self.steps += trajectory.statistics.get("steps", 0)
-        self.spans.append(Span(regime.assembly, trajectory, tuple(passing.phases)))
         assert trajectory.end is not None  # noqa: S101 (engines that follow guards say it)
         t, x = trajectory.end
-        x, sides = x[: moment.x.size], self._instants(moment).sides(t)
-        if trajectory.met is None and regime.assembly.model.form.has_impulses:
-            x = regime.assembly.bound(regime.p).impulse(x, *sides)
-        if trajectory.met is not None and passing.beyond is not None and sides == (t, t):
+        if self.demand.t_eval is not None and t in trajectory.t[-1:] and t < self.demand.span[1]:
+            # an output at an event belongs to the next phase, which has it too
+            trajectory = replace(trajectory, t=trajectory.t[:-1], x=trajectory.x[:-1])
+        self.spans.append(Span(regime.assembly, trajectory, tuple(passing.phases)))
+        met, sides = trajectory.met, self._instants(moment).sides(t)
+        if met is not None and passing.beyond is not None and sides == (t, t):
             moment, changes = passing.beyond
             self.note(t, changes)
             return t, moment
-        moment = passing.moment._replace(x=x)
-        over = trajectory.met is None and t >= self.demand.span[1]
-        return t, moment if over else self._settle(t, moment, trajectory.met)
+        moment = passing.moment._replace(x=x[: moment.x.size])
+        if sides != (t, t) and regime.assembly.model.form.has_impulses:
+            moment, changes = self.settling.jumped(t, moment, *sides)
+            self.note(t, changes)
+            met = None if changes else met
+        over = met is None and t >= self.demand.span[1]
+        return t, moment if over else self._settle(t, moment, met)
 
     def _outputs(self, t: float, end: float) -> Array | None:
         """The output times of a phase: an event belongs to the next one."""

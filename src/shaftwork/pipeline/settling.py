@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 from typing import TYPE_CHECKING
@@ -12,10 +12,11 @@ import numpy as np
 
 from shaftwork.codegen.elements import Array
 from shaftwork.components.branches import ACROSS
-from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.pipeline.assemblies import ModeNames, Watched
+from shaftwork.pipeline.impacts import NO_IMPACT, Impacts
 from shaftwork.pipeline.moments import ROUNDINGS, Change, Course, Moment, Regime, clear_of_limits
+from shaftwork.pipeline.regimes import Regimes, with_modes
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.phases import Phases
@@ -23,8 +24,11 @@ if TYPE_CHECKING:
 # How far ahead that course is looked at: parts of the time in which a state moves by its nominal size, and of the run.
 AHEAD, AHEAD_OF_RUN = 1e-3, 1e-7
 
-# A speed across what is joined, as part of the largest one or of one, up to which it is an error of the run, no impact.
-NO_IMPACT = 1e-8
+# What a look ahead gains must be more than so many rounding units.
+FEW = 4
+# So many changes within one instant have no end: of two rigid flanks without a gap between them, say.
+MOST_AT_ONCE = 2000
+MOST_REPEATS = 2
 
 
 class Settling:
@@ -37,60 +41,35 @@ class Settling:
     """
 
     def __init__(self, phases: Phases, values: Mapping[str, float], span: tuple[float, float]) -> None:
-        self._phases, self._values = phases, dict(values)
-        self.elements = phases.elements
+        self._phases, self.elements = phases, phases.elements
+        self._regimes = Regimes(phases, values)
+        self.regime, self.held = self._regimes.regime, self._regimes.held
+        self._impacts = Impacts(self._regimes, self.elements)
+        self.jumped = self._impacts.jumped
         self._ahead = AHEAD_OF_RUN * (span[1] - span[0])
         self.tick = ROUNDINGS * math.ulp(max(map(abs, span)))
         """How far in s rounding moves the time."""
-        self._regimes: dict[ModeNames, Regime] = {}
-
-    def regime(self, modes: ModeNames) -> Regime:
-        """A combination of modes.
-
-        Raises:
-            NetworkError: the equations of these modes contradict each other.
-        """
-        if modes not in self._regimes:
-            assembly = self._phases.assembly(modes)
-            p = assembly.vector(self._values, self._phases.numbers(modes))
-            made = Regime(
-                modes,
-                assembly,
-                p,
-                assembly.motion(p),
-                assembly.sides(modes),
-                assembly.sizes(p),
-                assembly.watched(modes),
-            )
-            self._regimes[modes] = made
-        return self._regimes[modes]
 
     def started(self, t: float, x: Array) -> Moment:
         """The modes in which a motion starts, from the states of the equations in which no mode joins anything.
+
+        An element that nothing else lets start in its mode, as a friction that a prescribed speed is about to turn,
+        starts in one to which that mode leads.
 
         Args:
             t: time in s at which inputs are read.
             x: (n,) states.
         """
         loose = self.regime(self._phases.first)
-        return self._changed(Moment(loose, x), t, loose.assembly.first_modes(t, x, loose.p))
-
-    def _changed(self, moment: Moment, t: float, modes: ModeNames) -> Moment:
-        """The same instant in other modes: all that is stored goes over.
-
-        Raises:
-            NetworkError: the equations of these modes contradict each other.
-        """
-        new, old = self.regime(modes), moment.regime
-        if new.assembly is old.assembly:
-            return Moment(new, moment.x)
-        return Moment(new, new.assembly.stores.states(new.assembly.bound(new.p), t, self.held(moment, t)))
-
-    def held(self, moment: Moment, t: float) -> dict[str, float]:
-        """All that is stored, by name."""
-        assembly, p = moment.regime.assembly, moment.regime.p
-        values = assembly.stores.of(lambda: assembly.bound(p), np.array([t]), moment.x[None, :])[0]
-        return dict(zip(assembly.stores.names, values.tolist(), strict=True))
+        modes, wanted = loose.modes, loose.assembly.first_modes(t, x, loose.p)
+        if self._regimes.possible(wanted):
+            modes = wanted
+        else:
+            for k, name in enumerate(wanted):
+                leaves = self.elements[k].modes[name].leaves
+                options = (with_modes(modes, {k: to}) for to in (name, *(leave.to for leave in leaves if leave.to)))
+                modes = next(filter(self._regimes.possible, options), modes)
+        return self._regimes.changed(Moment(loose, x), t, modes)
 
     def ends(self, moment: Moment, t: float, x: Array) -> bool:
         """Whether states are beyond a guard of the modes of a moment."""
@@ -111,30 +90,32 @@ class Settling:
             SimulationError: no modes are consistent; names the pair that changes for ever.
         """
         changes: list[Change] = []
+        still: list[tuple[int, Watched]] = []
         seen: dict[ModeNames, None] = {}
-        in_order = False
+        blocked, repeats = None, 0
         # a guard is met where it is beyond zero by its band, which then still is the band of what is the same after it
         ended = moment
         if met is None:
-            moment, found = self._violated(moment, after, ended)
+            moment, found = self._violated(moment, after, ended, still)
         else:
             found = next(pair for pair in moment.regime.watched if pair[1].guard == met)
         while found is not None:
-            moment, made = self._follow(t, after, moment, *found)
-            changes += made
-            if made and made[0].impact:
+            moment, made, contradiction = self._follow(t, after, moment, *found)
+            changes, blocked = [*changes, *made], contradiction or blocked
+            impact = bool(made) and made[0].impact
+            again = bool(made) and not impact and moment.regime.modes in seen
+            repeats += again
+            if repeats > MOST_REPEATS or len(changes) > MOST_AT_ONCE:
+                raise self._endless(t, changes, blocked)
+            if again or impact:
                 seen.clear()
-            elif made and moment.regime.modes in seen:
-                if in_order:
-                    raise self._endless(t, changes)
-                in_order = True
-                seen.clear()
+            still = [] if made else [*still, found]
             seen[moment.regime.modes] = None
-            moment, found = self._violated(moment, after, ended, in_order=in_order)
+            moment, found = self._violated(moment, after, ended, still, repeats)
         return moment, changes
 
     def _violated(
-        self, moment: Moment, t: float, ended: Moment, *, in_order: bool = False
+        self, moment: Moment, t: float, ended: Moment, still: Sequence[tuple[int, Watched]], repeats: int = 0
     ) -> tuple[Moment, tuple[int, Watched] | None]:
         """The guard that is farthest beyond its limit, or on it and about to go beyond; the moment with its bands.
 
@@ -142,8 +123,11 @@ class Settling:
             moment: modes and states.
             t: s.
             ended: the moment before any change.
-            in_order: take the first one instead. The worst leads faster to modes that are consistent, as a rule; but
-                this always does where parts hold each other (Murty, Linear Complementarity, 1988, section 4.1).
+            still: elements and guards that were found here already and change nothing.
+            repeats: how often modes have come back. After the first time the first guard is taken. The worst leads
+                faster to modes that are consistent, as a rule; but this always does where parts hold each other
+                (Murty, Linear Complementarity, 1988, section 4.1). After the second time, what comes back
+                within its limit by itself, at once, is no more beyond it.
         """
         regime, x = moment.regime, moment.x.tolist()
         rates, now = regime.motion(t, x)
@@ -157,19 +141,22 @@ class Settling:
         for pair in regime.watched:
             k = pair[1].guard
             value = pair[1].side * now[k]
-            if value < -wide[k]:
+            if value < -wide[k] or pair in still:
                 continue
             if value <= wide[k] or pair[1].leave.rebound is not None:  # only what comes nearer is thrown back
                 on_limit.append(pair)
             elif value > 0:
                 beyond.append((value, pair))
+        if repeats > 1 and beyond:
+            soon = _later(regime, self.ahead(regime, rates), (t, x, rates, now))[3]
+            beyond = [found for found in beyond if found[1][1].side * soon[found[1][1].guard] > 0]
         # impacts come first: torques are those of the motion after them
         hits = [found for found in beyond if not found[1][1].leave.by_torque]
         if on_limit and not hits:
             leaving = self._leaving(regime, (t, x, rates, now), (t + self.tick, moved, others, near), on_limit)
             hits = [found for found in leaving if found[1][1].leave.rebound is not None]
-            beyond = beyond + leaving if in_order else beyond or leaving
-        chosen = _chosen(hits or beyond, in_order=in_order)
+            beyond = beyond + leaving if repeats else beyond or leaving
+        chosen = _chosen(hits or beyond, in_order=repeats > 0)
         return Moment(regime, moment.x, clear_of_limits(regime, now, bands)), chosen
 
     def ahead(self, regime: Regime, rates: list[float]) -> float:
@@ -195,38 +182,58 @@ class Settling:
         ways, found = (here, beside), []
         for _ in range(2):  # where nothing moves yet, its acceleration tells
             ways = _later(regime, step, ways[0]), _later(regime, step, ways[1])
-            for number, made in on_limit:
-                k = made.guard
+            moving = []
+            for pair in on_limit:
+                made, k = pair[1], pair[1].guard
                 gain, other = made.side * (ways[0][3][k] - here[3][k]), made.side * (ways[1][3][k] - beside[3][k])
-                if gain > max(0.0, abs(gain - other)):
-                    found.append((gain, (number, made)))
+                units = abs(beside[3][k] - here[3][k]) / ROUNDINGS
+                if abs(gain) > max(abs(gain - other), FEW * units):
+                    moving.append((gain, pair))
+            found = [one for one in moving if one[0] > 0]
             if found:
                 break
+            on_limit = [pair for pair in on_limit if all(pair is not one for _, one in moving)]
         return found
 
     def _follow(
         self, t: float, after: float, moment: Moment, number: int, ended: Watched
-    ) -> tuple[Moment, list[Change]]:
-        """The mode of an element changes, or what hits is thrown back."""
-        element, leave, regime = self._phases.elements[number], ended.leave, moment.regime
+    ) -> tuple[Moment, list[Change], NetworkError | None]:
+        """The mode of an element changes, or what hits is thrown back; and what kept it from what it wanted."""
+        element, leave, regime = self.elements[number], ended.leave, moment.regime
         before = regime.modes[number]
         to = leave.to or regime.assembly.start_of(number, before, after, moment.x, regime.p)
-        speed = self._meets(moment, after, element.modes[to], number)
+        speed = self._impacts.meets(moment, after, element.modes[to], number)
         slips = next((name for side, name in element.modes[to].gives_way if side * speed > 0), "")
         if slips == before:  # it was met by rounding alone: it is moving away
-            return moment, []
+            return moment, [], None
         if slips:  # its torque is limited, so it takes no speed away at once
             to, speed = slips, 0.0
         try:
             if speed or (leave.rebound is not None and not slips):
-                new, changes = self._hit(t, after, moment, number, replace(leave, to=to))
-                return (self._at_limit(new, after, number, ended) if changes[0].rebound else new), changes
-            modes = _with(regime.modes, {number: to})
-            new, conducting = self._commutated(moment, after, modes, self._changed(moment, after, modes))
-            others = [Change(t, self._phases.elements[k], regime.modes[k], name) for k, name in conducting.items()]
-            return new, [Change(t, element, before, to), *others]
-        except NetworkError:
-            return self._around(t, after, moment, number, to)
+                return *self._hit(t, after, moment, number, replace(ended, leave=replace(leave, to=to))), None
+            modes = with_modes(regime.modes, {number: to})
+            new, conducting = self._commutated(moment, after, modes, self._regimes.changed(moment, after, modes))
+            others = [Change(t, self.elements[k], regime.modes[k], name) for k, name in conducting.items()]
+            return new, [Change(t, element, before, to), *others], None
+        except NetworkError as error:
+            return *self._around(t, after, moment, (number, to), error), error
+
+    def _hit(self, t: float, after: float, moment: Moment, number: int, ended: Watched) -> tuple[Moment, list[Change]]:
+        """An impact; what hits stays where a rebound would lose less than it gains, as it is found late by rounding."""
+        new, changes = self._impacts.hit(t, after, moment, number, ended.leave)
+        if not changes[0].rebound:
+            return new, changes
+        old, made, x = moment.regime, new.regime, new.x
+        share = old.assembly.constant(number, ended.leave.rebound, old.p)
+        speed = old.assembly.across(number, after, moment.x, old.p)
+        late = ended.side * old.motion(after, moment.x.tolist())[1][ended.guard]
+        rates = made.motion(after, x.tolist())[0]
+        step = self.ahead(made, rates)
+        later = made.assembly.across(number, after + step, x + step * np.array(rates), made.p)
+        pushed = math.copysign(1.0, speed) * (later - made.assembly.across(number, after, x, made.p)) / step
+        if 0 < (1 - share**2) * speed**2 < 4 * late * pushed:
+            return self._impacts.hit(t, after, moment, number, replace(ended.leave, rebound=None))
+        return self._impacts.at_limit(new, after, number, ended.leave), changes
 
     def _commutated(self, moment: Moment, t: float, modes: ModeNames, plain: Moment) -> tuple[Moment, dict[int, str]]:
         """What takes over a torque or current that a change would cut off from its store: a diode, a freewheel.
@@ -248,112 +255,54 @@ class Settling:
         ways = [
             (k, leave.to)
             for k, name in enumerate(modes)
-            for leave in self._phases.elements[k].modes[name].leaves
+            for leave in self.elements[k].modes[name].leaves
             if leave.when == ACROSS and leave.to
         ]
         for count in (1, 2):
             for chosen in combinations(ways, count):
-                other = self._changed(moment, t, _with(modes, dict(chosen)))
-                if lost(other) <= least and not self._violated(other, t, other)[1]:
+                if not self._regimes.possible(with_modes(modes, dict(chosen))):
+                    continue
+                other = self._regimes.changed(moment, t, with_modes(modes, dict(chosen)))
+                if lost(other) <= least and not self._violated(other, t, other, ())[1]:
                     return other, dict(chosen)
         return plain, {}
 
-    def _meets(self, moment: Moment, t: float, to: Mode, number: int) -> float:
-        """The speed across an element that is joined from now on; zero where it is no more than an error of the run."""
-        regime, modes = moment.regime, self._phases.elements[number].modes
-        if to.form in (modes.options[0].form, modes[regime.modes[number]].form):
-            return 0.0
-        speed = regime.assembly.across(number, t, moment.x, regime.p)
-        speeds = moment.x[: len(regime.assembly.model.form.across_states)]
-        least = NO_IMPACT * np.abs(speeds).max(initial=1.0)
-        if abs(speed) <= least:
-            return 0.0
-        try:
-            joined = self._changed(moment, t, _with(regime.modes, {number: to.name}))
-        except NetworkError:
-            return speed
-        held, after = self.held(moment, t), self.held(joined, t)
-        # between dampers alone a speed is whatever their torques make it: joining them stops no inertia
-        return speed if any(abs(after[name] - value) > least for name, value in held.items()) else 0.0
-
-    def _hit(self, t: float, after: float, moment: Moment, number: int, leave: Leave) -> tuple[Moment, list[Change]]:
-        """An impact: the element is joined for an instant, and for good where nothing throws it back.
-
-        Law: v = v_joined + e (v_joined - v_before), which gives e times the speed back and keeps every momentum.
-        """
-        elements, regime = self._phases.elements, moment.regime
-        speed = abs(regime.assembly.across(number, after, moment.x, regime.p))
-        share, rest = (regime.assembly.constant(number, given, regime.p) for given in (leave.rebound, leave.rest))
-        # what moves more slowly than the rest of an impact stays as it is: two contacts would part and meet for ever
-        joined = self._joined(moment, after, number, leave.to, max(rest, NO_IMPACT * speed))
-        rebound = leave.rebound is not None and share * speed > rest
-        changes = [Change(t, elements[number], regime.modes[number], leave.to, rebound, impact=True)]
-        for k, (before, name) in enumerate(zip(regime.modes, joined.regime.modes, strict=True)):
-            if k != number and name != before:
-                changes.append(Change(t, elements[k], before, name))
-        if not rebound:
-            return joined, changes
-        held, plastic = self.held(moment, after), self.held(joined, after)
-        thrown = {name: plastic[name] + share * (plastic[name] - value) for name, value in held.items()}
-        new = self.regime(_with(joined.regime.modes, {number: regime.modes[number]}))
-        return Moment(new, new.assembly.stores.states(new.assembly.bound(new.p), after, thrown)), changes
-
-    def _at_limit(self, moment: Moment, t: float, number: int, ended: Watched) -> Moment:
-        """What was thrown back, its twist right at the limit: the little beyond it would add up over many rebounds."""
-        regime, x = moment.regime, moment.x.copy()
-        state = regime.assembly.twist(number)
-        if state is None:
-            return moment
-        beyond = regime.motion(t, x.tolist())[1][ended.guard]
-        x[state] += 1.0
-        slope = regime.motion(t, x.tolist())[1][ended.guard] - beyond
-        x[state] = moment.x[state] - (beyond / slope if slope else 0.0)
-        return Moment(regime, x)
-
-    def _joined(self, moment: Moment, t: float, number: int, to: str, least: float) -> Moment:
-        """After an inelastic impact. What holds by a limited torque slips in it; contacts are pressed, not pulled."""
-        before, elements = moment.regime.modes, self._phases.elements
-        gives = {k: elements[k].modes[name].gives_way for k, name in enumerate(before) if k != number}
-        gives = {k: ways for k, ways in gives.items() if ways}
-        made = {number: to, **{k: ways[0][1] for k, ways in gives.items()}}
-        while True:
-            joined = self._changed(moment, t, _with(before, made))
-            after = joined.regime
-            speeds = {k: after.assembly.across(k, t, joined.x, after.p) for k in gives}
-            ways = {k: [name for side, name in gives[k] if side * speeds[k] > 0] for k in gives}
-            pressed = [k for k in gives if abs(speeds[k]) > least and not ways[k]]
-            if not pressed:
-                break
-            for k in pressed:
-                made[k] = before[k]
-                del gives[k]
-        made |= {k: ways[k][0] if abs(speeds[k]) > least else before[k] for k in gives}
-        return self._changed(joined, t, _with(before, made))
-
-    def _around(self, t: float, after: float, moment: Moment, number: int, to: str) -> tuple[Moment, list[Change]]:
-        """Past a mode whose equations contradict others: into the other one that it leads to.
+    def _around(
+        self, t: float, after: float, moment: Moment, wanted: tuple[int, str], error: NetworkError
+    ) -> tuple[Moment, list[Change]]:
+        """Past a mode whose equations contradict others: into one to which it leads, or something else gives way.
 
         A friction that a prescribed speed turns cannot stick: it passes from slipping one way to slipping the other.
         """
-        element, modes = self._phases.elements[number], moment.regime.modes
-        before = modes[number]
-        others = [leave.to for leave in element.modes[to].leaves if leave.to != before]
-        for other in others:
-            return self._changed(moment, after, _with(modes, {number: other})), [Change(t, element, before, other)]
-        raise SimulationError(f"'{element.name}' can neither stay '{before}' nor become '{to}' at t = {t:.9g} s.")
+        modes, (number, to) = moment.regime.modes, wanted
+        element, before = self.elements[number], modes[number]
+        ways = [{number: leave.to} for leave in element.modes[to].leaves if leave.to not in ("", before)]
+        for k, limited in self._impacts.limited(modes).items():
+            ways += [{number: to, k: name} for _, name in limited if k != number]
+        for way in ways:
+            if self._regimes.possible(new := with_modes(modes, way)):
+                changes = [Change(t, self.elements[k], modes[k], name) for k, name in way.items()]
+                return self._regimes.changed(moment, after, new), changes
+        raise SimulationError(
+            f"'{element.name}' can neither stay {element.modes[before].words} nor become {element.modes[to].words} "
+            f"at t = {t:.9g} s. {error.problems[0]}"
+        ) from error
 
-    def _endless(self, t: float, changes: list[Change]) -> SimulationError:
+    @staticmethod
+    def _endless(t: float, changes: list[Change], blocked: NetworkError | None) -> SimulationError:
         last = changes[-1]
         others = dict.fromkeys(change.element.name for change in changes)
+        before, after = (last.element.modes[name].words for name in (last.before, last.after))
+        if blocked is not None:
+            advice = str(blocked.problems[0])
+        elif last.rebound:
+            after, advice = "rebound", "Take a restitution below 1, a larger omega_rest, or a gap between its limits."
+        else:
+            advice = "Give the node between them an inertia or damping."
         return SimulationError(
             f"At t = {t:.9g} s no modes of {', '.join(others)} are consistent: '{last.element.name}' changes for ever "
-            f"between '{last.before}' and '{last.after}'. Give the node between them an inertia or damping."
+            f"between {before} and {after}. {advice}"
         )
-
-
-def _with(modes: ModeNames, changed: Mapping[int, str]) -> ModeNames:
-    """A combination of modes with some of them changed."""
-    return tuple(changed.get(k, name) for k, name in enumerate(modes))
 
 
 def _chosen(found: list[tuple[float, tuple[int, Watched]]], *, in_order: bool) -> tuple[int, Watched] | None:

@@ -172,6 +172,15 @@ def store_name(graph: CircuitGraph, branch: GraphBranch) -> str:
     return made(graph, branch).name
 
 
+def integral_name(graph: CircuitGraph, branch: GraphBranch) -> str:
+    """The name of the integral of what is across a branch: "gap.phi", "gap.phi_left" beside others of the part."""
+    part = graph.parts[branch.part]
+    name = f"{part.name}.{_domain(graph, branch).integral.name}"
+    if all(other == branch.index for other in graph.integrated[branch.part]):
+        return name
+    return f"{name}_{branch.template.label or part.branches.index(branch.index) + 1}"
+
+
 def _domain(graph: CircuitGraph, branch: GraphBranch) -> Domain:
     node = branch.plus if branch.plus >= 0 else branch.minus
     return graph.domains[node]
@@ -190,6 +199,4 @@ def _through_state(graph: CircuitGraph, branch: GraphBranch) -> State:
 
 def _integral_state(graph: CircuitGraph, branch: GraphBranch) -> State:
     quantity = _domain(graph, branch).integral
-    return State(
-        f"{graph.parts[branch.part].name}.{quantity.name}", branch.index, "integral", quantity.unit, quantity.latex
-    )
+    return State(integral_name(graph, branch), branch.index, "integral", quantity.unit, quantity.latex)

@@ -10,7 +10,7 @@ from shaftwork.components.rotation import Inertia
 from shaftwork.components.shaft_models import ShaftModel, Spectral
 from shaftwork.components.shafts import Shaft
 from shaftwork.pipeline.network import Network
-from shaftwork.scenes.catalog import Scene, enter
+from shaftwork.scenes.catalog import Scene
 from shaftwork.scenes.shaft_chain import (
     DENSITY,
     DIAMETER,
@@ -70,20 +70,18 @@ def bldc_shaft(
     return net
 
 
-BLDC_SHAFT = enter(
-    Scene(
-        name="bldc-shaft",
-        title="brushless motor, steel shaft and rotating mass, start on full voltage",
-        source="Popenda 2019, figures 4 to 13, data of section Results",
-        build=bldc_shaft,
-        t_end=0.5,
-        signals=("motor.tau", "motor.i_a", "line.tau_a", "line.tau_b", "Je.omega", "Jm.omega"),
-        chosen=(
-            "direct voltage 540 V (400 V mains, rectified), two pole pairs, flat tops of 120 degrees; 212 V are the "
-            "flat top of a phase at 3000 1/min, and L_mu and L_sigma together are the inductance of a phase",
-            "load of 12.7 N m (4 kW at 3000 1/min), against the motion from standstill on",
-            "shear modulus 77.5 GPa (steel) instead of the printed 7750 MN/m2",
-            "internal damping of the shaft 0.02 N m2 s/rad, 0.002 of critical at the lowest frequency",
-        ),
-    )
+BLDC_SHAFT = Scene(
+    name="bldc-shaft",
+    title="brushless motor, steel shaft and rotating mass, start on full voltage",
+    source="Popenda 2019, figures 4 to 13, data of section Results",
+    build=bldc_shaft,
+    t_end=0.5,
+    signals=("motor.tau", "motor.i_a", "line.tau_a", "line.tau_b", "Je.omega", "Jm.omega"),
+    chosen=(
+        "direct voltage 540 V (400 V mains, rectified), two pole pairs, flat tops of 120 degrees; 212 V are the "
+        "flat top of a phase at 3000 1/min, and L_mu and L_sigma together are the inductance of a phase",
+        "load of 12.7 N m (4 kW at 3000 1/min), against the motion from standstill on",
+        "shear modulus 77.5 GPa (steel) instead of the printed 7750 MN/m2",
+        "internal damping of the shaft 0.02 N m2 s/rad, 0.002 of critical at the lowest frequency",
+    ),
 )

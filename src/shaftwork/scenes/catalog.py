@@ -1,4 +1,4 @@
-"""What a ready scene is, and the list of all of them."""
+"""What a ready scene is."""
 
 from __future__ import annotations
 
@@ -35,12 +35,3 @@ class Scene:
 
     def __call__(self, **options: Any) -> Network:
         return self.build(**options)
-
-
-SCENES: dict[str, Scene] = {}
-
-
-def enter(scene: Scene) -> Scene:
-    """Put a scene on the list."""
-    SCENES[scene.name] = scene
-    return scene

@@ -15,7 +15,7 @@ from shaftwork.components.motor_catalogue import motors
 from shaftwork.components.rotation import Inertia, Spring
 from shaftwork.core.errors import ParameterError
 from shaftwork.pipeline.network import Network
-from shaftwork.scenes.catalog import Scene, enter
+from shaftwork.scenes.catalog import Scene
 
 MOTOR = motors["KBF-90 LA 2"]
 WHEEL_RADIUS = 0.125  # m
@@ -131,53 +131,47 @@ _CURVE = (
     "through the printed rated point 2510 1/min, 3.8 N m"
 )
 
-CRANE_START = enter(
-    Scene(
-        name="crane-start",
-        title="crane travel drive, start and steady travel",
-        source="Marinkovic 2012, section 3, figures 9 and 10",
-        build=crane_start,
-        t_end=6.5,
-        signals=("shaft.tau", "motor.tau", "J1.omega", "J2.omega"),
-        chosen=(_CURVE, "Kloss' curve from standstill on; the pull-up dip of the cage motor is left out"),
-    )
+CRANE_START = Scene(
+    name="crane-start",
+    title="crane travel drive, start and steady travel",
+    source="Marinkovic 2012, section 3, figures 9 and 10",
+    build=crane_start,
+    t_end=6.5,
+    signals=("shaft.tau", "motor.tau", "J1.omega", "J2.omega"),
+    chosen=(_CURVE, "Kloss' curve from standstill on; the pull-up dip of the cage motor is left out"),
 )
 
-CRANE = enter(
-    Scene(
-        name="crane",
-        title="crane travel drive, start, steady travel, braking and ringing down",
-        source="Marinkovic 2012, section 3, figures 9 to 12",
-        build=crane,
-        t_end=10.0,
-        signals=("shaft.tau", "motor.tau", "brake.tau", "J1.omega", "J2.omega"),
-        chosen=(
-            _CURVE,
-            "locked-rotor torque 7.0 and pull-up torque 6.4 N m (printed only in a figure)",
-            "no gap; with gap > 0 the motion starts in the middle of it",
-            "with load='random' a new number every 0.05 s; with start='frequency' a ramp of 4 s",
-        ),
-    )
+CRANE = Scene(
+    name="crane",
+    title="crane travel drive, start, steady travel, braking and ringing down",
+    source="Marinkovic 2012, section 3, figures 9 to 12",
+    build=crane,
+    t_end=10.0,
+    signals=("shaft.tau", "motor.tau", "brake.tau", "J1.omega", "J2.omega"),
+    chosen=(
+        _CURVE,
+        "locked-rotor torque 7.0 and pull-up torque 6.4 N m (printed only in a figure)",
+        "no gap; with gap > 0 the motion starts in the middle of it",
+        "with load='random' a new number every 0.05 s; with start='frequency' a ramp of 4 s",
+    ),
 )
 
-SIX_PHASES = enter(
-    Scene(
-        name="six-phases",
-        title="crane travel drive from an open gap, phase by phase",
-        source="Marinkovic 2012, section 2.1, figure 4, (12)-(16)",
-        build=six_phases,
-        t_end=10.0,
-        signals=("shaft.tau", "motor.tau", "brake.tau", "J1.omega", "J2.omega"),
-        chosen=(
-            "gap of 0.003 rad between the flanks, at first in its middle",
-            "the motor of the scene crane",
-        ),
-        phases=(
-            "load stuck, shaft open, brake released",
-            "load stuck, shaft in contact, brake released",
-            "load slipping forward, shaft in contact, brake released",
-            "load slipping forward, shaft in contact backward, brake slipping forward",
-            "load slipping backward, shaft in contact, brake locked",
-        ),
-    )
+SIX_PHASES = Scene(
+    name="six-phases",
+    title="crane travel drive from an open gap, phase by phase",
+    source="Marinkovic 2012, section 2.1, figure 4, (12)-(16)",
+    build=six_phases,
+    t_end=10.0,
+    signals=("shaft.tau", "motor.tau", "brake.tau", "J1.omega", "J2.omega"),
+    chosen=(
+        "gap of 0.003 rad between the flanks, at first in its middle",
+        "the motor of the scene crane",
+    ),
+    phases=(
+        "load stuck, shaft open, brake released",
+        "load stuck, shaft in contact, brake released",
+        "load slipping forward, shaft in contact, brake released",
+        "load slipping forward, shaft in contact backward, brake slipping forward",
+        "load slipping backward, shaft in contact, brake locked",
+    ),
 )

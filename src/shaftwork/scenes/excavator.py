@@ -10,7 +10,7 @@ from shaftwork.components.motors import CageMotor
 from shaftwork.components.rotation import Gear, Inertia, Spring
 from shaftwork.core.errors import NetworkWarning
 from shaftwork.pipeline.network import Network
-from shaftwork.scenes.catalog import Scene, enter
+from shaftwork.scenes.catalog import Scene
 
 T_DIG, T_END = 5.0, 30.0  # s: from then on it digs; end of figure 13
 PULL_UP_SPEED = 537.0  # 1/min, chosen: the one number with which the start has both of the extremes of figure 13
@@ -69,21 +69,19 @@ def _motor(pull_up_speed: float) -> CageMotor:
         return motors["excavator 250 kW"].cage("motor", n_s=pull_up_speed, symbol="M")
 
 
-EXCAVATOR = enter(
-    Scene(
-        name="excavator",
-        title="bucket wheel drive of an excavator, start in the air and digging",
-        source="Marinkovic 2012, section 3, figure 13",
-        build=excavator,
-        t_end=T_END,
-        signals=("shaft.tau", "motor.tau", "J1.omega", "J2.omega"),
-        chosen=(
-            "speed at pull-up 537 1/min, with which the start has both T_max and T_min of figure 13; the quartic then "
-            "first rises to 5.8 kN m at 110 1/min; synchronous speed 1000 1/min",
-            "grey clay: the source does not say in which of its three soils figure 13 digs",
-            "gear ratio 120 and edges at a radius of 3 m, which cut at 2.6 m/s; their mean length of 0.6 m in the soil "
-            "gives T_mean of figure 13; a bucket leaves the soil after 2 rad; losses of the reducer are left out",
-            "from 5 s on the wheel comes to its full depth within 1 s",
-        ),
-    )
+EXCAVATOR = Scene(
+    name="excavator",
+    title="bucket wheel drive of an excavator, start in the air and digging",
+    source="Marinkovic 2012, section 3, figure 13",
+    build=excavator,
+    t_end=T_END,
+    signals=("shaft.tau", "motor.tau", "J1.omega", "J2.omega"),
+    chosen=(
+        "speed at pull-up 537 1/min, with which the start has both T_max and T_min of figure 13; the quartic then "
+        "first rises to 5.8 kN m at 110 1/min; synchronous speed 1000 1/min",
+        "grey clay: the source does not say in which of its three soils figure 13 digs",
+        "gear ratio 120 and edges at a radius of 3 m, which cut at 2.6 m/s; their mean length of 0.6 m in the soil "
+        "gives T_mean of figure 13; a bucket leaves the soil after 2 rad; losses of the reducer are left out",
+        "from 5 s on the wheel comes to its full depth within 1 s",
+    ),
 )

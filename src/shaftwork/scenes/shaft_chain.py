@@ -8,7 +8,7 @@ from shaftwork.components.rotation import Inertia, Spring
 from shaftwork.components.sources import TorqueSource
 from shaftwork.core.errors import ParameterError
 from shaftwork.pipeline.network import Network
-from shaftwork.scenes.catalog import Scene, enter
+from shaftwork.scenes.catalog import Scene
 
 LENGTH, DIAMETER, DENSITY = 1.0, 0.02, 7900.0  # m, m, kg/m3
 SHEAR_MODULUS = 77.5e9  # Pa: steel
@@ -52,18 +52,16 @@ def shaft_chain(
     return net
 
 
-SHAFT_CHAIN = enter(
-    Scene(
-        name="shaft-chain",
-        title="steel shaft as 20 explicit elements between motor and load, torque step",
-        source="Popenda 2019, (1)-(4), data of section Results",
-        build=shaft_chain,
-        t_end=0.2,
-        signals=("c1.tau", "c10.tau", "c19.tau", "Je.omega", "Jm.omega"),
-        chosen=(
-            "shear modulus 77.5 GPa (steel) instead of the printed 7750 MN/m2",
-            "torque step 12.7 N m (4 kW at 3000 1/min) instead of the BLDC motor",
-            "no damping",
-        ),
-    )
+SHAFT_CHAIN = Scene(
+    name="shaft-chain",
+    title="steel shaft as 20 explicit elements between motor and load, torque step",
+    source="Popenda 2019, (1)-(4), data of section Results",
+    build=shaft_chain,
+    t_end=0.2,
+    signals=("c1.tau", "c10.tau", "c19.tau", "Je.omega", "Jm.omega"),
+    chosen=(
+        "shear modulus 77.5 GPa (steel) instead of the printed 7750 MN/m2",
+        "torque step 12.7 N m (4 kW at 3000 1/min) instead of the BLDC motor",
+        "no damping",
+    ),
 )

@@ -7,7 +7,7 @@ from shaftwork.components.shaft_models import Lumped, ShaftModel
 from shaftwork.components.shafts import Shaft
 from shaftwork.components.sources import TorqueSource
 from shaftwork.pipeline.network import Network
-from shaftwork.scenes.catalog import Scene, enter
+from shaftwork.scenes.catalog import Scene
 from shaftwork.scenes.shaft_chain import (
     DENSITY,
     DIAMETER,
@@ -54,18 +54,16 @@ def shaft_step(
     return net
 
 
-SHAFT_STEP = enter(
-    Scene(
-        name="shaft-step",
-        title="steel shaft between motor and load, torque step, model to choose",
-        source="Popenda 2019, (8)-(23), data of section Results",
-        build=shaft_step,
-        t_end=0.2,
-        signals=("line.tau_a", "line.tau_b", "Je.omega", "Jm.omega"),
-        chosen=(
-            "shear modulus 77.5 GPa (steel) instead of the printed 7750 MN/m2",
-            "torque step 12.7 N m (4 kW at 3000 1/min) instead of the BLDC motor",
-            "no damping",
-        ),
-    )
+SHAFT_STEP = Scene(
+    name="shaft-step",
+    title="steel shaft between motor and load, torque step, model to choose",
+    source="Popenda 2019, (8)-(23), data of section Results",
+    build=shaft_step,
+    t_end=0.2,
+    signals=("line.tau_a", "line.tau_b", "Je.omega", "Jm.omega"),
+    chosen=(
+        "shear modulus 77.5 GPa (steel) instead of the printed 7750 MN/m2",
+        "torque step 12.7 N m (4 kW at 3000 1/min) instead of the BLDC motor",
+        "no damping",
+    ),
 )

@@ -10,7 +10,7 @@ from shaftwork.components.shaft_models import ShaftModel, Spectral
 from shaftwork.components.shafts import Shaft
 from shaftwork.components.sources import TorqueSource
 from shaftwork.pipeline.network import Network
-from shaftwork.scenes.catalog import Scene, enter
+from shaftwork.scenes.catalog import Scene
 
 SECTIONS = ((4.5, 0.42), (9.0, 0.38), (6.0, 0.46))  # length and diameter in m
 FLYWHEEL, COUPLING, PROPELLER = 2800.0, 160.0, 5200.0  # kg m2
@@ -40,14 +40,12 @@ def ship_line(model: ShaftModel | str = Spectral(8)) -> Network:  # noqa: B008 (
     return net
 
 
-SHIP_LINE = enter(
-    Scene(
-        name="ship-line",
-        title="stepped ship line of three sections and two discs, engine torque with its fifth order",
-        source="typical of a two-stroke main engine of 2 MW; not from one paper",
-        build=ship_line,
-        t_end=4.0,
-        signals=("shaft1.tau_a", "shaft2.tau_a", "shaft3.tau_b", "propeller.omega"),
-        chosen=("all dimensions, inertias and torques are chosen as typical",),
-    )
+SHIP_LINE = Scene(
+    name="ship-line",
+    title="stepped ship line of three sections and two discs, engine torque with its fifth order",
+    source="typical of a two-stroke main engine of 2 MW; not from one paper",
+    build=ship_line,
+    t_end=4.0,
+    signals=("shaft1.tau_a", "shaft2.tau_a", "shaft3.tau_b", "propeller.omega"),
+    chosen=("all dimensions, inertias and torques are chosen as typical",),
 )

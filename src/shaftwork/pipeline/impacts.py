@@ -1,0 +1,143 @@
+"""Impacts: speeds that change at once where parts become joined, are thrown back or are pulled along by a jump."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from shaftwork.components.modes import Leave, Mode
+from shaftwork.core.errors import NetworkError
+from shaftwork.pipeline.assemblies import Element, ModeNames
+from shaftwork.pipeline.moments import Change, Moment
+from shaftwork.pipeline.regimes import Regimes, with_modes
+
+# A speed across what is joined, as part of the largest one or of one, up to which it is an error of the run, no impact.
+NO_IMPACT = 1e-8
+
+
+class Impacts:
+    """What speeds are after parts have met.
+
+    Args:
+        regimes: combinations of modes.
+        elements: of the network.
+    """
+
+    def __init__(self, regimes: Regimes, elements: Sequence[Element]) -> None:
+        self._regimes, self._elements = regimes, elements
+
+    def meets(self, moment: Moment, t: float, to: Mode, number: int) -> float:
+        """The speed across an element that is joined from now on; zero where it is no more than an error of the run."""
+        regime, modes = moment.regime, self._elements[number].modes
+        if to.form in (modes.options[0].form, modes[regime.modes[number]].form):
+            return 0.0
+        speed = regime.assembly.across(number, t, moment.x, regime.p)
+        speeds = moment.x[: len(regime.assembly.model.form.across_states)]
+        least = NO_IMPACT * np.abs(speeds).max(initial=1.0)
+        if abs(speed) <= least:
+            return 0.0
+        try:
+            joined = self._regimes.changed(moment, t, with_modes(regime.modes, {number: to.name}))
+        except NetworkError:
+            return speed
+        held, after = self._regimes.held(moment, t), self._regimes.held(joined, t)
+        # between dampers alone a speed is whatever their torques make it: joining them stops no inertia
+        return speed if any(abs(after[name] - value) > least for name, value in held.items()) else 0.0
+
+    def hit(self, t: float, after: float, moment: Moment, number: int, leave: Leave) -> tuple[Moment, list[Change]]:
+        """An impact: the element is joined for an instant, and for good where nothing throws it back.
+
+        Law: v = v_joined + e (v_joined - v_before), which gives e times the speed back and keeps every momentum.
+        """
+        regime = moment.regime
+        speed = abs(regime.assembly.across(number, after, moment.x, regime.p))
+        share, rest = (regime.assembly.constant(number, given, regime.p) for given in (leave.rebound, leave.rest))
+        held = self._regimes.held(moment, after)
+        # what moves more slowly than the rest of an impact stays as it is: two contacts would part and meet for ever
+        joined = self._joined(regime.modes, held, after, {number: leave.to}, max(rest, NO_IMPACT * speed))
+        plastic = self._regimes.held(joined, after)
+        # nothing throws back what has no inertia: a damper's end against a stop
+        moved = any(abs(plastic[name] - value) > NO_IMPACT * speed for name, value in held.items())
+        rebound = leave.rebound is not None and moved and share * speed > rest
+        hits = Change(t, self._elements[number], regime.modes[number], leave.to, rebound, impact=True)
+        changes = [hits, *self._differences(t, regime.modes, joined.regime.modes, number)]
+        if not rebound:
+            return joined, changes
+        thrown = {name: plastic[name] + share * (plastic[name] - value) for name, value in held.items()}
+        parted = with_modes(joined.regime.modes, {number: regime.modes[number]})
+        return self._regimes.taking(parted, after, thrown), changes
+
+    def at_limit(self, moment: Moment, t: float, number: int, leave: Leave) -> Moment:
+        """What was thrown back, its twist right at the limit: the little beyond it would add up over many rebounds."""
+        regime, x = moment.regime, moment.x.copy()
+        state = regime.assembly.twist(number)
+        if state is None:
+            return moment
+        guard = next(made.guard for k, made in regime.watched if k == number and made.leave == leave)
+        beyond = regime.motion(t, x.tolist())[1][guard]
+        x[state] += 1.0
+        slope = regime.motion(t, x.tolist())[1][guard] - beyond
+        x[state] = moment.x[state] - (beyond / slope if slope else 0.0)
+        return Moment(regime, x)
+
+    def jumped(self, t: float, moment: Moment, before: float, after: float) -> tuple[Moment, list[Change]]:
+        """After a source has jumped that is rigidly joined to inertias.
+
+        What holds by a limited torque takes no speed along at once, and contacts are pressed, not pulled.
+
+        Args:
+            t: the instant, s.
+            moment: what was before.
+            before: a time just before it, s, at which inputs are read.
+            after: the same just after it.
+        """
+        regime = moment.regime
+        if not self.limited(regime.modes):
+            bound = regime.assembly.bound(regime.p)
+            return moment._replace(x=bound.impulse(moment.x, before, after)), []
+        new = self._joined(regime.modes, self._regimes.held(moment, before), after, {}, NO_IMPACT)
+        return new, self._differences(t, regime.modes, new.regime.modes)
+
+    def limited(self, modes: ModeNames) -> dict[int, tuple[tuple[float, str], ...]]:
+        """Elements that join by a torque that is limited, with the sides on which it is and the modes there."""
+        found = {k: element.modes[name].gives_way for k, (element, name) in self._pairs(modes)}
+        return {k: ways for k, ways in found.items() if ways}
+
+    def _pairs(self, modes: ModeNames) -> enumerate[tuple[Element, str]]:
+        return enumerate(zip(self._elements, modes, strict=True))
+
+    def _differences(self, t: float, before: ModeNames, after: ModeNames, besides: int | None = None) -> list[Change]:
+        return [
+            Change(t, element, before[k], name)
+            for k, (element, name) in self._pairs(after)
+            if k != besides and name != before[k]
+        ]
+
+    def _joined(
+        self, before: ModeNames, held: Mapping[str, float], t: float, joins: Mapping[int, str], least: float
+    ) -> Moment:
+        """After an inelastic impact. What holds by a limited torque slips in it; contacts are pressed, not pulled.
+
+        Args:
+            before: modes.
+            held: all that was stored.
+            t: time in s at which inputs are read.
+            joins: elements that become joined, and their modes.
+            least: speed up to which an element stays as it is.
+        """
+        gives = {k: ways for k, ways in self.limited(before).items() if k not in joins}
+        made = {**joins, **{k: ways[0][1] for k, ways in gives.items()}}
+        while True:
+            joined = self._regimes.taking(with_modes(before, made), t, held)
+            after = joined.regime
+            speeds = {k: after.assembly.across(k, t, joined.x, after.p) for k in gives}
+            ways = {k: [name for side, name in gives[k] if side * speeds[k] > 0] for k in gives}
+            pressed = [k for k in gives if abs(speeds[k]) > least and not ways[k]]
+            if not pressed:
+                break
+            for k in pressed:
+                made[k] = before[k]
+                del gives[k]
+        made |= {k: ways[k][0] if abs(speeds[k]) > least else before[k] for k in gives}
+        return self._regimes.changed(joined, t, with_modes(before, made))

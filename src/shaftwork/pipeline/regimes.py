@@ -1,0 +1,88 @@
+"""Combinations of modes with everything that it takes to go on in them, and what goes over from one to another."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shaftwork.core.errors import NetworkError
+from shaftwork.pipeline.assemblies import ModeNames
+from shaftwork.pipeline.moments import Moment, Regime
+
+if TYPE_CHECKING:
+    from shaftwork.pipeline.phases import Phases
+
+
+class Regimes:
+    """The combinations of modes of a network for one set of values; each is made when it is first needed.
+
+    Args:
+        phases: the sets of equations.
+        values: parameters that differ from the network's.
+    """
+
+    def __init__(self, phases: Phases, values: Mapping[str, float]) -> None:
+        self._phases, self._values = phases, dict(values)
+        self._made: dict[ModeNames, Regime] = {}
+
+    def regime(self, modes: ModeNames) -> Regime:
+        """A combination of modes.
+
+        Raises:
+            NetworkError: the equations of these modes contradict each other.
+        """
+        if modes not in self._made:
+            assembly = self._phases.assembly(modes)
+            p = assembly.vector(self._values, self._phases.numbers(modes))
+            made = Regime(
+                modes,
+                assembly,
+                p,
+                assembly.motion(p),
+                assembly.sides(modes),
+                assembly.sizes(p),
+                assembly.watched(modes),
+            )
+            self._made[modes] = made
+        return self._made[modes]
+
+    def possible(self, modes: ModeNames) -> bool:
+        """Whether the equations of these modes agree with each other."""
+        try:
+            self.regime(modes)
+        except NetworkError:
+            return False
+        return True
+
+    def held(self, moment: Moment, t: float) -> dict[str, float]:
+        """All that is stored, by name."""
+        assembly, p = moment.regime.assembly, moment.regime.p
+        values = assembly.stores.of(lambda: assembly.bound(p), np.array([t]), moment.x[None, :])[0]
+        return dict(zip(assembly.stores.names, values.tolist(), strict=True))
+
+    def taking(self, modes: ModeNames, t: float, held: Mapping[str, float]) -> Moment:
+        """A moment in the given modes that takes up what was stored, with the inputs of a time in s.
+
+        Raises:
+            NetworkError: the equations of these modes contradict each other.
+        """
+        new = self.regime(modes)
+        return Moment(new, new.assembly.stores.states(new.assembly.bound(new.p), t, held))
+
+    def changed(self, moment: Moment, t: float, modes: ModeNames) -> Moment:
+        """The same instant in other modes: all that is stored goes over.
+
+        Raises:
+            NetworkError: the equations of these modes contradict each other.
+        """
+        new = self.regime(modes)
+        if new.assembly is moment.regime.assembly:
+            return Moment(new, moment.x)
+        return self.taking(modes, t, self.held(moment, t))
+
+
+def with_modes(modes: ModeNames, changed: Mapping[int, str]) -> ModeNames:
+    """A combination of modes with some of them changed."""
+    return tuple(changed.get(k, name) for k, name in enumerate(modes))

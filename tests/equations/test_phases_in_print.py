@@ -1,0 +1,81 @@
+"""Equations of networks whose parts change their mode: they say for which modes they hold, and are as short there."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import pytest
+import sympy
+
+import shaftwork as sw
+
+
+@cache
+def gapped() -> sw.Network:
+    net = sw.Network("gapped")
+    net.add(sw.Inertia("J1", J=2.0), "a")
+    net.add(sw.Backlash("gap", gap=0.02, c=100.0, d=3.0), "a", "b")
+    net.add(sw.Inertia("J2", J=5.0), "b")
+    net.add(sw.TorqueSource("soft", tau=-7 * sw.phi - sw.phi**3), "b")
+    net.add(sw.TorqueSource("firm", tau=4 - 11 * sw.phi), "b")
+    net.add(sw.CoulombLoad("load", tau=1.0), "b")
+    return net
+
+
+def entry(equations: sw.Equations, matrix: str, *place: int) -> sympy.Expr:
+    return getattr(equations.second_order, matrix).get(place, 0)
+
+
+def test_a_gap_in_contact_stands_in_the_stiffness_and_its_width_in_the_torques() -> None:
+    c, d, width = (sympy.Symbol(f"gap.{name}", real=True) for name in ("c", "d", "gap"))
+    touching = gapped().equations(phase="gap in contact")
+    assert entry(touching, "damping", 0, 0) == d
+    assert [entry(touching, "stiffness", *place) for place in ((0, 0), (0, 1), (1, 1))] == [c, -c, c + 11]
+    assert touching.second_order.forces[0] == c * width / 2
+    assert entry(gapped().equations(phase="gap in contact backward"), "stiffness", 0, 0) == c
+    assert entry(gapped().equations(phase="gap open"), "stiffness", 0, 0) == 0
+
+
+def test_a_law_that_bends_stays_a_torque_as_a_whole() -> None:
+    soft = sympy.Symbol("soft.tau", real=True)
+    angle = sympy.Symbol("J2.phi", real=True)
+    laws = gapped().equations().second_order.laws
+    assert laws[soft] == -7 * angle - angle**3
+    assert not any(symbol.name.startswith("firm") for symbol in laws)
+
+
+@pytest.mark.parametrize(
+    ("asked", "whole"),
+    [
+        (None, "gap open, load slipping forward"),
+        ("load stuck", "gap open, load stuck"),
+        ("load stuck, gap in contact", "gap in contact, load stuck"),
+    ],
+)
+def test_equations_say_for_which_modes_they_hold(asked: str | None, whole: str) -> None:
+    equations = gapped().equations(phase=asked)
+    assert equations.phase == whole
+    for form in ("kirchhoff", "state", "second-order"):
+        assert equations.latex(form).startswith(f"\\allowdisplaybreaks\n\\paragraph{{Phase}}\\mbox{{}}\n{whole}\n")  # type: ignore[arg-type]
+    assert equations._repr_latex_().startswith(f"$\\textbf{{Phase}}$ {whole}\n")
+    assert f"\\section{{Phase}}\n{whole}\n" in equations.document()
+
+
+def test_equations_without_modes_name_no_phase() -> None:
+    equations = sw.scenes.shaft_chain(3).equations()
+    assert equations.phase == ""
+    assert "Phase" not in equations.latex() + equations._repr_latex_() + equations.document()
+
+
+def test_a_curve_of_several_pieces_that_is_switched_is_one_list_of_cases() -> None:
+    """The cases of the time come first; the torque is the same as before the switch, and zero after it."""
+    net = sw.Network("switched")
+    net.add(sw.motors["KBF-90 LA 2"].cage("motor", t_on=1.0, t_off=2.0), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    (law,) = (row.right for row in net.equations().laws)
+    assert len(law.atoms(sympy.Piecewise)) == 1
+    assert net.equations().latex("kirchhoff").count(r"\begin{cases}") == 1
+    sol = net.simulate(3.0, engine="scipy", t_eval=[0.5, 1.0, 1.5, 2.5])
+    assert sol["motor.tau"].tolist()[::3] == [0.0, 0.0]
+    assert sol["motor.tau"][1] == pytest.approx(7.0, rel=1e-14)
+    assert sol["motor.tau"][2] > 0

@@ -1,0 +1,206 @@
+"""Brakes on times and conditions, and frictions that share, wait for or hold each other, beside closed forms."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy
+
+import shaftwork as sw
+
+ENGINES = ("heyoka", "scipy", "sundials")
+# Every motion here is a polynomial of time or nearly one, and events are located far below the tolerance of the run.
+EXACT = 1e-9
+
+
+def wheel(*parts: sw.Component, J: float = 2.0) -> sw.Network:
+    """Parts on the node of one inertia."""
+    net = sw.Network("wheel")
+    net.add(sw.Inertia("J", J=J), "wheel")
+    for part in parts:
+        net.add(part, "wheel")
+    return net
+
+
+def driven(omega: Any, *parts: sw.Component) -> sw.Network:
+    """A prescribed speed, and parts between it and an inertia."""
+    net = sw.Network("driven")
+    net.add(sw.SpeedSource("drive", omega=omega), "belt")
+    net.add(sw.Inertia("J", J=1.0), "block")
+    for part in parts:
+        net.add(part, "belt", "block")
+    return net
+
+
+def words(sol: sw.Solution) -> list[tuple[str, str, str]]:
+    """The events without their times."""
+    return [event[1:] for event in sol.events]
+
+
+def times(sol: sw.Solution) -> list[float]:
+    """The times of the events."""
+    return [event[0] for event in sol.events]
+
+
+def test_a_brake_whose_torque_rises_straight_stops_when_its_integral_says() -> None:
+    net = wheel(sw.Brake("brake", tau=6.0, t_on=0.5, t_rise=1.0))
+    sol = net.simulate(6.0, initial={"J.omega": 10.0}, engine="scipy")
+    # the momentum of 20 N m s less 3 while the torque rises, less 6 a second after that
+    assert times(sol) == pytest.approx([0.5, 1.5 + 17.0 / 6.0], abs=EXACT)
+    assert words(sol) == [("brake", "released", "slipping forward"), ("brake", "slipping forward", "locked")]
+    assert sol.at([1.0])["J.omega"] == pytest.approx([10.0 - 0.5**2 * 6.0 / 4.0], abs=EXACT)
+    assert sol.at([1.0])["brake.tau"] == pytest.approx([3.0], abs=EXACT)
+
+
+def test_a_brake_whose_torque_rises_with_a_lag_takes_the_momentum_of_its_exponential() -> None:
+    sol = wheel(sw.Brake("brake", tau=6.0, t_on=0.5, t_lag=0.4)).simulate(3.0, initial={"J.omega": 10.0})
+    since = sol.t[sol.t > 0.5] - 0.5
+    wanted = 10.0 - 3.0 * (since - 0.4 * (1.0 - np.exp(-since / 0.4)))
+    np.testing.assert_allclose(sol["J.omega"][sol.t > 0.5], wanted, atol=1e-7)  # some tens of steps at rtol = 1e-8
+
+
+def test_a_brake_holds_until_it_is_released_and_the_wheel_goes_on_from_rest() -> None:
+    sol = wheel(sw.TorqueSource("pull", tau=4.0), sw.Brake("brake", tau=10.0, t_on=1.0, t_off=3.0)).simulate(4.0)
+    # 2 rad/s after one second, -3 rad/s^2 from there
+    assert times(sol) == pytest.approx([1.0, 1.0 + 2.0 / 3.0, 3.0], abs=EXACT)
+    assert [event[2] for event in words(sol)] == ["slipping forward", "locked", "released"]
+    held = (sol.t > 5.0 / 3.0 + EXACT) & (sol.t < 3.0)
+    assert not sol["J.omega"][held].any()
+    assert sol["J.omega"][-1] == pytest.approx(2.0, abs=EXACT)
+
+
+@pytest.mark.parametrize(
+    ("condition", "t_on", "begins"),
+    [(sw.omega - 5, 0.0, 2.5), (sw.phi - 3, 0.0, math.sqrt(3.0)), (sw.omega - 5, 3.0, 3.0)],
+)
+@pytest.mark.parametrize("engine", ENGINES[:2])
+def test_a_brake_acts_from_when_its_condition_holds(condition: Any, t_on: float, begins: float, engine: str) -> None:
+    """And goes on when the condition no longer holds, as the speed falls below it at once."""
+    net = wheel(sw.TorqueSource("pull", tau=4.0), sw.Brake("brake", tau=10.0, on=condition, t_on=t_on))
+    sol = net.simulate(8.0, engine=engine)
+    assert times(sol) == pytest.approx([begins, begins + 2.0 * begins / 3.0], abs=EXACT)
+    assert words(sol) == [("brake", "released", "slipping forward"), ("brake", "slipping forward", "locked")]
+    assert sol["J.omega"][-1] == 0.0
+
+
+def test_a_torque_of_zero_brakes_nothing() -> None:
+    model = wheel(sw.Brake("brake", tau=1.0), sw.TorqueSource("pull", tau=sw.Step(2.0, 1.0))).compile()
+    assert (model.simulate(1.0, initial={"J.omega": 3.0}, parameters={"brake.tau": 0.0})["J.omega"] == 3.0).all()
+    sol = model.simulate(2.0, parameters={"brake.tau": 0.0})
+    assert sol["J.omega"][-1] == pytest.approx(1.0, abs=EXACT)
+    assert times(sol) == pytest.approx([1.0])
+
+
+def test_a_clutch_that_is_engaged_slips_again_when_it_is_asked_for_more() -> None:
+    net = sw.Network("pair")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.Inertia("J2", J=1.0), "b")
+    net.add(sw.Clutch("clutch", tau=3.0), "a", "b")
+    net.add(sw.TorqueSource("engine", tau=2.0 * sw.t), "a")
+    sol = net.simulate(5.0, rtol=1e-10)
+    # half of the torque goes through the clutch, so it gives way at 6 N m
+    assert times(sol) == pytest.approx([3.0], abs=EXACT)
+    assert sol.at([2.0])["clutch.tau"] == pytest.approx([2.0], abs=EXACT)
+    assert sol["clutch.tau"][-1] == pytest.approx(3.0, abs=EXACT)
+    assert sol["J2.omega"][-1] == pytest.approx(4.5 + 3.0 * 2.0, abs=1e-8)
+
+
+@pytest.mark.parametrize(("pull", "shares"), [(2.0, (2.0, 0.0)), (5.0, (3.0, 2.0)), (-5.0, (-3.0, -2.0))])
+def test_of_two_frictions_on_a_shaft_the_first_carries_what_it_can(pull: float, shares: tuple[float, float]) -> None:
+    net = wheel(sw.TorqueSource("pull", tau=pull), sw.DryFriction("one", tau_c=3.0), sw.DryFriction("other", tau_c=4.0))
+    sol = net.simulate(1.0)
+    assert not sol["J.omega"].any()
+    # it gives way at its limit by one part in 1e12 and slips there
+    np.testing.assert_allclose(sol["one.tau"][1:], shares[0], atol=1e-11)
+    np.testing.assert_allclose(sol["other.tau"][1:], shares[1], atol=1e-11)
+
+
+@pytest.mark.parametrize(("first", "second"), [(4.0, 3.0), (3.0, 4.0)])
+def test_frictions_in_line_with_a_damper_between_slip_at_the_weakest(first: float, second: float) -> None:
+    net = wheel(sw.TorqueSource("pull", tau=5.0))
+    net.add(sw.DryFriction("inner", tau_c=first), "wheel", "middle")
+    net.add(sw.DryFriction("outer", tau_c=second), "middle")
+    net.add(sw.Damper("oil", d=1e-6), "middle")
+    sol = net.simulate(1.0)
+    slips = {name: sol.phases[-1].modes[name].startswith("slipping") for name in ("inner", "outer")}
+    assert slips == {"inner": first < second, "outer": second < first}
+    assert sol["J.omega"][-1] == pytest.approx(1.0, abs=1e-6)  # the damper's 1e-6 N m beside 2 kg m^2
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_friction_behind_a_gear_holds_the_whole_group_up_to_its_torque_over_the_ratio(engine: str) -> None:
+    net = wheel(sw.TorqueSource("pull", tau=sw.t))
+    net.add(sw.Gear("gear", ratio=3.0), "wheel", "slow")
+    net.add(sw.Inertia("J2", J=9.0), "slow")
+    net.add(sw.DryFriction("shoe", tau_c=6.0), "slow")
+    sol = net.simulate(4.0, engine=engine, rtol=1e-10)
+    assert times(sol) == pytest.approx([2.0], abs=EXACT)
+    assert not sol["J.omega"][sol.t < 2.0].any()
+    # 3 kg m^2 in all on the fast side
+    assert sol["J.omega"][-1] == pytest.approx((16.0 / 2.0 - 2.0 - 2.0 * 2.0) / 3.0, abs=1e-8)
+    assert sol["J2.omega"][-1] == pytest.approx(sol["J.omega"][-1] / 3.0, rel=1e-12)
+
+
+@pytest.mark.parametrize(("start", "events"), [(-1.0, 1), (0.0, 0)])
+def test_friction_that_a_prescribed_speed_turns_never_rests(start: float, events: int) -> None:
+    """At zero speed it passes from one side to the other, or starts on the side to which the speed goes."""
+    net = driven(start + sw.t, sw.Spring("spring", c=10.0))
+    net.add(sw.DryFriction("shoe", tau_c=2.0), "belt")
+    sol = net.simulate(2.0)
+    assert words(sol) == [("shoe", "slipping backward", "slipping forward")][:events]
+    assert times(sol) == pytest.approx([1.0][:events], abs=EXACT)
+    clear = sol.t != -start
+    np.testing.assert_allclose(sol["shoe.tau"][clear], 2.0 * np.sign(sol.t + start)[clear])
+
+
+def test_a_gear_that_rubs_follows_a_prescribed_speed_through_zero() -> None:
+    """At rest it holds, which a prescribed speed does not let it: power turns round at once."""
+    net = sw.Network("hoist")
+    net.add(sw.SpeedSource("drive", omega=4.0 * sympy.sin(sw.t)), "rotor")
+    net.add(sw.LossyGear("gear", ratio=10.0, efficiency=0.5, efficiency_back=0.3), "rotor", "drum")
+    net.add(sw.Inertia("J", J=5.0), "drum")
+    net.add(sw.TorqueSource("load", tau=-20.0), "drum")
+    sol = net.simulate(4.0)
+    assert [phase.modes["gear"] for phase in sol.phases] == ["driving forward", "driven backward"]
+    assert times(sol) == pytest.approx([math.pi], abs=EXACT)
+    at_drum = 20.0 + 5.0 * 0.4 * np.cos(sol.t)
+    wanted = np.where(sol.t < math.pi, at_drum / 5.0, at_drum * 0.03)
+    np.testing.assert_allclose(sol["drive.tau"], wanted, rtol=1e-9)
+
+
+@pytest.mark.parametrize("begins", [0.0, 1.0])
+def test_friction_takes_no_speed_along_at_once_where_a_prescribed_speed_jumps(begins: float) -> None:
+    """Whether it slips before, at 0.5 rad/s, or is stuck."""
+    net = driven(sw.Step(-2.0, 1.0, before=1.0), sw.DryFriction("shoe", tau_c=0.5))
+    sol = net.simulate(1.5, initial={"J.omega": begins})
+    ((time, *change),) = sol.events
+    assert time == 1.0
+    assert change == ["shoe", "stuck" if begins else "slipping forward", "slipping backward"]
+    before = 1.0 if begins else 0.5
+    assert sol.at([1.0])["J.omega"] == pytest.approx([before], abs=EXACT)
+    assert sol["J.omega"][-1] == pytest.approx(before - 0.25, abs=EXACT)
+    assert sol.energy_residual < 1e-9
+
+
+def test_a_brake_gives_way_to_a_freewheel_that_a_prescribed_speed_locks() -> None:
+    """Locked both, they would contradict the speed from its zero on."""
+    net = driven(sw.t - 1.0, sw.Freewheel("clutch"))
+    net.add(sw.Brake("brake", tau=1.0), "block")
+    sol = net.simulate(2.0)
+    assert words(sol) == [("clutch", "free", "locked"), ("brake", "locked", "slipping forward")]
+    assert times(sol) == pytest.approx([1.0, 1.0], abs=EXACT)
+    assert sol["drive.tau"][-1] == pytest.approx(2.0, abs=EXACT)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_breakaway_ends_in_slipping_though_nothing_tells_it_from_sticking_at_first(engine: str) -> None:
+    """On a belt that gathers speed: at breakaway the block's acceleration is the belt's but for less than rounding."""
+    net = driven(sw.t - 1.0, sw.DryFriction("shoe", tau_c=3.0))
+    net.add(sw.TorqueSource("pull", tau=4.0 * sw.t), "block")
+    sol = net.simulate(2.0, engine=engine, initial={"J.omega": -1.0}, rtol=1e-10)
+    assert words(sol) == [("shoe", "stuck", "slipping backward")]
+    assert times(sol) == pytest.approx([1.0], abs=EXACT)
+    assert sol["J.omega"][-1] == pytest.approx(3.0, abs=EXACT)

@@ -1,0 +1,261 @@
+"""Impacts of rigid flanks, stops and freewheels, alone and several at once, beside momentum and energy by hand."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+
+import shaftwork as sw
+
+ENGINES = ("heyoka", "scipy", "sundials")
+# Between impacts every motion is a polynomial of time, and events are located far below the tolerance of the run.
+EXACT = 1e-9
+
+
+def wheel(*parts: sw.Component, J: float = 1.0) -> sw.Network:
+    """Parts on the node of one inertia."""
+    net = sw.Network("wheel")
+    net.add(sw.Inertia("J", J=J), "wheel")
+    for part in parts:
+        net.add(part, "wheel")
+    return net
+
+
+def row(*between: sw.Component, J: tuple[float, ...] = (1.0, 1.0)) -> sw.Network:
+    """Inertias J1, J2 and so on, with a part between each and the next."""
+    net = sw.Network("row")
+    for k, size in enumerate(J):
+        net.add(sw.Inertia(f"J{k + 1}", J=size), "abcd"[k])
+    for k, part in enumerate(between):
+        net.add(part, "abcd"[k], "abcd"[k + 1])
+    return net
+
+
+def words(sol: sw.Solution) -> list[tuple[str, str, str]]:
+    """The events without their times."""
+    return [event[1:] for event in sol.events]
+
+
+def times(sol: sw.Solution) -> list[float]:
+    """The times of the events."""
+    return [event[0] for event in sol.events]
+
+
+@cache
+def held(restitution: float) -> sw.Model:
+    """A gap before what dry friction holds."""
+    net = row(sw.Backlash("gap", gap=0.2, restitution=restitution))
+    net.add(sw.DryFriction("shoe", tau_c=1.0), "b")
+    return net.compile()
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+def test_what_dry_friction_holds_is_moved_by_an_impact_and_no_momentum_is_lost(restitution: float, engine: str) -> None:
+    sol = held(restitution).simulate(0.12, initial={"J1.omega": 1.0}, engine=engine)
+    after = "rebound" if restitution else "in contact"
+    assert words(sol) == [("gap", "open", after), ("shoe", "stuck", "slipping forward")]
+    assert times(sol) == pytest.approx([0.1, 0.1], abs=EXACT)
+    # 0.02 s of friction after it
+    assert sol["J1.omega"][-1] + sol["J2.omega"][-1] == pytest.approx(1.0 - 0.02, abs=EXACT)
+    assert sol.energy.lost_in["gap"] == pytest.approx((1.0 - restitution**2) / 4.0, abs=EXACT)
+
+
+def test_an_impact_turns_the_side_of_a_friction_that_slips() -> None:
+    # they come nearer at 1.5 - t, and exchange their speeds
+    sol = held(1.0).simulate(0.1, initial={"J1.omega": 1.0, "J2.omega": -0.5})
+    assert words(sol) == [("gap", "open", "rebound"), ("shoe", "slipping backward", "slipping forward")]
+    hit = (1.5 - math.sqrt(1.5**2 - 0.2)) / 1.0
+    assert times(sol) == pytest.approx([hit, hit], abs=EXACT)
+    assert sol.at([hit + 1e-7])["J2.omega"] == pytest.approx([1.0], abs=1e-6)
+
+
+def test_a_rebound_that_lets_frictions_before_it_slip_starts_right_at_the_limit() -> None:
+    """Its equations are not those of the flight before, and the little beyond the limit would add up."""
+    net = row(sw.DryFriction("first", tau_c=0.5), sw.Backlash("gap", gap=0.2, restitution=0.3), J=(2.0, 2.0, 2.0))
+    net.add(sw.DryFriction("shoe", tau_c=1.0), "a")
+    net.add(sw.TorqueSource("pull", tau=-2.0), "c")
+    sol = net.simulate(1.0)
+    assert ("first", "stuck") in {(part, before) for part, before, _ in words(sol)}
+    hits = [time for time, *_, after in sol.events if after == "rebound"]
+    assert len(hits) > 5
+    assert hits[0] == pytest.approx(math.sqrt(0.2), abs=EXACT)
+    np.testing.assert_allclose(sol.at(hits)["gap.phi"], 0.1, rtol=0, atol=1e-15)
+    assert sol.energy_residual < 1e-9
+
+
+def test_the_last_of_a_row_takes_the_speed_of_the_first() -> None:
+    """Newton's cradle: the second and the third touch before the impact, which goes through both in one instant."""
+    net = row(*(sw.Backlash(name, gap=0.2, restitution=1.0) for name in ("first", "second")), J=(1.0, 1.0, 1.0))
+    sol = net.simulate(0.2, initial={"J1.omega": 1.0, "second.phi": 0.1})
+    assert words(sol) == [("first", "open", "rebound"), ("second", "open", "rebound")]
+    speeds = [sol[f"J{k}.omega"][-1] for k in (1, 2, 3)]
+    assert speeds == pytest.approx([0.0, 0.0, 1.0], abs=EXACT)
+
+
+def test_inelastic_impacts_join_a_row_with_the_mean_of_its_momentum() -> None:
+    net = row(*(sw.Backlash(name, gap=0.2) for name in ("first", "second")), J=(1.0, 1.0, 1.0))
+    sol = net.simulate(1.0, initial={"J1.omega": 3.0, "J2.omega": 0.5})
+    assert [event[2] for event in words(sol)] == ["in contact", "in contact"]
+    assert sol["J1.omega"][-1] == pytest.approx(3.5 / 3.0, abs=EXACT)
+    assert sol["J1.omega"][-1] == sol["J2.omega"][-1] == sol["J3.omega"][-1]
+
+
+def test_a_freewheel_that_starts_overrun_the_wrong_way_locks_at_once_with_an_impact() -> None:
+    """A motion begins with what is stored after it."""
+    sol = row(sw.Freewheel("clutch"), J=(1.0, 3.0)).simulate(1.0, initial={"J1.omega": 8.0, "J2.omega": 4.0})
+    assert sol.events == ((0.0, "clutch", "free", "locked"),)
+    assert sol["J1.omega"][0] == sol["J1.omega"][-1] == sol["J2.omega"][-1] == pytest.approx(5.0, abs=EXACT)
+    assert sol.energy.stored[0] == pytest.approx(50.0)
+    assert sol.energy_residual < 1e-12
+
+
+def test_what_hits_a_wheel_that_a_backstop_holds_stops_with_it() -> None:
+    net = row(sw.Backlash("gap", gap=0.2))
+    net.add(sw.Freewheel("backstop"), "ground", "a")
+    sol = net.simulate(1.0, initial={"J2.omega": 1.0})
+    moving = net.simulate(1.0, initial={"J2.omega": -1.0})
+    assert sol["J1.omega"][-1] == sol["J2.omega"][-1] == pytest.approx(0.5, abs=EXACT)
+    assert times(moving)[-1] == pytest.approx(0.1, abs=EXACT)
+    assert moving.phases[-1].modes == {"gap": "in contact", "backstop": "locked"}
+    assert moving["J1.omega"][-1] == moving["J2.omega"][-1] == 0.0
+
+
+def test_what_opens_again_in_the_instant_of_its_impact_has_lost_its_speed() -> None:
+    """Closed for no time at all: a torque pulls it back off the stop that has taken its speed."""
+    sol = wheel(sw.TorqueSource("pull", tau=-1.0), sw.HardStop("stop", upper=1.0)).simulate(
+        1.5, initial={"J.omega": 2.0}
+    )
+    hit = 2.0 - math.sqrt(2.0)
+    assert times(sol) == pytest.approx([hit, hit], abs=EXACT)
+    assert words(sol) == [("stop", "open", "in contact"), ("stop", "in contact", "open")]
+    assert sol["J.omega"][-1] == pytest.approx(-(1.5 - hit), abs=EXACT)
+
+
+@cache
+def dropped() -> sw.Model:
+    """A wheel that a torque drives onto a stop."""
+    stop = sw.HardStop("stop", upper=0.1, restitution=0.5)
+    return wheel(sw.TorqueSource("weight", tau=20.0), stop).compile()
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("weight", [20.0, 2000.0])
+def test_rebounds_against_a_push_come_to_rest_however_short_the_flights(weight: float, engine: str) -> None:
+    """The last ones are shorter than rounding lets them be found, and would then lose no energy any more."""
+    sol = dropped().simulate(2.0, engine=engine, parameters={"weight.tau": weight})
+    hits = times(sol)
+    first, speed = math.sqrt(0.2 / weight), math.sqrt(0.2 * weight)
+    starts = first + np.cumsum([0.0, *(2.0 * speed * 0.5**n / weight for n in range(1, len(hits)))])
+    # a stop is found some 1e-13 rad late, which at the last speeds, 1e-6 rad/s, is a good part of a flight of 1e-6 s
+    np.testing.assert_allclose(hits, starts, rtol=0, atol=3e-6)
+    np.testing.assert_allclose(hits[:6], starts[:6], rtol=0, atol=EXACT)
+    assert sol.phases[-1].modes == {"stop": "in contact"}
+    assert not sol["J.omega"][-1]
+    assert len(hits) < 30
+
+
+def test_a_rebound_that_loses_nothing_goes_on_however_strong_the_push() -> None:
+    sol = dropped().simulate(1.0, parameters={"weight.tau": 2000.0, "stop.restitution": 1.0})
+    first = math.sqrt(0.2 / 2000.0)
+    np.testing.assert_allclose(times(sol), first * np.arange(1, 101, 2), atol=1e-8)
+    assert sol.energy_residual < 1e-9
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+def test_what_has_no_inertia_is_not_thrown_back(restitution: float) -> None:
+    """The end of a damper that a torque pushes against a stop stays there, with its force."""
+    net = sw.Network("damper")
+    net.add(sw.TorqueSource("push", tau=2.0), "end")
+    net.add(sw.Damper("oil", d=1.0), "end")
+    net.add(sw.HardStop("stop", upper=0.1, restitution=restitution), "end", "wheel")
+    net.add(sw.Inertia("J", J=4.0), "wheel")
+    sol = net.simulate(0.5)
+    assert words(sol) == [("stop", "open", "in contact")]
+    assert times(sol) == pytest.approx([0.05], abs=EXACT)
+    assert sol["J.omega"][-1] == pytest.approx(2.0 * (1.0 - math.exp(-0.45 / 4.0)), abs=1e-7)
+
+
+def test_events_at_one_instant_all_happen() -> None:
+    """A spring stop, a rebound, a rigid stop and a brake, each on a wheel of its own."""
+    net = sw.Network("several")
+    stops = ({"c": 10.0}, {"restitution": 1.0}, {})
+    for k, given in enumerate(stops, start=1):
+        net.add(sw.Inertia(f"J{k}", J=1.0), f"wheel {k}")
+        net.add(sw.HardStop(f"stop{k}", upper=1.0, **given), f"wheel {k}")
+    net.add(sw.Inertia("J4", J=1.0), "wheel 4")
+    net.add(sw.Brake("brake", tau=1.0, t_on=1.0), "wheel 4")
+    sol = net.simulate(1.5, initial={f"J{k}.omega": 1.0 for k in (1, 2, 3, 4)})
+    assert times(sol) == pytest.approx([1.0] * 4, abs=1e-12)
+    assert sorted(words(sol)) == [
+        ("brake", "released", "slipping forward"),
+        ("stop1", "open", "in contact"),
+        ("stop2", "open", "rebound"),
+        ("stop3", "open", "in contact"),
+    ]
+    ends = [sol[f"J{k}.omega"][-1] for k in (1, 2, 3, 4)]
+    assert ends == pytest.approx([math.cos(0.5 * math.sqrt(10.0)), -1.0, 0.0, 0.5], abs=1e-7)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(("beyond", "touches"), [(-1e-6, False), (1e-6, True), (1e-3, True)])
+def test_a_grazing_contact_is_found_if_there_is_one(beyond: float, touches: bool, engine: str) -> None:  # noqa: FBT001
+    """An oscillation whose peak lies a millionth before or beyond a stop, in steps far longer than the contact."""
+    sol = grazing().simulate(4.0, initial={"J.omega": 1.0 + beyond}, engine=engine, rtol=1e-9)
+    assert words(sol) == ([("stop", "open", "in contact"), ("stop", "in contact", "open")] if touches else [])
+    if touches:
+        assert times(sol)[0] == pytest.approx(math.asin(1.0 / (1.0 + beyond)), abs=1e-5)  # flat: an error has its root
+
+
+@cache
+def grazing() -> sw.Model:
+    """An oscillator beside a stop."""
+    net = wheel(sw.HardStop("stop", upper=1.0, c=2.0))
+    net.add(sw.Spring("spring", c=1.0), "wheel", "ground")
+    return net.compile()
+
+
+@pytest.mark.parametrize(("to", "after"), [(-1.0, "open"), (2.0, "in contact")])
+def test_a_contact_passes_on_a_jump_of_a_prescribed_speed_only_where_it_is_pressed(to: float, after: str) -> None:
+    net = sw.Network("jump")
+    net.add(sw.SpeedSource("drive", omega=sw.Step(to - 1.0, 1.0, before=1.0)), "a")
+    net.add(sw.Backlash("gap", gap=0.1), "a", "b")
+    net.add(sw.Inertia("J", J=1.0), "b")
+    sol = net.simulate(1.02)  # before the gap is closed on its other side
+    assert sol.phases[-1].modes == {"gap": after}
+    assert sol["J.omega"][-1] == pytest.approx(max(to, 1.0), abs=EXACT)
+    assert sol.energy_residual < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("parts", "says"),
+    [
+        (
+            (sw.Freewheel("clutch"), sw.SpeedSource("other", omega=0.5)),
+            "'clutch' can neither stay free nor become lock",
+        ),
+        ((sw.Backlash("gap", gap=0.2), sw.HardStop("stop", upper=0.5)), "no modes of .* are consistent: .* blocked sp"),
+    ],
+    ids=["two sources", "source against a stop"],
+)
+def test_what_cannot_go_on_says_which_parts_contradict_each_other(
+    parts: tuple[sw.Component, sw.Component], says: str
+) -> None:
+    net = sw.Network("jammed")
+    net.add(sw.SpeedSource("drive", omega=sw.t), "a")
+    net.add(parts[0], "a", "b")
+    net.add(parts[1], "b")
+    net.add(sw.Inertia("J", J=1.0), "b")
+    with pytest.raises(sw.SimulationError, match=says):
+        net.simulate(2.0)
+
+
+def test_flanks_without_a_gap_that_lose_nothing_hit_each_other_for_ever() -> None:
+    model = row(sw.Backlash("gap", gap=0.2, restitution=1.0)).compile()
+    with pytest.raises(sw.SimulationError, match="'gap' changes for ever between open and rebound"):
+        model.simulate(1.0, initial={"J1.omega": 1.0}, parameters={"gap.gap": 0.0})
+    sol = model.simulate(1.0, initial={"J1.omega": 1.0}, parameters={"gap.gap": 0.0, "gap.restitution": 0.5})
+    assert sol["J1.omega"][-1] == sol["J2.omega"][-1] == pytest.approx(0.5, abs=EXACT)

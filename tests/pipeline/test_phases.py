@@ -1,0 +1,181 @@
+"""Phases as a user reads them: names, tables, equations, output times, steady states, files, and what is refused."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import shaftwork as sw
+
+ENGINES = ("heyoka", "scipy", "sundials")
+
+
+def wheel(*parts: sw.Component) -> sw.Network:
+    """Parts on the node of one inertia of 2 kg m^2."""
+    net = sw.Network("wheel")
+    net.add(sw.Inertia("J", J=2.0), "wheel")
+    for part in parts:
+        net.add(part, "wheel")
+    return net
+
+
+def crane(tau_brake: float = 20.0, gap: float = 0.02) -> sw.Network:
+    """A motor, a gap, a load and a brake."""
+    net = sw.Network("crane")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.Inertia("J2", J=2.0), "b")
+    net.add(sw.Backlash("gap", gap=gap, c=1000.0, d=1.0), "a", "b")
+    net.add(sw.TorqueSource("motor", tau=sw.Step(-10.0, 1.0, before=10.0)), "a")
+    net.add(sw.CoulombLoad("load", tau=2.0), "b")
+    net.add(sw.Brake("brake", tau=tau_brake, t_on=1.0), "a")
+    return net
+
+
+@cache
+def model() -> sw.Model:
+    """The crane, compiled once."""
+    return crane().compile()
+
+
+@cache
+def motion() -> sw.Solution:
+    """Its motion from rest to rest."""
+    return model().simulate(3.0)
+
+
+def test_a_motion_that_starts_held_has_a_phase_and_no_event() -> None:
+    sol = wheel(sw.TorqueSource("pull", tau=1.0), sw.Brake("brake", tau=2.0)).simulate(1.0)
+    assert sol.events == ()
+    assert [(phase.start, phase.end, phase.name) for phase in sol.phases] == [(0.0, 1.0, "brake locked")]
+
+
+def test_every_phase_is_what_the_equations_can_be_printed_for() -> None:
+    net = crane()
+    equations = net.equations()
+    printed = {phase.name: equations.latex(form="state", phase=phase.name) for phase in motion().phases}
+    assert len(set(printed.values())) == len(printed) > 4
+    at_rest = equations.latex(form="state", phase="gap open, load stuck, brake locked")
+    assert r"\frac{d \omega" not in at_rest
+    last = motion().phases[-1].name
+    assert net.equations(phase=last).latex(form="state") == printed[last]
+
+
+def test_values_change_without_other_equations() -> None:
+    sol = model().simulate(3.0, parameters={"brake.tau": 15.0, "gap.gap": 0.03})
+    assert sol.events == crane(15.0, 0.03).simulate(3.0).events
+
+
+def test_a_gap_of_zero_is_a_spring() -> None:
+    net = sw.Network("pair")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.Inertia("J2", J=2.0), "b")
+    net.add(sw.Backlash("gap", gap=0.1, c=100.0), "a", "b")
+    start = {"J1.omega": 1.0}
+    found = net.compile().simulate(2.0, initial=start, parameters={"gap.gap": 0.0}, rtol=1e-10)
+    np.testing.assert_allclose(found["J1.omega"], (1.0 + 2.0 * np.cos(math.sqrt(150.0) * found.t)) / 3.0, atol=1e-8)
+
+
+def test_a_steady_state_is_that_of_the_modes_in_which_it_ends() -> None:
+    slow = wheel(sw.TorqueSource("pull", tau=4.0), sw.DryFriction("shoe", tau_c=1.0), sw.Damper("oil", d=0.5))
+    assert slow.compile().steady_state() == {"J.omega": pytest.approx(6.0, rel=1e-9)}
+    held = wheel(sw.TorqueSource("pull", tau=4.0), sw.Brake("brake", tau=10.0))
+    assert held.compile().steady_state() == {"J.omega": 0.0}
+
+
+def test_small_motions_are_those_of_the_phase_at_their_point() -> None:
+    net = crane()
+    assert max(net.modes(at={"J2.omega": 1.0, "J1.omega": 1.0}, t=0.5).frequencies) == 0.0
+    point = {"gap.phi": 0.05, "J2.omega": 1.0, "J1.omega": 1.0}
+    closed = max(net.modes(at=point, t=0.5).frequencies)
+    assert closed == pytest.approx(math.sqrt(1000.0 * 1.5) / (2.0 * math.pi), rel=1e-3)  # damped by 1 N m s/rad
+
+
+def test_a_file_keeps_everything_that_changes_modes(tmp_path: Path) -> None:
+    net = crane()
+    net.add(sw.Freewheel("backstop"), "ground", "a")
+    net.add(sw.HardStop("stop", upper=50.0, restitution=0.5), "b")
+    net.add(sw.DryFriction("shoe", tau_c=0.1, tau_s=0.2, omega_s=0.5, d=0.01), "a", "b")
+    net.save(tmp_path / "crane.toml")
+    assert sw.Network.load(tmp_path / "crane.toml").simulate(0.5).events == net.simulate(0.5).events
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_the_engines_own_steps_contain_every_event(engine: str) -> None:
+    sol = model().simulate(3.0, engine=engine, t_eval="steps")
+    times = {event[0] for event in sol.events}
+    assert times <= set(sol.t.tolist())
+    assert (np.diff(sol.t) >= 0.0).all()
+    assert times <= set(sol.steps.tolist())
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_an_output_at_an_event_is_there_once(engine: str) -> None:
+    net = wheel(sw.TorqueSource("pull", tau=4.0), sw.Brake("brake", tau=10.0, t_on=1.0)).compile()
+    asked: list[float] = []
+    for _ in range(2):  # the second time at the events of the first, which are the same to the last bit or nearly
+        sol = net.simulate(2.0, engine=engine, t_eval=[0.0, *asked, 2.0])
+        assert sol.t.tolist() == [0.0, *asked, 2.0]
+        asked = [event[0] for event in sol.events]
+    assert sol["J.omega"] == pytest.approx([0.0, 2.0, 0.0, 0.0], abs=1e-8)
+
+
+def test_a_motion_goes_on_from_the_end_of_another_as_if_there_had_been_no_end() -> None:
+    """At an event, in contact, and at rest."""
+    whole = model().simulate(3.0, rtol=1e-10)
+    for end in (whole.events[2][0], 0.5, 2.5):
+        first = model().simulate(end, rtol=1e-10)
+        held = {name: float(first[name][-1]) for name in first.states}
+        rest = model().simulate(3.0, t_start=end, initial=held, rtol=1e-10)
+        assert rest["gap.phi"][-1] == pytest.approx(whole["gap.phi"][-1], abs=1e-8)
+        assert rest.phases[-1].modes == whole.phases[-1].modes
+
+
+def test_an_instant_between_two_phases_is_read_in_the_later_one() -> None:
+    sol = wheel(sw.Brake("brake", tau=4.0)).simulate(3.0, initial={"J.omega": 4.0})
+    ((stop, *_),) = sol.events
+    at = sol.at([stop - 1e-6, stop, stop + 1e-6])
+    np.testing.assert_allclose(at["brake.tau"], [4.0, 0.0, 0.0], atol=1e-12)
+    assert at["J.omega"][1:].tolist() == [0.0, 0.0]
+
+
+def test_a_table_holds_what_each_phase_gives() -> None:
+    table = motion().to_pandas("J1.omega", "gap.tau", "brake.tau")
+    assert list(table.columns) == ["J1.omega", "gap.tau", "brake.tau"]
+    assert table.index.tolist() == motion().t.tolist()
+    assert not table.isna().to_numpy().any()
+    np.testing.assert_array_equal(table["brake.tau"][:0.99], 0.0)
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: sw.Brake("b", tau=1.0, on=sw.omega - 1, t_rise=1.0), "`on` comes true is not known before"),
+        (lambda: sw.Brake("b", tau=1.0, t_rise=1.0, t_lag=1.0), "give t_rise or t_lag, not both"),
+        (lambda: sw.Backlash("g", gap=0.1, d=1.0), "a damping d needs a stiffness c"),
+        (lambda: sw.Backlash("g", gap=0.1, c=1.0, restitution=0.5), "restitution is for rigid flanks"),
+        (lambda: sw.HardStop("s"), "give upper, lower or both"),
+        (lambda: sw.HardStop("s", upper=0.1, lower=0.1), "must be below upper"),
+    ],
+)
+def test_a_part_whose_values_contradict_each_other_says_so(make: Callable[[], sw.Component], says: str) -> None:
+    with pytest.raises(sw.ParameterError, match=says):
+        make()
+
+
+def test_a_phase_that_does_not_exist_is_refused_with_those_that_do() -> None:
+    known = r"gap open \| in contact \| in contact backward; load slipping forward"
+    with pytest.raises(sw.ParameterError, match=rf"no phase 'gap shut'.*{known}"):
+        crane().equations(phase="gap shut")
+    with pytest.raises(sw.ParameterError, match="No part of this network changes its mode"):
+        wheel(sw.Damper("oil", d=1.0)).equations(phase="oil open")
+
+
+@pytest.mark.parametrize("engine", ["exact", "banded"])
+def test_an_engine_that_follows_no_modes_is_refused_with_those_that_do(engine: str) -> None:
+    with pytest.raises(sw.ParameterError, match=rf"'{engine}' follows no parts that change their mode.*heyoka, scipy"):
+        model().simulate(1.0, engine=engine)
