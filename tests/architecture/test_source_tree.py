@@ -126,7 +126,11 @@ def test_code_run_from_data_is_recognised(line: str) -> None:
 
 
 def test_no_line_runs_code_from_data() -> None:
-    assert [place(file, node) for file in FILES for node in ast.walk(tree(file)) if runs_foreign_code(node)] == []
+    """But for the one place where equations become functions, whose code holds names of its own alone."""
+    files = [file for file in FILES if file.name != "code.py"]
+    assert [place(file, node) for file in files for node in ast.walk(tree(file)) if runs_foreign_code(node)] == []
+    (generator,) = [file for file in FILES if file.name == "code.py"]
+    assert sum(map(runs_foreign_code, ast.walk(tree(generator)))) == 2  # compile and exec of one line
 
 
 def test_there_is_no_import_cycle() -> None:

@@ -13,6 +13,7 @@ from sympy.printing.numpy import NumPyPrinter
 from sympy.printing.pycode import PythonCodePrinter
 
 from shaftwork.components.laws import NUMERICAL
+from shaftwork.core.errors import CompileError
 
 # Terms are printed as sympy keeps them, the same in every process; to sort them would take longer than the rest.
 SETTINGS = {"fully_qualified_modules": False, "inline": True, "allow_unknown_functions": True, "order": "none"}
@@ -39,6 +40,9 @@ class _Real:
     def _print(self, node: Any, **options: Any) -> str:
         name = self.known.get(node) if isinstance(node, Basic) else None
         return name or str(super()._print(node, **options))  # type: ignore[misc]
+
+    def _print_Symbol(self, symbol: Symbol) -> str:
+        raise CompileError(f"'{symbol}' stands in a law and has no value: it is no argument and no parameter.")
 
     def _print_Float(self, number: Float) -> str:
         return repr(float(number))  # sympy prints 15 digits, which is another float

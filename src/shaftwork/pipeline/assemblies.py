@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from itertools import count
 from typing import TYPE_CHECKING, Any
 
@@ -257,7 +257,7 @@ class Assembly:
 
         Its states are those of the model and, behind them, the integrals of the guards in `clocks`.
         """
-        guards, bound, rates = self.guards(p), cache(lambda: self.bound(p)), self._rates(p)
+        guards, bound, rates = self.guards(p), partial(self.bound, p), self._rates(p)
         clocks, size = list(self.clocks), x.size
         sides = self.sides(modes)
         watch = Guards(guards if not clocks else lambda t, y: guards(t, y[:, :size]), sides, np.array(bands))
@@ -296,10 +296,14 @@ class Assembly:
         motion, asked, scalar_program = self.motion(p), count(), self.model.scalar
         if scalar_program is None:
             return self.bound(p).rhs
-        own = cache(lambda: scalar_program.bind(p))
+        own: list[Callable[[float, Array], Array]] = []
 
         def rates(t: float, x: Array) -> Array:
-            return np.array(motion(t, x.tolist())[0]) if next(asked) < FEW else own()(t, x)
+            if next(asked) < FEW:
+                return np.array(motion(t, x.tolist())[0])
+            if not own:
+                own.append(scalar_program.bind(p))
+            return own[0](t, x)
 
         return rates
 

@@ -302,7 +302,8 @@ class Run:
         name, why = self.phases.engine(assembly, problem, self.demand.engine)
         share, loosest = FOLLOWING[name]
         tight = max(min(share * problem.rtol, loosest), min(problem.rtol, TIGHTEST_RTOL))
-        problem = replace(problem, rtol=tight, atol=problem.atol * (tight / problem.rtol))
+        if tight != problem.rtol:
+            problem = replace(problem, rtol=tight, atol=problem.atol * (tight / problem.rtol))
         trajectory, name, why = choice.solve(problem, name, why, fallback=self.demand.engine == "auto")
         if not self.engine:
             self.engine, self.why = name.removesuffix("-adams"), why

@@ -1,0 +1,43 @@
+"""Expressions as functions: what they compute, and that they compute it once."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import sympy
+from sympy import Heaviside, Max, Min, Piecewise, Symbol, sin, sqrt, tanh
+
+from shaftwork.codegen.code import scalar, vectorised, vectorised_list
+from shaftwork.core.errors import CompileError
+
+x, y, c = (Symbol(name, real=True) for name in ("x", "gap.phi", "class"))  # names that are no names in Python
+LAWS = [
+    c * sin(x) ** 2 / (1 + sin(x) ** 2) - sympy.Float(0.1) ** 3,
+    Max(-c, Min(c, x + y)) + abs(x - y) / sqrt(c),
+    Piecewise((x, (x > 0) & (y > 0)), (y**3, sympy.ITE(x > y, x > -1, y > -1)), (-c, True)),
+    sympy.sign(x) * tanh(y / c) + Heaviside(x - y, 0.5),
+    sympy.Integer(3),
+]
+
+
+@pytest.mark.parametrize("law", LAWS, ids=str)
+def test_a_law_has_the_value_that_sympy_finds(law: sympy.Expr) -> None:
+    points = np.random.default_rng(1).uniform(-2.0, 2.0, (40, 2))
+    wanted = [float(law.subs({x: a, y: b, c: 1.5})) for a, b in points.tolist()]
+    one = scalar({"t": x, "p": (y, c)}, [law])
+    np.testing.assert_allclose([one(a, [b, 1.5])[0] for a, b in points.tolist()], wanted, rtol=1e-13, atol=1e-15)
+    many = vectorised((x, y, c), law)
+    np.testing.assert_allclose(np.broadcast_to(many(*points.T, 1.5), 40), wanted, rtol=1e-13, atol=1e-15)
+
+
+def test_what_stands_twice_is_evaluated_once() -> None:
+    function = scalar((x, y), [sin(x * y) + 1 / sin(x * y), sin(x * y) ** 2])
+    assert str(function.__doc__).count("sin(") == 1
+    assert function(0.5, 2.0) == [math.sin(1.0) + 1 / math.sin(1.0), math.sin(1.0) ** 2]
+
+
+def test_a_symbol_without_a_value_is_refused_by_name() -> None:
+    with pytest.raises(CompileError, match=r"'gap\.phi' stands in a law and has no value"):
+        vectorised_list((x,), [x, x * y])
