@@ -68,19 +68,6 @@ class Impacts:
         parted = with_modes(joined.regime.modes, {number: regime.modes[number]})
         return self._regimes.taking(parted, after, thrown), changes
 
-    def at_limit(self, moment: Moment, t: float, number: int, leave: Leave) -> Moment:
-        """What was thrown back, its twist right at the limit: the little beyond it would add up over many rebounds."""
-        regime, x = moment.regime, moment.x.copy()
-        state = regime.assembly.twist(number)
-        if state is None:
-            return moment
-        guard = next(made.guard for k, made in regime.watched if k == number and made.leave == leave)
-        beyond = regime.motion(t, x.tolist())[1][guard]
-        x[state] += 1.0
-        slope = regime.motion(t, x.tolist())[1][guard] - beyond
-        x[state] = moment.x[state] - (beyond / slope if slope else 0.0)
-        return Moment(regime, x)
-
     def jumped(self, t: float, moment: Moment, before: float, after: float) -> tuple[Moment, list[Change]]:
         """After a source has jumped that is rigidly joined to inertias.
 

@@ -85,11 +85,12 @@ class Moment(NamedTuple):
 
 
 def clear_of_limits(regime: Regime, now: Sequence[float], bands: Sequence[float]) -> list[float]:
-    """The bands, wider where a guard is near its own or beyond: a phase that starts there has not met it.
+    """How far beyond zero guards are met: more where one is near its limit or beyond, for a phase that starts there has
+    not met it.
 
     None is zero: where a value is exactly zero at the start of a step, heyoka finds none of its later zeros in it.
     """
-    made = [band or NOTHING for band in bands]
+    made = [band / CLEAR or NOTHING for band in bands]
     for _, watched in regime.watched:
         k, value = watched.guard, watched.side * now[watched.guard]
         if 2 * value > -CLEAR * bands[k]:

@@ -35,7 +35,7 @@ CHATTER_EVENTS, CHATTER_SPAN = 200, 1e-9
 # Engines that follow guards. An error grows with every change of mode, by some hundreds through sixty contacts, so
 # they run with this part of the tolerance that is asked for, and with no looser one than the second number.
 FOLLOWING = {
-    "heyoka": (1.0, 1.0),
+    "heyoka": (1.0, 1e-12),  # the cost grows only with the logarithm
     "scipy": (1 / 30, 1e-7),
     "scipy-radau": (1 / 30, 1e-7),
     "sundials": (1 / 300, 1e-8),

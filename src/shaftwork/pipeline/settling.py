@@ -219,8 +219,13 @@ class Settling:
             return *self._around(t, after, moment, (number, to), error), error
 
     def _hit(self, t: float, after: float, moment: Moment, number: int, ended: Watched) -> tuple[Moment, list[Change]]:
-        """An impact; what hits stays where a rebound would lose less than it gains, as it is found late by rounding."""
-        new, changes = self._impacts.hit(t, after, moment, number, ended.leave)
+        """An impact; what hits stays where a rebound would lose less than it gains, as it is found late by rounding.
+
+        It is thrown back where it has passed its limit, and has been on its way since: what it would gain between there
+        and here would add up over many rebounds.
+        """
+        since = 0.0 if ended.leave.rebound is None else self._since(after, moment, ended)
+        new, changes = self._impacts.hit(t, after, _moved(moment, after, -since), number, ended.leave)
         if not changes[0].rebound:
             return new, changes
         old, made, x = moment.regime, new.regime, new.x
@@ -233,7 +238,15 @@ class Settling:
         pushed = math.copysign(1.0, speed) * (later - made.assembly.across(number, after, x, made.p)) / step
         if 0 < (1 - share**2) * speed**2 < 4 * late * pushed:
             return self._impacts.hit(t, after, moment, number, replace(ended.leave, rebound=None))
-        return self._impacts.at_limit(new, after, number, ended.leave), changes
+        return _moved(new, after, since), changes
+
+    def _since(self, t: float, moment: Moment, met: Watched) -> float:
+        """How long ago, in s, a guard passed through zero along a straight line."""
+        regime, x = moment.regime, moment.x.tolist()
+        rates, now = regime.motion(t, x)
+        step, beyond = self.ahead(regime, rates), met.side * now[met.guard]
+        gain = met.side * _later(regime, step, (t, x, rates, now))[3][met.guard] - beyond
+        return beyond * step / gain if 0 < beyond < gain else 0.0
 
     def _commutated(self, moment: Moment, t: float, modes: ModeNames, plain: Moment) -> tuple[Moment, dict[int, str]]:
         """What takes over a torque or current that a change would cut off from its store: a diode, a freewheel.
@@ -310,6 +323,14 @@ def _chosen(found: list[tuple[float, tuple[int, Watched]]], *, in_order: bool) -
     if not found:
         return None
     return (min(found, key=lambda one: one[1][0]) if in_order else max(found, key=lambda one: one[0]))[1]
+
+
+def _moved(moment: Moment, t: float, step: float) -> Moment:
+    """The same modes a little later or earlier, in s, along a straight line."""
+    if not step:
+        return moment
+    rates, _ = moment.regime.motion(t, moment.x.tolist())
+    return moment._replace(x=moment.x + step * np.array(rates))
 
 
 def _later(regime: Regime, step: float, course: Course) -> Course:
