@@ -1,0 +1,25 @@
+"""From the real machine to the small model: a train referred to one shaft, and one of few masses."""
+
+from __future__ import annotations
+
+from shaftwork.reduce.grouping import Grouping
+from shaftwork.reduce.reference_shaft import Referred, refer
+from shaftwork.reduce.referred_parts import Entry
+from shaftwork.reduce.scales import Scale
+from shaftwork.reduce.simplification import Comparison, FrequencyLoss, Group, GroupTable, Simplified, simplify
+from shaftwork.reduce.table import ReductionTable
+
+__all__ = [
+    "Comparison",
+    "Entry",
+    "FrequencyLoss",
+    "Group",
+    "GroupTable",
+    "Grouping",
+    "ReductionTable",
+    "Referred",
+    "Scale",
+    "Simplified",
+    "refer",
+    "simplify",
+]

@@ -1,0 +1,236 @@
+"""A train as a chain: inertias in a row with springs between them, and what sits on each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shaftwork.components.contacts import Backlash
+from shaftwork.components.rotation import Damper, Inertia, Spring
+from shaftwork.core.domains import ROTATION
+from shaftwork.core.errors import NetworkError, Problem
+from shaftwork.network.netlist import REFERENCE, Netlist, Placed
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Station:
+    """A place in a chain.
+
+    Args:
+        node: its name.
+        inertia: kg m^2, all together.
+        inertias: names and sizes of the parts.
+        riders: other parts that sit here.
+        support: stiffness of springs from here to the frame, N m/rad.
+    """
+
+    node: str
+    inertia: float = 0.0
+    inertias: tuple[tuple[str, float], ...] = ()
+    riders: tuple[Placed, ...] = ()
+    support: float = 0.0
+
+
+@dataclass(frozen=True)
+class Link:
+    """What is between two neighbours: springs and dampers beside each other, or in series.
+
+    Args:
+        name: of the spring, of the softest where there are several.
+        c: stiffness, N m/rad.
+        d: damping, N m s/rad.
+        parts: names of its springs.
+        placed: the parts themselves; none where several springs in series are one.
+    """
+
+    name: str
+    c: float
+    d: float
+    parts: tuple[str, ...]
+    placed: tuple[Placed, ...] = ()
+
+    def has(self, name: str) -> bool:
+        """Whether a part of this name is in it."""
+        return any(item.part.name == name for item in self.placed)
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Stations from one end to the other, a link between neighbours, and circuits beside them."""
+
+    stations: tuple[Station, ...]
+    links: tuple[Link, ...]
+    circuits: tuple[Placed, ...] = ()
+
+    def frequencies(self) -> Array:
+        """(n,) natural frequencies without damping in Hz, ascending, 0 for the turning of the whole."""
+        return modes_of(self)[0]
+
+
+def series(links: Sequence[Link]) -> Link:
+    """Springs one after the other as one.
+
+    Law: 1/c = sum 1/c_k; d = sum d_k (c/c_k)^2, so that a slow twist, which divides as the compliances do, loses as
+    much. Source: Abdelkader 2016, (15).
+    """
+    if len(links) == 1:
+        return links[0]
+    c = 1 / sum(1 / link.c for link in links)
+    d = sum(link.d * (c / link.c) ** 2 for link in links)
+    softest = min(links, key=lambda link: link.c)
+    return Link(softest.name, c, d, tuple(name for link in links for name in link.parts))
+
+
+def modes_of(chain: Chain) -> tuple[Array, Array]:
+    """(n,) natural frequencies in Hz and (n, n) shapes in columns, with a modal inertia of 1 kg m^2."""
+    inertias, stiffness = matrices_of(chain)
+    root = 1 / np.sqrt(inertias)
+    squares, shapes = np.linalg.eigh(root[:, None] * stiffness * root)
+    return hertz(squares, chain), root[:, None] * shapes
+
+
+def matrices_of(chain: Chain) -> tuple[Array, Array]:
+    """(n,) inertias and (n, n) stiffness of a chain."""
+    inertias = np.array([station.inertia for station in chain.stations])
+    stiffness = np.diag([station.support for station in chain.stations])
+    for k, link in enumerate(chain.links):
+        stiffness[k : k + 2, k : k + 2] += link.c * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    return inertias, stiffness
+
+
+def hertz(squares: Array, chain: Chain) -> Array:
+    """(n,) frequencies in Hz of ascending squares of rates; the first is exactly 0 where the whole chain turns."""
+    rates = np.sqrt(np.maximum(squares, 0.0))
+    if not any(station.support for station in chain.stations):
+        rates[0] = 0.0
+    return np.asarray(rates / (2 * np.pi))
+
+
+def read_chain(netlist: Netlist, keep: str) -> Chain:
+    """The chain that a network without gears is.
+
+    Args:
+        netlist: of the network.
+        keep: a spring or gap that stays a link of its own; empty for none.
+
+    Raises:
+        NetworkError: it is no chain of inertias and springs; names every part and node that is in the way.
+    """
+    problems: list[Problem] = []
+    stations: dict[str, Station] = {}
+    links: dict[tuple[str, str], list[Placed]] = {}
+    circuits: list[Placed] = []
+    for item in netlist.placed:
+        nodes = turning_nodes(item)
+        if len(nodes) == 2 and isinstance(item.part, Spring | Damper | Backlash):
+            a, b = sorted(nodes)
+            links.setdefault((a, b), []).append(item)
+            problems += _objections(item, keep)
+            for node in nodes:
+                stations.setdefault(node, Station(node))
+        elif len(nodes) == 1:
+            here = stations.setdefault(nodes[0], Station(nodes[0]))
+            stations[nodes[0]] = _with(here, item)
+        elif not nodes:
+            circuits.append(item)
+        else:
+            problems.append(_not_in_a_chain(item))
+    if not problems:
+        problems += _not_a_row(stations, links)
+    if problems:
+        raise NetworkError(f"'{netlist.name}' is no chain of inertias and springs", tuple(problems))
+    row = _in_a_row(stations, links)
+    return replace(_condensed(row, keep, netlist.name), circuits=tuple(circuits))
+
+
+def turning_nodes(item: Placed) -> tuple[str, ...]:
+    """The nodes of a part that turn, without the frame."""
+    pairs = zip(item.part.ports, item.nodes, strict=False)
+    return tuple(node for port, node in pairs if port.domain is ROTATION and node != REFERENCE)
+
+
+def _with(station: Station, item: Placed) -> Station:
+    if isinstance(item.part, Inertia):
+        size = float(item.part.J)
+        return replace(station, inertia=station.inertia + size, inertias=(*station.inertias, (item.part.name, size)))
+    support = float(item.part.c) if isinstance(item.part, Spring) else 0.0
+    return replace(station, riders=(*station.riders, item), support=station.support + support)
+
+
+def _objections(item: Placed, keep: str) -> Iterator[Problem]:
+    if isinstance(item.part, Backlash) and (item.part.name != keep or item.part.c is None):
+        yield Problem(
+            "gap in a chain",
+            f"Backlash '{item.part.name}' is no spring that can be one with its neighbours.",
+            "Keep it, keep='...' with a stiffness c; or put a Spring in its place.",
+            (item.part.name,),
+        )
+
+
+def _not_in_a_chain(item: Placed) -> Problem:
+    kind, name = type(item.part).__name__, item.part.name
+    hint = "net.expanded() writes a long shaft out part by part." if kind == "Shaft" else "Put springs in its place."
+    return Problem("no part of a chain", f"{kind} '{name}' joins {', '.join(item.nodes)}.", hint, (name,))
+
+
+def _not_a_row(stations: dict[str, Station], links: dict[tuple[str, str], list[Placed]]) -> Iterator[Problem]:
+    """Where a chain branches, closes or falls apart, and links without a spring."""
+    for (a, b), items in links.items():
+        if not any(float(getattr(item.part, "c", None) or 0.0) for item in items):
+            names = tuple(item.part.name for item in items)
+            yield Problem("no spring", f"Between '{a}' and '{b}' there is no spring.", "Give it one.", names, (a, b))
+    for node in stations:
+        beside = [pair for pair in links if node in pair]
+        if len(beside) > 2:
+            yield Problem(
+                "branching", f"At node '{node}' {len(beside)} shafts meet.", "Simplify one branch.", (), (node,)
+            )
+    if len(links) != len(stations) - 1:
+        what = f"{len(stations)} nodes are joined by {len(links)} shafts"
+        yield Problem("no row", f"{what}; a chain has one shaft less than nodes.", "Open the loop, or join the parts.")
+
+
+def _in_a_row(stations: dict[str, Station], links: dict[tuple[str, str], list[Placed]]) -> Chain:
+    ends = [node for node in stations if sum(node in pair for pair in links) < 2]
+    row, made, left = [ends[0]], list[Link](), dict(links)
+    while left:
+        pair = next(pair for pair in left if row[-1] in pair)
+        items = left.pop(pair)
+        row.append(pair[1] if pair[0] == row[-1] else pair[0])
+        c, d = (sum(float(getattr(item.part, name, None) or 0.0) for item in items) for name in ("c", "d"))
+        springs = tuple(item.part.name for item in items if not isinstance(item.part, Damper))
+        made.append(Link(springs[0], c, d, springs, tuple(items)))
+    return Chain(tuple(stations[node] for node in row), tuple(made))
+
+
+def _condensed(chain: Chain, keep: str, title: str) -> Chain:
+    """Springs that meet at a node without inertia, where nothing sits, are one."""
+    stations, links = list(chain.stations), list(chain.links)
+    problems: list[Problem] = []
+    for station in chain.stations:
+        if station.inertia:
+            continue
+        k = stations.index(station)
+        beside = links[max(k - 1, 0) : k + 1]
+        if station.riders or len(beside) < 2 or any(link.has(keep) for link in beside):
+            where = f"Node '{station.node}' has no inertia"
+            problems.append(
+                Problem(
+                    "massless node",
+                    f"{where}, and is the end of the kept shaft or of the chain, or parts sit there.",
+                    "Give it the inertia of what it stands for.",
+                    (),
+                    (station.node,),
+                )
+            )
+            continue
+        del stations[k]
+        links[k - 1 : k + 1] = [series(beside)]
+    if problems:
+        raise NetworkError(f"'{title}' is no chain of inertias and springs", tuple(problems))
+    return Chain(tuple(stations), tuple(links))

@@ -1,0 +1,232 @@
+"""Whether a part at the reference shaft does the same as another one behind a gear, tried on its laws."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+
+from sympy import Expr, Float, Symbol
+
+from shaftwork.components.base import Component
+from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, End, named_in, readings_in
+from shaftwork.components.laws import t
+from shaftwork.components.modes import Choice, Mode, Modes
+from shaftwork.core.domains import ELECTRICAL
+from shaftwork.network.graph import resolve
+from shaftwork.network.netlist import Placed
+from shaftwork.network.templates import BranchTemplate, Kind, Template, make_template
+from shaftwork.reduce.scales import Scale
+
+POINTS = (0.37, -1.93, 41.7, 0.0083)
+"""Arguments at which laws are compared: between them they pass most limits and knees."""
+CLOSE = 1e-9
+LINEAR = (Kind.ACROSS_STORE, Kind.THROUGH_STORE, Kind.CONDUCTANCE)
+
+
+def does_the_same(part: Component, referred: Component, scale: Scale) -> bool:
+    """Whether the one at the reference shaft has the laws of the other behind a gear, in all modes.
+
+    Law: with across = ratio across' and through' = ratio power through every store, law, coupling and guard agrees.
+
+    Args:
+        part: as it is.
+        referred: as it is at the reference shaft.
+        scale: of its speeds and powers to those of the reference shaft.
+    """
+    old, new = _View.of(part), _View.of(referred)
+    if len(old.modes) != len(new.modes):
+        return False
+    forms = [dict.fromkeys(mode.form for mode in element.options) for element in old.modes]
+    try:
+        guards = all(_Guards(old, new, scale, *pair).agree() for pair in zip(old.modes, new.modes, strict=True))
+        return guards and all(
+            _agree(old.chosen(tuple(map(Choice, chosen))), new.chosen(tuple(map(Choice, chosen))), scale)
+            for chosen in product(*forms)
+        )
+    except (TypeError, ValueError, ArithmeticError):
+        return False  # what has no value at the points cannot be compared
+
+
+@dataclass(frozen=True, eq=False)
+class _View:
+    """A part with the values of its parameters, and its branches in one combination of forms."""
+
+    part: Component
+    template: Template
+
+    @classmethod
+    def of(cls, part: Component, choices: tuple[Choice, ...] = ()) -> _View:
+        nodes = tuple("ground" for _ in part.ports)
+        return cls(part, make_template(part, resolve(Placed(part, nodes))[0].values, choices))
+
+    def chosen(self, choices: tuple[Choice, ...]) -> _View:
+        return self.of(self.part, choices) if choices else self
+
+    @property
+    def modes(self) -> tuple[Modes, ...]:
+        return self.template.modes
+
+    @cached_property
+    def numbers(self) -> Mapping[Symbol, Float]:
+        values = resolve(Placed(self.part, ()))[0].values
+        return {Symbol(name, real=True): Float(value) for name, value in values.items() if isinstance(value, float)}
+
+    def value(self, law: Expr, at: Mapping[Symbol, float]) -> float:
+        """A law at a point.
+
+        Raises:
+            TypeError: it has no real value there.
+        """
+        known = {**self.numbers, **{symbol: Float(value) for symbol, value in at.items()}}
+        return float(law.xreplace(known).evalf())
+
+    def is_electrical(self, end: End) -> bool:
+        ports = (*self.part.ports, *self.part.inner_ports())
+        return any(port.name == end and port.domain is ELECTRICAL for port in ports)
+
+    def scale_at(self, end: End, scale: Scale) -> Scale:
+        """What a node of the part is scaled by: nothing in a circuit."""
+        return Scale() if self.is_electrical(end) else scale
+
+    def scale_of(self, branch: BranchTemplate, scale: Scale) -> Scale:
+        """What a branch is scaled by, by either of its ends."""
+        ends = [end for end in branch.ends if end is not None]
+        return self.scale_at(ends[0], scale) if ends else scale
+
+    def labelled(self, label: str, scale: Scale) -> Scale:
+        """What the branch of a label is scaled by."""
+        found = (self.scale_of(branch, scale) for branch in self.template.branches if branch.label == label)
+        return next(found, scale)
+
+    def read(self, symbol: Symbol, scale: Scale) -> float:
+        """By what a reading of another port or branch of the part is multiplied to be that of the part as it was."""
+        kind, name = named_in(symbol)
+        if kind == "across":
+            return self.scale_at(name, scale).ratio
+        return self.labelled(name, scale).ratio if kind == "integral" else 1 / self.labelled(name, scale).through
+
+
+def _samples(symbols: Sequence[Symbol], modes: Sequence[Modes]) -> Iterator[dict[Symbol, float]]:
+    """Each symbol at one point after another, the numbers of modes at all that there are; time is not negative."""
+    numbers = {made.symbol: tuple(dict.fromkeys(mode.value for mode in made.options)) for made in modes}
+    own = [symbol for symbol in symbols if symbol.name in numbers]
+    for values in product(*(numbers[symbol.name] for symbol in own)):
+        for first in range(len(POINTS)):
+            chosen = {symbol: POINTS[(first + k) % len(POINTS)] for k, symbol in enumerate(symbols)}
+            chosen |= dict(zip(own, values, strict=True))
+            yield {symbol: abs(value) if symbol == t else value for symbol, value in chosen.items()}
+
+
+def _agree(old: _View, new: _View, scale: Scale) -> bool:
+    pairs = tuple(zip(old.template.branches, new.template.branches, strict=True))
+    return all(a.kind is b.kind and a.ends == b.ends and _same_branch(old, new, a, b, scale) for a, b in pairs)
+
+
+def _same_branch(old: _View, new: _View, before: BranchTemplate, after: BranchTemplate, scale: Scale) -> bool:
+    if before.terms:
+        return _proportional(old, new, before, after, scale)
+    own = old.scale_of(before, scale)
+    square = own.ratio * own.through
+    if before.line is not None and after.line is not None:
+        pairs = zip(before.line, after.line, (square, 1.0), strict=True)
+        return all(_close(new.value(b, {}), factor * old.value(a, {})) for a, b, factor in pairs)
+    factor = square if before.kind in LINEAR else own.through
+    if before.kind is Kind.ACROSS_SOURCE:
+        factor = 1 / own.ratio
+    symbols = tuple(dict.fromkeys((ACROSS, INTEGRAL, t, *readings_in(after.law), *_modes_in(after.law))))
+    for at in _samples(symbols, old.modes):
+        turned = {symbol: value * _turned(old, symbol, own, scale) for symbol, value in at.items()}
+        if not _close(new.value(after.law, at), factor * old.value(before.law, turned)):
+            return False
+    return True
+
+
+def _modes_in(law: Expr) -> tuple[Symbol, ...]:
+    found = (symbol for symbol in law.free_symbols if str(symbol.name).partition("_")[0] == "mode")
+    return tuple(sorted(found, key=lambda symbol: str(symbol.name)))
+
+
+def _turned(view: _View, symbol: Symbol, own: Scale, scale: Scale) -> float:
+    """By what an argument of a law at the reference shaft is multiplied to be that of the part as it was."""
+    if symbol in (ACROSS, INTEGRAL):
+        return own.ratio
+    if symbol == THROUGH:
+        return 1 / own.through
+    if named_in(symbol)[0]:
+        return view.read(symbol, scale)
+    return -1.0 if symbol != t and own.ratio < 0 else 1.0  # slipping forward is slipping backward
+
+
+def _proportional(old: _View, new: _View, before: BranchTemplate, after: BranchTemplate, scale: Scale) -> bool:
+    """Whether a coupling asks for the same speeds, and shares the same torques."""
+    ends = [(plus if plus is not None else minus) for _, plus, minus in before.terms]
+    scales = [old.scale_at(end, scale) for end in ends]
+    for laws, others, factors in (
+        (before.terms, after.terms, [own.ratio for own in scales]),
+        (before.balances, after.balances, [own.through for own in scales]),
+    ):
+        was = [old.value(law, {}) * factor for (law, *_), factor in zip(laws, factors, strict=True)]
+        now = [new.value(law, {}) for law, *_ in others]
+        if not all(_close(one * was[0], other * now[0]) for one, other in zip(now, was, strict=True)):
+            return False
+    return True
+
+
+def _close(one: float, other: float) -> bool:
+    return math.isclose(one, other, rel_tol=CLOSE)
+
+
+@dataclass(frozen=True, eq=False)
+class _Guards:
+    """The guards of an element of a part, before and after."""
+
+    old: _View
+    new: _View
+    scale: Scale
+    before: Modes
+    after: Modes
+
+    def agree(self) -> bool:
+        """Whether each mode ends where the same one ended; forward and backward are exchanged where the part turns."""
+        renamed = {mode.name: self._same(mode).name for mode in self.before.options}
+        return all(self._ends_alike(mode, self.after[renamed[mode.name]], renamed) for mode in self.before.options)
+
+    def _same(self, mode: Mode) -> Mode:
+        if self.scale.ratio > 0 or mode.value == 0 or self._own.ratio > 0:
+            return self.after[mode.name]
+        turned = (other for other in self.after.options if (other.value, other.form) == (-mode.value, mode.form))
+        return next(turned, mode)
+
+    @cached_property
+    def _own(self) -> Scale:
+        ends = self.before.ends or (self.old.part.ports[0].name, None)
+        return self.old.scale_at(ends[0], self.scale)
+
+    def _ends_alike(self, mode: Mode, other: Mode, renamed: Mapping[str, str]) -> bool:
+        if len(mode.leaves) != len(other.leaves):
+            return False
+        left = list(other.leaves)
+        for leave in mode.leaves:
+            to = renamed.get(leave.to, leave.to)
+            match = next((found for found in left if found.to == to and self._same_sign(leave.when, found.when)), None)
+            if match is None:
+                return False
+            left.remove(match)
+        return True
+
+    def _same_sign(self, before: Expr, after: Expr) -> bool:
+        """Whether a guard is a positive multiple of the other one."""
+        symbols = tuple(dict.fromkeys((ACROSS, THROUGH, INTEGRAL, t, *readings_in(after), *_modes_in(after))))
+        factors: list[float] = []
+        for at in _samples(symbols, self.old.modes):
+            turned = {symbol: value * _turned(self.old, symbol, self._own, self.scale) for symbol, value in at.items()}
+            was, now = self.old.value(before, turned), self.new.value(after, at)
+            if was == 0 or now == 0:
+                if was != now:
+                    return False
+                continue
+            factors.append(now / was)
+        return all(factor > 0 and _close(factor, factors[0]) for factor in factors)

@@ -1,0 +1,131 @@
+"""Neighbouring inertias as one: every way to group a chain, and what each does to it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import chain as joined
+from itertools import combinations, pairwise
+from math import comb
+
+import numpy as np
+
+from shaftwork.core.errors import ParameterError
+from shaftwork.reduce.chain import Chain, Station, modes_of, series
+
+MOST = 20_000
+"""Groupings that are tried one by one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Grouping:
+    """A chain of groups.
+
+    Args:
+        groups: the nodes of each.
+        chain: of a station for each group, with springs in series between their centres.
+        frequency_error: of the lowest natural frequency, relative.
+        torque_error: of the torque that a step at the driving end swings the kept shaft by in that mode, relative.
+    """
+
+    groups: tuple[tuple[str, ...], ...]
+    chain: Chain
+    frequency_error: float
+    torque_error: float
+
+
+def groupings(chain: Chain, masses: int, keep: str, driven: int) -> tuple[Grouping, ...]:
+    """Every grouping of neighbours into so many groups in which the kept shaft is between two of them, best first.
+
+    The best one has the smallest error of the lowest natural frequency, and among equal ones that of the torque: a
+    group boundary at the kept shaft keeps the inertia on either side of it, and with it the torque that accelerates
+    what is beyond, whatever the other boundaries are. What they change is how it swings.
+
+    Args:
+        chain: stations with inertia.
+        masses: the number of groups.
+        keep: a part of one link; empty for none.
+        driven: place of the station at which a step of torque acts.
+
+    Raises:
+        ParameterError: there are fewer stations than groups, or too many groupings.
+    """
+    count = len(chain.stations)
+    if isinstance(masses, bool) or not isinstance(masses, int) or not 1 <= masses <= count:
+        raise ParameterError(f"masses = {masses!r} must be a whole number from 1 to the {count} inertias of the chain.")
+    kept = next((k for k, link in enumerate(chain.links) if keep and link.has(keep)), None) if masses > 1 else None
+    free = [k for k in range(count - 1) if k != kept]
+    chosen = masses - 1 - (kept is not None)
+    if comb(len(free), chosen) > MOST:
+        raise ParameterError(
+            f"masses = {masses} of {count} inertias: {comb(len(free), chosen)} groupings are more than the {MOST} that "
+            "are tried. Take fewer masses, or simplify in two steps."
+        )
+    true = _swing(chain, driven, kept)
+    cuts = (tuple(sorted((*some, *(() if kept is None else (kept,))))) for some in combinations(free, chosen))
+    found = (_measured(chain, each, kept, driven, true) for each in cuts)
+    return tuple(sorted(found, key=lambda made: (made.frequency_error, made.torque_error)))
+
+
+def _measured(
+    chain: Chain, cuts: tuple[int, ...], kept: int | None, driven: int, true: tuple[float, float]
+) -> Grouping:
+    made, groups = grouped(chain, cuts, kept)
+    place = sum(cut < driven for cut in cuts)
+    swing = _swing(made, place, None if kept is None else cuts.index(kept))
+    errors = [abs(now - was) / was if was else 0.0 for was, now in zip(true, swing, strict=True)]
+    return Grouping(groups, made, *errors)
+
+
+def _swing(chain: Chain, driven: int, kept: int | None) -> tuple[float, float]:
+    """The lowest natural frequency, and the torque amplitude of a link in that mode after a unit step of torque."""
+    frequencies, shapes = modes_of(chain)
+    elastic = np.flatnonzero(frequencies > 0)
+    if not elastic.size:
+        return 0.0, 0.0
+    frequency, shape = float(frequencies[elastic[0]]), shapes[:, elastic[0]]
+    if kept is None:
+        return frequency, 0.0
+    twist = shape[kept] - shape[kept + 1]
+    return frequency, float(abs(chain.links[kept].c * twist * shape[driven])) / (2 * np.pi * frequency) ** 2
+
+
+def grouped(chain: Chain, cuts: tuple[int, ...], kept: int | None) -> tuple[Chain, tuple[tuple[str, ...], ...]]:
+    """The chain of the groups between cuts, and their nodes.
+
+    Args:
+        chain: stations with inertia.
+        cuts: places of the links at which groups end, ascending.
+        kept: that of the link that keeps its own stiffness; the groups beside it have their centres at its ends.
+    """
+    bounds = tuple(pairwise((-1, *cuts, len(chain.stations) - 1)))
+    centres = [_centre(chain, last + 1, end, kept) for last, end in bounds]
+    stations = tuple(
+        _one(chain.stations[last + 1 : end + 1], chain.stations[centre])
+        for (last, end), centre in zip(bounds, centres, strict=True)
+    )
+    links = tuple(series(chain.links[a:b]) for a, b in pairwise(centres))
+    groups = tuple(tuple(station.node for station in chain.stations[last + 1 : end + 1]) for last, end in bounds)
+    return Chain(stations, links, chain.circuits), groups
+
+
+def _centre(chain: Chain, first: int, last: int, kept: int | None) -> int:
+    """Where a group stands: at the kept shaft, else at its largest inertia."""
+    if kept is not None and last == kept:
+        return last
+    if kept is not None and first == kept + 1:
+        return first
+    return max(range(first, last + 1), key=lambda k: chain.stations[k].inertia)
+
+
+def _one(stations: tuple[Station, ...], centre: Station) -> Station:
+    def all_of(name: str) -> Iterator[object]:
+        return joined.from_iterable(getattr(station, name) for station in stations)
+
+    return Station(
+        centre.node,
+        sum(station.inertia for station in stations),
+        tuple(all_of("inertias")),  # type: ignore[arg-type]
+        tuple(all_of("riders")),  # type: ignore[arg-type]
+        sum(station.support for station in stations),
+    )

@@ -1,0 +1,194 @@
+"""A train referred to one of its shafts: a network without rigid gears that moves the same."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from shaftwork.components.lossy_gear import LossyGear
+from shaftwork.core.domains import ELECTRICAL
+from shaftwork.core.errors import NetworkError, ParameterError, Problem, SignalError
+from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart
+from shaftwork.network.netlist import REFERENCE, Netlist, Placed
+from shaftwork.pipeline.network import Network
+from shaftwork.reduce.kinematics import Kinematics, kinematics
+from shaftwork.reduce.referred_parts import ReferredPart, referred_part
+from shaftwork.reduce.scales import Scale
+from shaftwork.reduce.table import ReductionTable
+
+
+@dataclass(frozen=True, eq=False)
+class Referred:
+    """A network as it is seen from one of its shafts.
+
+    Args:
+        network: without rigid gears, planetary gears, drums and wheels; its parts have the names that they had.
+        table: every parameter before and after.
+        to: node of the reference shaft.
+        scales: by part, the ratio of its speed to that of the reference shaft, and what share of its power arrives.
+        nodes: by node of the train, the node of the referred network that it became part of, and its scale.
+        absorbed: the rigid parts that are in the ratios now.
+        at_rest: parts that cannot move, and are left out.
+    """
+
+    network: Network
+    table: ReductionTable
+    to: str
+    scales: Mapping[str, Scale]
+    nodes: Mapping[str, tuple[str, Scale]]
+    absorbed: tuple[str, ...]
+    at_rest: tuple[str, ...]
+
+    def ratio(self, part: str) -> float:
+        """Speed of a part over that of the reference shaft.
+
+        Raises:
+            SignalError: there is no such part in the referred network.
+        """
+        return self._scale(part).ratio
+
+    def torque_ratio(self, part: str) -> float:
+        """Torque of a part in the referred network over that in the train: its ratio, less what lossy gears keep.
+
+        Raises:
+            SignalError: there is no such part in the referred network.
+        """
+        return self._scale(part).through
+
+    def _scale(self, part: str) -> Scale:
+        if part not in self.scales:
+            raise SignalError(f"No part '{part}' was referred to '{self.to}'. There are: {', '.join(self.scales)}.")
+        return self.scales[part]
+
+
+def refer(net: Network, to: str, *, drives: Mapping[str, str] | None = None) -> Referred:
+    """Refer a whole train to one of its shafts.
+
+    Law: with i the speed of a part over that of the reference shaft, and equal energies and powers, J' = J i^2,
+    c' = c i^2, d' = d i^2, gap' = gap / i, tau' = i tau; a mass at the radius r is an inertia, m' = m r^2 i^2, and a
+    force a torque, F' = r i F; laws read omega = i omega', phi = i phi'. So every torque of the referred network is
+    i times that of the train, exactly and at any time. Behind a lossy gear all but speeds, angles and gaps are
+    multiplied by its efficiency besides, on the side that drives, and divided by it on the other: exact as long as that
+    side drives, tau' = i eta tau.
+
+    Every part is proven to do the same at the reference shaft: its laws are compared at some points. A part of one's
+    own is referred by the units of its parameters; where they do not tell, it says so itself, by a ClassVar `referred`
+    from parameters to the exponents of ratio and power, {"radius": (1, 0)}.
+
+    Args:
+        net: the train.
+        to: a node of the reference shaft, rotating or translating.
+        drives: by name of a `LossyGear` the side that drives it, "a" or "b"; by default that of the motors and
+            sources, where all of them are on one.
+
+    Raises:
+        ParameterError: there is no such node, it cannot move, or `drives` names no lossy gear.
+        NetworkError: the network cannot be assembled, or parts cannot be referred; lists every one with its reason.
+
+    Source: Abdelkader 2016, (4)-(17), with (3) and (6) put right; Marinkovic 2012, 2.2 and (18).
+    """
+    graph, netlist = net.graph(), net.netlist()
+    known = _checked_sides(graph, drives or {})
+    node = _checked_node(graph, to)
+    found = kinematics(graph, known)
+    title = f"'{net.name}' cannot be referred to '{to}'"
+    if found.problems:
+        raise NetworkError(title, found.problems)
+    if node not in found.shafts:
+        raise ParameterError(f"Node '{to}' of '{net.name}' is held at rest: nothing can be referred to it.")
+    view = _View(graph, netlist, found, node)
+    parts, problems = view.parts()
+    if problems:
+        raise NetworkError(title, problems)
+    made = Network(f"{net.name}, referred to {to}")
+    for part in parts:
+        made.add(part.placed.part, *part.placed.nodes)
+    entries = tuple(entry for part in parts for entry in part.entries)
+    table = ReductionTable(to, entries, lambda: net.equations().symbol_names)
+    scales = {part.placed.part.name: part.scale for part in parts}
+    absorbed = tuple(graph.parts[place].name for place in found.absorbed)
+    at_rest = tuple(part.name for part in graph.parts if part.name not in scales and part.name not in absorbed)
+    return Referred(made, table, to, scales, view.nodes(), absorbed, at_rest)
+
+
+def _checked_node(graph: CircuitGraph, to: str) -> int:
+    nodes = [name for name, domain in zip(graph.nodes, graph.domains, strict=True) if domain is not ELECTRICAL]
+    if to not in nodes:
+        raise ParameterError(f"to = {to!r} is no mechanical node of '{graph.name}'. There are: {', '.join(nodes)}.")
+    return graph.nodes.index(to)
+
+
+def _checked_sides(graph: CircuitGraph, drives: Mapping[str, str]) -> Mapping[str, str]:
+    gears = [part.name for part in graph.parts if isinstance(part.component, LossyGear)]
+    for name, side in drives.items():
+        if name not in gears:
+            raise ParameterError(f"drives: there is no LossyGear '{name}'. There are: {', '.join(gears) or 'none'}.")
+        if side not in ("a", "b"):
+            raise ParameterError(f"drives: side {side!r} of '{name}' must be 'a' or 'b'.")
+    return drives
+
+
+@dataclass(frozen=True, eq=False)
+class _View:
+    """A network from one of its nodes."""
+
+    graph: CircuitGraph
+    netlist: Netlist
+    found: Kinematics
+    to: int
+
+    def parts(self) -> tuple[list[ReferredPart], tuple[Problem, ...]]:
+        """The parts at the reference shaft, and those that have no place there."""
+        made: list[ReferredPart] = []
+        problems: list[Problem] = []
+        for place, (item, part) in enumerate(zip(self.netlist.placed, self.graph.parts, strict=True)):
+            if place in self.found.absorbed:
+                continue
+            seen = self._part(item, part)
+            if isinstance(seen, ReferredPart):
+                made.append(seen)
+            elif seen is not None:
+                problems.append(seen)
+        return made, tuple(problems)
+
+    def _part(self, item: Placed, part: GraphPart) -> ReferredPart | Problem | None:
+        """A part at the reference shaft; None where it cannot move."""
+        nodes = [number for number in part.nodes.values() if number != GROUND]
+        moving = [number for number in nodes if number in self.found.shafts]
+        places = tuple(self._place(part.nodes[port.name]) for port in item.part.ports[: len(item.nodes)])
+        if not moving:
+            electrical = any(self.graph.domains[number] is ELECTRICAL for number in nodes)
+            return ReferredPart(Placed(item.part, places), Scale(), ()) if electrical else None
+        if len(places) == 2 and places[0] == places[1]:
+            return None
+        name, kind = part.name, type(item.part).__name__
+        if self.found.shafts[moving[0]][0] != self.found.shafts[self.to][0]:
+            return Problem(
+                "other train",
+                f"{kind} '{name}' is not joined to '{self.graph.node_name(self.to)}' by any shaft.",
+                "Refer each train in a network of its own.",
+                (name,),
+            )
+        seen = referred_part(item, places, self.scale(moving[0]), self.graph.domains[self.to])
+        if isinstance(seen, ReferredPart):
+            return seen
+        hint = f"Refer to its own shaft, to='{self.graph.node_name(moving[0])}', or put a simpler part in its place."
+        return Problem("no such part there", f"{kind} '{name}' cannot be referred: {seen.rstrip('.')}.", hint, (name,))
+
+    def _place(self, node: int) -> str:
+        """Where a node is in the referred network: rigid shafts are one node."""
+        if node == GROUND or self.graph.domains[node] is ELECTRICAL:
+            return self.graph.node_name(node)
+        if node not in self.found.rigid:
+            return REFERENCE
+        members = self.found.rigid.members(node)
+        return self.graph.node_name(self.to if self.to in members else members[0])
+
+    def scale(self, node: int) -> Scale:
+        """Of a node to the reference shaft."""
+        return self.found.shafts[node][1] / self.found.shafts[self.to][1]
+
+    def nodes(self) -> Mapping[str, tuple[str, Scale]]:
+        """What every moving node became."""
+        moving = (node for node in range(len(self.graph.nodes)) if node in self.found.shafts)
+        return {self.graph.node_name(node): (self._place(node), self.scale(node)) for node in moving}

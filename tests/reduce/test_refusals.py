@@ -1,0 +1,182 @@
+"""What cannot be referred is refused by name; what is referred is proven to do the same."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+import shaftwork as sw
+from shaftwork.components import REGISTRY
+from shaftwork.core.domains import ROTATION, TRANSLATION
+from shaftwork.network.netlist import Placed
+from shaftwork.reduce import referred_parts
+from shaftwork.reduce.scales import Scale
+
+VALUES: dict[str, dict[str, Any]] = {
+    "CageMotor": {"tau_a": 5310.0, "tau_s": 4350.0, "tau_k": 5550.0, "tau_n": 2410.0, "n_n": 985.0, "n_sync": 1000.0},
+    "HardStop": {"upper": 0.1},
+    "TorqueSource": {"tau": 3 * sw.omega + sw.phi**2 + sw.t},
+    "ForceSource": {"f": 3 * sw.v + sw.s},
+    "PullOutDrive": {"tau_k": 9.0, "s_k": 0.2, "n_sync": 3000.0},
+    "RandomLoad": {"mean": 3.0, "std": 1.0, "interval": 0.1},
+    "Hoist": {"m": 100.0, "radius": 0.2, "efficiency": 0.9},
+    "DryFriction": {"tau_c": 3.0, "tau_s": 4.0},
+    "Brake": {"tau": 10.0, "on": sw.omega - 10},
+    "Shaft": {"length": 1.0, "diameter": 0.1, "inner_diameter": 0.02, "damping": 3.0},
+    "SpeedController": {"omega_ref": 100 * sw.t, "k_p": 3.0, "t_i": 0.1, "tau_max": 40.0},
+}
+ONE_WAY = {"AveragedBLDC", "BLDCMotor", "Hoist", "InductionMachine", "SpeedController"}
+"""They have a direction, one node and no sign that could turn it."""
+NOWHERE = {"BucketWheelLoad"}
+"""Its buckets are counted by its own angle."""
+BUILT_IN = {name: kind for name, kind in REGISTRY.items() if kind.__module__.startswith("shaftwork.")}
+
+
+def seen(kind: type[sw.Component], scale: Scale) -> Any:
+    values = VALUES.get(kind.__name__) or {item.name: 1.0 for item in kind.declared.values() if item.required}
+    part = kind("part", **values)
+    nodes = tuple("abc"[: len(part.ports)])
+    return referred_parts.referred_part(Placed(part, nodes), nodes, scale, ROTATION)
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_every_mechanical_component_is_referred_or_refused(name: str) -> None:
+    kind = BUILT_IN[name]
+    if any(port.domain in (ROTATION, TRANSLATION) for port in kind.ports):
+        assert isinstance(seen(kind, Scale(-2.5)), str) is (name in ONE_WAY | NOWHERE)
+        if name in ONE_WAY | NOWHERE:
+            assert isinstance(seen(kind, Scale(2.5)), str) is (name in NOWHERE)
+
+
+def test_a_part_whose_law_does_not_scale_so_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By their units alone a hoist's radius and a motor's gear would stay as they are."""
+    monkeypatch.setattr(referred_parts, "OF_CLASS", {})
+    assert isinstance(seen(sw.Hoist, Scale(2.5)), str)
+    assert isinstance(seen(sw.DCMachine, Scale(2.5)), str)
+
+
+def test_a_part_of_ones_own_says_how_it_scales() -> None:
+    @sw.component
+    class Lever(sw.Component):
+        arm: float = sw.parameter("m", "arm")
+        ports = (sw.Port("a"),)
+
+        def branches(self, p: Any) -> Any:
+            yield sw.ThroughLaw(5.0 * p.arm)
+
+    try:
+        assert isinstance(seen(Lever, Scale(2.5)), str)
+        Lever.referred = {"arm": (1, 1)}  # type: ignore[attr-defined]
+        assert seen(Lever, Scale(2.5, 0.5)).placed.part.arm == 1.25
+    finally:
+        del REGISTRY["Lever"]
+
+
+def base(*, gear: sw.Component | None = None) -> sw.Network:
+    net = sw.Network("train")
+    net.add(sw.TorqueSource("motor", tau=1.0), "a")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(gear or sw.Gear("gear", ratio=3.0), "a", "b")
+    net.add(sw.Inertia("J2", J=1.0), "b")
+    return net
+
+
+def refused(net: sw.Network, to: str = "a", **options: Any) -> str:
+    with pytest.raises(sw.NetworkError) as caught:
+        sw.reduce.refer(net, to, **options)
+    return str(caught.value)
+
+
+def test_a_spring_that_is_twisted_by_the_gear_beside_it_is_refused() -> None:
+    net = base()
+    net.add(sw.Spring("brace", c=1.0), "a", "b")
+    message = refused(net)
+    assert "'brace' closes a loop: by the way round it, node 'a' turns 3 times as fast as node 'b'" in message
+
+
+def test_a_differential_is_refused_and_one_with_a_fixed_ring_is_not() -> None:
+    net = base()
+    net.add(sw.PlanetaryGear("planets", ratio=2.0), "b", "carrier", "ring")
+    net.add(sw.Inertia("J3", J=1.0), "carrier")
+    net.add(sw.Inertia("J4", J=1.0), "ring")
+    assert "'planets' has no fixed member: 3 of its shafts turn" in refused(net)
+    net.add(sw.Ground("frame"), "ring")
+    small = sw.reduce.refer(net, "a")
+    assert small.ratio("J3") == pytest.approx(1 / 9, rel=1e-15)
+    assert small.at_rest == ("J4",)
+
+
+def test_losses_need_a_direction_of_power() -> None:
+    net = base(gear=sw.LossyGear("gear", ratio=3.0, efficiency=0.9, efficiency_back=0.8))
+    assert sw.reduce.refer(net, "b").torque_ratio("J1") == pytest.approx(2.7)
+    net.add(sw.TorqueSource("load", tau=-1.0), "b")
+    message = refused(net)
+    assert "direction of power" in message
+    assert "drives={'gear': 'a'}" in message
+    assert sw.reduce.refer(net, "b", drives={"gear": "a"}).torque_ratio("J1") == pytest.approx(2.7)
+    assert sw.reduce.refer(net, "b", drives={"gear": "b"}).torque_ratio("J1") == pytest.approx(3 / 0.8)
+
+
+def test_a_machine_is_referred_by_its_torque_constant_but_not_behind_losses() -> None:
+    def driven(gear: sw.Component) -> sw.Network:
+        net = sw.Network("servo")
+        net.add(sw.VoltageSource("supply", u=24.0), "plus", "ground")
+        net.add(sw.DCMachine("motor", k=0.1, R=1.0, L=0.01), "plus", "ground", "a")
+        net.add(sw.Inertia("J1", J=1.0), "a")
+        net.add(gear, "a", "b")
+        net.add(sw.Inertia("J2", J=1.0), "b")
+        return net
+
+    small = sw.reduce.refer(driven(sw.Gear("gear", ratio=3.0)), "b")
+    assert small.table["motor.k"].referred == pytest.approx(0.3)
+    assert "DCMachine 'motor' cannot be referred" in refused(
+        driven(sw.LossyGear("gear", ratio=3.0, efficiency=0.9)), "b"
+    )
+
+
+def test_other_trains_and_wrong_nodes_are_named() -> None:
+    net = base()
+    net.add(sw.Inertia("J3", J=1.0), "c")
+    assert "Inertia 'J3' is not joined to 'a' by any shaft" in refused(net)
+    with pytest.raises(sw.ParameterError, match=r"no mechanical node of 'train'\. There are: a, b\."):
+        sw.reduce.refer(base(), "d")
+    with pytest.raises(sw.ParameterError, match="there is no LossyGear 'gear'"):
+        sw.reduce.refer(base(), "a", drives={"gear": "a"})
+
+
+@pytest.mark.filterwarnings("ignore:locked gear loop")
+def test_members_that_turn_against_each_other_hold_the_carrier() -> None:
+    """omega_sun + 2 omega_ring = 3 omega_carrier with omega_sun = -2 omega_ring."""
+    net = base(gear=sw.Gear("gear", ratio=-2.0))
+    net.add(sw.PlanetaryGear("planets", ratio=2.0), "a", "carrier", "b")
+    net.add(sw.Spring("arm", c=10.0), "carrier", "tip")
+    net.add(sw.Inertia("J3", J=1.0), "carrier")
+    net.add(sw.Inertia("J4", J=1.0), "tip")
+    message = refused(net)
+    assert "Inertia 'J4' is not joined to 'a' by any shaft" in message
+    assert "J3" not in message
+    with pytest.raises(sw.ParameterError, match="Node 'carrier' of 'train' is held at rest"):
+        sw.reduce.refer(net, "carrier")
+
+
+def test_gears_round_a_loop_must_agree_in_ratio_and_losses() -> None:
+    net = base()
+    net.add(sw.LossyGear("other", ratio=3.0, efficiency=0.9), "a", "b")
+    assert "'other' closes a loop of gears round which ratios or losses differ" in refused(net, drives={"other": "a"})
+
+
+def test_a_self_locking_gear_is_driven_from_one_side() -> None:
+    net = base(gear=sw.LossyGear("worm", ratio=3.0, efficiency=0.4, efficiency_back=-0.5))
+    assert sw.reduce.refer(net, "b").torque_ratio("J1") == pytest.approx(1.2)
+    assert "'worm' cannot be driven from its side b" in refused(net, drives={"worm": "b"})
+    with pytest.raises(sw.ParameterError, match="side 'c' of 'worm' must be 'a' or 'b'"):
+        sw.reduce.refer(net, "a", drives={"worm": "c"})
+
+
+def test_what_was_not_referred_is_not_found_by_name() -> None:
+    small = sw.reduce.refer(base(), "b")
+    with pytest.raises(sw.SignalError, match="No part 'gear' was referred to 'b'"):
+        small.ratio("gear")
+    with pytest.raises(sw.SignalError, match=r"No parameter 'gear\.ratio'"):
+        small.table["gear.ratio"]
