@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pint
@@ -30,6 +31,13 @@ def problem_of(part: sw.Component) -> str:
         (sw.Inertia("J1", J=[1.0, 2.0]), ("J1", "number", "list")),
         (sw.Inertia("J1", J=sw.t), ("J1", "number")),
         (sw.Inertia("J1", J=1 + 2j), ("J1", "number")),
+        (sw.Brake("b", tau=-5.0), ("b", "tau = -5.0 must be at least 0", "Give tau (torque, also over time) in N*m")),
+        (sw.Clutch("b", tau=-5.0), ("b", "tau = -5.0 must be at least 0")),
+        (
+            sw.BLDCMotor("m", U=1.0, R=1.0, L=1.0, k=1.0, pole_pairs=1.5),
+            ("pole_pairs = 1.5 must be above 0 and whole",),
+        ),
+        (sw.HardStop("h", upper=1.0, restitution=2.0), ("Give restitution (of rigid flanks", "at most 1.")),
     ],
 )
 def test_a_value_that_cannot_be_is_named_with_its_part_and_bound(part: sw.Component, words: tuple[str, ...]) -> None:
@@ -79,7 +87,43 @@ def test_numpy_and_integer_values_are_numbers() -> None:
     assert list(net.compile().parameters.values()) == [2.0, 3.0, 4.0]
 
 
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: sw.DryFriction("p", tau_c=5.0, tau_s=3.0), "up to tau_s = 3 N.m, which is less than tau_c = 5 N.m"),
+        (lambda: sw.Brake("p", tau=1.0, t_on=3.0, t_off=1.0), "t_off = 1 s is not later than t_on = 3 s"),
+        (lambda: sw.FrequencyDrive("p", tau_k=9.0, s_k=0.1, n_sync=3000.0, f=50.0, f_end=60.0), "Leave one of them"),
+    ],
+)
+def test_values_that_do_not_go_together_are_refused_when_a_part_is_made(
+    make: Callable[[], sw.Component], words: str
+) -> None:
+    with pytest.raises(sw.ParameterError, match=f"'p': .*{words}"):
+        make()
+
+
+def test_new_values_are_judged_together_and_one_that_was_not_given_is_said_to_be_none() -> None:
+    net = sw.Network("brakes")
+    net.add(sw.Inertia("J", J=2.0), "a")
+    net.add(sw.Brake("b", tau=1.0, t_on=1.0, t_off=2.0), "a")
+    net.add(sw.Brake("c", tau=sw.Ramp(1.0, 2.0)), "a")
+    model, start = net.compile(), {"J.omega": 9.0}
+    later = model.simulate(5.0, initial=start, parameters={"b.t_on": 3.0, "b.t_off": 4.0, "c.t_on": 9.0})
+    assert [round(event[0], 9) for event in later.events] == [3.0, 4.0]
+    with pytest.raises(sw.ParameterError, match="t_off = 2 s is not later than t_on = 3 s"):
+        model.simulate(5.0, parameters={"b.t_on": 3.0})
+    with pytest.raises(
+        sw.ParameterError, match=r"t_off was not given when .*Give a number there, t_off=.*are: c\.t_on"
+    ):
+        model.simulate(5.0, parameters={"c.t_off": 3.0})
+    with pytest.raises(sw.ParameterError, match="tau is no number when"):
+        model.simulate(5.0, parameters={"c.tau": 3.0})
+    with pytest.raises(sw.ParameterError, match=r"no parameter 'c\.tua'\. There are: c\.t_on, c\.t_rise, c\.t_lag\."):
+        model.simulate(5.0, parameters={"c.tua": 3.0})
+
+
 def test_bounds_read_as_words() -> None:
     assert Parameter("eta", "1", "efficiency", above=0, at_most=1).bounds == "above 0 and at most 1"
     assert Parameter("i", "1", "ratio", nonzero=True).bounds == "not zero"
     assert Parameter("x", "m", "place").bounds == ""
+    assert Parameter("p", "1", "pairs", above=0, whole=True).bounds == "above 0 and whole"

@@ -61,6 +61,14 @@ def test_equations_say_for_which_modes_they_hold(asked: str | None, whole: str) 
     assert f"\\section{{Phase}}\n{whole}\n" in equations.document()
 
 
+def test_a_phase_of_a_motion_is_asked_for_by_its_row() -> None:
+    row = gapped().simulate(0.01, initial={"J2.omega": 1.0}).phases[0]
+    assert gapped().equations(phase=row).phase == row.name
+    assert gapped().equations().latex("state", phase=row) == gapped().equations(phase=row.name).latex("state")
+    with pytest.raises(sw.ParameterError, match="must be a text"):
+        gapped().equations(phase=3)  # type: ignore[arg-type]
+
+
 def test_equations_without_modes_name_no_phase() -> None:
     equations = sw.scenes.shaft_chain(3).equations()
     assert equations.phase == ""

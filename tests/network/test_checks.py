@@ -141,7 +141,7 @@ def test_a_machine_with_its_terminals_joined_is_allowed() -> None:
 def test_a_bad_value_is_said_with_unit_and_bounds(value: Any, words: str) -> None:
     problem = typed(rotation.Inertia("J3", J=value), "wheel")
     assert words in problem.message
-    assert (problem.kind, problem.hint) == ("parameter", "Give the moment of inertia in kg*m^2, at least 0.")
+    assert (problem.kind, problem.hint) == ("parameter", "Give J (moment of inertia) in kg*m^2, at least 0.")
     assert (problem.parts, problem.nodes) == (("J3",), ("wheel",))
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
 import sympy
+from scipy.integrate import quad
 
 import shaftwork as sw
 
@@ -204,3 +206,52 @@ def test_a_breakaway_ends_in_slipping_though_nothing_tells_it_from_sticking_at_f
     assert words(sol) == [("shoe", "stuck", "slipping backward")]
     assert times(sol) == pytest.approx([1.0], abs=EXACT)
     assert sol["J.omega"][-1] == pytest.approx(3.0, abs=EXACT)
+
+
+@pytest.mark.parametrize("omega_s", [0.5, 0.1, 1e-3])
+@pytest.mark.parametrize("engine", [*ENGINES, "scipy-radau"])
+def test_no_engine_steps_over_the_rise_of_friction_before_a_stop(engine: str, omega_s: float) -> None:
+    """Up to there the torque is constant, and steps are as long as they may be; the time is that of an integral."""
+    net = wheel(sw.DryFriction("shoe", tau_c=3.0, tau_s=15.0, omega_s=omega_s), J=1.0)
+    (event,) = net.simulate(5.0, engine=engine, rtol=1e-9, initial={"J.omega": 10.0}).events
+    speeds = [0.0, *(omega_s * k for k in (0.5, 1.0, 2.0, 4.0, 8.0)), 10.0]
+
+    def slowness(omega: float) -> float:
+        return 1.0 / (3.0 + 12.0 * math.exp(-((omega / omega_s) ** 2)))
+
+    wanted = sum(quad(slowness, *ends, epsabs=1e-14)[0] for ends in pairwise(speeds))
+    assert event[0] == pytest.approx(wanted, abs=1e-8)
+    assert event[3] == "stuck"
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(
+    ("names", "carried"),
+    [(("load", "brake"), (-3.0, 0.0)), (("brake", "load"), (3.0, 0.0)), (("weak", "brake"), (2.0, 1.0))],
+)
+def test_after_a_stop_the_first_part_carries_as_much_as_it_can(
+    names: tuple[str, str], carried: tuple[float, float], engine: str
+) -> None:
+    """As if they had always been at rest: what slipped last, and which way, tells nothing about who holds."""
+    parts = {
+        "load": sw.CoulombLoad("load", tau=5.0),
+        "brake": sw.Brake("brake", tau=40.0, t_on=0.5),
+        "weak": sw.DryFriction("weak", tau_c=2.0),
+    }
+    net = wheel(sw.TorqueSource("pull", tau=3.0), *(parts[name] for name in names))
+    sol = net.simulate(3.0, initial={"J.omega": 10.0}, engine=engine)
+    assert sol["J.omega"][-1] == 0.0
+    assert [sol[f"{name}.tau"][-1] for name in names] == pytest.approx(carried, abs=EXACT)  # torques of numbers alone
+    # each of them stops once, and the weak one gives way in the same instant
+    stops = [event[1] for event in sol.events if event[0] > 0.6]
+    assert sorted(stops) == sorted(name for name in names if name != "weak")
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_condition_that_rounding_leaves_at_its_limit_has_come_true(engine: str) -> None:
+    net = wheel(sw.TorqueSource("pull", tau=6.0), sw.Brake("brake", tau=40.0, on=sw.phi - 30), J=3.0)
+    sol = net.simulate(8.0, engine=engine)
+    # 2 rad/s^2 over 30 rad, and back with (40 - 6) / 3 rad/s^2
+    begins = math.sqrt(30.0)
+    assert times(sol) == pytest.approx([begins, begins * (1 + 2.0 * 3.0 / 34.0)], abs=EXACT)
+    assert words(sol) == [("brake", "released", "slipping forward"), ("brake", "slipping forward", "locked")]

@@ -260,3 +260,37 @@ def test_flanks_without_a_gap_that_lose_nothing_hit_each_other_for_ever() -> Non
         model.simulate(1.0, initial={"J1.omega": 1.0}, parameters={"gap.gap": 0.0})
     sol = model.simulate(1.0, initial={"J1.omega": 1.0}, parameters={"gap.gap": 0.0, "gap.restitution": 0.5})
     assert sol["J1.omega"][-1] == sol["J2.omega"][-1] == pytest.approx(0.5, abs=EXACT)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
+def test_what_a_source_gives_in_an_impact_is_supplied_and_half_of_it_lost_where_nothing_is_thrown_back(
+    restitution: float,
+) -> None:
+    """A wheel at rest behind a gap is taken along by a prescribed speed, whose momentum has no bounds."""
+    net = sw.Network("taken along")
+    net.add(sw.SpeedSource("drive", omega=10.0), "a")
+    net.add(sw.Backlash("gap", gap=1.0, restitution=restitution), "a", "b")
+    net.add(sw.Inertia("J", J=1.0), "b")
+    sol = net.simulate(0.06)
+    end = (1.0 + restitution) * 10.0
+    assert sol["J.omega"][-1] == pytest.approx(end, rel=EXACT)
+    assert sol.energy.supplied_by["drive"] == pytest.approx(10.0 * end, rel=EXACT)
+    assert sol.energy.lost_in["gap"] == pytest.approx(10.0 * end - end**2 / 2.0, abs=1e-6)
+    assert sol.energy_residual < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("part", "initial", "says"),
+    [
+        (sw.HardStop("stop", lower=0.3, upper=1.0), {}, "HardStop 'stop' .* 0 rad, below its lower limit of 0.3 rad"),
+        (sw.HardStop("stop", upper=-1.0), {}, "HardStop 'stop' .* 0 rad, above its upper limit of -1 rad"),
+        (sw.Backlash("gap", gap=0.05), {"gap.phi": 0.03}, r"'gap' .* 0.03 rad, .* 0.025 rad.*initial={'gap.phi'"),
+    ],
+)
+def test_no_motion_starts_beyond_a_rigid_limit(part: sw.Component, initial: dict[str, float], says: str) -> None:
+    net = sw.Network("limits")
+    net.add(sw.Inertia("J", J=2.0), "a")
+    net.add(sw.Inertia("K", J=1.0), "b")
+    net.add(part, "a", "b")
+    with pytest.raises(sw.ParameterError, match=says):
+        net.simulate(2.0, initial={"J.omega": 0.2, **initial})

@@ -95,6 +95,31 @@ def test_the_torque_of_a_load_is_what_it_gives_to_its_node_against_the_motion(lo
     _close(sol["drive.tau"], -sol["load.tau"])
 
 
+@pytest.mark.parametrize(
+    "part",
+    [
+        sw.Brake("part", tau=2.0),
+        sw.DryFriction("part", tau_c=2.0),
+        sw.Clutch("part", tau=2.0),
+        sw.Freewheel("part"),
+        sw.Backlash("part", gap=0.02, c=10.0),
+        sw.HardStop("part", upper=0.01, c=10.0),
+    ],
+    ids=lambda part: type(part).__name__,
+)
+def test_the_torque_of_what_rubs_or_touches_is_what_node_a_gives_away(part: Component) -> None:
+    """A drive turns node a forward: the part takes from it and gives to an inertia what it takes."""
+    sol = _motion(
+        (sw.Inertia("J1", J=2.0), ("a",)),
+        (sw.TorqueSource("drive", tau=5.0), ("a",)),
+        (part, ("a", "b")),
+        (sw.Inertia("J2", J=1.0), ("b",)),
+    )
+    assert sol["part.tau"][-1] > 0
+    _close(sol["part.tau"], 5.0 - sol["J1.tau"])
+    _close(sol["part.tau"], sol["J2.tau"])
+
+
 def test_the_torque_of_a_motor_is_what_it_gives_to_its_node() -> None:
     """Kloss' starting torque: ratio efficiency 2 tau_k s_k / (1 + s_k^2) at slip 1."""
     motor = sw.KlossMotor("motor", tau_k=10.0, s_k=0.25, n_sync=3000.0, ratio=4.0, efficiency=0.9)

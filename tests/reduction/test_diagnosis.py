@@ -208,6 +208,17 @@ def test_a_circuit_that_is_nowhere_grounded_is_named() -> None:
     assert problem.hint == "Add a Ground at 'p'."
 
 
+def test_a_circuit_that_floats_behind_diodes_is_told_of_a_resistor_to_ground() -> None:
+    rectifier = (part("CurrentSource", "I", "p", "n", i=1.0), part("Resistor", "R", "p", "n", R=1.0))
+    diodes = (part("Diode", "D1", "p", "frame"), part("Diode", "D2", "n", "frame"))
+    found = problems(*rectifier, *diodes, part("Resistor", "load", "frame", "end", R=1.0), part("Ground", "g", "end"))
+    (problem,) = (problem for problem in found if problem.severity == "error")
+    assert problem.hint == (
+        "Add a Ground at 'p'; where that would bridge 'D1', 'D2', which join it to ground at times only, a Resistor of "
+        "1e6 ohm from there to ground instead."
+    )
+
+
 def test_a_jump_of_a_speed_that_carries_an_inertia_is_a_warning() -> None:
     problem = only(part("SpeedSource", "drive", "rotor", omega=Step(3.0, 1.5)))
     assert problem.message == (

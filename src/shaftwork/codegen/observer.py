@@ -142,7 +142,7 @@ class ModelObserver:
         return self._read(t, x, lambda history: history.profile(part, profile))
 
     @property
-    def impacts(self) -> tuple[tuple[float, str], ...]:
+    def impacts(self) -> tuple[tuple[float, str, Mapping[str, float]], ...]:
         """Times at which energy is lost at once; only changes of mode do that."""
         return ()
 

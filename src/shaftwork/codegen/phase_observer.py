@@ -86,20 +86,20 @@ class PhaseObserver:
     Args:
         names: of all that is stored.
         stretches: makes the phases when a quantity is first read.
-        impacts: finds the times in s at which energy may be lost at once, and the part that loses it.
+        impacts: finds the times in s at which energy may be lost at once, the part, and what sources give then, in J.
     """
 
     def __init__(
         self,
         names: tuple[str, ...],
         stretches: Callable[[], Stretches],
-        impacts: Callable[[], tuple[tuple[float, str], ...]],
+        impacts: Callable[[], tuple[tuple[float, str, Mapping[str, float]], ...]],
     ) -> None:
         self._names, self._make, self._find_impacts = names, stretches, impacts
 
     @cached_property
-    def impacts(self) -> tuple[tuple[float, str], ...]:
-        """Times in s at which energy may be lost at once, and the part that loses it."""
+    def impacts(self) -> tuple[tuple[float, str, Mapping[str, float]], ...]:
+        """Times in s at which energy may be lost at once, the part that loses it, and what sources give then, in J."""
         return self._find_impacts()
 
     @property

@@ -117,6 +117,28 @@ class Stores:
             x += by_inputs @ np.where(inputs.of_time, u, 0.0)
         return np.asarray(x)
 
+    def given(
+        self, bound: BoundArrays, t: float, before: Mapping[str, float], after: Mapping[str, float]
+    ) -> dict[str, float]:
+        """What ideal sources of speed give at once, in J by part, where stores change all at once in these equations.
+
+        Law: E = e F_EK K (v_K - v_K'), the momentum that what is joined to a source takes, times the source's speed.
+        """
+        form, k = self._form, bound.part.coefficients
+        stores = [branch for branch in form.dependent_across if branch in self._branches.values()]
+        if not (form.across_inputs and stores):
+            return {}
+        names = {branch: name for name, branch in self._branches.items()}
+        inputs = bound.program.inputs
+        u = inputs.values(t, np.zeros(inputs.outputs), np.zeros(len(self._states)), bound.p)[len(form.laws) :]
+        gained = k[stores] * np.array([after[names[branch]] - before[names[branch]] for branch in stores])
+        energy = u * (self._matrices(bound.part)[0][np.ix_(list(form.across_inputs), stores)] @ gained)
+        found: dict[str, float] = {}
+        for branch, value in zip(form.across_inputs, energy.tolist(), strict=True):
+            part = form.graph.part_of(branch).name
+            found[part] = found.get(part, 0.0) + value
+        return found
+
     def _state_maps(self, part: LinearPart) -> tuple[Array, Array]:
         """What stores and inputs are multiplied by in the states that new equations start with; the last are kept."""
         if self._maps is None or self._maps[0] is not part:

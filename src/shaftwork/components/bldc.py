@@ -54,7 +54,7 @@ class BLDCMotor(Component):
     R: float = parameter("ohm", "resistance of a phase", at_least=0)
     L: float = parameter("H", "inductance of a phase", above=0)
     k: float = parameter("V*s/rad", "flat back EMF of a phase over speed; its torque over current", above=0)
-    pole_pairs: float = parameter("1", "number of pole pairs", above=0, default=1.0, latex="p")
+    pole_pairs: float = parameter("1", "number of pole pairs", above=0, whole=True, default=1.0, latex="p")
     flat: float = parameter(
         "rad", "electrical angle of the flat top", above=0, at_most=3, default=2 * 3.141592653589793 / 3, latex=r"\beta"
     )
@@ -144,7 +144,7 @@ class AveragedBLDC(Component):
     R: float = parameter("ohm", "resistance of a phase", at_least=0)
     L: float = parameter("H", "inductance of a phase", above=0)
     k: float = parameter("V*s/rad", "flat back EMF of a phase over speed; its torque over current", above=0)
-    pole_pairs: float = parameter("1", "number of pole pairs", above=0, default=1.0, latex="p")
+    pole_pairs: float = parameter("1", "number of pole pairs", above=0, whole=True, default=1.0, latex="p")
 
     role: ClassVar[Role] = "source"
     ports: ClassVar = (Port("rotor"),)

@@ -57,6 +57,11 @@ class FrequencyDrive(Component):
 
     def __post_init__(self) -> None:
         refuse_no_time_on(self)
+        if self.f is not None and self.f_end is not None:
+            raise ParameterError(
+                f"FrequencyDrive '{self.name}': f is the whole course of the frequency, and f_end the end of a ramp "
+                "that there is without it. Leave one of them out."
+            )
 
     def derived(self, p: Any) -> Iterator[Derived]:
         """Synchronous speed at the rated frequency, and by how much the motor lags behind it where it pulls out."""

@@ -12,7 +12,7 @@ from shaftwork.components.base import Component, Port, Role, component
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, Branch, End, ThroughLaw, rigid
 from shaftwork.components.laws import t
 from shaftwork.components.modes import ANEW, Leave, Mode, Modes
-from shaftwork.components.switching import while_on
+from shaftwork.components.switching import number_of, refuse_no_time_on, while_on
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter
 
@@ -78,6 +78,14 @@ class DryFriction(Component):
     role: ClassVar[Role] = "loss"
     ports: ClassVar = (Port("a"), Port("b", optional=True))
 
+    def __post_init__(self) -> None:
+        slips, holds = number_of(self, "tau_c"), number_of(self, "tau_s")
+        if slips is not None and holds is not None and holds < slips:
+            raise ParameterError(
+                f"DryFriction '{self.name}': it holds up to tau_s = {holds:g} N*m, which is less than tau_c = "
+                f"{slips:g} N*m while it slips. Give tau_s >= tau_c, or leave it out."
+            )
+
     def modes(self, p: Any) -> Iterator[Modes]:
         yield rubbing(p.tau_c if p.tau_s is None else p.tau_s)
 
@@ -94,11 +102,12 @@ class Brake(Component):
 
     Law: on from t_on, or from when `on` rises above zero, to t_off. While slipping the torque is sign(omega) tau, with
     tau constant; rising along a straight line over t_rise; or as tau (1 - exp(-(t - t_on) / t_lag)). While locked
-    omega = 0 exactly, and the torque is whatever holds, up to tau in size. Any other course of tau is a law of time.
+    omega = 0 exactly, and the torque is whatever holds, up to tau in size. Any other course of tau is a law of time,
+    which must not fall below zero: there it would drive. Only a plain number is checked for that.
     Modes: released, slipping forward or backward, locked. Source: Marinkovic 2012, (4)-(6).
     """
 
-    tau: Any = parameter("N*m", "torque, also over time", law=True)
+    tau: Any = parameter("N*m", "torque, also over time", at_least=0, law=True)
     t_on: float = parameter("s", "time from which it acts", default=0.0, latex=r"t_{on}")
     t_off: float | None = parameter("s", "time from which it acts no more", default=None, latex=r"t_{off}")
     t_rise: float = parameter("s", "time over which the torque rises straight", at_least=0, default=0.0, latex="t_A")
@@ -110,6 +119,7 @@ class Brake(Component):
     words: ClassVar[tuple[str, str, str]] = ("released", "slipping", "locked")
 
     def __post_init__(self) -> None:
+        refuse_no_time_on(self)
         if self.on is not None and (self.t_rise or self.t_lag):
             raise ParameterError(
                 f"{type(self).__name__} '{self.name}': a rise over t_rise or t_lag starts at t_on, and when `on` comes "

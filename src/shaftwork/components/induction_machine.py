@@ -40,7 +40,7 @@ class InductionMachine(Component):
     L_r_sigma: float = parameter("H", "leakage inductance of the rotor", at_least=0, latex=r"L_{r\sigma}")
     R_r: float = parameter("ohm", "rotor resistance", above=0)
     R_s: float = parameter("ohm", "stator resistance", at_least=0, default=0.0)
-    pole_pairs: float = parameter("1", "number of pole pairs", above=0, default=1.0, latex="p")
+    pole_pairs: float = parameter("1", "number of pole pairs", above=0, whole=True, default=1.0, latex="p")
     t_on: float | None = on_time()
 
     role: ClassVar[Role] = "source"

@@ -55,7 +55,8 @@ class Mode:
         leaves: what ends it.
         value: the number that stands in the laws as `p.mode`.
         form: which branches the part has; modes of equal form share equations.
-        starts: a motion begins in the first mode whose condition holds, in ACROSS, INTEGRAL and the time.
+        starts: a motion begins in the first mode whose condition holds, in ACROSS, INTEGRAL and the time; in the first
+            of all where none does.
         says: how phases of a motion and events call it; modes that say the same are told apart inside only.
     """
 

@@ -53,7 +53,7 @@ def number_of(part: Component, name: str) -> float | None:
 
 
 def refuse_no_time_on(part: Component) -> None:
-    """Refuse times between which a motor never gives torque.
+    """Refuse times between which a part never gives torque.
 
     Raises:
         ParameterError: `t_off` is not later than `t_on`.

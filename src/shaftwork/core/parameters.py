@@ -31,6 +31,7 @@ class Parameter:
         at_least: inclusive lower bound, or None.
         at_most: inclusive upper bound, or None.
         nonzero: zero is refused.
+        whole: only whole numbers are admitted.
         law: also takes a table or an expression of time, speed and angle.
         latex: LaTeX symbol.
         record: a class of records that the value is one of, instead of a number; its `read` makes one of a text.
@@ -44,6 +45,7 @@ class Parameter:
     at_least: float | None = None
     at_most: float | None = None
     nonzero: bool = False
+    whole: bool = False
     law: bool = False
     latex: str = ""
     record: Any = None
@@ -62,7 +64,8 @@ class Parameter:
             (self.at_most, "at most"),
         )
         words = [f"{text} {value:g}" for value, text in rules if value is not None]
-        return " and ".join([*words, "not zero"] if self.nonzero else words)
+        kinds = ((self.nonzero, "not zero"), (self.whole, "whole"))
+        return " and ".join([*words, *(text for asked, text in kinds if asked)])
 
     def objection(self, value: float) -> str | None:
         """Why a number is not admissible, or None when it is."""
@@ -75,6 +78,7 @@ class Parameter:
             or (self.at_least is not None and value < self.at_least)
             or (self.at_most is not None and value > self.at_most)
             or (self.nonzero and value == 0)
+            or (self.whole and value != round(value))
         )
         return f"must be {self.bounds}" if outside else None
 
@@ -145,7 +149,7 @@ def parameter(unit: str, meaning: str, *, default: Any = REQUIRED, latex: str = 
         meaning: what it is, a few words.
         default: value where the user gives none; without it the parameter is required.
         latex: LaTeX symbol, by default the name.
-        **bounds: `above`, `at_least`, `at_most`, `nonzero`, `law`, `record` of `Parameter`.
+        **bounds: `above`, `at_least`, `at_most`, `nonzero`, `whole`, `law`, `record` of `Parameter`.
     """
 
     def declare(name: str) -> Parameter:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, Protocol
 
 from sympy import Add, Eq, Expr, Float, Symbol
 
@@ -18,6 +18,14 @@ if TYPE_CHECKING:
     from shaftwork.equations.second_order import SecondOrder
 
 Form = Literal["kirchhoff", "state", "second-order"]
+
+
+class NamedPhase(Protocol):
+    """A phase of a motion that has a name, "gap open, load stuck": a row of `Solution.phases`."""
+
+    @property
+    def name(self) -> str:
+        """The mode of every part in words."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +190,7 @@ class Equations:
         eliminated: dependent stores, speeds without a store, reactions of couplings and prescribed speeds.
         notes: what was left out or decided by numerical values, in words.
         phase: the mode of every part that changes its mode, "gap open, load stuck", for which the rows hold.
-        in_phase: from the name of a phase to the equations there, where parts change their mode.
+        in_phase: from a phase to the equations there, where parts change their mode.
     """
 
     form: StateForm
@@ -195,7 +203,7 @@ class Equations:
     eliminated: tuple[Eliminated, ...]
     notes: tuple[str, ...]
     phase: str = ""
-    in_phase: Callable[[str], Equations] | None = None
+    in_phase: Callable[[str | NamedPhase], Equations] | None = None
 
     @cached_property
     def _notation(self) -> tuple[Mapping[str, str], tuple[Letter, ...]]:
@@ -245,14 +253,14 @@ class Equations:
 
         return second_order(self.form.graph)
 
-    def latex(self, form: Form | None = None, *, values: bool = False, phase: str | None = None) -> str:
+    def latex(self, form: Form | None = None, *, values: bool = False, phase: str | NamedPhase | None = None) -> str:
         """The equations as the body of a LaTeX document (needs amsmath), or for a notebook cell.
 
         Args:
             form: "kirchhoff" (balances, loops, laws), "state" (rates) or "second-order"; by default the first two.
             values: print the parameters' values instead of their symbols.
-            phase: the equations of this phase of a motion, "gap open, load stuck"; by default those of the phase of
-                these equations, which is printed above them.
+            phase: the equations of this phase of a motion, "gap open, load stuck", or a row of `Solution.phases`,
+                whose name is used; by default those of the phase of these equations, which is printed above them.
 
         Raises:
             CompileError: second-order form of a network with electrical nodes.

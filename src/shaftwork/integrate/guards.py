@@ -14,6 +14,12 @@ Dense = Callable[[Array], Array]
 
 # No step is shorter than so many rounding units of the time.
 CLEARANCE = 8
+# A step that meets a guard is looked at in panels that are halved towards it, so many times; Gauss' nodes in each.
+PANELS, NODES = 14, 4
+# By so many tolerances what the equations say along it may differ from what it has found.
+APART = 100.0
+# One that does not is made again in so many steps, unless it is shorter than this part of the whole run.
+SHORTER, LEAST = 8, 1e-9
 # Parts of the first stretch of a step at which it is looked at where a guard starts at its limit.
 NEARER = 0.5 ** np.arange(1, 41)
 
@@ -32,6 +38,7 @@ class GuardWatch:
         self._columns = np.zeros(0, dtype=np.intp) if guards is None else np.flatnonzero(guards.sides)
         self._offsets = np.zeros(0) if guards is None else guards.offsets[self._columns]
         self._guards, self._low, self._high = guards, low, high
+        self._problem = problem
         self.met: int | None = None
 
     def cut(self, start: float, x: Array, end: float, y: Array, dense: Dense) -> float | None:
@@ -63,6 +70,31 @@ class GuardWatch:
             return None
         time, self.met = min(known)
         return min(max(time, start + CLEARANCE * float(np.spacing(abs(end)))), end)
+
+    def follows(self, start: float, x: Array, end: float, dense: Dense) -> bool:
+        """Whether a step obeys the equations up to the guard that it has met.
+
+        What a law does just before a guard, as friction does that rises at low speeds, may lie between all points at
+        which the step has looked at it.
+
+        Args:
+            start: of the step, s.
+            x: (n,) state there.
+            end: where it meets the guard, s.
+            dense: its dense output, times (k,) to states (k, n).
+        """
+        if isinstance(self._problem, DaeProblem):
+            return True
+        nodes, weights = np.polynomial.legendre.leggauss(NODES)
+        edges = end - (end - start) * np.append(0.5 ** np.arange(PANELS), 0.0)
+        half = np.diff(edges)[:, None] / 2
+        times = (edges[:-1, None] + half * (nodes + 1)).ravel()
+        states = dense(times)
+        pairs = zip(np.clip(times, self._low, self._high).tolist(), states, strict=True)
+        rates = np.array([self._problem.rhs(t, y) for t, y in pairs])
+        wanted, found = (half * weights).ravel() @ rates, dense(np.array([end]))[0] - x
+        size = self._problem.rtol * np.abs(states).max(axis=0) + self._problem.atol
+        return bool((np.abs(wanted - found) <= APART * size).all())
 
     def _values(self, times: Array, states: Array) -> Array:
         assert self._guards is not None  # noqa: S101 (asked only then)

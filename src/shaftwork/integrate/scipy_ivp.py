@@ -13,7 +13,7 @@ from scipy.integrate import BDF, DOP853, LSODA, OdeSolution, Radau
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.cancellation import cancellation
 from shaftwork.integrate.crossings import Crossings
-from shaftwork.integrate.guards import GuardWatch
+from shaftwork.integrate.guards import LEAST, SHORTER, GuardWatch
 from shaftwork.integrate.pieces import (
     GuardedFunctions,
     Pace,
@@ -124,7 +124,7 @@ def _piece(
     watch = GuardWatch(problem, piece.low, piece.high)
     times, states = [piece.start], [x]
     interpolants: list[Any] = []
-    retired = np.zeros(2, dtype=int)
+    retired, shortest = np.zeros(2, dtype=int), LEAST * (problem.t_end - problem.t0)
     try:
         solver = _solver(problem, piece, x, method, guard, longest)
         while times[-1] < piece.end:
@@ -137,6 +137,11 @@ def _piece(
             end = watch.cut(times[-1], states[-1], solver.t, solver.y, _rows(dense))
             cut = crossings.cut(times[-1], states[-1], solver.t, solver.y, _rows(dense))
             if end is not None and (cut is None or end <= cut):
+                if not watch.follows(times[-1], states[-1], end, _rows(dense)) and solver.t - times[-1] > shortest:
+                    retired += solver.nfev, solver.njev
+                    rest, brief = replace(piece, start=times[-1]), (solver.t - times[-1]) / SHORTER
+                    solver = _solver(problem, rest, states[-1], method, guard, brief)
+                    continue
                 interpolants.append(dense)
                 times.append(end)
                 states.append(np.asarray(dense(end)))

@@ -17,7 +17,7 @@ from scipy.interpolate import BarycentricInterpolator
 
 from shaftwork.core.errors import MissingExtraError
 from shaftwork.integrate.crossings import Crossings
-from shaftwork.integrate.guards import GuardWatch
+from shaftwork.integrate.guards import LEAST, SHORTER, GuardWatch
 from shaftwork.integrate.pieces import (
     GuardedFunctions,
     Pace,
@@ -233,16 +233,22 @@ def _march(
     for piece in pieces(problem):
         opened, crossings = open_solver(piece, start_of_piece(problem, piece, x)), Crossings(problem, piece)
         watch = GuardWatch(problem, piece.low, piece.high)
-        x, t = opened.start, piece.start
+        x, t, longest = opened.start, piece.start, np.inf
         found.append((x, []))
         while t < piece.end:
             if left <= 0:
                 raise failure(problem, "sundials", t, x, f"{problem.max_steps} steps were not enough")
-            end, state = _step(problem, piece, opened, t, x)
+            end, state = _step(problem, piece, opened, t, x, longest)
             # Its formulas meet a law at the ends of steps alone, so that a step may be cut off at a switch.
             stop = watch.cut(t, x, end, state, opened.inside)
             cut = crossings.cut(t, x, end, state, opened.inside, again=False)
             stops = stop is not None and (cut is None or stop <= cut)
+            shortest = LEAST * (problem.t_end - problem.t0)
+            if stop is not None and stops and end - t > shortest and not watch.follows(t, x, stop, opened.inside):
+                longest, left = (end - t) / SHORTER, left - 1
+                opened = open_solver(replace(piece, start=t), x)
+                x = opened.start
+                continue
             whole, end = end, stop if stop is not None and stops else end if cut is None else cut
             x = state if end == whole else opened.inside(np.array([end]))[0]
             if (objection := pace.objection(end, rests=crossings.rests)) is not None:
@@ -262,11 +268,14 @@ def _march(
     return found, None
 
 
-def _step(problem: Problem | DaeProblem, piece: Piece, opened: _Opened, t: float, x: Array) -> tuple[float, Array]:
-    """End in s and state (n,) there of the next step from a time and state."""
+def _step(
+    problem: Problem | DaeProblem, piece: Piece, opened: _Opened, t: float, x: Array, longest: float
+) -> tuple[float, Array]:
+    """End in s and state (n,) there of the next step from a time and state, which is `longest` s long at most."""
+    stop = min(piece.end, t + longest)
     # SUNDIALS prints what its result says as well.
     with np.errstate(all="ignore"), redirect_stdout(None):
-        result = opened.solver.step(piece.end, method="onestep", tstop=piece.end)
+        result = opened.solver.step(stop, method="onestep", tstop=stop)
     if not result.success:
         raise failure(problem, "sundials", t, x, opened.explain(str(result.message)))
     end, state = float(result.t), result.y.copy()

@@ -214,7 +214,7 @@ class _Examination:
         unit = " as a pure number" if declared.unit == "1" else f" in {declared.unit}"
         unit = "" if declared.record is not None else unit
         shown = "" if kind == "wrong unit" else f" = {reprlib.repr(given)}"
-        hint = f"Give the {declared.meaning}{unit}{f', {declared.bounds}' if declared.bounds else ''}."
+        hint = f"Give {name} ({declared.meaning}){unit}{f', {declared.bounds}' if declared.bounds else ''}."
         self.report(kind, f"{title(part)}: {name}{shown} {objection}.", hint, placed)
 
     def _faults_of(self, part: Component, values: Mapping[str, Any]) -> tuple[_Fault, ...]:

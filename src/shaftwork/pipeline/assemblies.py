@@ -201,10 +201,11 @@ class Assembly:
     def first_modes(self, t: float, x: Array, p: Array) -> ModeNames:
         """The mode of each element in which a motion starts, in the equations in which nothing is joined by a mode."""
         shown = self._shown_at(t, x, p)
-        return tuple(self._start(number, "", t, shown) for number in range(len(self.elements)))
+        elements = enumerate(self.elements)
+        return tuple(self._start(k, "", t, shown) or element.modes.options[0].name for k, element in elements)
 
     def start_of(self, number: int, besides: str, t: float, x: Array, p: Array) -> str:
-        """The mode of an element in which a motion would start, besides one."""
+        """The mode of an element in which a motion would start, besides one; empty where it would start in none."""
         return self._start(number, besides, t, self._shown_at(t, x, p))
 
     def _start(self, number: int, besides: str, t: float, shown: Sequence[Any]) -> str:
@@ -212,7 +213,7 @@ class Assembly:
         first = sum(2 + len(self._symbols(k)) for k in range(number))
         symbols = self._symbols(number)
         holds = starts_of(modes, symbols)(t, *shown[first : first + 2 + len(symbols)])
-        return next(m.name for m, found in zip(modes.options, holds, strict=True) if found and m.name != besides)
+        return next((m.name for m, found in zip(modes.options, holds, strict=True) if found and m.name != besides), "")
 
     def _symbols(self, number: int) -> tuple[Symbol, ...]:
         return conditional(self.elements[number].modes)

@@ -60,7 +60,9 @@ class Impacts:
         # nothing throws back what has no inertia: a damper's end against a stop
         moved = any(abs(plastic[name] - value) > NO_IMPACT * speed for name, value in held.items())
         rebound = leave.rebound is not None and moved and share * speed > rest
-        hits = Change(t, self._elements[number], regime.modes[number], leave.to, rebound, impact=True)
+        taken = joined.regime.assembly.stores.given(joined.regime.assembly.bound(joined.regime.p), after, held, plastic)
+        given = {part: energy * (1 + share if rebound else 1) for part, energy in taken.items()}
+        hits = Change(t, self._elements[number], regime.modes[number], leave.to, rebound, impact=True, given=given)
         changes = [hits, *self._differences(t, regime.modes, joined.regime.modes, number)]
         if not rebound:
             return joined, changes

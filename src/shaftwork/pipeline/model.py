@@ -22,7 +22,7 @@ from shaftwork.pipeline.arguments import (
     Demand,
     OutputTimes,
     absolute_tolerances,
-    checked_parameter,
+    checked_parameters,
     meshes_anew,
     output_times,
     relative_tolerance,
@@ -362,7 +362,7 @@ class Model(CompiledModel):
             return {}
         if not isinstance(parameters, Mapping):
             raise ParameterError(f"parameters = {parameters!r} must map names to values, such as {{'shaft.c': 3e4}}.")
-        return {str(name): checked_parameter(self.netlist, str(name), value) for name, value in parameters.items()}
+        return checked_parameters(self.netlist, parameters)
 
     def _variant(self, values: Mapping[str, float]) -> Model:
         """The model of the same network with other values where these change its structure; the last few are kept."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,7 +28,7 @@ GOLDEN = (5**0.5 - 1) / 2
 class Change(NamedTuple):
     """A change of mode: when in s, of which element, from which mode to which; or a rebound, back to the one before.
 
-    With an impact speeds jump.
+    With an impact speeds jump, and sources of speed have given energy at once, in J by part.
     """
 
     time: float
@@ -36,6 +37,18 @@ class Change(NamedTuple):
     after: str
     rebound: bool = False
     impact: bool = False
+    given: Mapping[str, float] = MappingProxyType({})
+
+
+def together(changes: list[Change]) -> list[Change]:
+    """Changes of one instant, with those of each element in one; but an impact stays apart."""
+    made: dict[int, Change] = {}
+    if any(change.impact for change in changes):
+        return changes
+    for change in changes:
+        key = id(change.element)
+        made[key] = change._replace(before=made[key].before) if key in made else change
+    return [change for change in made.values() if change.before != change.after]
 
 
 @dataclass(frozen=True, eq=False)

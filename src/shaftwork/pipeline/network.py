@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 
 from shaftwork.core.errors import NetworkError, NetworkWarning, ParameterError, Problem, SignalError
 from shaftwork.equations.kirchhoff import kirchhoff
-from shaftwork.equations.records import Equations
+from shaftwork.equations.records import Equations, NamedPhase
 from shaftwork.network.builder import NetworkBuilder
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.netlist import Netlist
@@ -75,12 +75,13 @@ class Network(NetworkBuilder):
         netlist = self.netlist()
         return self._of(expanded(netlist, _sound(netlist).graph))
 
-    def equations(self, *, expand: bool = False, phase: str | None = None) -> Equations:
+    def equations(self, *, expand: bool = False, phase: str | NamedPhase | None = None) -> Equations:
         """Kirchhoff's node and loop equations, laws, states and what was eliminated.
 
         Args:
             expand: of the network with its shafts written out part by part.
-            phase: a phase of the motion, "gap open, load stuck"; by default every part is in its first mode.
+            phase: a phase of the motion, "gap open, load stuck", or a row of `Solution.phases`, whose name is used; by
+                default every part is in its first mode.
 
         Raises:
             NetworkError: the network cannot be assembled; lists every reason.
@@ -99,7 +100,8 @@ class Network(NetworkBuilder):
                 "all their modes in one. Leave phase out, or take another model of the shaft, such as Lumped(20)."
             )
 
-        def chosen(name: str) -> Equations:
+        def chosen(asked: Any) -> Equations:
+            name = getattr(asked, "name", asked)
             made = kirchhoff(_sound(in_phase(netlist, form.graph, name)) if name else form)
             return dataclasses.replace(made, phase=whole_name(form.graph, name), in_phase=chosen)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property, partial
 
 import numpy as np
@@ -90,19 +90,21 @@ def _stretch(run: Run, span: Span, phase: Phase) -> Stretch:
     )
 
 
-def _impacts(run: Run) -> tuple[tuple[float, str], ...]:
-    """Changes at which speeds may jump: of several at one time the first."""
-    found: dict[float, str] = {}
+def _impacts(run: Run) -> tuple[tuple[float, str, Mapping[str, float]], ...]:
+    """Changes at which speeds may jump, of several at one time the first; and what sources give in all of them."""
+    found: dict[float, tuple[str, dict[str, float]]] = {}
     for change in run.changes:
         modes = change.element.modes
         if change.rebound or modes[change.before].form != modes[change.after].form:
-            found.setdefault(change.time, change.element.part.name)
-    return tuple(found.items())
+            _, given = found.setdefault(change.time, (change.element.part.name, {}))
+            for source, energy in change.given.items():
+                given[source] = given.get(source, 0.0) + energy
+    return tuple((time, *at_once) for time, at_once in found.items())
 
 
 def _events(changes: Iterable[Change]) -> Iterator[tuple[float, str, str, str]]:
     """Changes in words: what says the same before and after is none."""
-    for time, element, before, after, rebound, _ in changes:
+    for time, element, before, after, rebound, *_ in changes:
         was, now = element.modes[before].words, "rebound" if rebound else element.modes[after].words
         if was != now:
             yield time, element.name, was, now

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from sympy import Integer
 
-from shaftwork.core.errors import NetworkError
-from shaftwork.pipeline.assemblies import ModeNames
+from shaftwork.codegen.elements import Array
+from shaftwork.components.branches import INTEGRAL
+from shaftwork.core.errors import NetworkError, ParameterError
+from shaftwork.pipeline.assemblies import Element, ModeNames
 from shaftwork.pipeline.moments import Moment, Regime
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.phases import Phases
+
+# How far in rad a motion may start beyond a rigid limit: what errors and printed digits of another run leave there.
+BEYOND = 1e-6
 
 
 class Regimes:
@@ -86,3 +92,30 @@ class Regimes:
 def with_modes(modes: ModeNames, changed: Mapping[int, str]) -> ModeNames:
     """A combination of modes with some of them changed."""
     return tuple(changed.get(k, name) for k, name in enumerate(modes))
+
+
+def refuse_beyond(regime: Regime, elements: Sequence[Element], t: float, x: Array) -> None:
+    """Refuse a start beyond a rigid limit, where no motion leads.
+
+    Args:
+        regime: of the modes in which nothing is joined.
+        elements: of the network.
+        t: s.
+        x: (n,) states.
+
+    Raises:
+        ParameterError: names the part, its twist and the limit.
+    """
+    now = regime.motion(t, x.tolist())[1]
+    for number, made in regime.watched:
+        element, when, beyond = elements[number], made.leave.when, made.side * now[made.guard]
+        if made.leave.rebound is None or not beyond > BEYOND:
+            continue
+        slope = float(when.diff(INTEGRAL))
+        limit = -slope * regime.assembly.constant(number, when.xreplace({INTEGRAL: Integer(0)}), regime.p)
+        raise ParameterError(
+            f"{type(element.part.component).__name__} '{element.name}' would start at a twist of "
+            f"{limit + slope * beyond:.9g} rad, {'above its upper' if slope > 0 else 'below its lower'} limit of "
+            f"{limit:.9g} rad, and it is rigid. Give a twist inside the limits, "
+            f"initial={{'{element.name}.phi': ...}}, or a stiffness c."
+        )

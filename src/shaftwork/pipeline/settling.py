@@ -15,8 +15,8 @@ from shaftwork.components.branches import ACROSS
 from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.pipeline.assemblies import ModeNames, Watched
 from shaftwork.pipeline.impacts import NO_IMPACT, Impacts
-from shaftwork.pipeline.moments import ROUNDINGS, Change, Course, Moment, Regime, clear_of_limits
-from shaftwork.pipeline.regimes import Regimes, with_modes
+from shaftwork.pipeline.moments import ROUNDINGS, Change, Course, Moment, Regime, clear_of_limits, together
+from shaftwork.pipeline.regimes import Regimes, refuse_beyond, with_modes
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.phases import Phases
@@ -59,8 +59,12 @@ class Settling:
         Args:
             t: time in s at which inputs are read.
             x: (n,) states.
+
+        Raises:
+            ParameterError: a twist lies beyond a rigid limit.
         """
         loose = self.regime(self._phases.first)
+        refuse_beyond(loose, self.elements, t, x)
         modes, wanted = loose.modes, loose.assembly.first_modes(t, x, loose.p)
         if self._regimes.possible(wanted):
             modes = wanted
@@ -89,6 +93,39 @@ class Settling:
         Raises:
             SimulationError: no modes are consistent; names the pair that changes for ever.
         """
+        new, changes = self._consistent(t, after, moment, met)
+        resting = self._resting(new, after) if changes else {}
+        if not resting:
+            return new, changes
+        try:  # joined all at once: what was slipping a change ago must not tell who carries
+            joined = self._regimes.changed(new, after, with_modes(new.regime.modes, resting))
+            held, further = self._consistent(t, after, joined, None)
+        except (NetworkError, SimulationError):
+            return new, changes
+        # back where it came from: a limit has just been exceeded there
+        if held.regime.modes == moment.regime.modes or any(one.impact for one in further):
+            return new, changes
+        if held.regime.modes == new.regime.modes:
+            return new, together(changes) or changes
+        at_once = [Change(t, self.elements[k], new.regime.modes[k], name) for k, name in resting.items()]
+        return held, together([*changes, *at_once, *further])
+
+    def _resting(self, moment: Moment, t: float) -> dict[int, str]:
+        """Elements that slip, with no speed across them as others hold their ends, and the modes in which they hold."""
+        regime, x = moment.regime, moment.x.tolist()
+        found = {}
+        for k, made in regime.watched:
+            modes, name = self.elements[k].modes, regime.modes[k]
+            if made.leave.to and name in (slips for _, slips in modes[made.leave.to].gives_way):
+                found[k] = made.leave.to, made.guard
+        if not found:
+            return {}
+        rates, now = regime.motion(t, x)
+        others = regime.motion(t + self.tick, regime.rounded(x, rates, self.tick))[1]
+        return {k: to for k, (to, guard) in found.items() if now[guard] == others[guard] == 0.0}
+
+    def _consistent(self, t: float, after: float, moment: Moment, met: int | None) -> tuple[Moment, list[Change]]:
+        """Modes that are consistent with the motion that follows, by one change after another; see `settle`."""
         changes: list[Change] = []
         still: list[tuple[int, Watched]] = []
         seen: dict[ModeNames, None] = {}
@@ -201,7 +238,7 @@ class Settling:
         """The mode of an element changes, or what hits is thrown back; and what kept it from what it wanted."""
         element, leave, regime = self.elements[number], ended.leave, moment.regime
         before = regime.modes[number]
-        to = leave.to or regime.assembly.start_of(number, before, after, moment.x, regime.p)
+        to = leave.to or self._anew(moment, after, number)
         speed = self._impacts.meets(moment, after, element.modes[to], number)
         slips = next((name for side, name in element.modes[to].gives_way if side * speed > 0), "")
         if slips == before:  # it was met by rounding alone: it is moving away
@@ -217,6 +254,21 @@ class Settling:
             return new, [Change(t, element, before, to), *others], None
         except NetworkError as error:
             return *self._around(t, after, moment, (number, to), error), error
+
+    def _anew(self, moment: Moment, t: float, number: int) -> str:
+        """The mode of an element in which a motion would start, other than the one that ends."""
+        regime, before = moment.regime, moment.regime.modes[number]
+        step = self.ahead(regime, regime.motion(t, moment.x.tolist())[0])
+        for later in (0.0, step):  # by rounding, what ends the mode may not be true yet
+            x = _moved(moment, t, later).x
+            to = regime.assembly.start_of(number, before, t + later, x, regime.p)
+            if to:
+                return to
+        element = self.elements[number]
+        raise SimulationError(
+            f"'{element.name}' is no more {element.modes[before].words} at t = {t:.9g} s, and starts in none of its "
+            "other modes. Give one of them a condition that holds there, Mode(starts=...)."
+        )
 
     def _hit(self, t: float, after: float, moment: Moment, number: int, ended: Watched) -> tuple[Moment, list[Change]]:
         """An impact; what hits stays where a rebound would lose less than it gains, as it is found late by rounding.

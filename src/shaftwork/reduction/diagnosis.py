@@ -164,7 +164,14 @@ class _Structure(View):
         many = len(nodes) > 1
         if domain.name == "electrical":
             message = f"the circuit at {at_nodes(nodes)} ({listed(names)}) is joined to ground nowhere."
-            return Problem("undetermined speed", message, f"Add a Ground at '{nodes[0]}'.", names, nodes)
+            hint = f"Add a Ground at '{nodes[0]}'."
+            if opens := [part.name for part in parts if part.modes]:
+                hint = (
+                    f"Add a Ground at '{nodes[0]}'; where that would bridge {listed(opens)}, which "
+                    f"{'join' if len(opens) > 1 else 'joins'} it to ground at times only, a Resistor of 1e6 ohm from "
+                    "there to ground instead."
+                )
+            return Problem("undetermined speed", message, hint, names, nodes)
         zeros = tuple(zero for zero in self.graph.zeros if zero.rsplit(".", 1)[0] in names)
         left_out = f" ({listed(zeros)} {'are' if len(zeros) > 1 else 'is'} zero and left out)" if zeros else ""
         message = (

@@ -59,7 +59,7 @@ def energy_balance(observer: Observer, dense: Dense, steps: Array) -> EnergyBala
         steps: (s,) times between which `dense` is smooth.
     """
     before, after = _stored_on_both_sides(observer, dense, steps)
-    impulses, hits = _impulses(observer, steps, after - before)
+    impulses, hits, given = _impulses(observer, steps, after - before)
     panels = 1
     found = _integrate(observer, dense, steps, panels)
     for _ in range(HALVINGS):
@@ -79,20 +79,27 @@ def energy_balance(observer: Observer, dense: Dense, steps: Array) -> EnergyBala
         lost=found.lost + np.cumsum(sum((energy for _, energy in hits), start=np.zeros(len(steps)))),
         work=found.work + float(np.abs(impulses).sum()),
         lost_in=lost_in,
-        supplied_by=found.supplied_by,
+        supplied_by={
+            part: found.supplied_by.get(part, 0.0) + given.get(part, 0.0) for part in {**found.supplied_by, **given}
+        },
     )
 
 
-def _impulses(observer: Observer, steps: Array, jumps: Array) -> tuple[Array, list[tuple[str, Array]]]:
-    """(s,) energy that sources give at once, and by part the (s,) that is lost at once, in an impact."""
-    given = jumps.copy()
+def _impulses(
+    observer: Observer, steps: Array, jumps: Array
+) -> tuple[Array, list[tuple[str, Array]], dict[str, float]]:
+    """(s,) energy that sources give at once; of impacts by part the (s,) that is lost, and what sources give."""
+    impulses = jumps.copy()
     lost: dict[str, Array] = {}
-    for time, part in observer.impacts:
-        places = np.flatnonzero(steps == time)
+    given: dict[str, float] = {}
+    for time, part, sources in observer.impacts:
+        places = np.flatnonzero(steps == time)[-1:]
         energy = lost.setdefault(part, np.zeros(len(steps)))
-        energy[places] -= given[places]
-        given[places] = 0.0
-    return given, list(lost.items())
+        energy[places] += sum(sources.values()) - impulses[places]
+        impulses[places] = sum(sources.values())
+        for source, supplied in sources.items():
+            given[source] = given.get(source, 0.0) + supplied
+    return impulses, list(lost.items()), given
 
 
 def _stored_on_both_sides(observer: Observer, dense: Dense, steps: Array) -> tuple[Array, Array]:

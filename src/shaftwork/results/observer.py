@@ -33,8 +33,8 @@ class Observer(Protocol):
         ...
 
     @property
-    def impacts(self) -> tuple[tuple[float, str], ...]:
-        """Times in s at which energy may be lost at once, and the part that loses it."""
+    def impacts(self) -> tuple[tuple[float, str, Mapping[str, float]], ...]:
+        """Times in s at which energy may be lost at once, the part that loses it, and what sources give then, in J."""
         ...
 
     def stored(self, t: Array, x: Array, dense: Dense) -> dict[str, Array]:
