@@ -1,9 +1,24 @@
-"""Studies: which model and which engine reach an asked accuracy at the least cost."""
+"""Studies: variants of a network, and which model and engine reach an asked accuracy at the least cost."""
 
 from __future__ import annotations
 
+from shaftwork.studies.sensitivities import frequency_sensitivities, motion_sensitivities
 from shaftwork.studies.stability import Cell, Stability, stability
 from shaftwork.studies.stability_cases import Case
+from shaftwork.studies.sweep import sweep
+from shaftwork.studies.sweep_result import Sweep
 from shaftwork.studies.work_precision import Trial, WorkPrecision, work_precision
 
-__all__ = ["Case", "Cell", "Stability", "Trial", "WorkPrecision", "stability", "work_precision"]
+__all__ = [
+    "Case",
+    "Cell",
+    "Stability",
+    "Sweep",
+    "Trial",
+    "WorkPrecision",
+    "frequency_sensitivities",
+    "motion_sensitivities",
+    "stability",
+    "sweep",
+    "work_precision",
+]

@@ -1,0 +1,116 @@
+"""One number of a motion: the largest torque, its effective value, a speed at the end, the damage of a shaft."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from shaftwork.core.errors import ParameterError
+from shaftwork.results.fatigue import SNLine
+from shaftwork.results.observer import Array
+from shaftwork.results.solution import Solution
+from shaftwork.results.turning import Read, turning_points
+
+KINDS: Mapping[str, str] = {
+    "max": "the largest value",
+    "min": "the smallest value",
+    "peak": "the largest size",
+    "mean": "the mean over time",
+    "rms": "the effective value, root of the mean square over time",
+    "end": "the value at the end",
+    "damage": "the share of the life that the motion takes, with `sn`",
+}
+"""What a measure may say of a quantity."""
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
+BLOCK = 50_000
+"""Times that are read at once."""
+PARTS, HALVINGS, SETTLED = 64, 12, 1e-10
+"""Of a motion at least; how often they are halved at most; and the change that is none, of the largest value."""
+SMALLEST = 1e-6
+"""Ups and downs of less than this part of the range make no peak."""
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One number of a motion, "max shaft.tau".
+
+    Args:
+        kind: one of `KINDS`.
+        quantity: "part.quantity" or "node.quantity".
+    """
+
+    kind: str
+    quantity: str
+
+    def __str__(self) -> str:
+        return f"{self.kind} {self.quantity}"
+
+    @classmethod
+    def read(cls, text: str) -> Measure:
+        """A measure from its text.
+
+        Raises:
+            ParameterError: it is none.
+        """
+        kind, _, quantity = text.strip().partition(" ")
+        if kind not in KINDS or not quantity.strip():
+            raise ParameterError(
+                f"'{text}' is no measure. Write what and of which quantity, such as 'max shaft.tau'; the first word "
+                f"is one of: {', '.join(KINDS)}."
+            )
+        return cls(kind, quantity.strip())
+
+    def of(self, solution: Solution, sn: Mapping[str, SNLine] | None = None) -> float:
+        """Its value for a motion, from the dense output and not from the output times.
+
+        Along a part it is that of the worst place.
+
+        Args:
+            solution: the motion.
+            sn: S-N lines by quantity, for damage.
+
+        Raises:
+            SignalError: there is no such quantity.
+        """
+        if self.kind == "damage":
+            return solution.damage(self.quantity, sn=(sn or {})[self.quantity]).damage
+        if self.kind == "end":
+            return _worst(np.atleast_2d(solution.at([solution.steps[-1]])[self.quantity]))
+        count = len(solution.places.get(self.quantity, (0,)))
+        along = self.quantity in solution.places
+        return max((self._at(solution, place if along else None) for place in range(count)), key=self._rank)
+
+    def _rank(self, value: float) -> float:
+        return -value if self.kind == "min" else abs(value) if self.kind == "mean" else value
+
+    def _at(self, solution: Solution, place: int | None) -> float:
+        def read(times: Array) -> Array:
+            blocks = (solution.at(times[k : k + BLOCK])[self.quantity] for k in range(0, len(times), BLOCK))
+            return np.concatenate([block if place is None else block[:, place] for block in blocks])
+
+        if self.kind in ("mean", "rms"):
+            return _mean(read, solution.steps, 2 if self.kind == "rms" else 1)
+        values = turning_points(read, solution.steps, smallest=SMALLEST).values
+        picked = {"max": values.max, "min": values.min, "peak": np.abs(values).max}[self.kind]()
+        return float(picked)
+
+
+def _worst(values: Array) -> float:
+    return float(values.ravel()[np.abs(values).argmax()])
+
+
+def _mean(read: Read, steps: Array, power: int) -> float:
+    """Gauss' rule in parts of every step, halved until that changes nothing: an exact engine has long steps."""
+    parts, before = max(1, PARTS // len(steps)), np.inf
+    for _ in range(HALVINGS):
+        ends = np.append((steps[:-1, None] + np.diff(steps)[:, None] * np.arange(parts) / parts).ravel(), steps[-1])
+        first, length = ends[:-1, None], np.diff(ends)[:, None]
+        times = first + length * (NODES + 1) / 2
+        values = read(times.ravel()).reshape(times.shape) ** power
+        mean = float((values @ WEIGHTS / 2) @ length[:, 0] / (steps[-1] - steps[0]))
+        if abs(mean - before) <= SETTLED * np.abs(values).max(initial=0.0):
+            break
+        before, parts = mean, 2 * parts
+    return float(np.sqrt(mean)) if power == 2 else mean

@@ -1,0 +1,68 @@
+"""Sensitivities of a network: which parameter moves a frequency, or a torque, and by how much."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from shaftwork.core.errors import ParameterError
+from shaftwork.pipeline.analysis import Given, Point, Time
+from shaftwork.pipeline.network import Network
+from shaftwork.pipeline.sensitivities import frequency_sensitivities as of_frequencies
+from shaftwork.pipeline.sensitivities import motion_sensitivities as of_motion
+from shaftwork.results.measures import Measure
+from shaftwork.results.sensitivities import FrequencySensitivities, MotionSensitivities
+
+
+def frequency_sensitivities(
+    net: Network, at: Point = None, *, parameters: Sequence[str] | None = None, t: Time = None
+) -> FrequencySensitivities:
+    """Derivatives of the natural frequencies and damping ratios of a network by its parameters, exact.
+
+    Args:
+        net: the network.
+        at: the point about which it moves, as for `Network.modes`; it is held while a parameter changes.
+        parameters: names, "shaft.c"; by default all that are not exactly zero.
+        t: time at which laws are read, s.
+
+    Raises:
+        CompileError: the network is too large for symbolic equations.
+        ParameterError: there is no such parameter.
+        SimulationError: two modes have the same rate.
+    """
+    return of_frequencies(net.compile(), at, parameters=_listed(parameters), t=t)
+
+
+def motion_sensitivities(
+    net: Network,
+    measures: Mapping[str, str] | Sequence[str],
+    *,
+    t_end: float,
+    parameters: Sequence[str] | None = None,
+    initial: Given = None,
+    rtol: float = 1e-9,
+) -> MotionSensitivities:
+    """Derivatives of measures of a motion by the parameters of the network, exact, by its sensitivity equations.
+
+    Args:
+        net: the network; no part changes its mode and no law switches.
+        measures: as in `sweep`, of which "max", "min", "peak" and "end" are known here.
+        t_end: end of the motion, s.
+        parameters: names, "shaft.c"; by default all that are not exactly zero.
+        initial: start values of states.
+        rtol: relative tolerance.
+
+    Raises:
+        CompileError: the equations change on the way, or there are no symbolic ones.
+        ParameterError: there is no such parameter or measure.
+    """
+    if not isinstance(measures, Mapping):
+        measures = {text: text for text in ((measures,) if isinstance(measures, str) else measures)}
+    if not measures:
+        raise ParameterError("Name a measure, such as 'max shaft.tau'.")
+    read = {name: Measure.read(text) for name, text in measures.items()}
+    model = net.compile()
+    return of_motion(model, read, t_end, parameters=_listed(parameters), initial=initial, rtol=rtol)
+
+
+def _listed(names: Sequence[str] | None) -> Sequence[str] | None:
+    return (names,) if isinstance(names, str) else names

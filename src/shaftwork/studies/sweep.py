@@ -1,0 +1,213 @@
+"""Variants of a network: every combination of values, or a table of samples; measured, judged and ranked."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shaftwork.core.errors import ParameterError
+from shaftwork.network.netlist import Netlist
+from shaftwork.pipeline.arguments import OutputTimes, relative_tolerance, time_span
+from shaftwork.pipeline.network import Network
+from shaftwork.results.fatigue import SNLine
+from shaftwork.results.measures import Measure
+from shaftwork.results.observer import Array
+from shaftwork.results.solution import Solution
+from shaftwork.studies.arguments import engine_names
+from shaftwork.studies.progress import Progress
+from shaftwork.studies.sweep_processes import chunks
+from shaftwork.studies.sweep_result import Limits, Sweep
+from shaftwork.studies.sweep_store import Store
+from shaftwork.studies.sweep_task import Reader, Task, Worker
+
+Measures = Mapping[str, "str | Callable[[Solution], float]"] | Iterable[str]
+
+
+def sweep(
+    net: Network,
+    parameters: Mapping[str, Iterable[float]] | None = None,
+    *,
+    t_end: float,
+    measures: Measures,
+    samples: Any = None,
+    require: Mapping[str, tuple[float | None, float | None]] | None = None,
+    sn: SNLine | Mapping[str, SNLine] | None = None,
+    rtol: float = 1e-8,
+    engine: str = "auto",
+    initial: Mapping[str, float] | None = None,
+    t_eval: OutputTimes = None,
+    processes: int | None = None,
+    store: str | Path | None = None,
+) -> Sweep:
+    """Simulate variants of a network and measure each of them; nothing is compiled anew.
+
+    Where all measures have names, many variants run side by side in compiled code (extra `fast`), and those that it
+    cannot follow run one by one; results do not depend on the number of processes and on the order.
+
+    Args:
+        net: the network.
+        parameters: a grid, {"shaft.c": [2e4, 3e4], "motor.tau_k": [8, 9, 10]}: all combinations, the last name fastest.
+        samples: instead of it a table, a mapping to columns of equal length or a pandas data frame: a variant each row.
+        t_end: end of the motions, s.
+        measures: names such as "max shaft.tau", or a mapping from names of your own to these, or to functions of a
+            solution. First words are "max", "min", "peak", "mean", "rms", "end" and "damage", see
+            `results.measures.KINDS`.
+        require: by measure, (low, high); None leaves a side open.
+        sn: S-N line for measures of damage, or one by quantity.
+        rtol: relative tolerance.
+        engine: as in `Model.simulate`.
+        initial: start values, as there.
+        t_eval: output times of the solutions that functions get, as there; names measure the motion, not the outputs.
+        processes: how many; by default as many as there are cores, where the sweep takes long enough.
+        store: a file to which all that is done is appended. The same call with the same file goes on where it stopped.
+
+    Raises:
+        ParameterError: an argument is out of its range, there is no such parameter or measure, or the store is that of
+            another sweep.
+        NetworkError: the network cannot be assembled.
+        SignalError: a measure is of a quantity that does not exist.
+    """
+    columns = _columns(net.netlist(), parameters, samples)
+    readers = _readers(measures)
+    limits = _limits(require, readers)
+    _, end = time_span(0.0, t_end)
+    (name,) = engine_names([engine])
+    if processes is not None and (isinstance(processes, bool) or not isinstance(processes, int) or processes < 1):
+        raise ParameterError(f"processes = {processes!r} must be a number, 1 or more; leave it out for all cores.")
+    options = {"rtol": relative_tolerance(rtol), "engine": name, "initial": initial, "t_eval": t_eval}
+    if t_eval is None and all(isinstance(reader, Measure) for reader in readers.values()):
+        options["t_eval"] = 2  # they read the motion between these
+    task = Task(net, columns, readers, _lines(sn, readers), end, options)
+    worker = Worker(task)
+    values, reasons = _run(task, worker, processes, None if store is None else Store(store, task))
+    measured = dict(zip(readers, values.T, strict=True))
+    return Sweep(net.name, columns, measured, limits, reasons, worker.why)
+
+
+def _run(task: Task, worker: Worker, processes: int | None, store: Store | None) -> tuple[Array, tuple[str, ...]]:
+    """(variants, measures), and why variants failed."""
+    values, reasons = np.full((len(task), len(task.measures)), np.nan), [""] * len(task)
+    left, progress = np.ones(len(task), dtype=bool), Progress(len(task), "variants")
+
+    def take(variants: Any, found: Array, why: Iterable[str]) -> None:
+        values[variants], left[variants] = found, False
+        for variant, reason in zip(variants.tolist(), why, strict=True):
+            reasons[variant] = reason
+
+    for chunk in [] if store is None else store.chunks:
+        take(chunk.variants, chunk.values, chunk.reasons)
+    try:
+        for chunk in chunks(worker, task, np.flatnonzero(left), processes):
+            if store is not None:
+                store.append(chunk)
+            take(chunk.variants, chunk.values, chunk.reasons)
+            failed = sum(map(bool, reasons))
+            progress.show(len(task) - int(left.sum()), f", {failed} failed" if failed else "")
+    finally:
+        progress.close()
+    return values, tuple(reasons)
+
+
+def _columns(netlist: Netlist, parameters: Any, samples: Any) -> dict[str, Array]:
+    """(variants,) values by parameter, in SI.
+
+    Raises:
+        ParameterError: there is no such parameter, a value is not admissible, or columns differ in length.
+    """
+    if (parameters is None) == (samples is None):
+        raise ParameterError(
+            "Give a grid, sweep(net, {'shaft.c': [...]}, ...), or a table, samples={'shaft.c': [...]}."
+        )
+    given = samples if parameters is None else parameters
+    if not hasattr(given, "items"):
+        raise ParameterError(f"{given!r} must map parameters to their values, such as {{'shaft.c': [2e4, 3e4]}}.")
+    checked = {str(name): _checked(netlist, str(name), _plain(values)) for name, values in given.items()}
+    if not checked or not all(len(values) for values in checked.values()):
+        raise ParameterError("A sweep needs at least one parameter, and a value for each.")
+    if parameters is None:
+        if len({len(values) for values in checked.values()}) > 1:
+            lengths = ", ".join(f"{name} {len(values)}" for name, values in checked.items())
+            raise ParameterError(f"The columns of samples differ in length: {lengths}.")
+        return checked
+    rows = np.array(list(itertools.product(*checked.values())))
+    return {name: rows[:, k].copy() for k, name in enumerate(checked)}
+
+
+def _checked(netlist: Netlist, name: str, values: Any) -> Array:
+    """(k,) values of one parameter in SI, each admissible by itself."""
+    owner, _, parameter = name.rpartition(".")
+    part = next((placed.part for placed in netlist.placed if placed.part.name == owner), None)
+    if part is None or parameter not in part.declared:
+        parts = [placed.part for placed in netlist.placed] if part is None else [part]
+        known = ", ".join(f"{other.name}.{key}" for other in parts for key in other.declared)
+        raise ParameterError(f"There is no parameter '{name}'. There are: {known or 'none'}.")
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise ParameterError(f"'{name}': {values!r} must be a sequence of values. Write [{values!r}].")
+    numbers = values if isinstance(values, np.ndarray) and values.dtype == float and values.ndim == 1 else None
+    found = []
+    for value in values if numbers is None else _telling(numbers):
+        number, objection = part.declared[parameter].magnitude(value)
+        if objection is None and not isinstance(number, float):
+            objection = "must be a number here: a law is part of the network"
+        if objection is not None:
+            raise ParameterError(f"{type(part).__name__} '{owner}': {parameter} = {value!r} {objection}.")
+        found.append(number)
+    return np.array(found if numbers is None else numbers, dtype=float)
+
+
+def _plain(values: Any) -> Any:
+    """A column of a data frame as an array."""
+    return values.to_numpy() if hasattr(values, "to_numpy") else values
+
+
+def _telling(values: Array) -> list[float]:
+    """Of many numbers those that tell whether all are admissible: bounds are on values and on sizes, or refuse zero."""
+    if not np.isfinite(values).all():
+        return [float(values[~np.isfinite(values)][0])]
+    ends = [values[pick(values)] for pick in (np.argmin, np.argmax)] if values.size else []
+    sizes = np.abs(values[values != 0.0])
+    smallest = values[values != 0.0][[sizes.argmin()]] if sizes.size else sizes
+    return [*map(float, ends), *smallest.tolist(), *([0.0] if sizes.size < values.size else [])]
+
+
+def _readers(measures: Measures) -> dict[str, Reader]:
+    if isinstance(measures, str):
+        measures = [measures]
+    if not isinstance(measures, Mapping):
+        measures = {str(name): str(name) for name in measures}
+    readers: dict[str, Reader] = {}
+    for name, reader in measures.items():
+        if not isinstance(reader, str) and not callable(reader):
+            raise ParameterError(f"measure '{name}' = {reader!r} must be a name, 'max shaft.tau', or a function.")
+        readers[str(name)] = Measure.read(reader) if isinstance(reader, str) else reader
+    if not readers:
+        raise ParameterError("A sweep needs a measure, such as measures=['max shaft.tau'].")
+    return readers
+
+
+def _limits(require: Mapping[str, Any] | None, readers: Mapping[str, Reader]) -> dict[str, Limits]:
+    limits: dict[str, Limits] = {}
+    for name, pair in (require or {}).items():
+        if name not in readers:
+            raise ParameterError(f"require: there is no measure '{name}'. There are: {', '.join(readers)}.")
+        try:
+            low, high = (None if side is None else float(side) for side in pair)
+        except (TypeError, ValueError):
+            raise ParameterError(
+                f"require['{name}'] = {pair!r} must be (low, high); None leaves a side open."
+            ) from None
+        limits[name] = (low, high)
+    return limits
+
+
+def _lines(sn: Any, readers: Mapping[str, Reader]) -> dict[str, SNLine]:
+    """The S-N line of every quantity whose damage is measured."""
+    asked = [made.quantity for made in readers.values() if isinstance(made, Measure) and made.kind == "damage"]
+    lines = dict(sn) if isinstance(sn, Mapping) else dict.fromkeys(asked, sn)
+    if missing := [name for name in asked if not isinstance(lines.get(name), SNLine)]:
+        raise ParameterError(f"The damage of '{missing[0]}' needs an S-N line: sn=SNLine(...), or sn={{name: SNLine}}.")
+    return {name: lines[name] for name in asked}

@@ -1,0 +1,153 @@
+"""What a sweep has found: a table of variants, which of them meet the requirements, and the best."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shaftwork.core.errors import MissingExtraError, ParameterError
+from shaftwork.results.observer import Array
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+SHOWN = 12
+"""Rows of a printed table."""
+
+Limits = tuple[float | None, float | None]
+"""The least and the most that is allowed; None leaves a side open."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """Variants of a network and their measures.
+
+    Args:
+        name: of the network.
+        parameters: (k,) values in SI by parameter.
+        measures: (k,) by measure; NaN where the variant failed.
+        require: limits by measure.
+        reasons: why each variant failed; empty where it did not.
+        why: why variants ran one by one; empty where they ran side by side.
+    """
+
+    name: str
+    parameters: Mapping[str, Array]
+    measures: Mapping[str, Array]
+    require: Mapping[str, Limits]
+    reasons: tuple[str, ...]
+    why: str = ""
+
+    def __len__(self) -> int:
+        return len(self.reasons)
+
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """(k,) whether a variant failed."""
+        return np.array([bool(reason) for reason in self.reasons])
+
+    @property
+    def passed(self) -> NDArray[np.bool_]:
+        """(k,) whether a variant did not fail and meets every requirement."""
+        good = ~self.failed
+        for name, (low, high) in self.require.items():
+            good &= True if low is None else self.measures[name] >= low
+            good &= True if high is None else self.measures[name] <= high
+        return good
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """Parameters, measures, whether the requirements are met, and reasons, each a column."""
+        return {
+            **self.parameters,
+            **self.measures,
+            "passed": self.passed,
+            "reason": np.array(self.reasons, dtype=object),
+        }
+
+    def table(self) -> pd.DataFrame:
+        """The columns as a data frame (extra `data`)."""
+        try:
+            import pandas as pd
+        except ImportError:
+            raise MissingExtraError("pandas", "data", "Sweep.table()") from None
+        return pd.DataFrame(self.columns)
+
+    def best(self, measure: str, count: int | None = None, *, largest: bool = False) -> Sweep:
+        """The variants that meet the requirements, ranked.
+
+        Args:
+            measure: by which; the smallest comes first.
+            count: how many at most.
+            largest: the largest comes first.
+
+        Raises:
+            ParameterError: there is no such measure.
+        """
+        if measure not in self.measures:
+            raise ParameterError(f"There is no measure '{measure}'. There are: {', '.join(self.measures)}.")
+        rows = np.flatnonzero(self.passed)
+        values = self.measures[measure][rows]
+        return self.rows(rows[np.argsort(-values if largest else values, kind="stable")][:count])
+
+    def rows(self, rows: Any) -> Sweep:
+        """Some of the variants, by their numbers or marked."""
+        taken = np.arange(len(self))[rows]
+        return Sweep(
+            self.name,
+            {name: column[taken] for name, column in self.parameters.items()},
+            {name: column[taken] for name, column in self.measures.items()},
+            self.require,
+            tuple(self.reasons[k] for k in taken.tolist()),
+            self.why,
+        )
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write all columns."""
+        columns = self.columns
+        with Path(path).open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(columns)
+            writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
+
+    def plot(self, *names: str) -> Figure:
+        """Parallel coordinates: a line for each variant, through its parameters and measures (extra `plot`).
+
+        Args:
+            *names: of the columns; by default all.
+
+        Raises:
+            ParameterError: there is no such column.
+            MissingExtraError: matplotlib is not installed.
+        """
+        from shaftwork.studies.sweep_picture import parallel_coordinates
+
+        return parallel_coordinates(self, names)
+
+    def __str__(self) -> str:
+        names = [*self.parameters, *self.measures]
+        given = {**self.parameters, **self.measures}
+        passed, shown = self.passed, range(min(len(self), SHOWN))
+        rows = [
+            [f"{k}", *(f"{given[name][k]:.6g}" for name in names), "yes" if passed[k] else "no", self.reasons[k]]
+            for k in shown
+        ]
+        header = ["", *names, "passed", "reason" if any(self.reasons) else ""]
+        widths = [max(len(row[column]) for row in [header, *rows]) for column in range(len(header))]
+        lines = [
+            "  ".join(
+                [*(text.rjust(width) for text, width in zip(row[:-1], widths[:-1], strict=True)), row[-1]]
+            ).rstrip()
+            for row in [header, *rows]
+        ]
+        more = [f"and {len(self) - SHOWN} more"] if len(self) > SHOWN else []
+        failed = int(self.failed.sum())
+        counts = f"{self.name}: {len(self)} variants, {int(passed.sum())} passed, {failed} failed"
+        return "\n".join([counts, *lines, *more])

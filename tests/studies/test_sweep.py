@@ -1,0 +1,314 @@
+"""Variants: what is measured is what a solution shows, side by side, one by one, in processes, and after a stop."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import shaftwork as sw
+from shaftwork.results.measures import Measure
+from shaftwork.studies import Sweep, sweep
+from shaftwork.studies.sweep_task import Task, Worker
+
+MEASURES = ("max shaft.tau", "rms shaft.tau", "mean motor.tau", "min J1.omega", "end J2.omega", "peak shaft.tau")
+
+
+@cache
+def crane_samples(count: int = 24) -> dict[str, np.ndarray]:
+    """Random shafts and motors of the crane."""
+    random = np.random.default_rng(7)
+    return {
+        "shaft.c": 24206.0 * random.uniform(0.5, 1.5, count),
+        "shaft.d": 14.0 * random.uniform(0.5, 1.5, count),
+        "motor.tau_k": 8.0 * random.uniform(0.9, 1.2, count),
+    }
+
+
+def crane_worker(measures: Iterable[str] = MEASURES) -> Worker:
+    task = Task(
+        sw.scenes.crane_start(), crane_samples(), {name: Measure.read(name) for name in measures}, {}, 2.0, OPTIONS
+    )
+    return Worker(task)
+
+
+OPTIONS = {"rtol": 1e-8, "engine": "auto", "initial": None, "t_eval": 2}
+
+
+def swing(damping: float = 0.0) -> sw.Network:
+    """One inertia on a spring: after a step of torque the spring swings between zero and twice the torque."""
+    net = sw.Network("swing")
+    net.add(sw.TorqueSource("motor", tau=5.0), "a")
+    net.add(sw.Inertia("J", J=2.0), "a")
+    net.add(sw.Spring("shaft", c=800.0, d=damping), "a", "ground")
+    return net
+
+
+def test_a_grid_is_every_combination_the_last_name_fastest() -> None:
+    made = sweep(swing(), {"motor.tau": [1.0, 2.0], "J.J": [1.0, 2.0, 3.0]}, t_end=0.1, measures=["end J.omega"])
+    assert len(made) == 6
+    assert made.parameters["motor.tau"].tolist() == [1, 1, 1, 2, 2, 2]
+    assert made.parameters["J.J"].tolist() == [1, 2, 3, 1, 2, 3]
+    omega = np.sqrt(800.0 / made.parameters["J.J"])
+    expected = made.parameters["motor.tau"] / (made.parameters["J.J"] * omega) * np.sin(0.1 * omega)
+    np.testing.assert_allclose(made.measures["end J.omega"], expected, rtol=1e-8)
+
+
+@pytest.mark.parametrize("count", [4, 20])
+def test_measures_equal_closed_forms(count: int) -> None:
+    """One by one (4) and, where heyoka is there, side by side (20): the run ends in the middle of a period."""
+    stiffness, end = np.linspace(500.0, 5000.0, count), 1.0
+    names = [f"{kind} shaft.tau" for kind in ("max", "min", "peak", "mean", "rms", "end")]
+    made = sweep(swing(), samples={"shaft.c": stiffness}, t_end=end, measures=names)
+    omega = np.sqrt(stiffness / 2.0)
+    cosine, sine = np.sinc(omega * end / np.pi), np.sinc(2 * omega * end / np.pi)
+    expected = {
+        "max": 10.0 + 0 * omega,
+        "min": 0 * omega,
+        "peak": 10.0 + 0 * omega,
+        "mean": 5.0 * (1 - cosine),
+        "rms": 5.0 * np.sqrt(1 - 2 * cosine + (1 + sine) / 2),
+        "end": 5.0 * (1 - np.cos(omega * end)),
+    }
+    for kind, values in expected.items():
+        # the engines follow the motion to 1e-8 of its size, and a peak is refined to 1e-7 of it
+        np.testing.assert_allclose(made.measures[f"{kind} shaft.tau"], values, atol=2e-6, err_msg=kind)
+
+
+def test_16_variants_of_the_crane_agree_with_scipy() -> None:
+    pytest.importorskip("heyoka")
+    samples = {name: values[:16] for name, values in crane_samples().items()}
+    fast = sweep(sw.scenes.crane_start(), samples=samples, t_end=0.7, measures=MEASURES)
+    slow = sweep(sw.scenes.crane_start(), samples=samples, t_end=0.7, measures=MEASURES, engine="scipy", rtol=1e-10)
+    assert fast.why == ""
+    assert slow.why == "engine = 'scipy' was asked for"
+    for name in MEASURES:
+        size = np.abs(slow.measures[name]).max()
+        np.testing.assert_allclose(fast.measures[name], slow.measures[name], atol=1e-6 * size or 1e-9, err_msg=name)
+
+
+def test_variants_side_by_side_are_those_of_any_order_and_grouping() -> None:
+    pytest.importorskip("heyoka")
+    worker = crane_worker()
+    assert worker.why == ""
+    whole = worker.run(np.arange(24))
+    order = np.random.default_rng(1).permutation(24)
+    mixed = np.concatenate([worker.run(part).values for part in (order[:5], order[5:6], order[6:])])
+    np.testing.assert_array_equal(mixed, whole.values[order])  # to the last bit
+    other = pickle.loads(pickle.dumps(crane_worker()._task))  # noqa: S301 (what a process gets)
+    np.testing.assert_array_equal(Worker(other).run(np.arange(24)).values, whole.values)
+
+
+def test_variants_with_a_gap_and_a_brake_change_their_modes_each_at_its_own_time() -> None:
+    pytest.importorskip("heyoka")
+    net = sw.Network("gap and brake")
+    net.add(sw.TorqueSource("motor", tau=100.0), "rotor")
+    net.add(sw.Inertia("J1", J=27.35), "rotor")
+    net.add(sw.Backlash("shaft", gap=0.003, c=24206.0, d=14.0), "rotor", "wheel")
+    net.add(sw.Inertia("J2", J=62.5), "wheel")
+    net.add(sw.Brake("brake", tau=150.0, t_on=0.3), "wheel")
+    random = np.random.default_rng(2)
+    samples = {"shaft.c": random.uniform(2e4, 3e4, 16), "brake.t_on": random.uniform(0.2, 0.4, 16)}
+    names = ("max shaft.tau", "min shaft.tau", "end J1.omega", "mean shaft.tau")
+    fast = sweep(net, samples=samples, t_end=0.8, measures=names)
+    assert fast.why == ""
+    model = net.compile()
+    for row in (0, 7, 15):
+        values = {name: float(column[row]) for name, column in samples.items()}
+        solution = model.simulate(0.8, parameters=values, rtol=1e-10)
+        for name in names:
+            expected = Measure.read(name).of(solution)
+            assert fast.measures[name][row] == pytest.approx(expected, rel=1e-6, abs=1e-8), name
+
+
+def test_what_runs_side_by_side_runs_one_by_one_where_it_must() -> None:
+    pytest.importorskip("heyoka")
+    stiffness, damping = np.linspace(500.0, 900.0, 16), np.full(16, 2.0)
+    damping[3] = 0.0  # has other equations
+    made = sweep(swing(1.0), samples={"shaft.c": stiffness, "shaft.d": damping}, t_end=1.0, measures=["max shaft.tau"])
+    assert made.why == ""
+    assert made.measures["max shaft.tau"][3] == pytest.approx(10.0, abs=1e-6)
+    assert (np.delete(made.measures["max shaft.tau"], 3) < 9.9).all()
+
+
+def test_a_variant_that_fails_is_a_row_with_its_reason() -> None:
+    def last(solution: sw.Solution) -> float:
+        return 1.0 / float(solution["J.omega"][-1] > 0)
+
+    times = [0.5, 2.0, 3.0]
+    net = swing()
+    net.add(sw.KlossMotor("late", tau_k=1.0, s_k=0.2, n_sync=1500, t_on=0.1, t_off=1.0), "a")
+    made = sweep(net, {"late.t_on": times}, t_end=0.1, measures={"end": "end J.omega", "own": last})
+    assert made.failed.tolist() == [False, True, True]
+    assert "t_on = 2" in made.reasons[1]
+    assert "t_off" in made.reasons[2]
+    made = sweep(swing(), {"motor.tau": [-5.0, 5.0]}, t_end=0.1, measures={"own": last})
+    assert made.reasons == ("measure 'own': ZeroDivisionError: float division by zero", "")
+    assert np.isnan(made.measures["own"][0])
+    assert "ZeroDivisionError" in str(made)
+
+
+def test_a_variant_that_runs_away_leaves_those_beside_it_alone() -> None:
+    """J w' = 1 + w^2 is w = tan(t / J), which has no end of the motion at 1 s where J < 2 / pi."""
+    net = sw.Network("runaway")
+    net.add(sw.TorqueSource("motor", tau=1 + sw.omega**2), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    inertias = np.linspace(2.0, 0.5, 17)
+    made = sweep(net, samples={"J.J": inertias}, t_end=1.0, measures=["end J.omega"])
+    assert made.failed.tolist() == (inertias < 2 / np.pi).tolist()
+    assert all("t = " in reason for reason in made.reasons if reason)
+    stay = ~made.failed
+    np.testing.assert_allclose(made.measures["end J.omega"][stay], np.tan(1 / inertias[stay]), rtol=1e-6)
+
+
+def test_requirements_filter_and_a_measure_ranks() -> None:
+    made = sweep(
+        swing(0.5),
+        {"shaft.c": [400.0, 800.0, 1600.0], "motor.tau": [1.0, 5.0]},
+        t_end=1.0,
+        measures={"largest": "max shaft.tau", "swing": "peak J.omega"},
+        require={"largest": (None, 9.0), "swing": (0.02, None)},
+    )
+    assert made.passed.any()
+    assert not made.passed.all()
+    best = made.best("largest", 2)
+    assert len(best) == min(2, int(made.passed.sum()))
+    assert best.passed.all()
+    assert (np.diff(best.measures["largest"]) >= 0).all()
+    assert made.best("swing", 1, largest=True).measures["swing"][0] == made.measures["swing"][made.passed].max()
+    with pytest.raises(sw.ParameterError, match="There is no measure 'tau'"):
+        made.best("tau")
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"parameters": {"shaft.k": [1.0]}}, r"no parameter 'shaft.k'. There are: shaft.c, shaft.d"),
+        ({"parameters": {"shaft.c": [1.0, -2.0]}}, r"shaft.*c = -2.0 must be at least 0"),
+        ({"samples": {"shaft.c": np.array([1.0, -3.0, 2.0])}}, r"shaft.*c = -3.0 must be at least 0"),
+        ({"samples": {"J.J": np.array([1.0, np.nan])}}, r"J.*J = nan must be a finite number"),
+        ({"parameters": {"shaft.c": 3.0}}, r"must be a sequence of values"),
+        ({"parameters": {"shaft.c": []}}, r"at least one parameter, and a value"),
+        ({"samples": {"shaft.c": [1.0], "J.J": [1.0, 2.0]}}, r"differ in length: shaft.c 1, J.J 2"),
+        ({}, r"Give a grid"),
+        ({"parameters": {"J.J": [1.0]}, "measures": ["shaft.tau"]}, r"'shaft.tau' is no measure"),
+        ({"parameters": {"J.J": [1.0]}, "measures": ["max shaft.torque"]}, r"'shaft' has: .*shaft.tau"),
+        ({"parameters": {"J.J": [1.0]}, "measures": ["damage shaft.tau"]}, r"needs an S-N line"),
+        ({"parameters": {"J.J": [1.0]}, "require": {"max": (0, 1)}}, r"there is no measure 'max'"),
+        ({"parameters": {"J.J": [1.0]}, "require": {"end J.omega": 1.0}}, r"must be \(low, high\)"),
+        ({"parameters": {"J.J": [1.0]}, "processes": 0}, r"processes = 0"),
+    ],
+)
+def test_what_is_wrong_is_refused_at_once(given: dict[str, object], message: str) -> None:
+    with pytest.raises(sw.ShaftworkError, match=message):
+        sweep(swing(), **({"t_end": 1.0, "measures": ["end J.omega"]} | given))  # type: ignore[arg-type]
+
+
+def test_damage_is_that_of_the_solution() -> None:
+    pytest.importorskip("rainflow")
+    line = sw.SNLine(amplitude=300.0, cycles=1e6, slope=5)
+    made = sweep(swing(), {"motor.tau": [5.0]}, t_end=1.0, measures=["damage shaft.tau"], sn=line)
+    expected = swing().simulate(1.0).damage("shaft.tau", sn=line).damage
+    assert made.measures["damage shaft.tau"][0] == pytest.approx(expected, rel=1e-9)
+
+
+def stopped(path: Path, monkeypatch: pytest.MonkeyPatch, after: int, **call: object) -> None:
+    """A sweep that its user stops after some chunks."""
+    run, count = Worker.run, iter(range(1000))
+
+    def stop(self: Worker, variants: np.ndarray) -> object:
+        if next(count) == after:
+            raise KeyboardInterrupt
+        return run(self, variants)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Worker, "run", stop)
+        with pytest.raises(KeyboardInterrupt):
+            sweep(swing(), store=path, **call)  # type: ignore[arg-type]
+
+
+def test_a_sweep_that_was_stopped_goes_on_to_identical_results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "swing.jsonl"
+    call = {"samples": {"shaft.c": np.linspace(500.0, 900.0, 20)}, "t_end": 0.2, "engine": "scipy"}
+    call |= {"measures": ["max shaft.tau", "end J.omega"]}
+    stopped(path, monkeypatch, 1, **call)
+    assert len(path.read_text().splitlines()) == 2
+    with path.open("a") as file:
+        file.write('{"variants": [8, 9')  # killed while it wrote
+    done: list[int] = []
+    run = Worker.run
+    with monkeypatch.context() as patch:
+        patch.setattr(Worker, "run", lambda self, variants: (done.extend(variants.tolist()), run(self, variants))[1])
+        resumed = sweep(swing(), store=path, **call)  # type: ignore[arg-type]
+    assert done == list(range(8, 20))
+    whole = sweep(swing(), **call)  # type: ignore[arg-type]
+    for name, values in whole.measures.items():
+        np.testing.assert_array_equal(resumed.measures[name], values)
+    again = sweep(swing(), store=path, require={"end J.omega": (0.0, None)}, **call)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(again.measures["max shaft.tau"], whole.measures["max shaft.tau"])
+    assert all(json.loads(line) for line in path.read_text().splitlines())
+
+
+@pytest.mark.parametrize(
+    ("changed", "what"),
+    [
+        ({"t_end": 0.3}, "t_end"),
+        ({"parameters": {"J.J": [1.0, 3.0]}}, "parameters"),
+        ({"measures": ["end J.omega"]}, "measures"),
+        ({"rtol": 1e-9}, "options"),
+    ],
+)
+def test_a_store_of_another_sweep_is_refused_by_what_differs(
+    tmp_path: Path, changed: dict[str, object], what: str
+) -> None:
+    call: dict[str, object] = {"parameters": {"J.J": [1.0, 2.0]}, "t_end": 0.2, "measures": ["max shaft.tau"]}
+    call["store"] = tmp_path / "store.jsonl"
+    sweep(swing(), **call)  # type: ignore[arg-type]
+    with pytest.raises(sw.ParameterError, match=f"another sweep: its {what} differs"):
+        sweep(swing(), **(call | changed))  # type: ignore[arg-type]
+
+
+def test_a_store_of_another_network_and_what_is_no_store_are_refused(tmp_path: Path) -> None:
+    call: dict[str, object] = {"parameters": {"J.J": [1.0]}, "t_end": 0.2, "measures": ["max shaft.tau"]}
+    sweep(swing(), store=tmp_path / "a", **call)  # type: ignore[arg-type]
+    with pytest.raises(sw.ParameterError, match="its network differs"):
+        sweep(swing(2.0), store=tmp_path / "a", **call)  # type: ignore[arg-type]
+    (tmp_path / "b").write_text("c = 3\n")
+    with pytest.raises(sw.ParameterError, match="is no file of a sweep"):
+        sweep(swing(), store=tmp_path / "b", **call)  # type: ignore[arg-type]
+    with pytest.raises(sw.ParameterError, match="cannot be used"):
+        sweep(swing(), store=tmp_path / "missing" / "c", **call)  # type: ignore[arg-type]
+
+
+def small() -> Sweep:
+    return sweep(swing(), {"shaft.c": [500.0, 600.0]}, t_end=0.5, measures=["max shaft.tau"], require=LIMITS)
+
+
+LIMITS = {"max shaft.tau": (0.0, 9.99)}
+
+
+def test_results_are_a_table_a_file_and_a_picture(tmp_path: Path) -> None:
+    made = small()
+    assert str(made).splitlines()[0] == f"swing: 2 variants, {int(made.passed.sum())} passed, 0 failed"
+    made.to_csv(tmp_path / "t.csv")
+    assert (tmp_path / "t.csv").read_text().splitlines()[0] == "shaft.c,max shaft.tau,passed,reason"
+    frame = pytest.importorskip("pandas").DataFrame
+    assert isinstance(made.table(), frame)
+    assert list(made.table().columns) == ["shaft.c", "max shaft.tau", "passed", "reason"]
+    pytest.importorskip("matplotlib")
+    (axes,) = made.plot().axes
+    assert [tick.get_text() for tick in axes.get_xticklabels()] == ["shaft.c", "max shaft.tau"]
+    with pytest.raises(sw.ParameterError, match="There is no column 'J'"):
+        made.plot("J")
+
+
+def test_processes_give_the_same() -> None:
+    """The one test that starts a process: it costs seconds."""
+    call = {"samples": {"shaft.c": np.linspace(500.0, 900.0, 9)}, "t_end": 0.2, "measures": ["max shaft.tau"]}
+    one, two = (sweep(swing(), processes=count, **call) for count in (1, 2))  # type: ignore[arg-type]
+    np.testing.assert_array_equal(one.measures["max shaft.tau"], two.measures["max shaft.tau"])
