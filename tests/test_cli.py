@@ -219,6 +219,6 @@ def test_a_long_run_shows_its_progress_on_a_terminal(
 ) -> None:
     clock = iter(range(10**9))
     monkeypatch.setattr("sys.stderr.isatty", lambda: True)
-    monkeypatch.setattr("shaftwork.cli.time.monotonic", lambda: float(next(clock)))
+    monkeypatch.setattr("shaftwork.core.progress.time.monotonic", lambda: float(next(clock)))
     assert main(["run", "crane-start", "--engine", "scipy", "--t-end", "0.1", "--rtol", "1e-4"]) == DONE
     assert "of 0.1 s" in capsys.readouterr().err

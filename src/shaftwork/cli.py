@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError
+from shaftwork.core.progress import Progress
 
 if TYPE_CHECKING:
     from shaftwork.equations.records import Equations
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from shaftwork.studies.work_precision import Trial
 
 DONE, FAILED, WRONG_INPUT = 0, 1, 2
-BAR = 40
-"""Characters of the progress bar."""
 FALLBACK_END = 10.0
 """End time of a model file when none is given, s."""
 COMPARED = 1.0
@@ -198,17 +196,8 @@ def _progress(t_end: float) -> Callable[[float], None] | None:
     """A line on a terminal's standard error that shows how far a long run has come."""
     if not sys.stderr.isatty():
         return None
-    shown = time.monotonic() + 1.0  # a run of a second needs none
-
-    def show(t: float) -> None:
-        nonlocal shown
-        now = time.monotonic()
-        if now >= shown:
-            done = int(BAR * min(max(t / t_end, 0.0), 1.0))
-            print(f"\r[{'=' * done}{' ' * (BAR - done)}] {t:.4g} of {t_end:g} s", end="", file=sys.stderr, flush=True)
-            shown = now + 0.2
-
-    return show
+    progress = Progress()
+    return lambda t: progress.show(t / t_end, f"{t:.4g} of {t_end:g} s")
 
 
 def _worth_seeing(solution: Solution) -> tuple[str, ...]:

@@ -127,7 +127,7 @@ def checked_parameters(netlist: Netlist, given: Mapping[str, Any]) -> dict[str, 
         ParameterError: there is no such parameter, a value is not admissible, or the values of a part do not go
             together.
     """
-    values = {str(name): _checked_parameter(netlist, str(name), value) for name, value in given.items()}
+    values = {str(name): checked_parameter(netlist, str(name), value) for name, value in given.items()}
     owners = {name.rpartition(".")[0] for name in values}
     for part in (placed.part for placed in netlist.placed if placed.part.name in owners):
         if hasattr(part, "__post_init__"):  # what the part says of values that do not go together
@@ -136,7 +136,12 @@ def checked_parameters(netlist: Netlist, given: Mapping[str, Any]) -> dict[str, 
     return values
 
 
-def _checked_parameter(netlist: Netlist, name: str, value: Any) -> float:
+def checked_parameter(netlist: Netlist, name: str, value: Any) -> float:
+    """A new value of a parameter "part.name", in SI and within its bounds.
+
+    Raises:
+        ParameterError: there is no such parameter, or the value is not admissible.
+    """
     owner, _, parameter = name.rpartition(".")
     part = next((placed.part for placed in netlist.placed if placed.part.name == owner), None)
     if part is None or parameter not in part.declared:

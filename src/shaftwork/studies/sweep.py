@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 from shaftwork.core.errors import ParameterError
+from shaftwork.core.progress import Progress
 from shaftwork.network.netlist import Netlist
-from shaftwork.pipeline.arguments import OutputTimes, relative_tolerance, time_span
+from shaftwork.pipeline.arguments import OutputTimes, checked_parameter, relative_tolerance, time_span
 from shaftwork.pipeline.network import Network
 from shaftwork.results.fatigue import SNLine
 from shaftwork.results.measures import Measure
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
 from shaftwork.studies.arguments import engine_names
-from shaftwork.studies.progress import Progress
 from shaftwork.studies.sweep_processes import chunks
 from shaftwork.studies.sweep_result import Limits, Sweep
 from shaftwork.studies.sweep_store import Store
@@ -91,7 +91,7 @@ def sweep(
 def _run(task: Task, worker: Worker, processes: int | None, store: Store | None) -> tuple[Array, tuple[str, ...]]:
     """(variants, measures), and why variants failed."""
     values, reasons = np.full((len(task), len(task.measures)), np.nan), [""] * len(task)
-    left, progress = np.ones(len(task), dtype=bool), Progress(len(task), "variants")
+    left, progress = np.ones(len(task), dtype=bool), Progress()
 
     def take(variants: Any, found: Array, why: Iterable[str]) -> None:
         values[variants], left[variants] = found, False
@@ -106,7 +106,8 @@ def _run(task: Task, worker: Worker, processes: int | None, store: Store | None)
                 store.append(chunk)
             take(chunk.variants, chunk.values, chunk.reasons)
             failed = sum(map(bool, reasons))
-            progress.show(len(task) - int(left.sum()), f", {failed} failed" if failed else "")
+            done, remark = len(task) - int(left.sum()), f", {failed} failed" if failed else ""
+            progress.show(done / len(task), f"{done} of {len(task)} variants{remark}")
     finally:
         progress.close()
     return values, tuple(reasons)
@@ -139,23 +140,13 @@ def _columns(netlist: Netlist, parameters: Any, samples: Any) -> dict[str, Array
 
 def _checked(netlist: Netlist, name: str, values: Any) -> Array:
     """(k,) values of one parameter in SI, each admissible by itself."""
-    owner, _, parameter = name.rpartition(".")
-    part = next((placed.part for placed in netlist.placed if placed.part.name == owner), None)
-    if part is None or parameter not in part.declared:
-        parts = [placed.part for placed in netlist.placed] if part is None else [part]
-        known = ", ".join(f"{other.name}.{key}" for other in parts for key in other.declared)
-        raise ParameterError(f"There is no parameter '{name}'. There are: {known or 'none'}.")
     if isinstance(values, str) or not isinstance(values, Iterable):
         raise ParameterError(f"'{name}': {values!r} must be a sequence of values. Write [{values!r}].")
+    if not isinstance(values, np.ndarray):
+        values = list(values)
+        values = np.array(values) if all(type(value) is float for value in values) else values
     numbers = values if isinstance(values, np.ndarray) and values.dtype == float and values.ndim == 1 else None
-    found = []
-    for value in values if numbers is None else _telling(numbers):
-        number, objection = part.declared[parameter].magnitude(value)
-        if objection is None and not isinstance(number, float):
-            objection = "must be a number here: a law is part of the network"
-        if objection is not None:
-            raise ParameterError(f"{type(part).__name__} '{owner}': {parameter} = {value!r} {objection}.")
-        found.append(number)
+    found = [checked_parameter(netlist, name, value) for value in (values if numbers is None else _telling(numbers))]
     return np.array(found if numbers is None else numbers, dtype=float)
 
 
