@@ -74,7 +74,7 @@ def test_latex_prints_the_phases_of_a_scene_or_the_one_asked_for(capsys: pytest.
     assert "There is no phase 'shaft broken'" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("form", ["kirchhoff", "state", "second-order"])
+@pytest.mark.parametrize("form", ["kirchhoff", "state", "second-order", "lagrange"])
 def test_latex_prints_the_equations(form: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["latex", "crane-start", "--form", form]) == DONE
     assert "J_{1}" in capsys.readouterr().out
@@ -89,8 +89,13 @@ def test_check_tells_structure_states_time_constants_and_engine(capsys: pytest.C
     printed = capsys.readouterr().out
     for word in ("5 parts", "2 nodes", "J1.omega", "natural frequencies", "time constants", "engine for 6.5 s: heyoka"):
         assert word in printed
+    # at rest the load holds J2, so that J1 swings alone; in motion both swing against each other
+    assert "natural frequencies at rest (load stuck) (1): 4.7348 Hz" in printed
+    assert "natural frequencies in motion (load slipping forward) (1): 5.6768 Hz" in printed
     assert main(["check", "shaft-chain"]) == DONE
     printed = capsys.readouterr().out
+    assert "natural frequencies at rest (" in printed
+    assert "in motion" not in printed
     assert "left out, being zero" in printed
     assert "eliminated stores (2)" in printed
 

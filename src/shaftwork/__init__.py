@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from shaftwork import reduce, scenes, studies
+    from shaftwork import reduce, scenes, sizing, studies
     from shaftwork.components.base import Component, Port, Signal, component
     from shaftwork.components.bldc import *
     from shaftwork.components.branches import (
@@ -116,7 +116,7 @@ _HOME = {
     "shaftwork.results.fatigue": ("SNLine",),
     "shaftwork.results.solution": ("Solution",),
 }
-_PACKAGES = ("reduce", "scenes", "studies")
+_PACKAGES = ("reduce", "scenes", "sizing", "studies")
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 
 

@@ -96,7 +96,8 @@ def _parser() -> argparse.ArgumentParser:
         choices=("auto", "scipy", "scipy-radau", "heyoka", "sundials", "exact", "banded", "wave"),
     )
     latex = command("latex", _latex, "print the equations as LaTeX")
-    latex.add_argument("--form", choices=("kirchhoff", "state", "second-order"), help="which equations (default: all)")
+    forms = ("kirchhoff", "state", "second-order", "lagrange")
+    latex.add_argument("--form", choices=forms, help="which equations (default: the first two)")
     latex.add_argument("--phase", metavar="WORDS", help="of one phase, such as 'gap open, load stuck'")
     latex.add_argument("--values", action="store_true", help="numbers instead of symbols")
     latex.add_argument("--document", action="store_true", help="a whole document that pdflatex compiles")
@@ -272,6 +273,10 @@ def _latex(options: argparse.Namespace) -> None:
 def _typeset(equations: Equations, options: argparse.Namespace) -> str:
     if options.document:
         return equations.document(values=options.values)
+    if options.form == "lagrange":
+        from shaftwork.equations.lagrange import lagrangian
+
+        return lagrangian(equations).latex(values=options.values)
     return equations.latex(form=options.form, values=options.values)
 
 

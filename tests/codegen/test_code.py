@@ -9,7 +9,7 @@ import pytest
 import sympy
 from sympy import Heaviside, Max, Min, Piecewise, Symbol, sin, sqrt, tanh
 
-from shaftwork.codegen.code import scalar, vectorised, vectorised_list
+from shaftwork.codegen.code import bindable, scalar, vectorised, vectorised_list
 from shaftwork.core.errors import CompileError
 
 x, y, c = (Symbol(name, real=True) for name in ("x", "gap.phi", "class"))  # names that are no names in Python
@@ -36,6 +36,22 @@ def test_what_stands_twice_is_evaluated_once() -> None:
     function = scalar((x, y), [sin(x * y) + 1 / sin(x * y), sin(x * y) ** 2])
     assert str(function.__doc__).count("sin(") == 1
     assert function(0.5, 2.0) == [math.sin(1.0) + 1 / math.sin(1.0), math.sin(1.0) ** 2]
+
+
+def test_two_lists_with_bound_parameters_are_those_of_one_function_and_the_second_asks_for_its_own_parts_only() -> None:
+    first, second = [LAWS[0] / c, sqrt(x) * y], [LAWS[1], y**3 + sqrt(x)]
+    whole = scalar({"t": x, "x": (y,), "p": (c,)}, [*first, *second])
+    both, one = bindable({"t": x, "x": (y,)}, {"p": (c,)}, first, second)([1.5])
+    assert both(0.3, [-0.7]) == (whole(0.3, [-0.7], [1.5])[:2], one(0.3, [-0.7]))
+    assert one(0.3, [-0.7]) == whole(0.3, [-0.7], [1.5])[2:]
+    reads_none_of_it = bindable({"t": x, "x": (y,)}, {"p": (c,)}, [sqrt(x), sqrt(x) + y], [2 * y])([1.5])
+    assert reads_none_of_it[1](-1.0, [2.0]) == [4.0]
+
+
+def test_where_one_value_is_none_all_are_nan() -> None:
+    both, one = bindable({"t": x, "x": (y,)}, {"p": (c,)}, [x], [y, sqrt(y)])([1.5])
+    assert np.isnan([*one(0.0, [-1.0]), *both(0.0, [-1.0])[0], *both(0.0, [-1.0])[1]]).all()
+    assert both(0.0, [4.0]) == ([0.0], [4.0, 2.0])
 
 
 def test_a_symbol_without_a_value_is_refused_by_name() -> None:

@@ -62,6 +62,14 @@ def test_the_mean_torque_is_that_of_the_closed_form() -> None:
     assert -sol["dig.tau"].mean() == pytest.approx(wheel.mean_torque, rel=spread)
 
 
+@pytest.mark.parametrize("ratio", [25.0, -25.0])
+def test_at_a_shaft_before_its_reducer_the_wheel_gives_the_torque_that_comes_there(ratio: float) -> None:
+    values = {"radius": 3.0, "edge": 0.7, "soil": "fault zone", "seed": 4.0}
+    there = turning(sw.BucketWheelLoad("dig", **values), 0.5, 20.0, 401)["dig.tau"]
+    before = turning(sw.BucketWheelLoad("dig", ratio=ratio, **values), 0.5 * ratio, 20.0, 401)["dig.tau"]
+    assert ratio * before == pytest.approx(there, rel=1e-9, abs=1e-6)
+
+
 def test_the_torque_is_continuous_where_buckets_come_and_go() -> None:
     """The steepest profile climbs by 1 / (2 - pi/2) per rad: a fine step in the angle changes the torque by no more."""
     wheel = sw.BucketWheelLoad("dig", radius=3.0, edge=0.7, seed=4.0)

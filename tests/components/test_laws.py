@@ -116,6 +116,10 @@ def test_a_table_of_a_number_is_a_number() -> None:
     assert TABLE(t).subs(t, 2.0) == sympy.Float(2.0)
 
 
+def test_a_table_stays_where_numbers_are_multiplied_out() -> None:
+    assert TABLE(sympy.pi * omega).evalf() == TABLE(sympy.pi.evalf() * omega)
+
+
 def test_latex_shows_the_points_of_short_tables_and_the_ends_of_long_ones() -> None:
     assert sympy.latex(Table([0, 1], [2, 3])(omega)) == (
         r"\operatorname{table}\left(\omega;\, 0.0 \mapsto 2.0,\, 1.0 \mapsto 3.0\right)"

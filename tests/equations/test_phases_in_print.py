@@ -69,6 +69,32 @@ def test_a_phase_of_a_motion_is_asked_for_by_its_row() -> None:
         gapped().equations(phase=3)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("part", ["brake", "load"])
+def test_a_torque_has_one_letter_and_one_sign_in_the_balances_of_all_phases(part: str) -> None:
+    """The same as the signal: what a brake takes from its node, what a load gives to it; also where they hold."""
+    net = sw.Network("rubbing")
+    net.add(sw.TorqueSource("pull", tau=3.0), "a")
+    net.add(sw.Inertia("J", J=2.0), "a")
+    rubs = {"brake": sw.Brake("brake", tau=1.0), "load": sw.CoulombLoad("load", tau=1.0)}
+    net.add(rubs[part], "a")
+    sign = {"brake": -1, "load": 1}[part]
+    for mode in ("slipping forward", "slipping backward", "locked" if part == "brake" else "stuck"):
+        equations = net.equations(phase=f"{part} {mode}")
+        (balance,) = equations.nodes
+        letters = {symbol.name: symbol for symbol in balance.expression.free_symbols}
+        assert sorted(letters) == sorted(["J.J", "der(J.omega)", "pull.tau", f"tau({part})"])
+        assert balance.expression.coeff(letters[f"tau({part})"]) == sign * balance.expression.coeff(letters["pull.tau"])
+
+
+def test_what_holds_beside_another_torque_of_its_part_has_a_letter_of_its_own() -> None:
+    net = sw.Network("hoist")
+    net.add(sw.Inertia("J", J=2.0), "a")
+    net.add(sw.Hoist("load", m=5.0, radius=0.1, efficiency=0.5), "a")
+    (balance,) = net.equations(phase="load stuck").nodes
+    assert {"load.tau_1", "load.tau_2"} < {symbol.name for symbol in balance.expression.free_symbols}
+    assert "load.tau" not in {symbol.name for symbol in balance.expression.free_symbols}
+
+
 def test_equations_without_modes_name_no_phase() -> None:
     equations = sw.scenes.shaft_chain(3).equations()
     assert equations.phase == ""

@@ -224,3 +224,16 @@ def test_a_measured_curve_is_followed_from_point_to_point() -> None:
     passed = sol.at(sol.steps)["J.omega"]
     for speed in speeds[(speeds < 2.0) & (speeds > passed[-1])]:
         assert np.abs(passed - speed).min() < 1e-6
+
+
+@pytest.mark.parametrize("d", [20.0, 50.0, 200.0])
+def test_a_speed_that_dies_away_turns_until_it_is_rounding(d: float) -> None:
+    """The motor is off and its curve still asks for the sign of a speed, whose turns heyoka cannot tell any more."""
+    net = sw.Network("held")
+    net.add(sw.motors["KBF-90 LA 2"].cage("motor", t_off=0.1), "rotor")
+    net.add(sw.Inertia("J", J=0.63), "rotor")
+    net.add(sw.Spring("shaft", c=26e4, d=d), "rotor", "ground")
+    net.add(sw.TorqueSource("weight", tau=20.0), "rotor")
+    sol = net.simulate(3.0, engine="heyoka")
+    assert sol["shaft.tau"][-1] == pytest.approx(20.0, rel=1e-9)
+    assert sol["J.omega"][-1] == pytest.approx(0.0, abs=1e-12)

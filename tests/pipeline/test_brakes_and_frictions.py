@@ -255,3 +255,62 @@ def test_a_condition_that_rounding_leaves_at_its_limit_has_come_true(engine: str
     begins = math.sqrt(30.0)
     assert times(sol) == pytest.approx([begins, begins * (1 + 2.0 * 3.0 / 34.0)], abs=EXACT)
     assert words(sol) == [("brake", "released", "slipping forward"), ("brake", "slipping forward", "locked")]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_given_time_is_that_of_its_event_to_the_last_digit(engine: str) -> None:
+    """Times that binary numbers do not hold, two parts at one time, and a time beside which nothing moves."""
+    brake, second = sw.Brake("brake", tau=4.0, t_on=0.1, t_off=0.7), sw.Brake("second", tau=4.0, t_on=0.7)
+    sol = wheel(sw.TorqueSource("pull", tau=3.0), brake, second).simulate(
+        1.3, engine=engine, t_eval=[0.05, 0.1, 0.7, 1.2]
+    )
+    switched = [(time, part) for time, part, before, after in sol.events if "released" in (before, after)]
+    assert switched == [(0.1, "brake"), (0.7, "brake"), (0.7, "second")]
+    # at the time itself the torque is the one after it
+    assert sol["brake.tau"].tolist() == [0.0, 4.0, 0.0, 0.0]
+    assert sol["second.tau"][2] == 3.0
+
+
+@pytest.mark.parametrize("first", ["load", "brake"])
+def test_a_hoist_and_a_brake_that_both_hold_carry_in_the_order_of_the_network(first: str) -> None:
+    """The friction of the hoist takes all that it can before the brake takes the rest, or nothing behind the brake."""
+    parts = {"load": sw.Hoist("load", m=20.0, radius=0.1, efficiency=0.81), "brake": sw.Brake("brake", tau=50.0)}
+    sol = wheel(parts[first], *(part for name, part in parts.items() if name != first)).simulate(1.0)
+    weight = 20.0 * 9.81 * 0.1
+    held = {"load": 0.81 * weight, "brake": (0.81 + 1 / 0.81) / 2 * weight}[first]
+    assert not sol["J.omega"].any()
+    assert sol["brake.tau"][-1] == pytest.approx(-held, rel=1e-12)
+    assert sol["load.tau"][-1] == pytest.approx(-held, rel=1e-12)
+
+
+@pytest.mark.parametrize(("start", "ends"), [(5.0, 2.0), (1.0, 2.0)])
+def test_a_torque_of_constant_power_has_a_pole_at_rest_where_a_brake_beside_it_never_holds(
+    start: float, ends: float
+) -> None:
+    """2 w' = 100 / w - 50 goes to 2 rad/s, as 100 W over 50 N m."""
+    net = wheel(sw.TorqueSource("drive", tau=100.0 / sw.omega), sw.Brake("brake", tau=50.0))
+    sol = net.simulate(10.0, initial={"J.omega": start})
+    assert sol["J.omega"][-1] == pytest.approx(ends, rel=1e-9)
+    assert sol.events == ()
+
+
+@pytest.mark.parametrize("t_off", [-1.0, 1.0, 3.0])
+@pytest.mark.parametrize(
+    ("part", "never"), [(sw.Brake, "gives torque"), (sw.Clutch, "gives torque"), (sw.Switch, "closes")]
+)
+def test_a_time_off_that_is_not_later_than_the_time_on_is_refused(part: Any, never: str, t_off: float) -> None:
+    given = {} if part is sw.Switch else {"tau": 1.0}
+    with pytest.raises(sw.ParameterError, match=f"never {never}"):
+        part("part", t_on=3.0, t_off=t_off, **given)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(("tau", "span"), [(1e7, 1.0), (1e9, 1.0), (1e5, 100.0)])
+def test_what_a_strong_brake_stops_stays_although_rounding_of_the_time_is_a_speed(
+    tau: float, span: float, engine: str
+) -> None:
+    """What loses 1e9 rad/s in a second passes rest by 1e-5 rad/s in a rounding of the time: that is no impact."""
+    sol = wheel(sw.Brake("brake", tau=tau), J=1.0).simulate(span, engine=engine, initial={"J.omega": 1e3}, t_eval=3)
+    assert words(sol) == [("brake", "slipping forward", "locked")]
+    assert times(sol) == pytest.approx([1e3 / tau], rel=1e-4)
+    assert sol["J.omega"].tolist()[1:] == [0.0, 0.0]

@@ -9,8 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import sympy
 
 import shaftwork as sw
+from shaftwork.integrate.problem import SeriesError
+from shaftwork.pipeline.moments import Moment
+from shaftwork.pipeline.passing import Passing
+from shaftwork.pipeline.settling import Settling
 
 ENGINES = ("heyoka", "scipy", "sundials")
 
@@ -179,3 +184,34 @@ def test_a_phase_that_does_not_exist_is_refused_with_those_that_do() -> None:
 def test_an_engine_that_follows_no_modes_is_refused_with_those_that_do(engine: str) -> None:
     with pytest.raises(sw.ParameterError, match=rf"'{engine}' follows no parts that change their mode.*heyoka, scipy"):
         model().simulate(1.0, engine=engine)
+
+
+def test_auto_goes_on_with_scipy_where_a_law_in_the_midst_of_contacts_has_no_taylor_series() -> None:
+    """A torque of sqrt(|omega|) passes zero again and again, between the contacts that one run of heyoka passes."""
+    net = sw.Network("rattle")
+    net.add(sw.TorqueSource("drive", tau=8 * sympy.sin(3 * sw.t)), "a")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.Backlash("gap", gap=0.02, c=2000.0, d=2.0), "a", "b")
+    net.add(sw.Inertia("J2", J=2.0), "b")
+    net.add(sw.TorqueSource("load", tau=-3 * sympy.Abs(sw.omega) ** 0.5), "b")
+    model = net.compile()
+    sol, other = model.simulate(6.0, t_eval=61), model.simulate(6.0, engine="scipy", rtol=1e-11, t_eval=61)
+    assert [event[1:] for event in sol.events] == [event[1:] for event in other.events]
+    assert len(sol.events) > 40
+    # the slope of the root is infinite at its zero, where every method loses digits
+    np.testing.assert_allclose(sol["J2.omega"], other["J2.omega"], atol=1e-5)
+
+
+def test_an_end_of_a_mode_that_the_series_have_hidden_is_told() -> None:
+    settling = Settling(model().phases, {}, (0.0, 10.0))
+    regime = settling.regime(("open", "forward", "released"))
+    size, bands = len(regime.assembly.model.states), [1e-12] * len(regime.sides)
+    passing = Passing(settling, Moment(regime, np.zeros(size), bands), 0.0, lambda _t, _made: None)
+    twist = regime.assembly.model.states.index("gap.phi")
+    within = np.ones(size)
+    within[twist] = 0.0
+    beyond = np.ones(size)
+    passing.refuse_missed(None, 1.0, within)
+    with pytest.raises(SeriesError, match="has not seen that 'gap' ceased to be open before t = 1 s"):
+        passing.refuse_missed(None, 1.0, beyond)
+    passing.refuse_missed(next(made.guard for _, made in regime.watched if made.leave.to == "forward"), 1.0, beyond)

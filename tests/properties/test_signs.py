@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-import sympy
 
 import shaftwork as sw
 from shaftwork.components import REGISTRY, Component
-from shaftwork.core.domains import ELECTRICAL, ROTATION, TRANSLATION
+from shaftwork.core.domains import ELECTRICAL
+from tests.beds import bed_of, registered
 
 TIMES = np.linspace(0.0, 0.4, 9)
 
@@ -209,62 +209,11 @@ def test_a_dc_machine_on_a_positive_voltage_drives_its_rotor_forward() -> None:
     _close(sol["motor.u"], np.full(9, 6.0))
 
 
-VALUES = {
-    "Inertia": {"J": 2.0},
-    "Mass": {"m": 2.0},
-    "Spring": {"c": 30.0, "d": 0.7},
-    "TranslationalSpring": {"c": 30.0, "d": 0.7},
-    "KlossMotor": {"tau_k": 5.0, "s_k": 0.3, "n_sync": 100.0, "ratio": 1.5, "efficiency": 0.9},
-    "CageMotor": {"tau_a": 5.0, "tau_s": 4.0, "tau_k": 6.0, "n_k": 80.0, "n_sync": 100.0, "ratio": 1.5, "t_off": 0.3},
-    "TableMotor": {"curve": sw.Table([0.0, 50.0, 100.0], [5.0, 6.0, 0.0]), "ratio": 1.5, "efficiency": 0.9},
-    "FrequencyDrive": {"tau_k": 5.0, "s_k": 0.3, "n_sync": 100.0, "t_ramp": 0.3, "f_end": 80.0, "boost": 0.2},
-    "PullOutDrive": {"tau_k": 5.0, "s_k": 0.3, "n_sync": 60.0, "overspeed": 2.0, "efficiency": 0.9},
-    "SpeedController": {"omega_ref": 4.0, "k_p": 1.0, "t_i": 3.0, "tau_max": 50.0},
-    "CoulombLoad": {"tau": 2.0, "omega_s": 0.3},
-    "HardStop": {"upper": 0.1, "c": 50.0},
-    "LossyGear": {"ratio": 2.5, "efficiency": 0.8},
-    "DCMachine": {"k": 0.4, "R": 1.5, "L": 0.3},
-    "SpeedSource": {"omega": sympy.sin(3 * sw.t)},
-    "VoltageSource": {"u": sympy.cos(3 * sw.t)},
-    "TorqueSource": {"tau": 2 - sw.omega},
-    "ForceSource": {"f": 2 - sw.v},
-    "CurrentSource": {"i": 1 - sw.u},
-}
-
-
-def _registered() -> list[str]:
-    return [name for name, kind in REGISTRY.items() if kind.__module__.startswith("shaftwork.")]
-
-
 def _in_a_test_bed(name: str) -> sw.Solution:
-    """The component with a moving store behind a lossy element at every port, and a push that starts the motion."""
-    kind = REGISTRY[name]
-    numbers = {key: 1.5 for key, declared in kind.declared.items() if declared.required}
-    net = sw.Network(f"test bed of {name}")
-    nodes = [f"n{k}" for k in range(len(kind.ports))]
-    net.add(kind("subject", **{**numbers, **VALUES.get(name, {})}), *nodes)
-    for k, (port, node) in enumerate(zip(kind.ports, nodes, strict=True)):
-        push = 3.0 - k
-        # a curve over speed needs the speed of a store, or it would stand in an equation that has no explicit solution
-        direct = len(kind.ports) == 1 and kind.role in ("source", "loss")
-        far = node if direct else f"far{k}"
-        if port.domain is ELECTRICAL:
-            net.add(sw.CurrentSource(f"push{k}", i=push), far, "ground")
-            net.add(sw.Capacitor(f"store{k}", C=0.3), far, "ground")
-            net.add(sw.Resistor(f"loss{k}", R=0.8), far, node)
-        elif port.domain is TRANSLATION:
-            net.add(sw.ForceSource(f"push{k}", f=push), far)
-            net.add(sw.Mass(f"store{k}", m=0.3), far)
-            net.add(sw.TranslationalDamper(f"loss{k}", d=0.8), far, node)
-        else:
-            assert port.domain in (ROTATION, None)
-            net.add(sw.TorqueSource(f"push{k}", tau=push), far)
-            net.add(sw.Inertia(f"store{k}", J=0.3), far)
-            net.add(sw.Damper(f"loss{k}", d=0.8), far, "ground" if direct else node)
-    return net.simulate(0.4, t_eval=401, rtol=1e-11)
+    return bed_of(name).simulate(0.4, t_eval=401, rtol=1e-11)
 
 
-@pytest.mark.parametrize("name", _registered())
+@pytest.mark.parametrize("name", registered())
 def test_a_component_absorbs_what_it_stores_and_loses(name: str) -> None:
     """Power at the ports = d(energy)/dt + heat, for every component; a source "loses" what it supplies, negative.
 
@@ -289,7 +238,7 @@ def test_a_component_absorbs_what_it_stores_and_loses(name: str) -> None:
         assert "subject" in sol.observer.stored(sol.t, sol.x, sol.dense)
 
 
-@pytest.mark.parametrize("name", _registered())
+@pytest.mark.parametrize("name", registered())
 def test_the_signals_of_a_component_multiply_to_its_power(name: str) -> None:
     """Across times through, summed over the ports with the signs of the sign page, is what the part absorbs."""
     sol, kind = _in_a_test_bed(name), REGISTRY[name]

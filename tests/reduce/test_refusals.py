@@ -28,8 +28,6 @@ VALUES: dict[str, dict[str, Any]] = {
 }
 ONE_WAY = {"AveragedBLDC", "BLDCMotor", "Hoist", "InductionMachine", "SpeedController"}
 """They have a direction, one node and no sign that could turn it."""
-NOWHERE = {"BucketWheelLoad"}
-"""Its buckets are counted by its own angle."""
 BUILT_IN = {name: kind for name, kind in REGISTRY.items() if kind.__module__.startswith("shaftwork.")}
 
 
@@ -44,10 +42,9 @@ def seen(kind: type[sw.Component], scale: Scale) -> Any:
 def test_every_mechanical_component_is_referred_or_refused(name: str) -> None:
     kind = BUILT_IN[name]
     if any(port.domain in (ROTATION, TRANSLATION) for port in kind.ports):
-        assert isinstance(seen(kind, Scale(-2.5)), str) is (name in ONE_WAY | NOWHERE)
-        if name in ONE_WAY | NOWHERE:
-            # a machine of one pole pair is one of two pairs at half its speed, and there is none of two and a half
-            assert isinstance(seen(kind, Scale(2.0)), str) is (name in NOWHERE)
+        assert isinstance(seen(kind, Scale(-2.5)), str) is (name in ONE_WAY)
+        # a machine of one pole pair is one of two pairs at half its speed, and there is none of two and a half
+        assert not isinstance(seen(kind, Scale(2.0)), str)
 
 
 def test_a_part_whose_law_does_not_scale_so_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:

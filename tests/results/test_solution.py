@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import shaftwork as sw
+from shaftwork.scenes import SCENES
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +54,17 @@ def test_twist_is_torque_over_stiffness_and_node_speeds_are_part_speeds(sol: sw.
     assert sol["shaft.phi_rel"] == pytest.approx(sol["shaft.tau_c"] / 24206.0)
     assert sol["wheel.omega"] == pytest.approx(sol["J2.omega"])
     assert sol["shaft.tau"] == pytest.approx(sol["shaft.tau_c"] + 14.0 * sol["shaft.omega_rel"])
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_state_is_the_quantity_of_its_name_as_it_follows_from_the_equations(name: str) -> None:
+    found = SCENES[name].build().compile().simulate(t_end=0.2, t_eval=21)
+    for state in found.states:
+        if state in found:
+            again = found.observer.signal(state, found.t, found.x, found.dense)
+            assert np.array_equal(found[state], found.x[:, found.states.index(state)])
+            # recovered through trees and loops: rounding
+            np.testing.assert_allclose(again, found[state], rtol=1e-12, atol=1e-12 * np.abs(found[state]).max())
 
 
 def test_energy_is_supplied_stored_and_lost(sol: sw.Solution) -> None:

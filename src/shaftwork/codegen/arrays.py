@@ -58,7 +58,7 @@ class BoundArrays:
     def values(self, t: Any, x: Array) -> tuple[Array, Array]:
         """Outputs y and inputs u at states x, (n,) or (n, k) with t (k,)."""
         if self.loops is not None:
-            return self._values_with_loops(self.loops, t, x)
+            return self.loops.inputs_at(t, x, self.loops.solve(t, x))[:2]
         inputs = self.program.inputs
         y = self._outputs(t, x)
         return y, inputs.values(t, y, x, self.p)
@@ -78,13 +78,6 @@ class BoundArrays:
         """What jumps or bends a law where its sign changes, (k, m), at times (k,) and states (k, n)."""
         y = self._outputs(t, x.T) if self.loops is None else self.values(t, x.T)[0]
         return self.program.inputs.switches(t, y, x.T, self.p).T
-
-    def _values_with_loops(self, loops: LoopSolver, t: Any, x: Array) -> tuple[Array, Array]:
-        if x.ndim == 1:
-            return loops.inputs_at(t, x, loops.solve(t, x))[:2]
-        columns = [self._values_with_loops(loops, time, state) for time, state in zip(t, x.T, strict=True)]
-        y, u = zip(*columns, strict=True)
-        return np.array(y).T, np.array(u).T
 
     def rhs(self, t: Any, x: Array) -> Array:
         """x' at time t, (n,); or (n, k) for states (n, k) at times (k,)."""

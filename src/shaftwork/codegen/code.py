@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache, reduce
 from typing import Any
 
@@ -19,6 +20,7 @@ from shaftwork.core.errors import CompileError
 SETTINGS = {"fully_qualified_modules": False, "inline": True, "allow_unknown_functions": True, "order": "none"}
 SCALAR = {**vars(math), **NUMERICAL}
 VECTORISED = {**vars(np), "reduce": reduce, **NUMERICAL}
+SHARED = re.compile(r"\bs\d+\b")
 KEPT = 4096
 """Functions of single laws that are kept: the same ones come back in every set of equations."""
 
@@ -105,7 +107,72 @@ def scalar(
     """
     if not isinstance(arguments, Mapping):
         arguments = {f"v{k}": symbol for k, symbol in enumerate(arguments)}
-    known: dict[Basic, str] = {}
+    printer, lines = _reading(arguments, expressions)
+    return _function(printer, lines, tuple(arguments), expressions, SCALAR)
+
+
+def bindable(
+    arguments: Mapping[str, Symbol | Sequence[Symbol]],
+    parameters: Mapping[str, Sequence[Symbol]],
+    first: Sequence[Expr],
+    second: Sequence[Expr],
+) -> Callable[..., tuple[Callable[..., Any], Callable[..., Any]]]:
+    """Two lists of expressions as functions of floats, for values of the parameters that are given once.
+
+    The one gives both lists, the other the second alone; where a value is none, all of them are nan.
+
+    Args:
+        arguments: by names for the code, a symbol or those of the floats in a list.
+        parameters: the same, of what is bound.
+        first: expressions.
+        second: expressions.
+    """
+    both = (*first, *second)
+    printer, bound = _reading(parameters, both)
+    own, read = _reading(arguments, both)
+    printer.known |= own.known
+    shared = _shared(printer, both)
+    lists = [[printer.doprint(made) for made in made_of] for made_of in (first, second)]
+    inner = [
+        *_guarded("both", arguments, read, shared, lists),
+        *_guarded("one", arguments, read, shared, lists[1:]),
+        "return both, one",
+    ]
+    return _compiled("bind", tuple(parameters), [*bound, *inner], SCALAR)
+
+
+def _guarded(
+    name: str, arguments: Iterable[str], read: list[str], shared: Mapping[str, str], lists: list[list[str]]
+) -> list[str]:
+    """The lines of a function that returns lists, of nan where a value is none."""
+    needed = _needed(shared, [text for texts in lists for text in texts])
+    found = ", ".join(f"[{', '.join(texts)}]" for texts in lists)
+    none = ", ".join(f"[nan] * {len(texts)}" for texts in lists)
+    lines = [*read, *(f"{part} = {shared[part]}" for part in shared if part in needed), f"return {found}"]
+    return [
+        f"def {name}({', '.join(arguments)}):",
+        "    try:",
+        *(f"        {line}" for line in lines),
+        "    except (ArithmeticError, ValueError):",
+        f"        return {none}",
+    ]
+
+
+def _needed(shared: Mapping[str, str], texts: Iterable[str]) -> set[str]:
+    """The names of shared parts that stand in texts, or in such parts."""
+    needed = set[str]()
+    found = {name for text in texts for name in SHARED.findall(text)}
+    while found:
+        needed |= found
+        found = {name for part in found for name in SHARED.findall(shared[part])} - needed
+    return needed
+
+
+def _reading(
+    arguments: Mapping[str, Symbol | Sequence[Symbol]], expressions: Sequence[Expr]
+) -> tuple[_Scalar, list[str]]:
+    """A printer that knows the symbols of arguments by name, and the lines that read them from lists."""
+    known: dict[Symbol, str] = {}
     lines = []
     used = set[Basic]().union(*(made.free_symbols for made in expressions))
     for name, given in arguments.items():
@@ -115,7 +182,7 @@ def scalar(
         taken = {symbol: k for k, symbol in enumerate(given) if symbol in used}
         lines += [f"{name}{k} = {name}[{k}]" for k in taken.values()]
         known |= {symbol: f"{name}{k}" for symbol, k in taken.items()}
-    return _function(_Scalar(known), lines, tuple(arguments), expressions, SCALAR)
+    return _Scalar(known), lines
 
 
 def vectorised(symbols: Sequence[Symbol], expression: Expr) -> Callable[..., Any]:
@@ -148,17 +215,28 @@ def _function(
     `sympy.lambdify` builds every expression anew to rename its symbols and to share its parts: most of the time in
     which a network is compiled. A printer that knows the names does without.
     """
-    for number, shared in enumerate(_repeated([found] if isinstance(found, Expr) else found)):
-        lines.append(f"s{number} = {printer.doprint(shared)}")
-        printer.known[shared] = f"s{number}"
+    shared = _shared(printer, [found] if isinstance(found, Expr) else found)
+    lines += [f"{name} = {code}" for name, code in shared.items()]
     results = printer.doprint(found) if isinstance(found, Expr) else f"[{', '.join(map(printer.doprint, found))}]"
-    lines.append(f"return {results}")
-    source = f"def function({', '.join(arguments)}):\n" + "".join(f"    {line}\n" for line in lines)
+    return _compiled("function", arguments, [*lines, f"return {results}"], names)
+
+
+def _compiled(name: str, arguments: tuple[str, ...], lines: list[str], names: dict[str, Any]) -> Callable[..., Any]:
+    source = f"def {name}({', '.join(arguments)}):\n" + "".join(f"    {line}\n" for line in lines)
     made: dict[str, Any] = {}
     exec(compile(source, "<equations>", "exec"), names, made)  # noqa: S102 (of our own making, from expressions)
-    function: Callable[..., Any] = made["function"]
+    function: Callable[..., Any] = made[name]
     function.__doc__ = source
     return function
+
+
+def _shared(printer: Any, expressions: Sequence[Expr]) -> dict[str, str]:
+    """The code of what stands in expressions more than once, by the names that the printer knows from here on."""
+    found = {}
+    for number, shared in enumerate(_repeated(expressions)):
+        found[f"s{number}"] = printer.doprint(shared)
+        printer.known[shared] = f"s{number}"
+    return found
 
 
 def _repeated(expressions: Sequence[Expr]) -> list[Basic]:

@@ -82,6 +82,10 @@ class HeyokaProgram:
         """Values of the guards (k,); arguments as for `switch_values`."""
         return self._values("guards", self.guards, t, x, parameters)
 
+    def slopes(self, t: float, x: Array, parameters: Array) -> Array:
+        """Derivatives of the states (n,); arguments as for `switch_values`."""
+        return self._values("rows", self.rows, t, x, parameters)
+
     def _values(self, name: str, expressions: tuple[Any, ...], t: float, x: Array, parameters: Array) -> Array:
         if name not in self._functions:
             import heyoka

@@ -133,6 +133,33 @@ class Inputs:
                 by_y += [(found, group.inputs, places) for found, places in pairs if found is not None]
         return _matrix(by_y, (self.size, self.outputs)), _matrix(by_x, (self.size, self.states))
 
+    def along(self, t: Any, y: Array, x: Array, p: Array, by_y: Array, by_x: Array | None = None) -> Array:
+        """The slopes of u by q variables, (m, q); with t (k,), y (outputs, k) and x (n, k) it is (m, q, k).
+
+        Args:
+            t: time, s.
+            y: outputs.
+            x: states.
+            p: parameter vector.
+            by_y: (outputs, q) the slopes of the outputs by the variables.
+            by_x: (n, q) those of the states; None where they are zero.
+        """
+        result = np.zeros((self.size, by_y.shape[1], *x.shape[1:]))
+        t = np.float64(t)
+        with np.errstate(all="ignore"):
+            for group in self._groups:
+                if not (group.outputs.size or group.reads.size):
+                    continue
+                _, across, integral, *others = group.slopes
+                moved = ((across, group.outputs, by_y), (integral, group.integrals, by_x))
+                reads = ((function, places, by_y) for function, places in zip(others, group.reads, strict=True))
+                read = _read(group, y, x, p)
+                for function, places, by in (*moved, *reads):
+                    if function is not None and places.size and by is not None:
+                        made = function(t, *read) + np.zeros((group.inputs.size, *x.shape[1:]))
+                        result[group.inputs] += np.einsum("i...,iq->iq...", made, by[places])
+        return result
+
     @property
     def linear(self) -> bool:
         """Whether every input is linear in all that it reads, with constant slopes."""

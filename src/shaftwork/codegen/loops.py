@@ -6,7 +6,8 @@ variable of a law that is in the tree. With g the values of all laws,
     link:  a - g(y) = 0,    tree:  P x + Q u - g(y) = 0,    y = C x + D u.
 
 They are solved by Newton's method with the exact slopes, starting from the last solution, so that a motion stays on its
-branch where there are several.
+branch where there are several. Along a motion each instant starts from the one before: all start from guesses at once,
+and those whose guess was another one start once more, until all have started from where the one before them ended.
 """
 
 from __future__ import annotations
@@ -23,6 +24,12 @@ from shaftwork.codegen.matrices import LinearPart
 
 ITERATIONS, HALVINGS = 50, 30
 ROUNDING = 1e-14
+NEARLY = 1e4 * ROUNDING
+"""Residuals and steps up to which they are rounding where no step makes the residual smaller, as parts of the terms."""
+SAME = 1e-9
+"""Part of the largest unknowns by which two starts may differ and be the same."""
+AT_ONCE = 2_000_000
+"""Slopes, inputs by loops by instants, that are made at once."""
 
 
 class LoopSolver:
@@ -44,36 +51,80 @@ class LoopSolver:
         self._P, self._Q = part.tree_law_x.toarray(), part.tree_law_u.toarray()
         self._last = np.zeros(len(places))
 
-    def solve(self, t: float, x: Array) -> Array:
-        """The unknowns a (loops,) at a time and state; NaN where Newton's method finds none."""
-        a = self._last
-        residual, size = self.residual(t, x, a)
-        for _ in range(ITERATIONS):
-            if (np.abs(residual) <= ROUNDING * size).all():
-                break
-            slope, _ = self.slopes(t, x, a)
-            step = np.linalg.lstsq(slope, -residual, rcond=None)[0]
-            for _ in range(HALVINGS):
-                trial, trial_size = self.residual(t, x, a + step)
-                if np.linalg.norm(trial) < np.linalg.norm(residual):
-                    break
-                step = step / 2
-            else:  # no step makes it smaller: either this is rounding, or there is no solution near
-                if (np.abs(residual) <= 1e4 * ROUNDING * size).all():
-                    break
-                return np.full_like(a, np.nan)
-            a, residual, size = a + step, trial, trial_size
-        self._last = a
-        return a
+    def solve(self, t: Any, x: Array) -> Array:
+        """The unknowns a (loops,) at a time and state; (loops, k) at times (k,) and states (n, k) of a motion.
+
+        They are NaN where Newton's method finds none.
+        """
+        if x.ndim == 1:
+            return self._followed(np.array([t]), x[:, None])[:, 0]
+        size = max(1, AT_ONCE // (self._inputs.size * len(self.places)))
+        blocks = (slice(first, first + size) for first in range(0, len(t), size))
+        return np.concatenate([self._followed(t[block], x[:, block]) for block in blocks], axis=1)
 
     def start_from(self, a: Array) -> None:
         """Begin the next solution at these unknowns."""
         self._last = a
 
-    def inputs_at(self, t: float, x: Array, a: Array) -> tuple[Array, Array, Array]:
-        """Outputs y, inputs u and law values g for given unknowns."""
+    def _followed(self, t: Array, x: Array) -> Array:
+        """The unknowns (loops, k), those of each instant by Newton's method from those of the one before."""
+        starts = np.tile(self._last[:, None], len(t))
+        a = self._newton(t, x, starts)
+        if len(t) == 1:
+            self._last = a[:, 0] if np.isfinite(a).all() else self._last
+            return a
+        while True:
+            known = np.column_stack([self._last, a])
+            found = np.where(np.isfinite(known).all(axis=0), np.arange(known.shape[1]), 0)
+            ends = known[:, np.maximum.accumulate(found)]  # where there is no solution, the last one that there was
+            least = SAME * np.abs(ends).max(axis=1, keepdims=True)
+            other = np.flatnonzero((np.abs(ends[:, :-1] - starts) > least).any(axis=0))
+            if not other.size:
+                self._last = ends[:, -1]
+                return a
+            starts[:, other] = ends[:, other]
+            a[:, other] = self._newton(t[other], x[:, other], starts[:, other])
+
+    def _newton(self, t: Array, x: Array, starts: Array) -> Array:
+        """The unknowns (loops, k) from starts, each on its own; NaN where none are found."""
+        a = starts.copy()
+        residual, size = self.residual(t, x, a)
+        going, near = np.ones(len(t), dtype=bool), np.zeros(a.shape, dtype=bool)
+        for _ in range(ITERATIONS):
+            going &= ~(np.abs(residual) <= ROUNDING * size).all(axis=0)
+            if not going.any():
+                break
+            here = np.flatnonzero(going)
+            step, solves = self._step(t[here], x[:, here], a[:, here], residual[:, here])
+            near[:, here] = solves & (np.abs(step) <= NEARLY * np.abs(a[:, here]))
+            norm = np.linalg.norm(residual, axis=0)
+            for _ in range(HALVINGS):
+                trial = a[:, here] + step
+                left, terms = self.residual(t[here], x[:, here], trial)
+                better = np.linalg.norm(left, axis=0) < norm[here]
+                taken = here[better]
+                a[:, taken], residual[:, taken], size[:, taken] = trial[:, better], left[:, better], terms[:, better]
+                here, step = here[~better], step[:, ~better] / 2
+                if not here.size:
+                    break
+            going[here] = False  # no step makes it smaller: either this is rounding, or there is no solution near
+        return np.where((near | (np.abs(residual) <= NEARLY * size)).all(axis=0), a, np.nan)
+
+    def _step(self, t: Array, x: Array, a: Array, residual: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Newton's step (loops, k), NaN where a slope is not finite; and whether (k,) it takes the residual away."""
+        slope = np.moveaxis(self._by_loops(t, x, a)[0], -1, 0)
+        known = np.isfinite(slope).all(axis=(1, 2))
+        step = np.full_like(residual, np.nan)
+        inverse = np.linalg.pinv(slope[known], rcond=len(a) * np.finfo(float).eps)
+        step[:, known] = -np.einsum("kij,jk->ik", inverse, residual[:, known])
+        left = residual + np.einsum("kij,jk->ik", slope, step)
+        return step, np.linalg.norm(left, axis=0) < 0.5 * np.linalg.norm(residual, axis=0)
+
+    def inputs_at(self, t: Any, x: Array, a: Array) -> tuple[Array, Array, Array]:
+        """Outputs y, inputs u and law values g for given unknowns, at one instant or at k."""
         inputs, part = self._inputs, self._part
-        known = np.where(inputs.of_time, inputs.values(t, np.zeros(inputs.outputs), x, self._p), 0.0)
+        known = inputs.values(t, np.zeros((inputs.outputs, *x.shape[1:])), x, self._p)
+        known[~inputs.of_time] = 0.0
         known[self.places] = a
         y = part.C @ x[: inputs.states] + self._D @ known
         if self._controls.size:  # they read nothing that depends on others of their kind
@@ -83,8 +134,8 @@ class LoopSolver:
         u[self.places] = a
         return y, u, g
 
-    def residual(self, t: float, x: Array, a: Array) -> tuple[Array, Array]:
-        """What is left of the equations (loops,), and the size of their terms."""
+    def residual(self, t: Any, x: Array, a: Array) -> tuple[Array, Array]:
+        """What is left of the equations, and the size of their terms; both are as a, (loops,) or (loops, k)."""
         _, u, g = self.inputs_at(t, x, a)
         left, size = a - g[self.places], np.abs(a) + np.abs(g[self.places])
         if self._tree.any():
@@ -94,24 +145,41 @@ class LoopSolver:
             size[self._tree] = terms + np.abs(g[self.places[self._tree]])
         return left, size + np.finfo(float).tiny
 
-    def slopes(self, t: float, x: Array, a: Array) -> tuple[Array, Array]:
-        """The residual by a (loops, loops), and all inputs u by the states through the loops (m, n)."""
-        inputs = self._inputs
+    def _by_loops(self, t: Any, x: Array, a: Array) -> tuple[Array, Array]:
+        """The residual (loops, loops) and the inputs (m, loops) by the unknowns; at k instants with a last axis k."""
+        own = np.eye(len(self.places))
+        return self._total(own, self._slopes(t, x, a, self._D[:, self.places]))
+
+    def _slopes(self, t: Any, x: Array, a: Array, through_y: Array, through_x: Array | None = None) -> Array:
+        """Of all laws by q variables that move the outputs and the states; (m, q), or at k instants (m, q, k)."""
         y, _, _ = self.inputs_at(t, x, a)
-        by_y, by_x = (made.toarray() for made in inputs.slopes(t, y, x, self._p))
-        through = by_y @ self._D[:, self._controls]
-        by_state, by_loop = by_y @ self._part.C.toarray() + by_x, by_y @ self._D[:, self.places]
-        by_state, by_loop = (made + through @ made[self._controls] for made in (by_state, by_loop))
-        u_state, u_loop = by_state.copy(), by_loop.copy()
-        u_state[self.places], u_loop[self.places] = 0.0, np.eye(len(self.places))
-        r_loop, r_state = np.eye(len(self.places)) - by_loop[self.places], -by_state[self.places]
+        made = self._inputs.along(t, y, x, self._p, through_y, through_x)
+        if not self._controls.size:
+            return made
+        by_controls = self._inputs.along(t, y, x, self._p, self._D[:, self._controls])
+        return np.asarray(made + np.einsum("mc...,cq...->mq...", by_controls, made[self._controls]))
+
+    def _total(self, own: Array, by: Array, states: Array | None = None) -> tuple[Array, Array]:
+        """The residual and the inputs by q variables.
+
+        Args:
+            own: (loops, q) the unknowns by them.
+            by: (m, q) or (m, q, k) the laws by them.
+            states: (n, q) the states by them; None where they do not move them.
+        """
+        own = own.reshape(*own.shape, *(1,) * (by.ndim - 2))
+        u, left = by.copy(), own - by[self.places]
+        u[self.places] = own
         if self._tree.any():
-            tree = self.places[self._tree]
-            r_loop[self._tree] = self._Q @ u_loop - by_loop[tree]
-            r_state[self._tree] = self._P + self._Q @ u_state - by_state[tree]
-        return r_loop, u_state - u_loop @ np.linalg.lstsq(r_loop, r_state, rcond=None)[0]
+            left[self._tree] = np.tensordot(self._Q, u, 1) - by[self.places[self._tree]]
+            left[self._tree] += 0.0 if states is None else self._P @ states
+        return left, u
 
     def jacobian(self, t: float, x: Array) -> Any:
         """d rhs / d x as scipy.sparse.csc_array (n, n)."""
-        _, by_state = self.slopes(t, x, self.solve(t, x))
-        return sparse.csc_array(self._part.A + self._part.B @ sparse.csr_array(by_state))
+        a, size, part = self.solve(t, x), self._inputs.states, self._part
+        r_loop, u_loop = self._by_loops(t, x, a)
+        by_state = self._slopes(t, x, a, part.C.toarray(), np.eye(size))
+        r_state, u_state = self._total(np.zeros((len(a), size)), by_state, np.eye(size))
+        total = u_state - u_loop @ np.linalg.lstsq(r_loop, r_state, rcond=None)[0]
+        return sparse.csc_array(part.A + part.B @ sparse.csr_array(total))

@@ -12,7 +12,7 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.recovery import History, signals_of
 from shaftwork.codegen.timeline import NOTHING, Timeline
 from shaftwork.codegen.waves import Carrying, Dense, along_lines
-from shaftwork.components.base import Profile, Signal
+from shaftwork.components.base import Component, Profile, Signal
 from shaftwork.core.domains import ROTATION
 from shaftwork.core.errors import SignalError
 from shaftwork.network.graph import CircuitGraph, GraphPart
@@ -36,7 +36,7 @@ class ModelObserver:
     def __init__(self, form: StateForm, bind: Callable[[], BoundArrays], instants: Timeline = NOTHING) -> None:
         self._form, self._bind, self._instants = form, bind, instants
         self._graph: CircuitGraph = form.graph
-        self._last: tuple[tuple[int, int], History] | None = None
+        self._last: tuple[Array, Array, History] | None = None
 
     @cached_property
     def _signals(self) -> dict[str, tuple[GraphPart, Signal]]:
@@ -63,10 +63,9 @@ class ModelObserver:
 
     def history(self, t: Array, x: Array) -> History:
         """All branch quantities along a trajectory; the last one asked for is kept."""
-        key = (id(t), id(x))
-        if self._last is None or self._last[0] != key:
-            self._last = (key, History(self._bind(), self._instants.one_sided(t), x))
-        return self._last[1]
+        if self._last is None or self._last[0] is not t or self._last[1] is not x:
+            self._last = t, x, History(self._bind(), self._instants.one_sided(t), x)
+        return self._last[2]
 
     def _read(self, t: Array, x: Array, read: Callable[[History], Array]) -> Array:
         """What is read of a trajectory; of a large one in blocks of times, since all branches take much memory."""
@@ -164,6 +163,19 @@ class ModelObserver:
         lost = {part.name: history.lost(part) for part in parts if part.component.role != "source"}
         supplied = {part.name: -history.lost(part) for part in parts if part.component.role == "source"}
         return lost, supplied
+
+    def part(self, name: str) -> Component:
+        """A component of the network, with the parameter values of this motion.
+
+        Raises:
+            SignalError: there is none of this name.
+        """
+        known = {part.name: part for part in self._graph.parts}
+        if name not in known:
+            raise SignalError(f"There is no part '{name}' in '{self._graph.name}'. There are: {', '.join(known)}.")
+        made, p = known[name].component, self._bind().p
+        places = known[name].parameters
+        return made.changed(**{key: float(p[places[key]]) for key in made.declared if key in places})
 
 
 def _unit(signal: Signal) -> str:

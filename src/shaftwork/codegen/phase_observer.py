@@ -15,6 +15,7 @@ from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.stores import Stores
 from shaftwork.codegen.timeline import Timeline
 from shaftwork.codegen.waves import Dense
+from shaftwork.components.base import Component
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,16 +44,21 @@ class Stretch:
 
 
 class Stretches:
-    """All phases of a motion, by time.
+    """All phases of a motion, by time; each is made when it is first read.
 
     Args:
-        stretches: in their order, none of them empty.
+        starts: of each phase, s, not falling.
+        make: makes a phase by its number.
     """
 
-    def __init__(self, stretches: Sequence[Stretch]) -> None:
-        self.all = tuple(stretches)
-        self.starts = np.array([made.start for made in stretches])
-        self.names = self.all[0].stores.names
+    def __init__(self, starts: Sequence[float], make: Callable[[int], Stretch]) -> None:
+        self.starts, self._make = np.array(starts), make
+        self._made: dict[int, Stretch] = {}
+
+    def __getitem__(self, number: int) -> Stretch:
+        if number not in self._made:
+            self._made[number] = self._make(number)
+        return self._made[number]
 
     def groups(self, t: Array) -> Iterator[tuple[tuple[Stretch, ...], Index]]:
         """Phases with equal equations, and the places of the times (k,) in them.
@@ -64,18 +70,18 @@ class Stretches:
         index = index - twice
         keys: dict[Any, list[int]] = {}
         for number in np.unique(index).tolist():
-            keys.setdefault(self.all[number].key, []).append(number)
+            keys.setdefault(self[number].key, []).append(number)
         for numbers in keys.values():
             places = np.flatnonzero(np.isin(index, numbers))
-            yield tuple(self.all[number] for number in numbers), places
+            yield tuple(self[number] for number in numbers), places
 
     def dense(self, t: Array) -> Array:
         """(k, stores) all that is stored at times (k,)."""
         t = np.atleast_1d(np.asarray(t, dtype=float))
-        made = np.empty((t.size, len(self.names)))
+        made = np.empty((t.size, len(self[0].stores.names)))
         index = np.clip(np.searchsorted(self.starts, t, side="right") - 1, 0, None)
         for number in np.unique(index).tolist():
-            stretch, places = self.all[number], np.flatnonzero(index == number)
+            stretch, places = self[number], np.flatnonzero(index == number)
             made[places] = stretch.stores.of(stretch.bind, t[places], stretch.dense(t[places]))
         return made
 
@@ -108,7 +114,7 @@ class PhaseObserver:
 
     @property
     def _first(self) -> ModelObserver:
-        return self._stretches.all[0].observer
+        return self._stretches[0].observer
 
     @property
     def units(self) -> Mapping[str, str]:
@@ -142,6 +148,10 @@ class PhaseObserver:
         """Lost power and supplied power by part."""
         lost = self._by_part(t, x, lambda observer, times, states: observer.powers(times, states)[0])
         return lost, self._by_part(t, x, lambda observer, times, states: observer.powers(times, states)[1])
+
+    def part(self, name: str) -> Component:
+        """A component of the network, with the parameter values of this motion."""
+        return self._first.part(name)
 
     def _by_part(
         self, t: Array, x: Array, read: Callable[[ModelObserver, Array, Array], dict[str, Array]]

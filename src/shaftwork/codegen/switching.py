@@ -50,6 +50,7 @@ class _Switch:
         places: of its parameters in the parameter vector.
         line: from their values to slope and offset, or None where the argument is not linear in time.
         value: from times (k,) and their values to the argument (k,).
+        shown: the argument in the symbols of the network.
         whole: the line passes a level at every whole number, and these are not in `levels`.
         acts: it is in the law of a branch, and not in what ends a mode alone.
     """
@@ -60,6 +61,7 @@ class _Switch:
     places: tuple[int, ...]
     line: Callable[..., Sequence[float]] | None
     value: Callable[..., Any]
+    shown: Expr
     whole: bool = False
     acts: bool = True
 
@@ -74,7 +76,7 @@ class Switching:
     def __init__(self, form: StateForm) -> None:
         self._switches = tuple(_switches(form))
         self._places = sorted({place for switch in self._switches for place in switch.places})
-        self._found: dict[tuple[bytes, float, float], Timeline] = {}
+        self._found: dict[tuple[bytes, float, float, bool], Timeline] = {}
 
     def known(self, p: Array) -> tuple[float, ...]:
         """Times in s of switches that are linear in time, increasing: they are known without a run.
@@ -90,8 +92,20 @@ class Switching:
         whole = (switch for switch in self._switches if switch.whole and switch.acts and _straight(switch, p)[0])
         return tuple(dict.fromkeys(switch.part for switch in whole))
 
-    def timeline(self, p: Array, t0: float, t_end: float) -> Timeline:
-        """The instants of a run from t0 to t_end in s with a parameter vector.
+    def passed(self, p: Array, before: float, after: float, *, modes: bool = False) -> tuple[Expr, ...]:
+        """What makes the law of a branch jump or bend between two times in s, in the symbols of the network.
+
+        Args:
+            p: parameter vector.
+            before: s.
+            after: s.
+            modes: also what ends a mode.
+        """
+        made, times = (one for one in self._switches if one.acts or modes), np.array([before, after])
+        return tuple(dict.fromkeys(one.shown for one in made if np.ptp(_sides(one, p)(times))))
+
+    def timeline(self, p: Array, t0: float, t_end: float, *, modes: bool = True) -> Timeline:
+        """The instants of a run from t0 to t_end in s with a parameter vector; without `modes` those of laws alone.
 
         Law: a switch that is linear in time, or the sine of something linear, is solved for it. Any other is sampled at
         times that are spread without a pattern, until four times as many show no more changes of side; where it only
@@ -102,10 +116,10 @@ class Switching:
         """
         if not self._switches:
             return NOTHING
-        key = (p[self._places].tobytes(), t0, t_end)
+        key = (p[self._places].tobytes(), t0, t_end, modes)
         if key not in self._found:
             found: list[tuple[float, float]] = []
-            for switch in self._switches:
+            for switch in (one for one in self._switches if one.acts or modes):
                 if switch.line is None:
                     found += _searched(switch, p, t0, t_end)
                 else:
@@ -124,6 +138,8 @@ def _switches(form: StateForm) -> Iterator[_Switch]:
     for part, law, parameters, acts in _laws(form):
         if law not in found:
             moving = switches(law) if law.has(TIME) else ()
+            if not acts and line(law) is not None:  # the mode ends at that very time
+                moving = (*moving, (law, (0.0,)))
             found[law] = tuple((argument, levels) for argument, levels in moving if argument.has(TIME))
         for argument, levels in found[law]:
             symbols = tuple(symbol for symbol in parameters if argument.has(symbol))
@@ -160,6 +176,7 @@ def _made(
         places,
         None if straight is None else scalar(symbols, straight),
         vectorised((TIME, *symbols), argument),
+        argument.xreplace({symbol: Symbol(f"{part.name}.{symbol.name}", real=True) for symbol in symbols}),
         whole is not None,
     )
 
@@ -207,23 +224,39 @@ def _on_a_line(switch: _Switch, levels: Array, p: Array) -> list[tuple[float, fl
 
 def _searched(switch: _Switch, p: Array, t0: float, t_end: float) -> list[tuple[float, float]]:
     """Times in s at which a switch changes sides in a run, and the reach of their rounding."""
-    values = [float(p[place]) for place in switch.places]
-
-    def argument(t: Array) -> Array:
-        with np.errstate(all="ignore"):
-            return np.broadcast_to(np.asarray(switch.value(t, *values), dtype=float), t.shape)
-
-    def sides(t: Array) -> NDArray[np.intp]:
-        x = argument(t)
-        found = np.searchsorted(switch.levels, x, side="left") + np.searchsorted(switch.levels, x, side="right")
-        return np.where(np.isnan(x), -1, found)
-
+    argument, sides = _argument(switch, p), _sides(switch, p)
     t = _sampled(sides, t0, t_end)
     if t is None:
         raise _too_often(switch, t0, t_end)
     if switch.levels.size == 1:
         t = np.sort(np.append(t, _nearest(lambda at: np.abs(argument(at) - switch.levels[0]), t)))
     return _changes(sides, t)
+
+
+def _argument(switch: _Switch, p: Array) -> Callable[[Array], Array]:
+    """The argument of a switch at times (k,)."""
+    values = [float(p[place]) for place in switch.places]
+
+    def argument(t: Array) -> Array:
+        with np.errstate(all="ignore"):
+            return np.broadcast_to(np.asarray(switch.value(t, *values), dtype=float), t.shape)
+
+    return argument
+
+
+def _sides(switch: _Switch, p: Array) -> Sides:
+    """The sides of a switch, of one that passes every whole number those of the line."""
+    if switch.whole:
+        slope, offset = _straight(switch, p)
+        return lambda t: np.floor(slope * t + offset).astype(np.intp)
+    argument = _argument(switch, p)
+
+    def sides(t: Array) -> NDArray[np.intp]:
+        x = argument(t)
+        found = np.searchsorted(switch.levels, x, side="left") + np.searchsorted(switch.levels, x, side="right")
+        return np.where(np.isnan(x), -1, found)
+
+    return sides
 
 
 def _sampled(sides: Sides, t0: float, t_end: float) -> Array | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -14,7 +15,7 @@ from sympy import Expr
 from shaftwork.components.branches import Branch, End
 from shaftwork.components.modes import Modes
 from shaftwork.core.domains import ELECTRICAL, ROTATION, Domain
-from shaftwork.core.errors import ParameterError, ShaftworkError
+from shaftwork.core.errors import NetworkWarning, ParameterError, ShaftworkError
 from shaftwork.core.parameters import Parameter, parameter
 
 Role = Literal["store", "loss", "source", "coupling"]
@@ -141,6 +142,12 @@ class Component:
     def inner_ports(self) -> tuple[Port, ...]:
         """The nodes inside the part; by default the same for all parts of the class."""
         return self.inner
+
+    def changed(self, **values: Any) -> Self:
+        """The same part with other values, of which its author has been warned already."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", NetworkWarning)
+            return dataclasses.replace(self, **values)
 
     @property
     def values(self) -> dict[str, Any]:

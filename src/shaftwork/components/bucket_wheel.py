@@ -91,18 +91,19 @@ class Buckets(int):
 class BucketWheelLoad(Component):
     """The torque of a bucket wheel that digs: of each bucket in the soil, with a random resistance for each pass.
 
-    Law: torque on the node -radius edge sum_j k_j f(psi_j) tanh(omega / omega_s) over the buckets in the soil. Bucket
-    pass j begins at the angle phi = 2 pi j / buckets, its own angle psi_j goes on from zero, and f = sin(psi) up to
-    pi/2, then (alpha - psi) / (alpha - pi/2), and zero from alpha on. k_j = max(0, k_1 + sigma nu_j) is drawn for each
-    pass from the soil's normal distribution. So the torque is a function of the angle and the seed, and continuous.
-    From `t_on` on the wheel digs, to its full depth after `rise`. The soil in the buckets is left out, as there. At
-    rest it holds nothing: a wheel that is pushed in the soil creeps, at the speed below omega_s where the law balances
-    the push.
+    Law: torque on the node -(radius edge / ratio) sum_j k_j f(psi_j) tanh(omega / (ratio omega_s)) over the buckets in
+    the soil. Bucket pass j begins at the angle phi / ratio = 2 pi j / buckets of the wheel, its own angle psi_j goes on
+    from zero, and f = sin(psi) up to pi/2, then (alpha - psi) / (alpha - pi/2), and zero from alpha on.
+    k_j = max(0, k_1 + sigma nu_j) is drawn for each pass from the soil's normal distribution. So the torque is a
+    function of the angle and the seed, and continuous. From `t_on` on the wheel digs, to its full depth after `rise`.
+    The soil in the buckets is left out, as there. At rest it holds nothing: a wheel that is pushed in the soil creeps,
+    at a speed below omega_s where the law balances the push.
     Source: Marinkovic 2012, (9)-(11), algorithm of 6 steps, table 1.
     """
 
     radius: float = parameter("m", "of the cutting edges", above=0, latex="R")
     edge: float = parameter("m", "mean length of an edge in the soil", at_least=0, latex="l")
+    ratio: float = parameter("1", "node speed over wheel speed", nonzero=True, default=1.0, latex="i")
     alpha: float = parameter(
         "rad", "angle at which a bucket leaves the soil", above=1.5708, at_most=3.1416, default=2.0, latex=r"\alpha"
     )
@@ -118,7 +119,7 @@ class BucketWheelLoad(Component):
 
     @property
     def mean_torque(self) -> float:
-        """Mean over many passes in N m: radius edge k_1 buckets (2 + alpha - pi/2) / (4 pi)."""
+        """Mean over many passes in N m, at the wheel: radius edge k_1 buckets (2 + alpha - pi/2) / (4 pi)."""
         radius, edge, alpha = (
             self.declared[name].magnitude(getattr(self, name))[0] for name in ("radius", "edge", "alpha")
         )
@@ -132,12 +133,13 @@ class BucketWheelLoad(Component):
 
     def branches(self, p: Any) -> Iterator[Branch]:
         pitch = 2 * pi / p.buckets
-        last = floor(INTEGRAL / pitch)
+        angle, speed = INTEGRAL / p.ratio, ACROSS / p.ratio
+        last = floor(angle / pitch)
         force = sum(
-            _resistance(last - k, p) * _profile(INTEGRAL - pitch * (last - k), k, p)
+            _resistance(last - k, p) * _profile(angle - pitch * (last - k), k, p)
             for k in range((p.buckets + 1) // 2)  # alpha is at most pi: only half of the buckets are in the soil
         )
-        yield ThroughLaw(_depth(p) * p.radius * p.edge * force * tanh(ACROSS / p.omega_s))
+        yield ThroughLaw(_depth(p) * p.radius * p.edge / p.ratio * force * tanh(speed / p.omega_s))
 
 
 def _resistance(number: Expr, p: Any) -> Expr:

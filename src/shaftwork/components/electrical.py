@@ -12,6 +12,7 @@ from shaftwork.components.branches import ACROSS, AcrossLaw, AcrossStore, Branch
 from shaftwork.components.friction import STUCK, conducting
 from shaftwork.components.laws import t
 from shaftwork.components.modes import ANEW, Leave, Mode, Modes
+from shaftwork.components.switching import refuse_no_time_on
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.parameters import parameter
 
@@ -85,9 +86,9 @@ class CurrentSource(Component):
 class Switch(Component):
     """An ideal switch between two nodes of a circuit.
 
-    Law: u = 0 while closed, i = 0 while open. It closes at t_on, or when `on` rises above zero, and opens at t_off.
-    Modes: open, closed. A current that an inductance drives is cut off at once, with its energy lost in the switch; a
-    diode beside the inductance lets it flow on.
+    Law: u = 0 while closed, i = 0 while open. It closes at t_on, or when `on` rises above zero, and opens for good at
+    t_off, which must be later than t_on. Modes: open, closed. A current that an inductance drives is cut off at once,
+    with its energy lost in the switch; a diode beside the inductance lets it flow on.
     """
 
     t_on: float = parameter("s", "time at which it closes", default=0.0, latex=r"t_{on}")
@@ -98,6 +99,9 @@ class Switch(Component):
 
     role: ClassVar[Role] = "loss"
     ports: ClassVar = TERMINALS
+
+    def __post_init__(self) -> None:
+        refuse_no_time_on(self, "closes")
 
     def modes(self, p: Any) -> Iterator[Modes]:
         begins = t - p.t_on if p.on is None else p.on if p.t_on == 0 else Min(t - p.t_on, p.on)

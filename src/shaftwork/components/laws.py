@@ -161,6 +161,9 @@ class _TableFunction(sympy.Function):  # type: ignore[misc]
     def _eval_is_real(self) -> bool | None:
         return self.argument.is_extended_real  # type: ignore[no-any-return]
 
+    def _eval_evalf(self, _precision: int) -> sympy.Expr:
+        return self.func(self.argument.evalf(), self.table)
+
 
 class Interpolation(_TableFunction):
     """`Table(x, y)(argument)` as a sympy expression; the points are `.xs` and `.ys`."""
@@ -281,7 +284,7 @@ def switches(expression: sympy.Basic) -> Iterator[tuple[sympy.Expr, Sequence[flo
     One that is constant but for steps of `floor` passes its levels there alone, and is left out.
     """
     for node in sympy.preorder_traversal(expression):
-        yield from ((argument, levels) for argument, levels in _switches(node) if not _only_steps(argument))
+        yield from ((argument, levels) for argument, levels in switches_of(node) if not _only_steps(argument))
 
 
 def pieces_degree(expression: sympy.Expr) -> int | None:
@@ -299,7 +302,7 @@ def _degree(expression: sympy.Expr) -> float:
         return 0
     if t not in between_steps(expression):
         return 0 if all(line(step.args[0]) is not None for step in expression.atoms(sympy.floor)) else math.inf
-    if any(line(argument) is None for argument, _ in _switches(expression)):
+    if any(line(argument) is None for argument, _ in switches_of(expression)):
         return math.inf
     match expression:
         case sympy.Symbol():
@@ -321,7 +324,7 @@ def _degree(expression: sympy.Expr) -> float:
     return math.inf
 
 
-def _switches(node: sympy.Basic) -> Iterable[tuple[sympy.Expr, Sequence[float]]]:
+def switches_of(node: sympy.Basic) -> Iterable[tuple[sympy.Expr, Sequence[float]]]:
     """Arguments of a node and the levels at which the node is not smooth in them."""
     match node:
         case Relational():

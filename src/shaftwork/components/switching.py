@@ -52,8 +52,12 @@ def number_of(part: Component, name: str) -> float | None:
     return value if objection is None and isinstance(value, float) else None
 
 
-def refuse_no_time_on(part: Component) -> None:
-    """Refuse times between which a part never gives torque.
+def refuse_no_time_on(part: Component, does: str = "gives torque") -> None:
+    """Refuse times between which a part never does anything.
+
+    Args:
+        part: with `t_on` and `t_off`.
+        does: what it then never does.
 
     Raises:
         ParameterError: `t_off` is not later than `t_on`.
@@ -62,5 +66,5 @@ def refuse_no_time_on(part: Component) -> None:
     if start is not None and end is not None and end <= start:
         raise ParameterError(
             f"{type(part).__name__} '{part.name}': t_off = {end:g} s is not later than t_on = {start:g} s, so that it "
-            "never gives torque. Give t_off > t_on, or leave one of them out."
+            f"never {does}. Give t_off > t_on, or leave one of them out."
         )

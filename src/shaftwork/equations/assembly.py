@@ -47,6 +47,11 @@ def rising_first(terms: Iterable[Expr]) -> Terms:
     return tuple(sorted(kept, key=lambda term: bool(term.could_extract_minus_sign())))
 
 
+def terms_of(total: Expr) -> tuple[Expr, ...]:
+    """The terms of a sum."""
+    return tuple(total.args) if total.is_Add else (total,)
+
+
 def tidy(expression: Expr) -> Expr:
     """The expression with sums of negative terms inside products turned round: -(-1 - i) x is (1 + i) x."""
     if not (expression.is_Add or expression.is_Mul or (expression.is_Pow and expression.exp.is_even)):
@@ -125,7 +130,7 @@ class Assembly:
     def stored(self, branch: int) -> Expr:
         """The through variable of an across store or of a coupling."""
         if self.form.graph.branches[branch].terms:
-            return self.quantities.multiplier(branch)
+            return self.quantities.multiplier_sign(branch) * self.quantities.multiplier(branch)
         across = self.quantities.across(self.ends(branch))
         sign = -1 if across.could_extract_minus_sign() else 1
         return sign * self.quantities.law(branch) * rate_of(sign * across)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import zip_longest
@@ -61,11 +61,11 @@ class Blocks:
         equations = self.equations
         domains = dict.fromkeys(equations.form.graph.domains)
         balanced = " and ".join(", ".join(BALANCES[domain] for domain in domains).rsplit(", ", 1))
-        nodes = [row for number, row in enumerate(equations.nodes) if number not in self._inside]
-        balances = (summed.balance() for summed in self._sums)
+        nodes = [row for number, row in enumerate(equations.nodes) if number not in self.inside]
+        balances = (summed.balance() for summed in self.sums)
         yield Block(f"Balance of {balanced} at the nodes", (*self._lines(nodes), *balances))
-        loops = [row for row in equations.loops if equations.assembly.ends(row.link)[0] not in self._twists]
-        twists = (line for summed in self._sums for line in summed.loops())
+        loops = [row for row in equations.loops if equations.assembly.ends(row.link)[0] not in self.twists]
+        twists = (line for summed in self.sums for line in summed.loops())
         yield Block("Speeds around the loops", (*self._lines(loops), *twists))
         around = {_to_rounding(row.expression) for row in equations.loops}  # only asked for membership
         said = [(_to_rounding(row.expression), _to_rounding(-row.expression)) for row in equations.couplings]
@@ -77,7 +77,7 @@ class Blocks:
     def derived(self) -> Block:
         """The definitions of the letters that stand for several parameters; nothing where numbers are printed."""
         definitions = {} if self.values else self.equations.definitions
-        weights = (WEIGHTS,) if self._sums else ()
+        weights = (WEIGHTS,) if self.sums else ()
         return Block(
             "Derived quantities",
             (*(self.writer.line(sides(symbol, (law,))) for symbol, law in definitions.items()), *weights),
@@ -85,19 +85,22 @@ class Blocks:
         )
 
     @cached_property
-    def _sums(self) -> tuple[Sums, ...]:
+    def sums(self) -> tuple[Sums, ...]:
+        """The shafts whose rows are printed as sums."""
         return sums_of(self.equations.assembly.quantities, self.writer)
 
     @cached_property
-    def _inside(self) -> frozenset[int]:
-        return frozenset(node for summed in self._sums for node in summed.inside)
+    def inside(self) -> frozenset[int]:
+        """The nodes between the ends of these shafts."""
+        return frozenset(node for summed in self.sums for node in summed.inside)
 
     @cached_property
-    def _twists(self) -> frozenset[int]:
-        return frozenset(node for summed in self._sums for node in summed.twists)
+    def twists(self) -> frozenset[int]:
+        """The nodes whose speeds are rates of twist of these shafts."""
+        return frozenset(node for summed in self.sums for node in summed.twists)
 
     def _is_summed(self, row: StateEquation) -> bool:
-        return self.equations.assembly.ends(row.branches[0])[0] in self._inside | self._twists
+        return self.equations.assembly.ends(row.branches[0])[0] in self.inside | self.twists
 
     def state(self, *, laws: bool = True) -> Iterator[Block]:
         """Rates of the states, what stands in them, and what was eliminated.
@@ -109,7 +112,7 @@ class Blocks:
         shown = [row.sides if row.explicit and len(row.groups) <= 1 else row.coupled for row in rows]
         coupled = any(made is not row.sides for made, row in zip(shown, rows, strict=True))
         remark = "Rates that stand together on a left side are coupled by inertias or springs." if coupled else ""
-        summed = (line for made in self._sums for line in made.states())
+        summed = (line for made in self.sums for line in made.states())
         yield Block("State equations", (*map(self.writer.line, shown), *summed), remark)
         algebraic = [row for row in self.equations.eliminated if row.kind == "algebraic"]
         standing = self._laws_in_states() if laws else ()
@@ -127,7 +130,7 @@ class Blocks:
         yield Block("Equations of motion", lines)
         flows = self.equations.assembly.quantities.flows
         known = [flow for flow in flows if self.equations.assembly.quantities.through(flow) in form.laws]
-        laws = [line for flow in known for line in self._law(flow, form.across)]
+        laws = [line for flow in known for line in self.law(flow, form.across)]
         assembly = self.equations.assembly
         for end, other in assembly.opposite.items():
             across = assembly.quantities.across(assembly.ends(other)).xreplace(form.across)
@@ -153,13 +156,16 @@ class Blocks:
 
     def _motions(self, form: SecondOrder) -> Iterator[Line]:
         """Row by row; shafts whose ends are coordinates have one row for all inside."""
-        nodes = self.equations.form.graph.nodes
-        free = frozenset(form.nodes)
-        summed = [made for made in self._sums if {nodes[made.part.nodes[end]] for end in ("a", "b")} <= free]
+        nodes, summed = self.equations.form.graph.nodes, self.summed_between(form.nodes)
         inside = {nodes[node] for made in summed for node in made.inside}
         yield from (self._motion(form, row) for row, node in enumerate(form.nodes) if node not in inside)
         for made in summed:
             yield from made.motion()
+
+    def summed_between(self, free: Collection[str]) -> tuple[Sums, ...]:
+        """The shafts whose rows are printed as sums in the equations of motion: the nodes at both ends are free."""
+        nodes = self.equations.form.graph.nodes
+        return tuple(made for made in self.sums if {nodes[made.part.nodes[end]] for end in ("a", "b")} <= set(free))
 
     def _motion(self, form: SecondOrder, row: int) -> Line:
         left = self.writer.pieces((Group(Integer(1), tuple(map(tidy, form.terms(row)))),))
@@ -199,7 +205,7 @@ class Blocks:
         for row in self.equations.laws:
             flow = self.equations.assembly.quantities.flow_of[row.branches[0]]
             if row.left == self.equations.assembly.quantities.through(flow):
-                yield from self._law(flow, {})
+                yield from self.law(flow, {})
             elif not row.trivial:
                 yield self.writer.line(row.sides)
 
@@ -211,7 +217,7 @@ class Blocks:
             across = assembly.quantities.across((flow.plus, flow.minus))
             sign = -1 if across.could_extract_minus_sign() else 1
             known = sign * Add(*assembly.around(flow.branches[0]))
-            yield from self._law(flow, {} if across == 0 else {sign * across: known})
+            yield from self.law(flow, {} if across == 0 else {sign * across: known})
         for source in self.equations.form.across_sources:
             prescribed = assembly.law_of_source(source)
             if prescribed.groups[0].terms != (prescribed.left,):
@@ -219,7 +225,7 @@ class Blocks:
         for end, other in assembly.opposite.items():
             yield self.writer.line(assembly.law_of_history(end, Add(*assembly.around(other))))
 
-    def _law(self, flow: Flow, known: Mapping[Expr, Expr]) -> Iterator[Line]:
+    def law(self, flow: Flow, known: Mapping[Expr, Expr]) -> Iterator[Line]:
         """A flow's law, and the letters in it; nothing where the law is a parameter alone."""
         symbol = self.equations.assembly.quantities.through(flow)
         shared, terms = self._split[flow]

@@ -184,7 +184,8 @@ class _Writer:
 
     def _reactions(self) -> Iterator[Eliminated]:
         for branch in self.form.tree.tree[Kind.COUPLING]:
-            make = partial(self._carried, self.assembly.quantities.multiplier, branch)
+            sign = self.assembly.quantities.multiplier_sign(branch)
+            make = partial(self._carried, self.assembly.quantities.multiplier, branch, sign)
             ideal = "" if self.graph.branches[branch].template.through else "is ideal: it "
             why = f"{self.part(branch)} {ideal}takes whatever the balance asks"
             yield Eliminated(*self._cutset(branch), make, f"reaction of {self.part(branch)}", why, "reaction")
@@ -196,8 +197,8 @@ class _Writer:
     def _cutset(self, branch: int) -> Origin:
         return self.origin((branch, *(link for link, _ in self.assembly.cutsets.get(branch, ()))))
 
-    def _carried(self, symbol: Callable[[int], Expr], branch: int) -> Sides:
-        return sides(symbol(branch), self.assembly.out_of(branch))
+    def _carried(self, symbol: Callable[[int], Expr], branch: int, sign: int = 1) -> Sides:
+        return sides(symbol(branch), (sign * term for term in self.assembly.out_of(branch)))
 
     def _supplied(self, branch: int) -> Sides:
         flow = self.assembly.quantities.flow_of[branch]

@@ -1,175 +1,345 @@
-"""Lagrange's equations of a mechanical network, from its energies alone.
+"""Lagrange's equations of a network, from its energies alone.
 
-An independent way to the second-order form: coordinates come from the couplings by linear algebra, the equations from
+An independent way to the equations of motion: coordinates come from the couplings by linear algebra, the equations from
 differentiating kinetic and potential energy, Rayleigh's dissipation function and virtual work. Neither the normal tree
-nor the matrices of the second-order form are used. Source: Abdelkader 2016, (18)-(31).
+nor Kirchhoff's laws are used. In the analogy the coordinate of an electrical node is its flux linkage, so that circuits
+have energies like drive trains: a capacitor's is kinetic, a coil's potential. Source: Abdelkader 2016, (18)-(31).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
-import numpy as np
-from sympy import Add, Expr, Float, Integer, Matrix, Rational, Symbol, cancel
+from sympy import Add, Expr, Integer, Rational, Symbol, cancel, expand
 
-from shaftwork.components.branches import ACROSS, INTEGRAL
+from shaftwork.components.branches import ACROSS, HISTORY, INTEGRAL
 from shaftwork.components.laws import t as TIME
-from shaftwork.core.domains import ELECTRICAL
-from shaftwork.core.errors import CompileError
-from shaftwork.equations.quantities import Quantities, rate_of, refuse_controlled
-from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch
+from shaftwork.equations.assembly import Group, Sides, rising_first, sides, terms_of, tidy
+from shaftwork.equations.coordinates import Coordinates, coordinates, is_prescribed
+from shaftwork.equations.motion import Motion
+from shaftwork.equations.quantities import rate_of
+from shaftwork.equations.records import Equations, Row
+from shaftwork.equations.second_order import linear_stiffness
+from shaftwork.network.graph import GROUND, GraphBranch
 from shaftwork.network.templates import Kind
 
-INDEPENDENT = 1e-9
-"""A coupling whose row is within this of the rows before it says nothing new."""
+if TYPE_CHECKING:  # the record proves and prints itself through these modules
+    from shaftwork.equations.lagrange_proof import Proof
+
+
+class Square(NamedTuple):
+    """Half of a coefficient times the square of a position or speed: an energy, or half of a loss.
+
+    Args:
+        branch: number of the branch.
+        coefficient: inertia, stiffness or damping.
+        along: what is squared.
+    """
+
+    branch: int
+    coefficient: Expr
+    along: Expr
+
+    @property
+    def energy(self) -> Expr:
+        """The whole term."""
+        return Rational(1, 2) * self.coefficient * self.along**2
+
+    def pull(self, symbol: Symbol) -> Group:
+        """Minus the term differentiated: a torque."""
+        return Group(tidy(-self.coefficient * self.along.diff(symbol)), rising_first(terms_of(self.along)))
+
+
+@dataclass(frozen=True, eq=False)
+class MotionEquation(Row):
+    """Lagrange's equation of a coordinate, solved for the rate of its momentum: d/dt(dT/dq') = Q - dV/dq - dR/dq'.
+
+    Args:
+        node: the node whose angle, position or flux linkage the coordinate is.
+        coordinate: its symbol q.
+        force: the generalised force Q.
+        displacements: for each node that moves with the coordinate by how much: its position differentiated by q.
+    """
+
+    node: str
+    coordinate: Symbol
+    force: Expr
+    displacements: Mapping[str, Expr]
+
+
+@dataclass(frozen=True, eq=False)
+class Constraint(Row):
+    """What a part imposes on the rates by a reaction that does work: a gear with losses, a controlled voltage.
+
+    Args:
+        reaction: the torque, force or current with which it does so; it stands in the generalised forces.
+    """
+
+    reaction: Symbol
 
 
 @dataclass(frozen=True, eq=False)
 class Lagrangian:
     """The energies of a network and the equations of motion that follow.
 
+    Law: d/dt(dL/dq') - dL/dq + dR/dq' = Q with L = T - V. Angles are counted from the untwisted position.
+
     Args:
-        coordinates: generalised coordinates: angles and positions of nodes.
-        kinetic: kinetic energy T of inertias and masses.
-        potential: potential energy V of springs.
-        dissipation: Rayleigh's function R of linear dampers, half of the power that they lose.
-        forces: generalised force of laws and sources by virtual work, for each coordinate.
-        equations: d/dt(dT/dq') - dT/dq + dR/dq' + dV/dq - Q, zero along every motion.
+        kirchhoff: Kirchhoff's equations of the same network, in the same phase.
+        coordinates: generalised coordinates q: angles, positions and flux linkages of nodes.
+        inertias: kinetic energies of inertias and masses (and of capacitors).
+        springs: potential energies of springs and of laws that are linear in the twist (and of coils).
+        dampers: terms of Rayleigh's function: of linear dampers (and resistors), half of the power that each loses.
+        equations: the equation of each coordinate, with its generalised force.
+        constraints: what couplings with losses and controlled sources impose besides, each with a reaction in `forces`.
+        reactions: torques, forces and currents of couplings and prescribed speeds, which do no work and stand nowhere.
+        laws: torques, forces and currents that stand in `forces`, in coordinates and rates.
+        motion: every other quantity of Kirchhoff's equations in coordinates and rates: speeds, torques of springs.
+        prescribed: speed of every prescribed angle or position.
     """
 
+    kirchhoff: Equations
     coordinates: tuple[Symbol, ...]
-    kinetic: Expr
-    potential: Expr
-    dissipation: Expr
-    forces: tuple[Expr, ...]
-    equations: tuple[Expr, ...]
+    inertias: tuple[Square, ...]
+    springs: tuple[Square, ...]
+    dampers: tuple[Square, ...]
+    equations: tuple[MotionEquation, ...]
+    constraints: tuple[Constraint, ...]
+    reactions: tuple[Symbol, ...]
+    laws: Mapping[Symbol, Expr]
+    motion: Mapping[Symbol, Expr]
+    prescribed: Mapping[Symbol, Expr]
+
+    @cached_property
+    def kinetic(self) -> Expr:
+        """Kinetic energy T."""
+        return Add(*(square.energy for square in self.inertias))
+
+    @cached_property
+    def potential(self) -> Expr:
+        """Potential energy V."""
+        return Add(*(square.energy for square in self.springs))
+
+    @cached_property
+    def dissipation(self) -> Expr:
+        """Rayleigh's function R, half of the power that linear dampers lose."""
+        return Add(*(square.energy for square in self.dampers))
+
+    @property
+    def forces(self) -> tuple[Expr, ...]:
+        """Generalised force Q of each coordinate: laws and sources by virtual work, in their symbols."""
+        return tuple(row.force for row in self.equations)
 
     @property
     def lagrangian(self) -> Expr:
         """L = T - V."""
         return self.kinetic - self.potential
 
+    @property
+    def velocities(self) -> tuple[Symbol, ...]:
+        """The rates of the coordinates."""
+        return tuple(map(rate_of, self.coordinates))
 
-def lagrangian(graph: CircuitGraph) -> Lagrangian:
-    """Lagrange's equations of a network of rotating and translating parts.
+    @property
+    def phase(self) -> str:
+        """The mode of every part that changes its mode, "gap open, load stuck", for which the equations hold."""
+        return self.kirchhoff.phase
 
-    Raises:
-        CompileError: the network has electrical nodes, or a law reads others.
+    def proof(self) -> Proof:
+        """That these are Kirchhoff's equations: every one compared, with the symbolic difference, which is zero."""
+        from shaftwork.equations.lagrange_proof import prove
+
+        return prove(self)
+
+    def latex(self, *, values: bool = False) -> str:
+        """Energies, generalised forces and equations as the body of a LaTeX document (needs amsmath).
+
+        Args:
+            values: print the parameters' values instead of their symbols.
+        """
+        from shaftwork.equations.lagrange_print import body
+
+        return body(self, values=values)
+
+    def _repr_latex_(self) -> str:
+        from shaftwork.equations.lagrange_print import notebook
+
+        return notebook(self)
+
+
+def lagrangian(equations: Equations) -> Lagrangian:
+    """Lagrange's equations of the network that Kirchhoff's are given of; of these only the network is read."""
+    return _Writer(equations).made()
+
+
+class Torque(NamedTuple):
+    """What a branch takes from nodes, and the position on which that does work.
+
+    Args:
+        branch: number of the branch.
+        size: the torque, force or current.
+        along: position across the branch; of a coupling with losses the sum that its torques work on.
     """
-    if ELECTRICAL in graph.domains:
-        raise CompileError(
-            f"Lagrange's equations are for mechanical networks, but '{graph.name}' has electrical nodes. "
-            "Take form='state'."
-        )
-    refuse_controlled(graph)
-    return _Energies(graph).made()
+
+    branch: int
+    size: Expr
+    along: Expr
 
 
-class _Energies:
-    def __init__(self, graph: CircuitGraph) -> None:
-        self.graph, self.quantities = graph, Quantities(graph)
-        self.free, self.position = _positions(graph, self.quantities)
-        self.coordinates = tuple(map(self.quantities.angle, self.free))
-        self.velocities = tuple(map(rate_of, self.coordinates))
-        self.speeds: dict[Symbol, Expr] = dict(zip(self.coordinates, self.velocities, strict=True))
-        for branch in graph.branches:
-            if branch.template.kind is Kind.ACROSS_SOURCE:
-                self.speeds[self.quantities.integral(branch.index)] = self.quantities.law(branch.index)
-
-    def across(self, branch: GraphBranch) -> tuple[Expr, Expr]:
-        """The position and the speed across a branch."""
-        position = self.position[branch.plus] - self.position[branch.minus]
-        return position, self.rate(position)
-
-    def rate(self, position: Expr) -> Expr:
-        """The time derivative of a position, by the chain rule."""
-        return Add(*(position.diff(symbol) * speed for symbol, speed in self.speeds.items()))
-
-    def energy(self, kind: Kind, of: int) -> Expr:
-        """Half the sum of coefficient times square of the position (`of` 0) or speed (1) across branches of a kind."""
-        branches = (branch for branch in self.graph.branches if branch.template.kind is kind)
-        squares = (self.quantities.law(branch.index) * self.across(branch)[of] ** 2 for branch in branches)
-        return Rational(1, 2) * Add(*squares)
-
-    def work(self, coordinate: Symbol) -> Expr:
-        """Generalised force: what laws and sources do along a small change of the coordinate."""
-        terms: list[Expr] = []
-        for branch in self.graph.branches:
-            if branch.template.kind in (Kind.LAW, Kind.THROUGH_SOURCE):
-                position, speed = self.across(branch)
-                law = self.quantities.law(branch.index).xreplace({ACROSS: speed, INTEGRAL: position})
-                terms.append(-law * position.diff(coordinate))
-        return Add(*terms)
+class _Writer:
+    def __init__(self, equations: Equations) -> None:
+        self.equations, self.quantities = equations, equations.assembly.quantities
+        self.graph = self.quantities.graph
+        self.coordinates = coordinates(self.quantities)
+        self.motion = Motion(self.coordinates)
+        self.inertias: list[Square] = []
+        self.springs: list[Square] = []
+        self.dampers: list[Square] = []
+        self.torques: list[Torque] = []
+        self.constraints: list[Constraint] = []
+        self.laws: dict[Symbol, Expr] = {}
 
     def made(self) -> Lagrangian:
-        kinetic, potential = self.energy(Kind.ACROSS_STORE, 1), self.energy(Kind.THROUGH_STORE, 0)
-        dissipation = self.energy(Kind.CONDUCTANCE, 1)
-        forces = tuple(map(self.work, self.coordinates))
-        equations = tuple(
-            self._momentum_rate(kinetic.diff(velocity))
-            - kinetic.diff(coordinate)
-            + dissipation.diff(velocity)
-            + potential.diff(coordinate)
-            - force
-            for coordinate, velocity, force in zip(self.coordinates, self.velocities, forces, strict=True)
+        for branch in self.graph.branches:
+            self._enter(branch)
+        equations = tuple(self._equations())
+        flows = (flow for flow in self.quantities.flows if self.quantities.through(flow) not in self.laws)
+        return Lagrangian(
+            self.equations,
+            self.coordinates.symbols,
+            tuple(self.inertias),
+            tuple(self.springs),
+            tuple(self.dampers),
+            equations,
+            tuple(self.constraints),
+            tuple(map(self._reaction, self.coordinates.imposed)),
+            self.laws,
+            {**self.motion.of_flows(flows), **self.motion.known},
+            self.coordinates.prescribed,
         )
-        return Lagrangian(self.coordinates, kinetic, potential, dissipation, forces, equations)
 
-    def _momentum_rate(self, momentum: Expr) -> Expr:
-        by_speed = (momentum.diff(velocity) * rate_of(velocity) for velocity in self.velocities)
-        by_position = (momentum.diff(position) * speed for position, speed in self.speeds.items())
-        return Add(*by_speed, *by_position, momentum.diff(TIME))
+    @cached_property
+    def _accelerations(self) -> frozenset[Symbol]:
+        return frozenset(self.coordinates.accelerations)
+
+    def _reaction(self, branch: int) -> Symbol:
+        """What a coupling or prescribed speed gives."""
+        if self.graph.branches[branch].terms:
+            return self.quantities.multiplier(branch)
+        return self.quantities.through(self.quantities.flow_of[branch])
+
+    def _enter(self, branch: GraphBranch) -> None:
+        """Put a branch down as an energy, a loss, a torque or a constraint."""
+        law = self.quantities.law(branch.index)
+        match branch.template.kind:
+            case Kind.ACROSS_STORE:
+                self.inertias.append(Square(branch.index, law, self.motion.speed(branch)))
+            case Kind.THROUGH_STORE:
+                self.springs.append(Square(branch.index, law, self.motion.twist(branch)))
+            case Kind.CONDUCTANCE:
+                self.dampers.append(Square(branch.index, law, self.motion.speed(branch)))
+            case Kind.LAW | Kind.THROUGH_SOURCE:
+                self._enter_law(branch, law)
+            case Kind.ACROSS_SOURCE if not is_prescribed(branch):
+                reaction, sign = self._reaction(branch.index), self.quantities.flow_of[branch.index].sign
+                self._constrain(branch, reaction, self.motion.speed(branch), self.motion.of(law))
+                self.torques.append(Torque(branch.index, sign * reaction, self.motion.twist(branch)))
+            case Kind.COUPLING if branch.template.through:
+                reaction = self._reaction(branch.index)
+                speeds = self.coordinates.rate(self.motion.summed(branch, branch.terms))
+                self._constrain(branch, reaction, speeds, Integer(0))
+                self.torques.append(Torque(branch.index, reaction, self.motion.summed(branch, branch.balances)))
+
+    def _enter_law(self, branch: GraphBranch, law: Expr) -> None:
+        """What is linear in the twist is an energy; what is left a torque, by its symbol where it has one."""
+        flow, twist, whole = self.quantities.flow_of[branch.index], self.motion.twist(branch), True
+        if (stiffness := linear_stiffness(law)) != 0:
+            rest, whole = law.subs(INTEGRAL, 0), False
+            fixed = not branch.template.reads and not rest.has(ACROSS, TIME)
+            shift = expand(rest / stiffness) if fixed else Integer(0)
+            self.springs.append(Square(branch.index, stiffness, twist + shift))
+            law = Integer(0) if fixed else rest
+            if law == 0:
+                return
+        size, symbol = self.motion.by_law(branch, law), self.quantities.through(flow)
+        if branch.template.is_history:
+            self.laws[self.quantities.history(branch.index)] = self._history(branch)
+        if whole and len(flow.branches) == 1:
+            if symbol != flow.sign * size:
+                self.laws[symbol] = flow.sign * size
+            size = flow.sign * symbol
+        self.torques.append(Torque(branch.index, size, twist))
+
+    def _history(self, branch: GraphBranch) -> Expr:
+        """What arrives at an end of a line: what left the other end a delay ago."""
+        other = self.equations.assembly.opposite[branch.index]
+        speed, history = self.motion.speed(self.graph.branches[other]), self.quantities.history(other)
+        return self.quantities.printed(branch.index).xreplace({ACROSS: speed, HISTORY: history})
+
+    def _constrain(self, branch: GraphBranch, reaction: Symbol, left: Expr, right: Expr) -> None:
+        pairs = branch.terms or ((Integer(1), branch.plus, branch.minus),)
+        nodes = dict.fromkeys(node for _, *ends in pairs for node in ends if node != GROUND)
+        names, part = tuple(self.graph.nodes[node] for node in nodes), self.graph.part_of(branch.index).name
+        make = partial(sides, left, (right,))
+        self.constraints.append(Constraint((part,), (branch.index,), names, make, reaction))
+
+    def _equations(self) -> Iterator[MotionEquation]:
+        """The equation of every coordinate."""
+        at = self.coordinates
+        inertias, dampers = _by_symbol(self.inertias, at.velocities), _by_symbol(self.dampers, at.velocities)
+        springs, torques = _by_symbol(self.springs, at.symbols), _by_symbol(self.torques, at.symbols)
+        moved = _moved(at)
+        for node, symbol, velocity in zip(at.free, at.symbols, at.velocities, strict=True):
+            force = Add(*(-made.size * made.along.diff(symbol) for made in torques[symbol]))
+            stored = (*inertias[velocity], *springs[symbol], *dampers[velocity])
+            numbers = [*(made.branch for made in stored), *(made.branch for made in torques[symbol])]
+            branches = dict.fromkeys(sorted(numbers))
+            parts = dict.fromkeys(self.graph.part_of(branch).name for branch in branches)
+            pulls = [made.pull(symbol) for made in springs[symbol]]
+            pulls += [made.pull(velocity) for made in dampers[velocity]]
+            make = partial(self._sides, velocity, inertias[velocity], pulls, force)
+            origin = (tuple(parts), tuple(branches), tuple(moved[symbol]))
+            yield MotionEquation(*origin, make, self.graph.nodes[node], symbol, force, moved[symbol])
+
+    def _sides(self, velocity: Symbol, inertias: list[Square], pulls: list[Group], force: Expr) -> Sides:
+        """The rate of the momentum dT/dq', sorted by accelerations; what is prescribed of it counts as a torque."""
+        coefficients: dict[Symbol, list[Expr]] = {}
+        right = [*terms_of(force)]
+        for made in inertias:
+            rate, factor = self.coordinates.rate(made.along), made.coefficient * made.along.diff(velocity)
+            present = rate.free_symbols & self._accelerations
+            for symbol in present:
+                coefficients.setdefault(symbol, []).append(factor * rate.diff(symbol))
+            right.append(-factor * rate.xreplace(dict.fromkeys(present, Integer(0))))
+        left, (torques,) = sides(Add(*(Add(*terms) * symbol for symbol, terms in coefficients.items())), right)
+        groups = (group for group in (torques, *pulls) if group.terms)
+        return Sides(left, tuple(sorted(groups, key=lambda group: _falls(group.factor * group.terms[0]))))
 
 
-def _positions(graph: CircuitGraph, quantities: Quantities) -> tuple[tuple[int, ...], Mapping[int, Expr]]:
-    """Free nodes, and the position of every node in terms of theirs and of prescribed ones.
-
-    Nodes without inertia are solved for first, and of two nodes the one named later.
-    """
-    heavy = {
-        node
-        for branch in graph.branches
-        if branch.template.kind is Kind.ACROSS_STORE and GROUND in (branch.plus, branch.minus)
-        for node in (branch.plus, branch.minus)
-    }
-    order = sorted(range(len(graph.nodes)), key=lambda node: (node in heavy, -node))
-    rows = _independent(tuple(_constraints(graph, quantities, order)), graph.parameters)
-    position: dict[int, Expr] = {GROUND: Integer(0), **{node: quantities.angle(node) for node in order}}
-    if not rows:
-        return tuple(range(len(graph.nodes))), position
-    reduced, pivots = Matrix(rows).rref(iszerofunc=lambda entry: cancel(entry) == 0, simplify=cancel)
-    unknowns = [*(position[node] for node in order), Integer(1)]
-    for row, pivot in enumerate(pivots):
-        others = (reduced[row, k] * unknowns[k] for k in range(pivot + 1, len(unknowns)))
-        position[order[pivot]] = -Add(*others)
-    return tuple(sorted(set(range(len(order))) - {order[pivot] for pivot in pivots})), position
+def _falls(term: Expr) -> bool:
+    return bool(term.could_extract_minus_sign())
 
 
-def _constraints(graph: CircuitGraph, quantities: Quantities, order: list[int]) -> Iterator[list[Expr]]:
-    """Couplings and prescribed positions as rows of coefficients of the nodes in the given order; last the constant."""
-    for branch in graph.branches:
-        terms = branch.terms or ((Integer(1), branch.plus, branch.minus),)
-        if branch.template.kind not in (Kind.COUPLING, Kind.ACROSS_SOURCE):
-            continue
-        row = [Integer(0)] * (len(order) + 1)
-        for coefficient, plus, minus in terms:
-            for node, sign in ((plus, 1), (minus, -1)):
-                if node != GROUND:
-                    row[order.index(node)] += sign * graph.in_network_symbols(coefficient, branch)
-        if not branch.terms:
-            row[-1] = -quantities.integral(branch.index)
-        yield row
+def _moved(at: Coordinates) -> dict[Symbol, dict[str, Expr]]:
+    """For each coordinate the nodes that move with it, and by how much."""
+    moved: dict[Symbol, dict[str, Expr]] = {symbol: {} for symbol in at.symbols}
+    for number, name in enumerate(at.quantities.graph.nodes):
+        position = at.positions[number]
+        for symbol in position.free_symbols & moved.keys():
+            moved[symbol][name] = cancel(position.diff(symbol))
+    return moved
 
 
-def _independent(rows: tuple[list[Expr], ...], parameters: Mapping[str, float]) -> list[list[Expr]]:
-    """The rows that say something new for the given values of the ratios."""
-    values = {Symbol(name, real=True): Float(value) for name, value in parameters.items()}
-    kept: list[list[Expr]] = []
-    numbers: list[list[float]] = []
-    for row in rows:
-        candidate = [*numbers, [float(entry.xreplace(values)) for entry in row[:-1]]]
-        if np.linalg.matrix_rank(np.array(candidate), rtol=INDEPENDENT) == len(candidate):
-            kept.append(row)
-            numbers = candidate
-    return kept
+S = TypeVar("S", Square, Torque)
+
+
+def _by_symbol(found: Iterable[S], symbols: Iterable[Symbol]) -> dict[Symbol, list[S]]:
+    """For each symbol what contains it."""
+    made: dict[Symbol, list[S]] = {symbol: [] for symbol in symbols}
+    for item in found:
+        for symbol in item.along.free_symbols & made.keys():
+            made[symbol].append(item)
+    return made

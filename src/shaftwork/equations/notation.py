@@ -191,8 +191,9 @@ def _quantity_letters(form: StateForm, quantities: Quantities) -> Iterator[tuple
                 yield flow.part, _letter(quantities.store(index), quantity, template.label)
     for made in graph.branches:
         if made.template.kind is Kind.ACROSS_SOURCE:
-            domain = quantities.domain((made.plus, made.minus))
-            yield made.part, _letter(quantities.integral(made.index), domain.integral)
+            quantity, symbol = quantities.domain((made.plus, made.minus)).integral, quantities.integral(made.index)
+            _, _, label = symbol.name.partition(f".{quantity.name}_")
+            yield made.part, _letter(symbol, quantity, label)
         if made.template.is_history:
             line, _, end = made.template.label.partition("_")
             meaning = f"torque wave that arrives at {end}"

@@ -221,11 +221,13 @@ def _broken(line: Line, beside: float) -> list[str]:
         texts.append(rf"&\qquad {line.remark}")
     elif line.remark:
         texts[-1] += rf" \qquad {line.remark}"
-    return [_bracketed(text, whole=len(rows) == 1) for text in texts]
+    return [_bracketed(text) for text in texts]
 
 
-def _bracketed(text: str, *, whole: bool) -> str:
+def _bracketed(text: str) -> str:
     """Brackets that grow where they stand on one line, and of a fixed size where a line break parts them."""
+    places = [character for character in text if character in (OPENS, CLOSES)]
+    whole = places == [OPENS, CLOSES] * (len(places) // 2)
     opens, closes = (r"\left[", r"\right]") if whole else (r"\biggl[", r"\biggr]")
     if whole and r"\left(" not in text:
         opens, closes = r"\left(", r"\right)"

@@ -7,12 +7,14 @@ node a to its node b.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 from sympy import Expr, Integer, Symbol
 
+from shaftwork.components.branches import End
 from shaftwork.core.domains import ELECTRICAL, Domain, Quantity
 from shaftwork.core.errors import CompileError
 from shaftwork.network.controlled import readings_of
@@ -151,17 +153,37 @@ class Quantities:
 
     def angle(self, number: int) -> Symbol:
         """The angle, position or flux linkage of a node: the integral of its across variable."""
-        quantity = self.graph.domains[number].integral
-        owner = self.owners.get(number)
+        return self._angles[number]
+
+    @cached_property
+    def _angles(self) -> tuple[Symbol, ...]:
+        """Named after the part that defines the speed, and after the node where the part has several of that name."""
+        own = [self._own_angle(number) for number in range(len(self.graph.nodes))]
+        between = (branch for branch in self.graph.branches if branch.minus != GROUND)
+        read = (integral_name(self.graph, made) for made in between if made.index in self.graph.integrated[made.part])
+        counted = Counter((*own, *read))
+        named = zip(own, self.graph.domains, self.graph.nodes, strict=True)
+        names = (name if counted[name] == 1 else f"{domain.integral.name}({node})" for name, domain, node in named)
+        return tuple(Symbol(name, real=True) for name in names)
+
+    def _own_angle(self, number: int) -> str:
+        """The name of a node's angle after the part that defines its speed; of a node without one after the node."""
+        quantity, owner = self.graph.domains[number].integral, self.owners.get(number)
         if owner is None:
-            return Symbol(f"{quantity.name}({self.graph.nodes[number]})", real=True)
+            return f"{quantity.name}({self.graph.nodes[number]})"
         number_within = running_number(self.graph.branches[owner].template.label)
         ending = f"_{number_within}" if number_within else ""
-        return Symbol(f"{self.graph.part_of(owner).name}.{quantity.name}{ending}", real=True)
+        return f"{self.graph.part_of(owner).name}.{quantity.name}{ending}"
 
     def integral(self, branch: int) -> Symbol:
         """The integral of what is across a branch: of a law that reads it, or of a prescribed speed."""
-        return Symbol(integral_name(self.graph, self.graph.branches[branch]), real=True)
+        made, name = self.graph.branches[branch], integral_name(self.graph, self.graph.branches[branch])
+        if branch not in self.graph.integrated[made.part] and made.template.kind is Kind.ACROSS_SOURCE:
+            if self.owners.get(made.plus) == branch:
+                return self.angle(made.plus)
+            siblings = (self.graph.branches[index].template.kind for index in self.graph.parts[made.part].branches)
+            name += f"_{self._label(made)}" if sum(kind is Kind.ACROSS_SOURCE for kind in siblings) > 1 else ""
+        return Symbol(name, real=True)
 
     def through(self, flow: Flow) -> Symbol:
         """The through variable of a flow: a state, where it is a lone store; a parameter, where that is all its law."""
@@ -170,7 +192,9 @@ class Quantities:
             if first.template.kind is Kind.THROUGH_STORE:
                 return self.store(first.index)
             law = flow.sign * self.law(first.index)
-            if law.is_Symbol and first.template.kind is Kind.THROUGH_SOURCE and law.name in self.graph.parameters:
+            given = law.is_Symbol and first.template.kind is Kind.THROUGH_SOURCE and law.name in self.graph.parameters
+            # the torque of a part with modes has the same letter in all of them
+            if given and not self.graph.parts[flow.part].modes:
                 return law
         return self._named(flow.part, self.domain((flow.plus, flow.minus)).through, flow.label)
 
@@ -182,6 +206,15 @@ class Quantities:
         """The through variable of a coupling: a term of coefficient r takes r times it from its node."""
         part = self.graph.branches[branch].part
         return self._named(part, self.multiplier_quantity(branch), self.multiplier_label(branch))
+
+    def multiplier_sign(self, branch: int) -> int:
+        """The sign of that symbol, so that it means what the signal of its name does.
+
+        What holds a load at rest is then, as the load's torque while it moves, what it gives to its node.
+        """
+        made = self.graph.branches[branch]
+        terms = made.template.terms
+        return self._sign_between(self.graph.parts[made.part], terms[0][1:]) if len(terms) == 1 else 1
 
     def multiplier_label(self, branch: int) -> str:
         """What tells a coupling from the other branches of its part; empty where it is the only one."""
@@ -269,9 +302,10 @@ class Quantities:
             if branch.template.kind not in (Kind.COUPLING, Kind.ACROSS_STORE):
                 prescribes = branch.template.kind is Kind.ACROSS_SOURCE  # takes what the balance leaves, by no law
                 together.setdefault((branch.plus, branch.minus, prescribes), []).append(index)
-        labels = [
-            self._label(self.graph.branches[branches[0]]) if len(together) > 1 else "" for branches in together.values()
-        ]
+        joints = [self.graph.branches[index].terms for index in part.branches if self.graph.branches[index].terms]
+        held = any(len(terms) == 1 and (*terms[0][1:], False) in together for terms in joints)  # by a torque beside it
+        several = len(together) > 1 or held
+        labels = [self._label(self.graph.branches[branches[0]]) if several else "" for branches in together.values()]
         numbers = [running_number(label) or label for label in labels]
         alike = len(set(numbers)) < len(numbers)  # springs and dampers in different places: the numbers do not do
         for ((plus, minus, _), branches), label, brief in zip(together.items(), labels, numbers, strict=True):
@@ -285,8 +319,11 @@ class Quantities:
         templates = [self.graph.branches[index].template for index in branches]
         if any(template.kind is Kind.THROUGH_STORE for template in templates):
             return 1
+        return self._sign_between(part, templates[0].ends)
+
+    def _sign_between(self, part: GraphPart, ends: tuple[End, End]) -> int:
         signals = part.component.signals().values()
-        return next((s.sign for s in signals if s.kind == "through" and s.ends == templates[0].ends), 1)
+        return next((s.sign for s in signals if s.kind == "through" and s.ends == ends), 1)
 
     def _label(self, branch: GraphBranch) -> str:
         template, siblings = branch.template, self.graph.parts[branch.part].branches

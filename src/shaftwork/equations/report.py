@@ -32,7 +32,11 @@ BEGIN = r"""\date{}
 
 def body(equations: Equations, form: Form | None = None, *, values: bool = False) -> str:
     """The blocks of one form, or of Kirchhoff's equations and the state form, each under a paragraph heading."""
-    blocks = blocks_of(equations, form, values=values)
+    return typeset(equations, blocks_of(equations, form, values=values))
+
+
+def typeset(equations: Equations, blocks: Iterable[Block]) -> str:
+    """Blocks for a document, below the phase for which they hold."""
     return "\n".join(("\\allowdisplaybreaks", *_phase(equations), *map(_paragraph, blocks)))
 
 
@@ -47,7 +51,11 @@ def _paragraph(block: Block) -> str:
 
 def notebook(equations: Equations) -> str:
     """The body with headings that a notebook renders."""
-    blocks = blocks_of(equations, None, values=False)
+    return rendered(equations, blocks_of(equations, None, values=False))
+
+
+def rendered(equations: Equations, blocks: Iterable[Block]) -> str:
+    """Blocks for a notebook, below the phase for which they hold."""
     phase = (f"$\\textbf{{Phase}}$ {in_text(equations.phase)}\n",) if equations.phase else ()
     made = (f"$\\textbf{{{block.heading}}}$\n{_content(block)}" for block in blocks)
     return "\n".join((*phase, *made))

@@ -186,7 +186,7 @@ class _Writer:
         A law that is linear in the twist, as that of a gap in contact, is a stiffness, and what is left a torque.
         """
         law, whole = self.quantities.law(branch), True
-        if (stiffness := _stiffness(law)) != 0:
+        if (stiffness := linear_stiffness(law)) != 0:
             self._add_linear(branch, Kind.THROUGH_STORE, stiffness)
             law, whole = law.subs(INTEGRAL, 0), False
             if law == 0:
@@ -211,7 +211,7 @@ class _Writer:
             self.forces[i].append(-gain * law)
 
 
-def _stiffness(law: Expr) -> Expr:
+def linear_stiffness(law: Expr) -> Expr:
     """The slope of a law over the twist where it is the same everywhere, else 0."""
     if not law.has(INTEGRAL) or jumps(law, INTEGRAL):
         return Integer(0)

@@ -90,23 +90,65 @@ class Sums:
 
     def motion(self) -> Iterator[Line]:
         """The rows of the second-order form inside, and what the angles of the ends are called in them."""
-        angle, length = self.quantities.angle(self.part.nodes["1"]), ("length",)
+        angle = self._angle
         speed = rate_of(angle)
         pieces = [rf"{self._shown('line_inertia', 'length')} \, h_{{j}} \, {self._indexed(rate_of(speed), 'j')}"]
         if self._has("friction"):
             pieces.append(rf"+ {self._shown('friction', 'length')} \, h_{{j}} \, {self._indexed(speed, 'j')}")
-        for name, symbol in (("damping", speed), ("line_stiffness", angle)):
-            if name == "line_stiffness" or self._has(name):
-                twist = rf"\sum_{{i = 0}}^{{{self.degree}}} w_{{k,i}} \, {self._indexed(symbol, 'i')}"
-                outer = rf"\sum_{{k = 0}}^{{{self.degree - 1}}} \frac{{w_{{k,j}}}}{{\lambda_{{k}}}}"
-                pieces.append(rf"+ {self._shown(name, below=length)} {outer} {twist}")
+        pieces += (f"+ {torque}" for torque in self.elastic("j"))
         yield Line("", (*pieces, "= 0"), _range("j", 1, self.degree - 1), relation="")
-        for number, end in ((0, "a"), (self.degree, "b")):
+        for number, end in self.ends:
             symbol = self.writer.latex(self.quantities.angle(self.part.nodes[end]))
             yield Line("", (self._indexed(angle, str(number)), f"= {symbol}"), relation="")
 
+    def elastic(self, index: str) -> Iterator[str]:
+        """The torques of damping and stiffness against the motion of the node of an index."""
+        for name, symbol in self._twisting:
+            outer = rf"\sum_{{k = 0}}^{{{self.degree - 1}}} \frac{{w_{{k,{index}}}}}{{\lambda_{{k}}}}"
+            yield rf"{self._shown(name, below=('length',))} {outer} {self._twisted(symbol)}"
+
+    def kinetic(self) -> Iterator[str]:
+        """The kinetic energy."""
+        yield rf"\frac{{1}}{{2}} \, {self._shown('line_inertia', 'length')} \, {self._squares(rate_of(self._angle))}"
+
+    def losses(self) -> Iterator[str]:
+        """Half of the power that damping and bearings take."""
+        yield from (self._stored(name, symbol) for name, symbol in self._twisting if name == "damping")
+        if self._has("friction"):
+            yield rf"\frac{{1}}{{2}} \, {self._shown('friction', 'length')} \, {self._squares(rate_of(self._angle))}"
+
+    def potential(self) -> Iterator[str]:
+        """The energy of the twist."""
+        yield self._stored("line_stiffness", self._angle)
+
+    def _stored(self, name: str, symbol: Symbol) -> str:
+        over = rf"\sum_{{k = 0}}^{{{self.degree - 1}}} \frac{{1}}{{\lambda_{{k}}}}"
+        factor = rf"\frac{{1}}{{2}} \, {self._shown(name, below=('length',))}"
+        return rf"{factor} {over} \Bigl( {self._twisted(symbol)} \Bigr)^{{2}}"
+
+    def _squares(self, symbol: Symbol) -> str:
+        return rf"\sum_{{i = 0}}^{{{self.degree}}} h_{{i}} \, {self._indexed(symbol, 'i')}^{{2}}"
+
+    def _twisted(self, symbol: Symbol) -> str:
+        return rf"\sum_{{i = 0}}^{{{self.degree}}} w_{{k,i}} \, {self._indexed(symbol, 'i')}"
+
+    @property
+    def _twisting(self) -> tuple[tuple[str, Symbol], ...]:
+        """What the twist is multiplied by, and whether its rate or the twist itself."""
+        speed = (("damping", rate_of(self._angle)),) if self._has("damping") else ()
+        return (*speed, ("line_stiffness", self._angle))
+
+    @property
+    def _angle(self) -> Symbol:
+        return self.quantities.angle(self.part.nodes["1"])
+
+    @property
+    def ends(self) -> tuple[tuple[int, str], ...]:
+        """Number and name of the nodes at its ends."""
+        return ((0, "a"), (self.degree, "b"))
+
     def _ends(self) -> Iterator[Line]:
-        for number, end in ((0, "a"), (self.degree, "b")):
+        for number, end in self.ends:
             yield Line(self._speed(str(number)), (self.writer.latex(self.quantities.node(self.part.nodes[end])),))
 
     @property

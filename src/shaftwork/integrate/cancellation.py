@@ -99,15 +99,19 @@ def _parts(problem: Problem, times: Array, states: Array) -> list[_Part]:
 
 
 def _split(matrices: list[Any]) -> list[_Part]:
-    rows = [sparse.csr_array(matrix) for matrix in matrices]
-    for matrix in rows:
-        matrix.data[~np.isfinite(matrix.data)] = 0.0  # a slope at a point where the law has none
+    if matrices[0].shape[0] <= LARGEST_EIGENVALUES:  # full ones are by far the faster
+        rows = [matrix.toarray() for matrix in matrices]
+        for matrix in rows:
+            matrix[~np.isfinite(matrix)] = 0.0  # a slope at a point where the law has none
+    else:
+        rows = [sparse.csr_array(matrix) for matrix in matrices]
+        for matrix in rows:
+            matrix.data[~np.isfinite(matrix.data)] = 0.0
     scale = balance(sum(abs(matrix) for matrix in rows))
     parts = []
     for matrix in rows:
         scaled = scale_by(matrix, scale)
-        if scale.size <= LARGEST_EIGENVALUES:
-            scaled = scaled.toarray()  # by far the faster
+        if isinstance(scaled, np.ndarray):
             springs = np.where(scaled * scaled.T < 0, scaled, 0.0)
         else:
             springs = scaled * (scaled.multiply(scaled.T) < 0)

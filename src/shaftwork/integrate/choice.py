@@ -150,7 +150,7 @@ def solve(
             warnings.warn(lost, AccuracyWarning, stacklevel=4)
         return trajectory, name, why or reason
     run = load(name)
-    from shaftwork.integrate.heyoka_taylor import SeriesError
+    from shaftwork.integrate.problem import SeriesError
 
     try:
         return run(problem), name, why or reason

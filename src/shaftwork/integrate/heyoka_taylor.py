@@ -12,7 +12,7 @@ import numpy as np
 
 from shaftwork.core.errors import MissingExtraError, SimulationError
 from shaftwork.integrate.pieces import Piece, PiecewiseDense, both_sides, failure, pieces, start_of_piece
-from shaftwork.integrate.problem import Array, Problem, Trajectory
+from shaftwork.integrate.problem import Array, Problem, SeriesError, Trajectory
 from shaftwork.integrate.switches import Watch, keeps_sides, settle
 
 # The cost grows only with the logarithm of the tolerance, and a loose one loses events.
@@ -31,10 +31,6 @@ GUARD = "guard"
 CHUNK = 32
 # heyoka's outcomes proper are below this number; those above are events that have ended a run.
 FIRST_OUTCOME = -(2**32)
-
-
-class SeriesError(SimulationError):
-    """A Taylor series has terms that are not finite: the motion runs away, or a law is not smooth there, sqrt at 0."""
 
 
 def solve(problem: Problem) -> Trajectory:
@@ -121,6 +117,8 @@ class _Run:
         self.state = integrator.state.copy()
         if not np.isfinite(self.state).all():
             raise self._failure(piece, "err_nf_state", watch)
+        if self.problem.react is not None:
+            self.problem.react.refuse_missed(self.met, integrator.time, self.state)
 
     def _guard(self, pars: Array, sides: Array, offsets: Array | Sequence[float]) -> None:
         """Watch the guards from here on, by their sides and offsets."""
@@ -233,27 +231,27 @@ class _Run:
 
 
 def _on_grid(problem: Problem, times: Array) -> Trajectory:
-    run = _Run(problem)
+    run, stops = _Run(problem), list[float]()
     states = np.empty((times.size, run.state.size))
     done, chunk = 0, times.size + 1 if problem.guards is None else CHUNK
     for piece in pieces(problem):
         # An output at a breakpoint belongs to the next piece: it is the state after the jump.
         stop = times.size if piece.end == problem.t_end else int(np.searchsorted(times, piece.end, side="left"))
-        recorder = _GridRecorder(states[done:stop], times[done:stop], piece.end, chunk)
+        recorder = _GridRecorder(states[done:stop], times[done:stop], piece.end, chunk, stops)
         run.piece(piece, recorder)
         if run.met is not None:
             done += recorder.filled
             break
         done = stop
     end = None if problem.guards is None else (run.integrator.time, run.state)
-    return Trajectory(times[:done], states[:done], _Replay(problem), {"steps": run.steps}, met=run.met, end=end)
+    return Trajectory(times[:done], states[:done], _Replay(problem, stops), {"steps": run.steps}, met=run.met, end=end)
 
 
 class _GridRecorder:
-    """Fills rows of output while the integrator passes their times."""
+    """Fills rows of output while the integrator passes their times; `stops` are those at which it stops in between."""
 
-    def __init__(self, rows: Array, times: Array, end: float, chunk: int) -> None:
-        self._rows, self._chunk = rows, chunk
+    def __init__(self, rows: Array, times: Array, end: float, chunk: int, stops: list[float]) -> None:
+        self._rows, self._chunk, self._stops = rows, chunk, stops
         # The grid always ends with the piece, because the next piece starts from there.
         self._grid = times if times.size and times[-1] == end else np.append(times, end)
         self._filled = 0
@@ -281,22 +279,29 @@ class _GridRecorder:
             arrived = self._filled == self._grid.size
             if arrived or len(found) < len(pending) or taken >= limit:
                 return outcome, _outcome(outcome, watch, arrived=arrived), taken
+            self._stops.append(integrator.time)
 
 
 class _SegmentRecorder:
-    """Keeps heyoka's continuous output of the spans that it passes."""
+    """Keeps heyoka's continuous output of the spans that it passes, with the stops of an earlier run in between."""
 
-    def __init__(self, end: float) -> None:
-        self._end = end
+    def __init__(self, end: float, stops: Sequence[float] = ()) -> None:
+        self._end, self._stops = end, stops
         self.segments: list[Any] = []
 
     def __call__(self, integrator: Any, watch: Watch | None, limit: int, longest: float) -> tuple[Any, str, int]:
-        outcome, _, _, steps, segment, _ = integrator.propagate_until(
-            self._end, max_steps=max(limit, 1), max_delta_t=longest, callback=watch, c_output=True
-        )
-        if segment is not None:
-            self.segments.append(segment)
-        return outcome, _outcome(outcome, watch, arrived=integrator.time == self._end), steps
+        taken = 0
+        while True:
+            stop = min((stop for stop in self._stops if stop > integrator.time), default=self._end)
+            outcome, _, _, steps, segment, _ = integrator.propagate_until(
+                stop, max_steps=max(limit - taken, 1), max_delta_t=longest, callback=watch, c_output=True
+            )
+            taken += steps
+            if segment is not None:
+                self.segments.append(segment)
+            arrived = integrator.time == self._end
+            if arrived or integrator.time != stop or taken >= limit:
+                return outcome, _outcome(outcome, watch, arrived=arrived), taken
 
 
 def _outcome(outcome: Any, watch: Watch | None, *, arrived: bool) -> str:
@@ -308,17 +313,22 @@ def _outcome(outcome: Any, watch: Watch | None, *, arrived: bool) -> str:
 
 
 class _Replay:
-    """Dense output that runs the problem when it is first asked."""
+    """Dense output that runs the problem when it is first asked, in the steps of the run before, if there was one.
 
-    def __init__(self, problem: Problem) -> None:
-        self._problem = problem
+    Args:
+        problem: what to solve.
+        stops: times in s at which that run has stopped on its way.
+    """
+
+    def __init__(self, problem: Problem, stops: Sequence[float] = ()) -> None:
+        self._problem, self._stops = problem, stops
 
     @cached_property
     def _made(self) -> tuple[tuple[tuple[Any, ...], ...], int | None]:
         run = _Run(self._problem)
         recorders = []
         for piece in pieces(self._problem):
-            recorder = _SegmentRecorder(piece.end)
+            recorder = _SegmentRecorder(piece.end, [stop for stop in self._stops if stop < piece.end])
             run.piece(piece, recorder)
             recorders.append(recorder)
             if run.met is not None:

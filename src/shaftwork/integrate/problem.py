@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from shaftwork.core.errors import SimulationError
 from shaftwork.core.times import around
 
 Array = NDArray[np.float64]
@@ -59,6 +60,36 @@ class Reaction(NamedTuple):
     offsets: Sequence[float]
 
 
+class SeriesError(SimulationError):
+    """A Taylor series does not show the motion, and another engine may go on.
+
+    Its terms are not finite, where the motion runs away or a law is not smooth, sqrt at 0; or it has hidden a guard.
+    """
+
+
+class React(Protocol):
+    """How a run goes on past guards; only engines that gain by it ask."""
+
+    def __call__(self, number: int, met: int, t: float, x: Array) -> Reaction | None:
+        """How it goes on in the same equations with the same state, or None where it must end.
+
+        Args:
+            number: of guards met before.
+            met: the guard.
+            t: time, s.
+            x: (n,) state.
+        """
+        ...
+
+    def refuse_missed(self, met: int | None, t: float, x: Array) -> None:
+        """Where a run has ended, look whether it has passed a guard unseen, other than the one that ended it.
+
+        Raises:
+            SeriesError: it has.
+        """
+        ...
+
+
 @dataclass(frozen=True)
 class Problem:
     """An initial value problem x' = rhs(t, x) on [t0, t_end], smooth between its breakpoints.
@@ -81,8 +112,7 @@ class Problem:
             (`Crossings`), or finds it by its own means.
         guards: what ends the run before `t_end`, or None where nothing does. An engine then returns what it has, up to
             the time at which the first guard is met, located as exactly as its solution allows; see `Trajectory.met`.
-        react: from the number of guards met so far, the guard, the time in s and the state (n,) to how the run goes on
-            in the same equations with the same state, or None where it must end. Only engines that gain by it ask.
+        react: how the run goes on past guards, or None where each of them ends it.
         t_eval: strictly increasing output times in [t0, t_end], or None for the engine's own steps. At a breakpoint the
             state after the jump is the output.
         linear: the same system in linear form, where it is one and its input is, between breakpoints, a polynomial of
@@ -106,7 +136,7 @@ class Problem:
     sides: Callable[[float], tuple[float, float]] = around
     switches: Callable[[Array, Array], Array] | None = None
     guards: Guards | None = None
-    react: Callable[[int, int, float, Array], Reaction | None] | None = None
+    react: React | None = None
     t_eval: Array | None = None
     linear: LinearInputs | None = None
     driven: LinearInputs | None = None

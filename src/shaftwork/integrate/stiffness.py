@@ -79,7 +79,7 @@ def balance(matrix: Any, sweeps: int = 8) -> Array:
 
     Source: Osborne, On pre-conditioning of matrices, 1960. Powers of two, so the scaling itself does not round.
     """
-    size = abs(sparse.csr_array(matrix))
+    size = abs(matrix if isinstance(matrix, np.ndarray) else sparse.csr_array(matrix))
     scale = np.ones(matrix.shape[0])
     for _ in range(sweeps):
         rows = (size @ scale) / scale
@@ -91,7 +91,9 @@ def balance(matrix: Any, sweeps: int = 8) -> Array:
 
 
 def scale_by(matrix: Any, scale: Array) -> Any:
-    """d^-1 A d for a sparse A and the diagonal d (n,)."""
+    """d^-1 A d for a sparse or full A and the diagonal d (n,)."""
+    if isinstance(matrix, np.ndarray):
+        return matrix * scale / scale[:, None]
     return sparse.diags_array(1 / scale) @ matrix @ sparse.diags_array(scale)
 
 

@@ -138,6 +138,7 @@ class Watch:
         self._moving: NDArray[np.bool_] = ~program.timed
         counting = () if program.held is None else tuple(program.held.by_switch)
         self._turns = self._moving & ~np.isin(np.arange(size.size), counting)
+        self._cooled = np.full(size.size, -np.inf)
         self.reason: str | None = None
         self.leaves = False
         """Whether a switch that rested at zero has stopped the run."""
@@ -157,11 +158,19 @@ class Watch:
         """Whether the run goes on where a switch is at zero, or on the wrong side of it."""
         wrong = (inside < -WRONG_SIDE * self._largest) & self._moving
         past = inside < 0.0
+        cooling = integrator.te_cooldowns[: past.size]
+        cooled: list[int] = np.flatnonzero(self._cooled > self._last).tolist()
+        for number in (k for k, found in enumerate(cooling) if found is not None):
+            passed, whole = cooling[number]
+            self._cooled[number] = integrator.time - passed + whole
         if past.any():
             # Right at its event (heyoka still "cools" it down) a switch may be on the wrong side by rounding.
-            past &= [cooling is None for cooling in integrator.te_cooldowns[: past.size]]
+            past &= [found is None for found in cooling]
             # In a step too short for heyoka to see an event a switch is past it by that step, and has just turned too.
             wrong &= past & (integrator.time - self._last >= self._short)
+            # A speed that dies away turns while heyoka still cools its last turn down: wrong only where it matters.
+            for number in cooled:
+                wrong[number] = wrong[number] and self._matters(integrator, number)
             signs[past & ~wrong & self._turns] *= -1.0  # the step ended at another event, at the very same instant
         # A switch that rested at zero and now leaves it needs its sign.
         self.leaves = bool((values[(signs == 0.0) & self._moving] != 0.0).any())
@@ -170,21 +179,35 @@ class Watch:
             self.leaves or (self._program.guards and self._ended_at_a_switch(integrator))
         )
 
-    def _goes_on(self, integrator: Any, values: Array, wrong: NDArray[np.bool_]) -> bool:
+    def _goes_on(self, integrator: Any, values: Array, wrong: NDArray[np.bool_] | None = None) -> bool:
         """Whether time goes on and no switch is on the wrong side."""
-        self._short_steps = self._short_steps + 1 if integrator.time - self._last < self._short else 0
-        before, self._last = self._last, integrator.time
-        if wrong.any() or self._short_steps > CHATTER_STEPS:
-            nearest = int(np.argmin(np.where(self._moving, np.abs(values), np.inf)))
-            condition = self._program.conditions[int(np.argmax(wrong)) if wrong.any() else nearest]
+        before, now = self._last, integrator.time
+        self._short_steps = self._short_steps + 1 if now - before < self._short else 0
+        self._last = now
+        stuck = None
+        if wrong is not None and wrong.any():
+            stuck = np.argmax(wrong)
+        elif self._short_steps > CHATTER_STEPS:
+            stuck = np.argmin(np.where(self._moving, np.abs(values), np.inf))
+        if stuck is not None:
+            condition = self._program.conditions[int(stuck)]
             self.reason = (
                 f"from t = {before:.9g} s on the motion sticks where the condition {condition} changes, because "
                 "the laws on both sides drive it back there. Give the law a smooth transition, such as "
                 "tanh(omega / 0.01) in place of sign(omega)"
             )
             return False
-        self.last_good = integrator.time, integrator.state.copy()
+        self.last_good = now, integrator.state.copy()
         return True
+
+    def _matters(self, integrator: Any, number: int) -> bool:
+        """Whether the motion is another one on the other side of a switch."""
+        other = integrator.pars.copy()
+        other[self._signs.start + number] *= -1.0
+        here, there = (
+            self._program.slopes(integrator.time, integrator.state, each) for each in (integrator.pars, other)
+        )
+        return not np.allclose(here, there, rtol=WRONG_SIDE, atol=0.0)
 
     def _ended_at_a_switch(self, integrator: Any) -> bool:
         """Whether the last step ended where a switch passed through zero."""

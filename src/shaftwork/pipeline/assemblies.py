@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
@@ -14,7 +13,7 @@ from scipy import sparse
 from sympy import Expr, Integer, Piecewise, Symbol
 
 from shaftwork.codegen.arrays import BoundArrays
-from shaftwork.codegen.code import scalar, vectorised_list
+from shaftwork.codegen.code import bindable, scalar, vectorised_list
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.recovery import History
 from shaftwork.codegen.stores import Stores
@@ -43,6 +42,7 @@ SAMPLES = 64
 ModeNames = tuple[str, ...]
 """The mode of every element of a network, in their order."""
 Motion = Callable[[float, list[float]], tuple[list[float], list[float]]]
+Limits = Callable[[float, list[float]], list[float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +136,11 @@ class Assembly:
             pairs = ((number, made) for number, name in enumerate(modes) for made in self._watched[number, name])
             self._ends[modes] = tuple(pairs)
         return self._ends[modes]
+
+    @property
+    def guards_shown(self) -> tuple[Expr, ...]:
+        """The guards in states, parameters and time, by number."""
+        return tuple(self._expressions)
 
     @cached_property
     def clocks(self) -> tuple[int, ...]:
@@ -245,11 +250,13 @@ class Assembly:
 
     def constant(self, number: int, expression: Expr | None, p: Array) -> float:
         """A number that is made of an element's parameters."""
-        if expression is None:
-            return 0.0
-        element = self.elements[number]
-        made = self._readings.guard(self._parts[element.part.name], element.modes, as_expression(expression))
+        made = self.of_element(number, expression)
         return float(made.xreplace({s: p[self._places[s.name]] for s in made.free_symbols}))
+
+    def of_element(self, number: int, expression: Expr | None) -> Expr:
+        """What is made of an element's parameters, in those of the network; zero where there is nothing."""
+        element, made = self.elements[number], as_expression(0 if expression is None else expression)
+        return self._readings.guard(self._parts[element.part.name], element.modes, made)
 
     def problem(
         self, p: Array, modes: ModeNames, x: Array, bands: Sequence[float], span: tuple[float, float], times: Timeline
@@ -294,7 +301,7 @@ class Assembly:
 
     def _rates(self, p: Array) -> Callable[[float, Array], Array]:
         """The right-hand side; an engine that asks for it often gets code of its own."""
-        motion, asked, scalar_program = self.motion(p), count(), self.model.scalar
+        (motion, _), asked, scalar_program = self.motion(p), count(), self.model.scalar
         if scalar_program is None:
             return self.bound(p).rhs
         own: list[Callable[[float, Array], Array]] = []
@@ -329,32 +336,23 @@ class Assembly:
             self._sides[modes] = sides
         return self._sides[modes]
 
-    def motion(self, p: Array) -> Motion:
-        """Rates and guards together, from a time in s and a list of states: in plain floats, for a single instant."""
-        if self.model.rows is None:
-            bound, guards = self.bound(p), self.guards(p)
+    def motion(self, p: Array) -> tuple[Motion, Limits]:
+        """Rates and guards together, and guards alone, from a time in s and a list of states, for a single instant."""
+        if self.model.rows is not None:
+            return self._scalar(p.tolist())
+        bound, guards = self.bound(p), self.guards(p)
 
-            def recovered(t: float, x: list[float]) -> tuple[list[float], list[float]]:
-                state = np.array(x)
-                return bound.rhs(t, state).tolist(), guards(np.array([t]), state[None, :])[0].tolist()
+        def limits(t: float, x: list[float]) -> list[float]:
+            return guards(np.array([t]), np.array([x]))[0].tolist()  # type: ignore[no-any-return]
 
-            return recovered
-        function, values, sizes = self._scalar, p.tolist(), (len(self.model.states), len(self._expressions))
-
-        def made(t: float, x: list[float]) -> tuple[list[float], list[float]]:
-            try:
-                found = function(t, x, values)
-            except (ArithmeticError, ValueError):
-                return [math.nan] * sizes[0], [math.nan] * sizes[1]
-            return found[: sizes[0]], found[sizes[0] :]
-
-        return made
+        return lambda t, x: (bound.rhs(t, np.array(x)).tolist(), limits(t, x)), limits
 
     @cached_property
-    def _scalar(self) -> Callable[..., list[float]]:
+    def _scalar(self) -> Callable[[list[float]], tuple[Motion, Limits]]:
         rows = self.model.rows
         assert rows is not None  # noqa: S101 (asked only then)
-        return scalar({"t": TIME, "x": rows.states, "p": rows.parameters}, (*rows.rates, *self._expressions))
+        arguments = {"t": TIME, "x": rows.states}
+        return bindable(arguments, {"p": rows.parameters}, rows.rates, self._expressions)
 
     def sizes(self, p: Array) -> list[float]:
         """The nominal size of each state."""

@@ -90,7 +90,8 @@ class Ensemble:
         form, model = self.model.form, self.model
         if model.rows is None or form.waves or form.loop_laws or not model.states:
             raise CompileError("The network is too large, holds waves, or has a nonlinear law at a massless node.")
-        if form.has_impulses or form.across_sources or len(model.switching.timeline(model.defaults, *self.span).times):
+        times = model.switching.timeline(model.defaults, *self.span, modes=False).times
+        if form.has_impulses or form.across_sources or times:
             raise CompileError("A source switches or jumps at a time of its own.")
         if not {*form.graph.zeros, *form.tree.frozen}.isdisjoint(self.names):
             raise CompileError("A parameter that varies decides which equations hold.")

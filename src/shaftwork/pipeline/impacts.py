@@ -9,7 +9,7 @@ import numpy as np
 from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError
 from shaftwork.pipeline.assemblies import Element, ModeNames
-from shaftwork.pipeline.moments import Change, Moment
+from shaftwork.pipeline.moments import CLEAR, Change, Moment
 from shaftwork.pipeline.regimes import Regimes, with_modes
 
 # A speed across what is joined, as part of the largest one or of one, up to which it is an error of the run, no impact.
@@ -22,10 +22,11 @@ class Impacts:
     Args:
         regimes: combinations of modes.
         elements: of the network.
+        tick: how far in s rounding moves the time.
     """
 
-    def __init__(self, regimes: Regimes, elements: Sequence[Element]) -> None:
-        self._regimes, self._elements = regimes, elements
+    def __init__(self, regimes: Regimes, elements: Sequence[Element], tick: float) -> None:
+        self._regimes, self._elements, self._tick = regimes, elements, tick
 
     def meets(self, moment: Moment, t: float, to: Mode, number: int) -> float:
         """The speed across an element that is joined from now on; zero where it is no more than an error of the run."""
@@ -35,7 +36,7 @@ class Impacts:
         speed = regime.assembly.across(number, t, moment.x, regime.p)
         speeds = moment.x[: len(regime.assembly.model.form.across_states)]
         least = NO_IMPACT * np.abs(speeds).max(initial=1.0)
-        if abs(speed) <= least:
+        if abs(speed) <= least or abs(speed) <= abs(speed - self._shortly_before(moment, t, number)):
             return 0.0
         try:
             joined = self._regimes.changed(moment, t, with_modes(regime.modes, {number: to.name}))
@@ -44,6 +45,12 @@ class Impacts:
         held, after = self._regimes.held(moment, t), self._regimes.held(joined, t)
         # between dampers alone a speed is whatever their torques make it: joining them stops no inertia
         return speed if any(abs(after[name] - value) > least for name, value in held.items()) else 0.0
+
+    def _shortly_before(self, moment: Moment, t: float, number: int) -> float:
+        """The speed across an element so long ago as its guard may be found late, twice that to be sure."""
+        regime, late = moment.regime, 2 * CLEAR * self._tick
+        rates = np.array(regime.motion(t, moment.x.tolist())[0])
+        return regime.assembly.across(number, t, moment.x - late * rates, regime.p)
 
     def hit(self, t: float, after: float, moment: Moment, number: int, leave: Leave) -> tuple[Moment, list[Change]]:
         """An impact: the element is joined for an instant, and for good where nothing throws it back.

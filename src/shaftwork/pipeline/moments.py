@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from shaftwork.codegen.elements import Array
-from shaftwork.pipeline.assemblies import Assembly, Element, ModeNames, Motion, Watched
+from shaftwork.pipeline.assemblies import Assembly, Element, Limits, ModeNames, Motion, Watched
 from shaftwork.pipeline.prepared import NOMINAL
 
 # A guard within so many rounding units of zero is on its limit, and only its further course tells its side.
@@ -60,6 +60,7 @@ class Regime:
         assembly: the equations.
         p: their parameters, numbers of modes among them.
         motion: rates and guards at an instant.
+        limits: the guards alone.
         sides: (guards,) on which each is met.
         sizes: nominal size of each state.
         watched: element and guard of everything that may end one of the modes.
@@ -70,6 +71,7 @@ class Regime:
     assembly: Assembly
     p: Array
     motion: Motion
+    limits: Limits
     sides: Array
     sizes: list[float]
     watched: tuple[tuple[int, Watched], ...]
@@ -97,17 +99,27 @@ class Moment(NamedTuple):
     bands: Sequence[float] = ()
 
 
-def clear_of_limits(regime: Regime, now: Sequence[float], bands: Sequence[float]) -> list[float]:
-    """How far beyond zero guards are met: more where one is near its limit or beyond, for a phase that starts there has
+def clear_of_limit(beyond: float, band: float) -> float:
+    """How far beyond zero a guard is met: more where it is near its limit or beyond, for a phase that starts there has
     not met it.
 
-    None is zero: where a value is exactly zero at the start of a step, heyoka finds none of its later zeros in it.
+    It is not zero: where a value is exactly zero at the start of a step, heyoka finds none of its later zeros in it.
+
+    Args:
+        beyond: how far it is beyond now; negative within its limit.
+        band: how far rounding moves it.
     """
-    made = [band / CLEAR or NOTHING for band in bands]
+    if 2 * beyond > -CLEAR * band:
+        return max(beyond, 0.0) + CLEAR * band or NOTHING
+    return band / CLEAR or NOTHING
+
+
+def clear_of_limits(regime: Regime, now: Sequence[float], bands: Sequence[float]) -> list[float]:
+    """How far beyond zero each of the guards of a combination of modes is met."""
+    made = [0.0] * len(now)
     for _, watched in regime.watched:
-        k, value = watched.guard, watched.side * now[watched.guard]
-        if 2 * value > -CLEAR * bands[k]:
-            made[k] = max(value, 0.0) + CLEAR * bands[k] or NOTHING
+        k = watched.guard
+        made[k] = clear_of_limit(watched.side * now[k], bands[k])
     return made
 
 

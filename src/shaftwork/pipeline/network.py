@@ -27,6 +27,7 @@ from shaftwork.reduction.form import StateForm, state_form
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
+    from shaftwork.equations.lagrange import Lagrangian
     from shaftwork.pipeline.analysis import Point, SmallMotions, Time
     from shaftwork.results.campbell import Campbell
     from shaftwork.results.frequency import FrequencyResponse
@@ -106,6 +107,21 @@ class Network(NetworkBuilder):
             return dataclasses.replace(made, phase=whole_name(form.graph, name), in_phase=chosen)
 
         return chosen("" if phase is None else phase)
+
+    def lagrangian(self, *, expand: bool = False, phase: str | NamedPhase | None = None) -> Lagrangian:
+        """Energies, generalised coordinates and forces, and Lagrange's equations, with their proof by Kirchhoff's.
+
+        Args:
+            expand: of the network with its shafts written out part by part.
+            phase: a phase of the motion, as for `equations`.
+
+        Raises:
+            NetworkError: the network cannot be assembled; lists every reason.
+            ParameterError: as for `equations`.
+        """
+        from shaftwork.equations.lagrange import lagrangian
+
+        return lagrangian(self.equations(expand=expand, phase=phase))
 
     def compile(
         self,

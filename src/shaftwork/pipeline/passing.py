@@ -7,10 +7,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from shaftwork.codegen.elements import Array
-from shaftwork.integrate.problem import Reaction
+from shaftwork.integrate.problem import Reaction, SeriesError
 from shaftwork.pipeline.assemblies import ModeNames
-from shaftwork.pipeline.moments import Change, Moment, Regime, clear_of_limits
+from shaftwork.pipeline.moments import Change, Moment, Regime, clear_of_limit
 from shaftwork.pipeline.settling import Settling
+
+# Of so many roundings of the time a guard may be late that is met together with another one.
+LATE = 1e4
 
 
 class Phase(NamedTuple):
@@ -84,37 +87,57 @@ class Passing:
 
     def _settled(self, met: int, t: float, x: Array) -> tuple[Moment, list[Change]] | None:
         before = Moment(self.moment.regime, x[: self._size].copy(), self.moment.bands)
+        self.refuse_missed(met, t, x)
         moment, changes = self._settling.settle(t, t, before, met)
         if moment.x is before.x:
             return moment, changes
         self.beyond = moment, changes  # other states are other equations, or an impact in these
         return None
 
+    def refuse_missed(self, met: int | None, t: float, x: Array) -> None:
+        """Fail where another guard has been beyond its limit for longer than rounding of the time explains.
+
+        Raises:
+            SeriesError: the engine has not seen it.
+        """
+        regime, bands, states = self.moment.regime, self.moment.bands, x[: self._size].tolist()
+        rates, now = regime.motion(t, states)
+        late = LATE * self._settling.tick
+        before = regime.limits(t - late, [v - late * rate for v, rate in zip(states, rates, strict=True)])
+        for number, made in regime.watched:
+            k = made.guard
+            if k != met and min(made.side * now[k], made.side * before[k]) > bands[k]:
+                element = self._settling.elements[number]
+                raise SeriesError(
+                    f"The heyoka engine has not seen that '{element.name}' ceased to be "
+                    f"{element.modes[regime.modes[number]].words} before t = {t:.9g} s. Take engine='scipy'."
+                )
+
     def _direct(self, met: int, t: float, x: Array) -> tuple[Moment, list[Change]] | None:
-        """The modes that follow by this guard alone, or None where it takes more to tell."""
+        """The modes that follow by this guard alone, or None where it takes more to tell.
+
+        The same as in `Settling`, for the guards of one combination of modes only, as it is asked at every change.
+        """
         way = self._way(met)
         if way is None:
             return None
-        motion, states = way.to.motion, x[: self._size].tolist()
-        rates, now = motion(t, states)
+        to, states = way.to, x[: self._size].tolist()
+        rates, now = to.motion(t, states)
         tick, before = self._settling.tick, self.moment.bands
-        near = motion(t + tick, way.to.rounded(states, rates, tick))[1]
-        bands = [abs(n - g) for n, g in zip(near, now, strict=True)]
+        near = to.limits(t + tick, to.rounded(states, rates, tick))
+        bands = [0.0] * len(now)
         for guard, side in way.watched:
-            beyond = side * now[guard]
-            if (beyond >= -bands[guard] or beyond >= -before[guard]) and (guard != met or side == way.side):
+            beyond, band = side * now[guard], abs(near[guard] - now[guard])
+            if (beyond >= -band or beyond >= -before[guard]) and (guard != met or side == way.side):
                 return None
-        if way.side * now[met] < 0 or not self._goes_on(way, met, t, states, rates, now):
+            bands[guard] = clear_of_limit(beyond, band)
+        if way.side * now[met] < 0:
             return None
-        return Moment(way.to, x, clear_of_limits(way.to, now, bands)), [way.change(t)]
-
-    def _goes_on(
-        self, way: _Way, met: int, t: float, states: list[float], rates: list[float], now: list[float]
-    ) -> bool:
-        """Whether the guard that was met is left behind for good."""
-        step = self._settling.ahead(way.to, rates)
-        ahead = way.to.motion(t + step, [v + step * rate for v, rate in zip(states, rates, strict=True)])[1]
-        return way.side * (ahead[met] - now[met]) > 0
+        step = self._settling.ahead(to, rates)
+        ahead = to.limits(t + step, [v + step * rate for v, rate in zip(states, rates, strict=True)])
+        if not way.side * (ahead[met] - now[met]) > 0:  # it is not left behind for good
+            return None
+        return Moment(to, x, bands), [way.change(t)]
 
     def _way(self, met: int) -> _Way | None:
         """Where a guard leads in the same equations."""

@@ -62,7 +62,8 @@ class _Whole:
     @cached_property
     def stretches(self) -> Stretches:
         """The phases as they are read."""
-        return Stretches([_stretch(self._run, span, phase) for span in self._run.spans for phase in span.phases])
+        pairs = [(span, phase) for span in self._run.spans for phase in span.phases]
+        return Stretches([phase.start for _, phase in pairs], lambda number: _stretch(self._run, *pairs[number]))
 
     @property
     def steps(self) -> Array:
@@ -112,19 +113,21 @@ def _events(changes: Iterable[Change]) -> Iterator[tuple[float, str, str, str]]:
 
 def _table(run: Run) -> tuple[PhaseRow, ...]:
     """The phases in words: those that say the same are one."""
-    found: list[tuple[float, dict[str, str]]] = []
     phases = [phase for span in run.spans for phase in span.phases]
     last = run.demand.span[1]
     ends = [*(phase.start for phase in phases[1:]), last]
-    words: dict[ModeNames, dict[str, str]] = {}
+    words: dict[ModeNames, Mapping[str, str]] = {}
+    known: dict[tuple[str, ...], Mapping[str, str]] = {}
+    names = [element.name for element in run.phases.elements]
+    starts: list[float] = []
+    found: list[Mapping[str, str]] = []
     for phase, end in zip(phases, ends, strict=True):
         if phase.modes not in words:
             pairs = zip(run.phases.elements, phase.modes, strict=True)
-            words[phase.modes] = {element.name: element.modes[name].words for element, name in pairs}
+            said = tuple(element.modes[name].words for element, name in pairs)
+            words[phase.modes] = known.setdefault(said, dict(zip(names, said, strict=True)))
         modes = words[phase.modes]
-        if found and found[-1][1] == modes:
-            continue
-        if end > phase.start:
-            found.append((phase.start, modes))
-    starts = [start for start, _ in found]
-    return tuple(PhaseRow(start, end, modes) for (start, modes), end in zip(found, [*starts[1:], last], strict=True))
+        if end > phase.start and not (found and found[-1] is modes):
+            starts.append(phase.start)
+            found.append(modes)
+    return tuple(map(PhaseRow, starts, [*starts[1:], last], found))

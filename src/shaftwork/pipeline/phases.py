@@ -7,6 +7,7 @@ after another until all of them are consistent with the motion that follows, and
 from __future__ import annotations
 
 import warnings
+from bisect import bisect_right
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -18,7 +19,7 @@ from shaftwork.codegen.timeline import Timeline
 from shaftwork.components.modes import Choice
 from shaftwork.core.errors import NetworkError, NetworkWarning, ParameterError, SimulationError
 from shaftwork.integrate import choice
-from shaftwork.integrate.problem import Problem, Trajectory
+from shaftwork.integrate.problem import Problem, SeriesError, Trajectory
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import Demand, absolute_tolerances, watched_by
 from shaftwork.pipeline.assemblies import Assembly, ModeNames, elements_of
@@ -248,7 +249,7 @@ class Run:
     def _problem(self, t: float, moment: Moment, passing: Passing | None = None) -> Problem:
         """The motion from a time on, up to the next instant at which an input jumps."""
         demand, regime, times = self.demand, moment.regime, self._instants(moment)
-        end = min(next((time for time in times.times if time > t), np.inf), demand.span[1])
+        end = min([*times.times[bisect_right(times.times, t) :][:1], demand.span[1]])
         problem = regime.assembly.problem(regime.p, regime.modes, moment.x, moment.bands, (t, end), times)
         atol = demand.rtol * problem.atol
         if demand.atol is not None:
@@ -265,9 +266,8 @@ class Run:
 
     def _span(self, t: float, moment: Moment) -> tuple[float, Moment]:
         """One run of the engine, up to a change of equations or the next instant at which an input jumps."""
-        passing = Passing(self.settling, moment, t, self.note)
         regime = moment.regime
-        trajectory = self._solve(regime.assembly, self._problem(t, moment, passing))
+        trajectory, passing = self._passed(t, moment)
         self.steps += trajectory.statistics.get("steps", 0)
         assert trajectory.end is not None  # noqa: S101 (engines that follow guards say it)
         t, x = trajectory.end
@@ -295,16 +295,29 @@ class Run:
         first, last = np.searchsorted(self.demand.t_eval, (t, end), side="left")
         return self.demand.t_eval[first : last + (end == self.demand.span[1])]
 
-    def _solve(self, assembly: Assembly, problem: Problem) -> Trajectory:
+    def _passed(self, t: float, moment: Moment) -> tuple[Trajectory, Passing]:
+        """One run of the engine; where a Taylor series cannot go on, another engine begins it anew."""
+        passing, noted, soon = Passing(self.settling, moment, t, self.note), len(self.changes), self._soon
+        problem = self._problem(t, moment, passing)
         if not problem.x0.size:
             made, _, _ = at_rest(problem)
-            return replace(made, end=(problem.t_end, problem.x0))
-        name, why = self.phases.engine(assembly, problem, self.demand.engine)
+            return replace(made, end=(problem.t_end, problem.x0)), passing
+        name, why = self.phases.engine(moment.regime.assembly, problem, self.demand.engine)
+        try:
+            return self._solve(problem, name, why), passing
+        except SeriesError:
+            if self.demand.engine != "auto":
+                raise
+        del self.changes[noted:]
+        self._soon = soon
+        return self._solve(problem, "scipy", choice.NOT_ANALYTIC), Passing(self.settling, moment, t, self.note)
+
+    def _solve(self, problem: Problem, name: str, why: str) -> Trajectory:
         share, loosest = FOLLOWING[name]
         tight = max(min(share * problem.rtol, loosest), min(problem.rtol, TIGHTEST_RTOL))
         if tight != problem.rtol:
             problem = replace(problem, rtol=tight, atol=problem.atol * (tight / problem.rtol))
-        trajectory, name, why = choice.solve(problem, name, why, fallback=self.demand.engine == "auto")
+        trajectory, _, _ = choice.solve(problem, name, why)
         if not self.engine:
             self.engine, self.why = name.removesuffix("-adams"), why
         return trajectory

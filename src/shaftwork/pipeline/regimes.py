@@ -46,7 +46,7 @@ class Regimes:
                 modes,
                 assembly,
                 p,
-                assembly.motion(p),
+                *assembly.motion(p),
                 assembly.sides(modes),
                 assembly.sizes(p),
                 assembly.watched(modes),
@@ -106,7 +106,7 @@ def refuse_beyond(regime: Regime, elements: Sequence[Element], t: float, x: Arra
     Raises:
         ParameterError: names the part, its twist and the limit.
     """
-    now = regime.motion(t, x.tolist())[1]
+    now = regime.limits(t, x.tolist())
     for number, made in regime.watched:
         element, when, beyond = elements[number], made.leave.when, made.side * now[made.guard]
         if made.leave.rebound is None or not beyond > BEYOND:

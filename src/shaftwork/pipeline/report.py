@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
+from shaftwork.core.errors import SimulationError
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.network import Network
+from shaftwork.pipeline.phase_names import whole_name
 
 LARGEST_DENSE = 1500
 """States up to which all eigenvalues are computed."""
@@ -41,30 +46,49 @@ def _lines(net: Network, model: Model, t_end: float) -> Iterator[str]:
     cost = model.cost()
     yield f"right-hand side: {cost.form} code, {cost.total} operations; {cost.entries} entries in the linear part"
     if 0 < len(model.states) <= LARGEST_DENSE:
-        yield from _time_constants(model)
+        for point in _points(model):
+            yield from _time_constants(*point)
     if model.states:
         name, why = model.choose_engine(t_end)
         yield f"engine for {t_end:g} s: {name}, {why}"
 
 
-def _time_constants(model: Model) -> Iterator[str]:
-    jacobian = model.jacobian(0.0, np.zeros(len(model.states))).toarray()
+def _points(model: Model) -> Iterator[tuple[str, Sequence[str], NDArray[np.float64]]]:
+    """Words, states and slopes at rest; where parts change their mode also of the phase in which nothing holds."""
+    graph, states = model.form.graph, model.states
+    slopes = np.asarray(model.jacobian(0.0, np.zeros(len(states))).toarray())
+    if model.form.waves or not any(part.modes for part in graph.parts):
+        yield "at rest", states, slopes
+        return
+    with suppress(SimulationError):  # a law has no finite slope there, as those below say of the phase in motion
+        rest = model.linearize()
+        yield f"at rest {rest.title.removeprefix(model.name).strip()}", rest.states, _dense(rest.A)
+    yield f"in motion ({whole_name(graph)})", states, slopes
+
+
+def _dense(matrix: Any) -> NDArray[np.float64]:
+    return np.asarray(matrix.toarray() if sparse.issparse(matrix) else matrix)
+
+
+def _time_constants(words: str, states: Sequence[str], jacobian: NDArray[np.float64]) -> Iterator[str]:
     if not np.isfinite(jacobian).all():
-        rows = np.flatnonzero(~np.isfinite(jacobian).all(axis=1))
-        yield f"time constants at rest: none, since {_some([model.states[k] for k in rows])} has no finite slope there"
+        steep = [states[k] for k in np.flatnonzero(~np.isfinite(jacobian).all(axis=1)).tolist()]
+        yield f"time constants {words}: none, since {_some(steep)} has no finite slope there"
         return
     eigenvalues: NDArray[np.complex128] = np.linalg.eigvals(jacobian).astype(complex)
     size = np.abs(eigenvalues)
-    moving = eigenvalues[size > 1e-9 * size.max()] if size.max() else eigenvalues[:0]
+    moving = eigenvalues[size > 1e-9 * size.max(initial=0.0)]
     swings = np.unique(np.round(np.abs(moving.imag[moving.imag > 1e-9 * np.abs(moving)]) / (2 * np.pi), 12))
     decays = np.sort(-1 / moving.real[moving.real < -1e-12 * np.abs(moving)])
     if swings.size:
-        yield f"natural frequencies at rest ({swings.size}): {_some([f'{f:.5g}' for f in swings])} Hz"
+        yield f"natural frequencies {words} ({swings.size}): {_some([f'{f:.5g}' for f in swings])} Hz"
     if decays.size:
         ratio = decays[-1] / decays[0]
-        yield f"time constants at rest: {decays[0]:.3g} s to {decays[-1]:.3g} s, stiffness ratio {ratio:.3g}"
+        yield f"time constants {words}: {decays[0]:.3g} s to {decays[-1]:.3g} s, stiffness ratio {ratio:.3g}"
+    if not (swings.size or decays.size):
+        yield f"time constants {words}: none"
     if (moving.real > 1e-9 * np.abs(moving)).any():
-        yield f"unstable at rest: grows within {1 / moving.real.max():.3g} s (a motor's starting curve does this)"
+        yield f"unstable {words}: grows within {1 / moving.real.max():.3g} s (a motor's starting curve does this)"
 
 
 def _some(names: Sequence[object], most: int = 12) -> str:

@@ -44,11 +44,11 @@ class Settling:
         self._phases, self.elements = phases, phases.elements
         self._regimes = Regimes(phases, values)
         self.regime, self.held = self._regimes.regime, self._regimes.held
-        self._impacts = Impacts(self._regimes, self.elements)
-        self.jumped = self._impacts.jumped
         self._ahead = AHEAD_OF_RUN * (span[1] - span[0])
         self.tick = ROUNDINGS * math.ulp(max(map(abs, span)))
         """How far in s rounding moves the time."""
+        self._impacts = Impacts(self._regimes, self.elements, self.tick)
+        self.jumped = self._impacts.jumped
 
     def started(self, t: float, x: Array) -> Moment:
         """The modes in which a motion starts, from the states of the equations in which no mode joins anything.
@@ -77,7 +77,7 @@ class Settling:
 
     def ends(self, moment: Moment, t: float, x: Array) -> bool:
         """Whether states are beyond a guard of the modes of a moment."""
-        now = moment.regime.motion(t, x.tolist())[1]
+        now = moment.regime.limits(t, x.tolist())
         wide = moment.bands or [0.0] * len(now)
         return any(made.side * now[made.guard] > wide[made.guard] for _, made in moment.regime.watched)
 
@@ -121,7 +121,7 @@ class Settling:
         if not found:
             return {}
         rates, now = regime.motion(t, x)
-        others = regime.motion(t + self.tick, regime.rounded(x, rates, self.tick))[1]
+        others = regime.limits(t + self.tick, regime.rounded(x, rates, self.tick))
         return {k: to for k, (to, guard) in found.items() if now[guard] == others[guard] == 0.0}
 
     def _consistent(self, t: float, after: float, moment: Moment, met: int | None) -> tuple[Moment, list[Change]]:
@@ -283,7 +283,7 @@ class Settling:
         old, made, x = moment.regime, new.regime, new.x
         share = old.assembly.constant(number, ended.leave.rebound, old.p)
         speed = old.assembly.across(number, after, moment.x, old.p)
-        late = ended.side * old.motion(after, moment.x.tolist())[1][ended.guard]
+        late = ended.side * old.limits(after, moment.x.tolist())[ended.guard]
         rates = made.motion(after, x.tolist())[0]
         step = self.ahead(made, rates)
         later = made.assembly.across(number, after + step, x + step * np.array(rates), made.p)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from shaftwork.reduce.comparison import Comparison
 from shaftwork.reduce.grouping import Grouping
+from shaftwork.reduce.groups import Group, GroupTable
 from shaftwork.reduce.reference_shaft import Referred, refer
 from shaftwork.reduce.referred_parts import Entry
 from shaftwork.reduce.scales import Scale
-from shaftwork.reduce.simplification import Comparison, FrequencyLoss, Group, GroupTable, Simplified, simplify
+from shaftwork.reduce.simplification import FrequencyLoss, Simplified, simplify
 from shaftwork.reduce.table import ReductionTable
 
 __all__ = [

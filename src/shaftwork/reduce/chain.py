@@ -35,22 +35,29 @@ class Station:
     riders: tuple[Placed, ...] = ()
     support: float = 0.0
 
+    @property
+    def heaviest(self) -> str:
+        """The name of its largest inertia."""
+        return max(self.inertias, key=lambda own: own[1])[0]
+
 
 @dataclass(frozen=True)
 class Link:
-    """What is between two neighbours: springs and dampers beside each other, or in series.
+    """What is between two neighbours: springs, gaps and dampers beside each other, or in series.
 
     Args:
         name: of the spring, of the softest where there are several.
-        c: stiffness, N m/rad.
+        c: stiffness with gaps closed, N m/rad.
         d: damping, N m s/rad.
-        parts: names of its springs.
+        gap: whole free twist, rad.
+        parts: names of its springs and gaps.
         placed: the parts themselves; none where several springs in series are one.
     """
 
     name: str
     c: float
     d: float
+    gap: float
     parts: tuple[str, ...]
     placed: tuple[Placed, ...] = ()
 
@@ -73,17 +80,17 @@ class Chain:
 
 
 def series(links: Sequence[Link]) -> Link:
-    """Springs one after the other as one.
+    """Springs and gaps one after the other as one.
 
     Law: 1/c = sum 1/c_k; d = sum d_k (c/c_k)^2, so that a slow twist, which divides as the compliances do, loses as
-    much. Source: Abdelkader 2016, (15).
+    much; gap = sum gap_k, since one torque closes all of them. Source: Abdelkader 2016, (15).
     """
     if len(links) == 1:
         return links[0]
     c = 1 / sum(1 / link.c for link in links)
     d = sum(link.d * (c / link.c) ** 2 for link in links)
     softest = min(links, key=lambda link: link.c)
-    return Link(softest.name, c, d, tuple(name for link in links for name in link.parts))
+    return Link(softest.name, c, d, sum(link.gap for link in links), tuple(n for link in links for n in link.parts))
 
 
 def modes_of(chain: Chain) -> tuple[Array, Array]:
@@ -97,10 +104,16 @@ def modes_of(chain: Chain) -> tuple[Array, Array]:
 def matrices_of(chain: Chain) -> tuple[Array, Array]:
     """(n,) inertias and (n, n) stiffness of a chain."""
     inertias = np.array([station.inertia for station in chain.stations])
-    stiffness = np.diag([station.support for station in chain.stations])
-    for k, link in enumerate(chain.links):
-        stiffness[k : k + 2, k : k + 2] += link.c * np.array([[1.0, -1.0], [-1.0, 1.0]])
-    return inertias, stiffness
+    supports = np.diag([station.support for station in chain.stations])
+    return inertias, supports + row_matrix([link.c for link in chain.links])
+
+
+def row_matrix(values: Sequence[float]) -> Array:
+    """(n, n) stiffness or damping of n places in a row, by the (n - 1,) values between neighbours."""
+    matrix = np.zeros((len(values) + 1, len(values) + 1))
+    for k, value in enumerate(values):
+        matrix[k : k + 2, k : k + 2] += value * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    return matrix
 
 
 def hertz(squares: Array, chain: Chain) -> Array:
@@ -130,7 +143,6 @@ def read_chain(netlist: Netlist, keep: str) -> Chain:
         if len(nodes) == 2 and isinstance(item.part, Spring | Damper | Backlash):
             a, b = sorted(nodes)
             links.setdefault((a, b), []).append(item)
-            problems += _objections(item, keep)
             for node in nodes:
                 stations.setdefault(node, Station(node))
         elif len(nodes) == 1:
@@ -140,6 +152,7 @@ def read_chain(netlist: Netlist, keep: str) -> Chain:
             circuits.append(item)
         else:
             problems.append(_not_in_a_chain(item))
+    problems += (found for items in links.values() for found in _objections(items, keep))
     if not problems:
         problems += _not_a_row(stations, links)
     if problems:
@@ -162,14 +175,28 @@ def _with(station: Station, item: Placed) -> Station:
     return replace(station, riders=(*station.riders, item), support=station.support + support)
 
 
-def _objections(item: Placed, keep: str) -> Iterator[Problem]:
-    if isinstance(item.part, Backlash) and (item.part.name != keep or item.part.c is None):
-        yield Problem(
-            "gap in a chain",
-            f"Backlash '{item.part.name}' is no spring that can be one with its neighbours.",
-            "Keep it, keep='...' with a stiffness c; or put a Spring in its place.",
-            (item.part.name,),
-        )
+def _objections(items: Sequence[Placed], keep: str) -> Iterator[Problem]:
+    """Gaps that no chain of springs describes."""
+    beside = [item.part.name for item in items if not isinstance(item.part, Damper)]
+    for item in items:
+        part = item.part
+        if not isinstance(part, Backlash):
+            continue
+        if part.c is None:
+            yield Problem(
+                "rigid gap",
+                f"Backlash '{part.name}' has rigid flanks, which have no stiffness to swing by.",
+                "Give it a stiffness c.",
+                (part.name,),
+            )
+        elif len(beside) > 1 and keep not in beside:
+            yield Problem(
+                "gap beside a spring",
+                f"Backlash '{part.name}' lies beside {', '.join(name for name in beside if name != part.name)}: in "
+                "series with others they are no one gap.",
+                f"Keep it, keep='{part.name}'.",
+                (part.name,),
+            )
 
 
 def _not_in_a_chain(item: Placed) -> Problem:
@@ -202,9 +229,9 @@ def _in_a_row(stations: dict[str, Station], links: dict[tuple[str, str], list[Pl
         pair = next(pair for pair in left if row[-1] in pair)
         items = left.pop(pair)
         row.append(pair[1] if pair[0] == row[-1] else pair[0])
-        c, d = (sum(float(getattr(item.part, name, None) or 0.0) for item in items) for name in ("c", "d"))
+        c, d, gap = (sum(float(getattr(item.part, name, 0.0)) for item in items) for name in ("c", "d", "gap"))
         springs = tuple(item.part.name for item in items if not isinstance(item.part, Damper))
-        made.append(Link(springs[0], c, d, springs, tuple(items)))
+        made.append(Link(springs[0], c, d, gap, springs, tuple(items)))
     return Chain(tuple(stations[node] for node in row), tuple(made))
 
 

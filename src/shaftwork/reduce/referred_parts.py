@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +15,7 @@ from shaftwork.components.rotation import Damper, Inertia, Spring
 from shaftwork.components.sources import ForceSource, TorqueSource
 from shaftwork.components.translation import Mass, TranslationalDamper, TranslationalSpring
 from shaftwork.core.domains import ROTATION, TRANSLATION, Domain
-from shaftwork.core.errors import ShaftworkError
+from shaftwork.core.errors import NetworkWarning, ShaftworkError
 from shaftwork.core.parameters import Parameter
 from shaftwork.network.netlist import REFERENCE, Placed
 from shaftwork.reduce.covariance import does_the_same
@@ -54,6 +55,7 @@ OF_CLASS: Mapping[str, Mapping[str, Exponents]] = {
         "d": _exponents(0, 1),
         "omega_s": _exponents(-1),
     },
+    "BucketWheelLoad": {"edge": _exponents(0, 1), "ratio": _exponents(-1)},
     "Shaft": {
         **dict.fromkeys(("diameter", "inner_diameter"), _exponents("1/2", "1/4")),
         **dict.fromkeys(("damping", "friction"), _exponents(2, 1)),
@@ -162,7 +164,9 @@ def _scaled(part: Component, scale: Scale, here: Domain, domain: Domain) -> tupl
                     *(made[0], target.unit, made[1]),
                 )
             )
-    return kind(part.name, **values), tuple(entries)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NetworkWarning)  # what is odd about the part was said when it was made
+        return kind(part.name, **values), tuple(entries)
 
 
 def _powers(part: Component, declared: Parameter) -> Exponents:

@@ -3,66 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from itertools import zip_longest
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from shaftwork.components.rotation import Inertia, Spring
+from shaftwork.components.rotation import Gear
 from shaftwork.core.domains import ROTATION
 from shaftwork.core.errors import ParameterError
-from shaftwork.equations.nomenclature import table as longtable
-from shaftwork.equations.printing import printed_number
-from shaftwork.equations.spelling import in_text
-from shaftwork.network.netlist import REFERENCE
+from shaftwork.network.netlist import REFERENCE, Placed
 from shaftwork.pipeline.network import Network
-from shaftwork.reduce.chain import Chain, Link, Station, read_chain, turning_nodes
-from shaftwork.reduce.grouping import Grouping, groupings
+from shaftwork.reduce.chain import Chain, read_chain
+from shaftwork.reduce.comparison import Comparison
+from shaftwork.reduce.grouping import Grouping, grouped, groupings
+from shaftwork.reduce.groups import GroupTable, add_chain
 from shaftwork.reduce.reference_shaft import Referred, refer
-from shaftwork.reduce.truncation import truncated_frequencies
+from shaftwork.reduce.truncation import ModalChain, truncated
+from shaftwork.results.solution import Solution
 
 KEPT = 0.05
 """A natural frequency is kept when the small model has it within this fraction."""
 AMPLIFIED = 0.1
 """Up to where a lost mode would swing along by no more than this fraction, the small model is valid."""
 POINTS = 4001
-
-
-@dataclass(frozen=True)
-class Group:
-    """What became one part: name, quantity, value in SI, and the names of what it was made of."""
-
-    part: str
-    quantity: str
-    value: float
-    unit: str
-    made_of: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class GroupTable:
-    """The inertias and springs of a small model and what they were made of."""
-
-    rows: tuple[Group, ...]
-    rigid: tuple[str, ...]
-
-    def __str__(self) -> str:
-        cells = [(row.part, row.quantity, f"{row.value:.6g}", row.unit, ", ".join(row.made_of)) for row in self.rows]
-        rows = [("part", "quantity", "value", "unit", "made of"), *cells]
-        widths = [max(len(row[column]) for row in rows) for column in range(5)]
-        lines = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
-        return "\n".join([*lines, f"rigid now: {', '.join(self.rigid) or 'nothing'}"])
-
-    def latex(self) -> str:
-        """The table as LaTeX, a `longtable`."""
-        rows = [
-            (in_text(row.part), f"${row.quantity}$", f"${printed_number(row.value)}$", in_text(", ".join(row.made_of)))
-            for row in self.rows
-        ]
-        return longtable("llrl", ("Part", "Quantity", "Value in SI", "Made of"), rows)
 
 
 @dataclass(frozen=True)
@@ -85,57 +50,30 @@ class FrequencyLoss:
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
-    """The torque of the kept shaft in the train and in the small model, on one motion.
-
-    Args:
-        t: (k,) times, s.
-        before: (k,) torque of the train at the reference shaft, N m.
-        after: (k,) torque of the small model, N m.
-    """
-
-    t: NDArray[np.float64]
-    before: NDArray[np.float64]
-    after: NDArray[np.float64]
-
-    @property
-    def peaks(self) -> tuple[float, float]:
-        """Largest torque in size before and after, N m."""
-        return float(np.abs(self.before).max()), float(np.abs(self.after).max())
-
-    @property
-    def peak_error(self) -> float:
-        """Of the largest torque, relative; negative where the small model says less."""
-        before, after = self.peaks
-        return after / before - 1
-
-    @property
-    def rms_error(self) -> float:
-        """Root mean square of the difference over that of the torque of the train."""
-        return float(np.sqrt(np.mean((self.after - self.before) ** 2) / np.mean(self.before**2)))
-
-
-@dataclass(frozen=True, eq=False)
 class Simplified:
     """A small model of a train.
 
     Args:
         network: of the small model; the kept shaft and everything but inertias and other springs has its name.
+        by_modes: as many inertias by modes (Craig and Bampton), a network; None of one mass, or with no shaft kept.
         table: the groups.
         frequencies: before and after.
         keep: the kept shaft; empty for none.
         groupings: all that were tried, the chosen one first.
         train: the network as it was.
         referred: the same at the reference shaft.
+        chain: what that is as inertias and springs in a row.
     """
 
     network: Network
+    by_modes: Network | None
     table: GroupTable
     frequencies: tuple[FrequencyLoss, ...]
     keep: str
     groupings: tuple[Grouping, ...]
     train: Network
     referred: Referred
+    chain: Chain
 
     def __str__(self) -> str:
         title = f"{self.network.name}, valid up to {self.valid_up_to:.3g} Hz"
@@ -153,27 +91,51 @@ class Simplified:
         lost = (row.before for row in self.frequencies if row.error is None or abs(row.error) > KEPT)
         return next(lost, math.inf) * math.sqrt(AMPLIFIED / (1 + AMPLIFIED))
 
-    def compare(self, t_end: float, **options: Any) -> Comparison:
-        """Simulate both and compare the torque of the kept shaft.
+    def compare(
+        self, t_end: float, *, before: Solution | None = None, modes: bool = True, **options: Any
+    ) -> Comparison:
+        """Simulate the train and its small models and compare the torque of the kept shaft.
+
+        Of a single mass it is the torque that would be in the kept shaft if it were rigid as well.
 
         Args:
             t_end: end of the motion, s.
-            **options: of `Network.simulate`, for both.
+            before: the train's motion, where it is known already; its times are taken.
+            modes: whether the model by modes is simulated as well, where there is one.
+            **options: of `Network.simulate`, for all.
 
         Raises:
-            ParameterError: no shaft was kept.
+            ParameterError: no shaft was kept, or the motion that is known has another end.
         """
-        if not any(part.name == self.keep for part in self.network.parts):
-            raise ParameterError("compare: there is no kept shaft. Simplify to two or more masses with keep='...'.")
-        options = {"t_eval": np.linspace(0.0, t_end, POINTS), **options}
-        name = f"{self.keep}.{'tau' if f'{self.keep}.tau' in _signals(self.train, self.keep) else 'f'}"
-        before, after = self.train.simulate(t_end, **options), self.network.simulate(t_end, **options)
-        return Comparison(before.t, before[name] * self.referred.torque_ratio(self.keep), after[f"{self.keep}.tau"])
+        if not self.keep:
+            raise ParameterError("compare: there is no kept shaft. Simplify with keep='...', the name of one.")
+        if before is None:
+            before = self.train.simulate(t_end, **{"t_eval": np.linspace(0.0, t_end, POINTS), **options})
+        elif not math.isclose(float(before.t[-1]), t_end):
+            raise ParameterError(f"compare: the motion `before` ends at {before.t[-1]:g} s, and t_end is {t_end:g} s.")
+        options |= {"t_eval": before.t}
+        own = f"{self.keep}.tau" if f"{self.keep}.tau" in before.names else f"{self.keep}.f"
+        small = self.network if len(self.groupings[0].groups) > 1 else _split(self.chain, self.keep)
+        after = small.simulate(t_end, **options)
+        torque = f"{self.keep}.{'tau' if small is self.network else 'tau_a'}"
+        modal = self.by_modes.simulate(t_end, **options)[f"{self.keep}.tau"] if modes and self.by_modes else None
+        return Comparison(before.t, before[own] * self.referred.torque_ratio(self.keep), after[torque], modal)
 
 
-def _signals(net: Network, name: str) -> tuple[str, ...]:
-    part = next(part for part in net.parts if part.name == name)
-    return tuple(f"{name}.{quantity}" for quantity in part.signals())
+def _split(chain: Chain, keep: str) -> Network:
+    """The rigid train as two halves of which one carries the other, so that the torque between them can be read."""
+    kept = _place(chain, keep)
+    halves = grouped(chain, (kept,), kept)[0]
+    own = next(item for item in chain.links[kept].placed if item.part.name == keep)
+    link = replace(halves.links[0], placed=(Placed(Gear(keep, ratio=1.0), own.nodes),))
+    net = Network("rigid")
+    add_chain(net, replace(halves, links=(link,)))
+    return net
+
+
+def _place(chain: Chain, keep: str) -> int:
+    """The link of a kept shaft."""
+    return next(k for k, link in enumerate(chain.links) if link.has(keep))
 
 
 def simplify(
@@ -210,12 +172,15 @@ def simplify(
         known = ", ".join(item.part.name for link in chain.links for item in link.placed)
         raise ParameterError(f"keep = {keep!r} is no shaft between two inertias of '{net.name}'. There are: {known}.")
     tried = groupings(chain, masses, keep, _driven(chain))
-    made = Network(f"{net.name}, {masses} {'mass' if masses == 1 else 'masses'}")
-    rows = tuple(_built(made, tried[0].chain))
+    title = f"{net.name}, {masses} {'mass' if masses == 1 else 'masses'}"
+    made = Network(title)
+    rows = add_chain(made, tried[0].chain)
     used = {name for row in rows for name in row.made_of}
     rigid = tuple(name for link in chain.links for name in link.parts if name not in used)
-    losses = _losses(chain, tried[0].chain, keep)
-    return Simplified(made, GroupTable(rows, rigid), losses, keep, tried, net, referred)
+    modal = truncated(chain, masses, _place(chain, keep)) if keep and masses > 1 else None
+    by_modes = modal.network(f"{title}, by modes") if modal else None
+    losses = _losses(chain, tried[0].chain, modal)
+    return Simplified(made, by_modes, GroupTable(rows, rigid), losses, keep, tried, net, referred, chain)
 
 
 def _reference(net: Network, keep: str) -> str:
@@ -241,43 +206,15 @@ def _driven(chain: Chain) -> int:
     return next(places, 0)
 
 
-def _built(net: Network, chain: Chain) -> Iterator[Group]:
-    """Add the parts of a small model, station by station; what each inertia and spring was made of."""
-    for item in chain.circuits:
-        net.add(item.part, *item.nodes)
-    for k, station in enumerate(chain.stations):
-        for item in station.riders:
-            moved = turning_nodes(item)
-            net.add(item.part, *(station.node if node in moved else node for node in item.nodes))
-        name = max(station.inertias, key=lambda own: own[1])[0]
-        net.add(Inertia(name, J=station.inertia), station.node)
-        yield Group(name, "J", station.inertia, "kg*m^2", tuple(own for own, _ in station.inertias))
-        if k < len(chain.links):
-            yield from _linked(net, chain.links[k], station, chain.stations[k + 1])
-
-
-def _linked(net: Network, link: Link, station: Station, other: Station) -> Iterator[Group]:
-    if link.placed:
-        for item in link.placed:
-            forward = item.nodes[0] == station.node
-            net.add(item.part, *((station.node, other.node) if forward else (other.node, station.node)))
-    else:
-        net.add(Spring(link.name, c=link.c, d=link.d), station.node, other.node)
-    yield Group(link.name, "c", link.c, "N*m/rad", link.parts)
-
-
-def _losses(before: Chain, after: Chain, keep: str) -> tuple[FrequencyLoss, ...]:
-    kept = next((k for k, link in enumerate(before.links) if keep and link.has(keep)), None)
-    by_modes = (
-        () if kept is None or len(after.stations) < 2 else truncated_frequencies(before, len(after.stations), kept)
-    )
-    was, now, modal = (
+def _losses(before: Chain, after: Chain, modal: ModalChain | None) -> tuple[FrequencyLoss, ...]:
+    by_modes = () if modal is None else modal.frequencies()
+    was, now, other = (
         [float(f) for f in found if f > 0] for found in (before.frequencies(), after.frequencies(), by_modes)
     )
-    rows = zip_longest(was, now, modal)
+    rows = zip_longest(was, now, other)
     return tuple(
-        FrequencyLoss(k, f, found, None if found is None else found / f - 1, other)
-        for k, (f, found, other) in enumerate(rows, 1)
+        FrequencyLoss(k, f, found, None if found is None else found / f - 1, bound)
+        for k, (f, found, bound) in enumerate(rows, 1)
     )
 
 

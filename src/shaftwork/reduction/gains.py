@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 from zlib import crc32
 
-from sympy import Expr, Float, Integer, Symbol, cancel
+from sympy import Expr, Float, Integer, Rational, Symbol, cancel
 
 CANCELLATION = 1e-10
 """A difference below this fraction of its terms is zero: ratios are typed to some ten digits (1.2 * 1.5 is 1.8)."""
@@ -22,6 +22,8 @@ _OPERATIONS: Mapping[str, Callable[[Any, Any], Any]] = {
     "+": operator.add,
     "/": operator.truediv,
 }
+LONGEST = 1000
+"""The largest denominator of a fraction that is printed as one."""
 T = TypeVar("T")
 
 
@@ -167,5 +169,18 @@ def exact_of(numbers: Iterable[Number]) -> list[Expr]:
 
 
 def simplified(number: Number) -> Expr:
-    """The expression in its shortest rational form, for equations that people read."""
-    return cancel(exact_of((number,))[0])
+    """The expression in its shortest rational form, for equations that people read; decimals are rounded only once."""
+    if isinstance(number, int):
+        return Integer(number)
+    return in_decimals(cancel(fold((number,), exactly)[0]))
+
+
+def exactly(expression: Expr) -> Expr:
+    """The expression with the fraction that every decimal number is, so that algebra with it rounds nothing."""
+    return expression.xreplace({number: Rational(number) for number in expression.atoms(Float)})
+
+
+def in_decimals(expression: Expr) -> Expr:
+    """The expression with decimal numbers for fractions that are too long to be read."""
+    long = (number for number in expression.atoms(Rational) if number.q > LONGEST)
+    return expression.xreplace({number: Float(number) for number in long})

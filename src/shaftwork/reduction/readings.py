@@ -12,17 +12,23 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
-from sympy import Add, Expr, Integer, Symbol
+from sympy import Add, Expr, Integer, Symbol, nan, oo, zoo
 
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, End, across_of, integral_of, through_of
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Modes
 from shaftwork.components.slopes import slope
+from shaftwork.core.errors import NetworkError, Problem
 from shaftwork.network.graph import GROUND, GraphBranch, GraphPart
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.gains import exact_of
 from shaftwork.reduction.rows import Rows
+
+
+def _no_limit(name: str) -> Problem:
+    message = f"a law that acts on '{name}' has no finite value where '{name}' holds still, so that nothing holds it."
+    return Problem("law with a pole", message, "Give the law a finite value at rest.", (name,))
 
 
 class Readings:
@@ -45,7 +51,11 @@ class Readings:
         return self.rows.states
 
     def guard(self, part: GraphPart, element: Modes, expression: Expr) -> Expr:
-        """An expression of a guard, in the symbols of its component, in states, the network's parameters and time."""
+        """An expression of a guard, in the symbols of its component, in states, the network's parameters and time.
+
+        Raises:
+            NetworkError: it has no finite value: a law of another part has a pole where this part holds still.
+        """
         ports = [port.name for port in part.component.ports]
         ends = element.ends or (ports[0], ports[1] if len(ports) > 1 else None)
         known: dict[Symbol, Expr] = {}
@@ -58,7 +68,10 @@ class Readings:
                 known[symbol] = self._integral(part, element.angle)
             else:
                 known[symbol] = self._named(part, symbol)
-        return expression.xreplace(known)
+        made = expression.xreplace(known)
+        if made.has(zoo, oo, nan):
+            raise NetworkError(f"'{self.graph.name}' cannot be assembled", (_no_limit(part.name),))
+        return made
 
     def _named(self, part: GraphPart, symbol: Symbol) -> Expr:
         for port in part.nodes:

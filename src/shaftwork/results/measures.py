@@ -10,6 +10,7 @@ import numpy as np
 from shaftwork.core.errors import ParameterError
 from shaftwork.results.fatigue import SNLine
 from shaftwork.results.observer import Array
+from shaftwork.results.quadrature import Panels, integrate
 from shaftwork.results.solution import Solution
 from shaftwork.results.turning import Read, turning_points
 
@@ -23,11 +24,8 @@ KINDS: Mapping[str, str] = {
     "damage": "the share of the life that the motion takes, with `sn`",
 }
 """What a measure may say of a quantity."""
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 BLOCK = 50_000
 """Times that are read at once."""
-PARTS, HALVINGS, SETTLED = 64, 12, 1e-10
-"""Of a motion at least; how often they are halved at most; and the change that is none, of the largest value."""
 SMALLEST = 1e-6
 """Ups and downs of less than this part of the range make no peak."""
 
@@ -102,15 +100,10 @@ def _worst(values: Array) -> float:
 
 
 def _mean(read: Read, steps: Array, power: int) -> float:
-    """Gauss' rule in parts of every step, halved until that changes nothing: an exact engine has long steps."""
-    parts, before = max(1, PARTS // len(steps)), np.inf
-    for _ in range(HALVINGS):
-        ends = np.append((steps[:-1, None] + np.diff(steps)[:, None] * np.arange(parts) / parts).ravel(), steps[-1])
-        first, length = ends[:-1, None], np.diff(ends)[:, None]
-        times = first + length * (NODES + 1) / 2
-        values = read(times.ravel()).reshape(times.shape) ** power
-        mean = float((values @ WEIGHTS / 2) @ length[:, 0] / (steps[-1] - steps[0]))
-        if abs(mean - before) <= SETTLED * np.abs(values).max(initial=0.0):
-            break
-        before, parts = mean, 2 * parts
+    def integrand(panels: Panels) -> Array:
+        times = panels.times
+        return (read(times.ravel()) ** power).reshape(1, *times.shape)
+
+    total, _ = integrate(integrand, steps)
+    mean = float(total[0] / (steps[-1] - steps[0]))
     return float(np.sqrt(mean)) if power == 2 else mean

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +46,10 @@ class Observer(Protocol):
 
     def powers(self, t: Array, x: Array) -> tuple[dict[str, Array], dict[str, Array]]:
         """By part, at times t (k,) with states x (k, n): lost power in W, supplied power in W."""
+        ...
+
+    def part(self, name: str) -> Any:
+        """A component of the network, with the parameter values of this motion."""
         ...
 
 

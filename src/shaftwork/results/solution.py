@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
 
@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True)
-class PhaseRow:
+class PhaseRow(NamedTuple):
     """A phase of a motion.
 
     Args:
@@ -90,6 +89,8 @@ class Solution:
         Raises:
             SignalError: there is no such quantity; the message lists what the part has.
         """
+        if name in self.states and name in self:
+            return self.x[:, self.states.index(name)].copy()
         if isinstance(name, str) and name in self.observer.profiles:
             return self.observer.profile(name, self.t, self.x, self.dense)
         return self.observer.signal(self._known(name), self.t, self.x, self.dense)

@@ -67,6 +67,7 @@ def _sampled(steps: Array, panels: int) -> Array:
     """Times in every step, its end just before what may jump there included."""
     first, last = steps[:-1], np.nextafter(steps[1:], steps[:-1])
     inside = first[:, None] + (last - first)[:, None] * np.linspace(0.0, 1.0, panels + 1)
+    inside[:, -1] = last  # which the sum may miss by a rounding
     return np.unique(np.append(inside, steps[-1]))
 
 

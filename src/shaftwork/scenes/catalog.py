@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
+from shaftwork.core.errors import ParameterError
 from shaftwork.pipeline.network import Network
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -35,3 +38,14 @@ class Scene:
 
     def __call__(self, **options: Any) -> Network:
         return self.build(**options)
+
+
+def choice(what: str, asked: str, scene: str, known: Mapping[str, T]) -> T:
+    """What an option of a scene stands for.
+
+    Raises:
+        ParameterError: there is no such option.
+    """
+    if asked not in known:
+        raise ParameterError(f"There is no {what} {asked!r} of the {scene}. There are: {', '.join(known)}.")
+    return known[asked]

@@ -15,12 +15,13 @@ from shaftwork.components.motor_catalogue import motors
 from shaftwork.components.rotation import Inertia, Spring
 from shaftwork.core.errors import ParameterError
 from shaftwork.pipeline.network import Network
-from shaftwork.scenes.catalog import Scene
+from shaftwork.scenes.catalog import Scene, choice
 
 MOTOR = motors["KBF-90 LA 2"]
 WHEEL_RADIUS = 0.125  # m
 GEAR = {"ratio": 35.5, "efficiency": 0.95}
-BRAKE_TORQUE = 9.6 * GEAR["ratio"] * GEAR["efficiency"]  # N m at the wheel shaft, (18): 323.76
+BRAKE_AT_MOTOR = 9.6  # N m
+BRAKE_TORQUE = BRAKE_AT_MOTOR * GEAR["ratio"] * GEAR["efficiency"]  # N m at the wheel shaft, (18): 323.76
 T_BRAKE = 6.5  # s: then the motor is off and the brake on
 RESISTANCE, SPREAD = 22.4, 10.0  # N m: mean and standard deviation
 INTERVAL = 0.05  # s, chosen: from one random resistance to the next
@@ -104,7 +105,7 @@ def _motor(start: str) -> Component:
         "frequency": lambda: MOTOR.drive("motor", t_ramp=T_RAMP, **values),
         "pull-out": lambda: PullOutDrive("motor", **curve, **values),
     }
-    return _choice("start", start, starts)()
+    return choice("start", start, "crane", starts)()
 
 
 def _shaft(gap: float) -> Component:
@@ -117,13 +118,7 @@ def _load(kind: str, seed: float = 1.0) -> Component:
         "constant": lambda: CoulombLoad("load", tau=RESISTANCE, symbol="w"),
         "random": lambda: RandomLoad("load", mean=RESISTANCE, std=SPREAD, interval=INTERVAL, seed=seed, symbol="w"),
     }
-    return _choice("load", kind, loads)()
-
-
-def _choice(what: str, asked: str, known: dict[str, Callable[[], Component]]) -> Callable[[], Component]:
-    if asked not in known:
-        raise ParameterError(f"There is no {what} {asked!r} of the crane. There are: {', '.join(known)}.")
-    return known[asked]
+    return choice("load", kind, "crane", loads)()
 
 
 _CURVE = (

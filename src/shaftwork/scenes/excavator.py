@@ -42,27 +42,25 @@ def excavator(
         alpha: angle at which a bucket leaves the soil, rad.
     """
     net = Network("excavator")
-    net.add(_motor(pull_up_speed), "rotor")
+    net.add(cage_motor(pull_up_speed), "rotor")
     net.add(Inertia("J1", J=27.0, symbol="1"), "rotor")
     net.add(Spring("shaft", c=1608.0, symbol="sh"), "rotor", "coupling")
     net.add(Inertia("J2", J=8.2, symbol="2"), "coupling")
     net.add(Gear("reducer", ratio=ratio, symbol="R"), "coupling", "wheel")
-    digging = BucketWheelLoad(
-        "digging",
-        radius=radius,
-        edge=edge,
-        alpha=alpha,
-        soil=soil,
-        seed=seed,
-        t_on=T_DIG,
-        rise=RISE,
-        symbol="w",
-    )
-    net.add(digging, "wheel")
+    net.add(digging(soil, seed=seed, radius=radius, edge=edge, alpha=alpha), "wheel")
     return net
 
 
-def _motor(pull_up_speed: float) -> CageMotor:
+def digging(
+    soil: Soil | str, *, seed: float, radius: float = RADIUS, edge: float = EDGE, alpha: float = ALPHA
+) -> BucketWheelLoad:
+    """The wheel in the soil, from 5 s on; arguments as of `excavator`."""
+    values = {"radius": radius, "edge": edge, "alpha": alpha, "seed": seed, "t_on": T_DIG, "rise": RISE}
+    return BucketWheelLoad("digging", soil=soil, symbol="w", **values)  # type: ignore[arg-type]
+
+
+def cage_motor(pull_up_speed: float) -> CageMotor:
+    """The motor with a speed at pull-up, 1/min, without a warning of its curve."""
     with warnings.catch_warnings():
         # the quartic first rises to 5.8 kN m at 110 1/min: the price of the extremes of figure 13
         warnings.simplefilter("ignore", NetworkWarning)

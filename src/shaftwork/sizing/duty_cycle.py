@@ -1,0 +1,298 @@
+"""What a motion asks of its motor: torque, power and speed at the motor's shaft, and the heat they stand for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from shaftwork.core.errors import MissingExtraError, ParameterError
+from shaftwork.core.parameters import in_si
+from shaftwork.results.observer import Array
+from shaftwork.results.quadrature import Panels
+from shaftwork.results.turning import turning_points
+from shaftwork.sizing.motor_shaft import REST, SMALLEST, MotorShaft
+from shaftwork.sizing.reserve import Limit, Reserve, reserve_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+TYPES = ("S1", "S3")
+LONG_CYCLE = 600.0
+"""Duration of a duty cycle in s that IEC 60034-1, 4.2.3, takes where none is agreed on."""
+BRIEF = 1e-9
+"""Part of a cycle that is no time: at the ends of standstill a torque may be read that jumps there."""
+SAMPLES, FINE = 4001, 4 * float(np.finfo(float).eps)
+"""Times among which a speed is looked for, and how exactly its time is found."""
+
+
+@dataclass(frozen=True)
+class Flow:
+    """Power in one direction.
+
+    Args:
+        duration: time with power in this direction, s.
+        energy: J, positive.
+        peak: largest power, W, positive.
+        rms: effective value during `duration`, W.
+    """
+
+    duration: float
+    energy: float
+    peak: float
+    rms: float
+
+    @property
+    def mean(self) -> float:
+        """Mean during `duration`, W."""
+        return self.energy / self.duration if self.duration else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Duty:
+    """A duty cycle of a motor, at the motor's own shaft.
+
+    Integrals are those of the motion, split where torque jumps or power changes its sign, not sums over output times.
+
+    Args:
+        title: of the network.
+        motor: name of the motor, or of the torque.
+        duration: of the cycle, rest after the motion included, s.
+        tau_rms: effective torque over the cycle, sqrt(integral of tau^2 / duration), N m.
+        tau_mean: mean torque over the cycle, with sign, N m.
+        tau_max: largest torque, N m.
+        tau_min: smallest torque, N m; below zero where the motor brakes, or turns backwards.
+        power_rms: effective power over the cycle, W.
+        power_mean: mean power over the cycle, braking counted negative, W.
+        motoring: power from the motor into the train.
+        braking: power from the train into the motor.
+        n_top: highest speed in size, 1/min.
+        n_mean: mean size of the speed over the cycle, 1/min.
+        loaded: time with torque or speed, s; starting and braking are in it.
+        held: time at standstill with torque, s; it is part of `loaded`.
+        cooled: the cycle in time of full cooling, integral of the cooling over the time, s.
+        cooling: heat given off at standstill over that at full cooling.
+        n_cooling: speed from which cooling is full, 1/min.
+        shaft: where torque and speed are read.
+        panels: of the motion, torque and power smooth in each.
+    """
+
+    title: str
+    motor: str
+    duration: float
+    tau_rms: float
+    tau_mean: float
+    tau_max: float
+    tau_min: float
+    power_rms: float
+    power_mean: float
+    motoring: Flow
+    braking: Flow
+    n_top: float
+    n_mean: float
+    loaded: float
+    held: float
+    cooled: float
+    cooling: float
+    n_cooling: float
+    shaft: MotorShaft = field(repr=False)
+    panels: Panels = field(repr=False)
+
+    @property
+    def tau_peak(self) -> float:
+        """Largest torque in size, N m."""
+        return max(abs(self.tau_max), abs(self.tau_min))
+
+    @property
+    def power_peak(self) -> float:
+        """Largest power in size, W."""
+        return max(self.motoring.peak, self.braking.peak)
+
+    @property
+    def rest(self) -> float:
+        """Time at standstill without torque, s."""
+        return max(self.duration - self.loaded, 0.0)
+
+    @property
+    def cyclic_duration_factor(self) -> float:
+        """Time of load, starting and braking included, over duration of the cycle: IEC 60034-1, 3.2 and 4.2.3."""
+        return self.loaded / self.duration
+
+    def thermal(self, duty_type: str = "S1", factor: Any = None) -> float:
+        """The constant torque in N m that heats the motor as the cycle does; not more than its rating may be.
+
+        Law: equal copper losses, proportional to the square of the torque. S1: sqrt(integral of tau^2 / t_c), where t_c
+        is the duration of the cycle, or the time of full cooling (`cooled`) for a motor that cools itself. S3:
+        sqrt(integral of tau^2 / (factor duration)), for a motor rated for S3 at this cyclic duration factor; at the
+        factor of the cycle that is the effective torque of its time under load. Source: IEC 60034-1, 4.2.1 and 4.2.3,
+        defines S1, S3 and the factor; the equivalent torque is practice and no formula of the standard. It holds for
+        cycles much shorter than the thermal time constant (the standard has 10 min for S3) and constant flux.
+
+        Args:
+            duty_type: "S1" or "S3".
+            factor: of an S3 rating, such as 0.25; by default that of the cycle.
+
+        Raises:
+            ParameterError: there is no such type, or no such factor.
+        """
+        if duty_type not in TYPES:
+            raise ParameterError(f"There is no duty type {duty_type!r} here. There are: {', '.join(TYPES)}.")
+        if duty_type == "S1":
+            if factor is not None:
+                raise ParameterError(f"factor = {factor!r}: S1 is continuous and has none. Leave it out, or take 'S3'.")
+            return self.tau_rms * math.sqrt(self.duration / self.cooled)
+        share = self.cyclic_duration_factor if factor is None else in_si("factor", factor, above=0, at_most=1)
+        return self.tau_rms / math.sqrt(share) if share else 0.0
+
+    def acceleration_time(self, share: Any = 1.0) -> float:
+        """Time in s from standstill until the speed first has a share of its highest value in size.
+
+        It counts from the last standstill before, or from the start of the motion. A motor that settles asymptotically
+        comes to its highest speed late: ask for a share such as 0.95.
+
+        Args:
+            share: of the highest speed.
+
+        Raises:
+            ParameterError: it is no share, or nothing moves.
+        """
+        part = in_si("share", share, above=0, at_most=1)
+        if not self.n_top:
+            raise ParameterError(f"'{self.motor}' does not move in '{self.title}'; there is no acceleration.")
+        return _run_up(self.shaft, part)
+
+    def reserve(self, limit: Limit = None) -> Reserve:
+        """How far the torque stays below a limit, at the worst instant of the motion.
+
+        Args:
+            limit: largest torque in size in N m over the motor's speed in 1/min: a number, a `Table`, or a function of
+                an array of speeds, all without sign. By default the pull-out torque of the motor's own curve at each
+                instant: a motor that starts on the mains goes through it, and has no reserve there.
+
+        Raises:
+            ParameterError: the motor has no curve of torque over speed, or the limit is no such thing.
+        """
+        return reserve_of(self.shaft, limit)
+
+    def plot(self, limit: Limit = None) -> Figure:
+        """The motion in the plane of speed and torque, with the motor's own curve and a limit (extra `plot`).
+
+        Args:
+            limit: as in `reserve`.
+
+        Raises:
+            MissingExtraError: matplotlib is not installed.
+            ParameterError: the limit is no limit.
+        """
+        from shaftwork.sizing.picture import speed_torque_plane
+
+        return speed_torque_plane(self, limit)
+
+    @property
+    def figures(self) -> Mapping[str, tuple[float, str]]:
+        """All figures with their units."""
+        return {
+            "cycle": (self.duration, "s"),
+            "time under load": (self.loaded, "s"),
+            "cyclic duration factor": (100 * self.cyclic_duration_factor, "%"),
+            "torque, effective": (self.tau_rms, "N*m"),
+            "torque, mean": (self.tau_mean, "N*m"),
+            "torque, largest": (self.tau_max, "N*m"),
+            "torque, smallest": (self.tau_min, "N*m"),
+            "thermal torque, S1": (self.thermal("S1"), "N*m"),
+            "thermal torque, S3 at the factor": (self.thermal("S3"), "N*m"),
+            "power, effective": (self.power_rms, "W"),
+            "power, mean": (self.power_mean, "W"),
+            "motoring, peak": (self.motoring.peak, "W"),
+            "motoring, mean": (self.motoring.mean, "W"),
+            "motoring, energy": (self.motoring.energy, "J"),
+            "braking, peak": (self.braking.peak, "W"),
+            "braking, mean": (self.braking.mean, "W"),
+            "braking, energy": (self.braking.energy, "J"),
+            "speed, highest": (self.n_top, "1/min"),
+            "speed, mean": (self.n_mean, "1/min"),
+            **(
+                {
+                    "to 95 % of the highest speed": (self.acceleration_time(0.95), "s"),
+                    "to the highest speed": (self.acceleration_time(), "s"),
+                }
+                if self.n_top
+                else {}
+            ),
+        }
+
+    def to_pandas(self) -> pd.DataFrame:
+        """The figures as a data frame (extra `data`).
+
+        Raises:
+            MissingExtraError: pandas is not installed.
+        """
+        try:
+            import pandas as pd
+        except ImportError:
+            raise MissingExtraError("pandas", "data", "Duty.to_pandas()") from None
+        return pd.DataFrame.from_dict(self.figures, orient="index", columns=["value", "unit"])
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader of the figures must know."""
+        shaft, made = self.shaft, list[str]()
+        if shaft.ratio != 1 or shaft.efficiency != 1:
+            whose = "the motor's own gear" if shaft.own_gear else "the gear that was given"
+            made.append(f"at the motor's shaft, before {whose}: ratio {shaft.ratio:g}, efficiency {shaft.efficiency:g}")
+        if self.held > BRIEF * self.duration:
+            made.append(f"torque is held at standstill for {self.held:.6g} s; at_rest='released' if a brake does that")
+        if (jumps := _jumps(shaft)).size:
+            made.append(
+                f"the speed jumps at {jumps[0]:.6g} s; what an inertia rigidly there takes at once is in no figure"
+            )
+        if self.cooling < 1:
+            made.append(f"cooling {self.cooling:g} at standstill, full from {self.n_cooling:.6g} 1/min on")
+        if self.duration > LONG_CYCLE:
+            made.append("the cycle is longer than 10 min; the motor may come to its limits before an average tells")
+        return tuple(made)
+
+    def __str__(self) -> str:
+        rows = [f"{name:34}{value:>12.6g} {unit}" for name, (value, unit) in self.figures.items()]
+        return "\n".join((f"duty of {self.motor} in '{self.title}'", *rows, *(f"- {note}" for note in self.notes)))
+
+
+def cooling_at(n: Array, cooling: float, n_cooling: Any) -> Array:
+    """Cooling over full cooling at speeds in 1/min: a straight line from standstill on."""
+    share = np.minimum(n / n_cooling, 1.0) if np.all(n_cooling) else np.ones_like(n)
+    return np.asarray(cooling + (1.0 - cooling) * share)
+
+
+def _jumps(shaft: MotorShaft) -> Array:
+    """Times in s at which the speed of the motor jumps."""
+    ends = shaft.steps[1:]
+    (_, before), (_, after) = shaft.read(np.nextafter(ends, -np.inf)), shaft.read(ends)
+    return ends[np.abs(after - before) > BRIEF * shaft.omega_top]
+
+
+def _run_up(shaft: MotorShaft, share: float) -> float:
+    """Time from the last standstill to the first time at a share of the highest speed."""
+
+    def size(times: Array) -> Array:
+        return np.abs(shaft.read(times)[1])
+
+    def crossing(level: float, first: int) -> float:
+        """Where the speed comes to a level between two samples."""
+        bracket = float(t[first]), float(t[first + 1])
+        return float(brentq(lambda time: float(size(np.array([time]))[0]) - level, *bracket, xtol=1e-300, rtol=FINE))
+
+    goal = share * shaft.omega_top * (1 - REST)
+    turns = turning_points(size, shaft.steps, smallest=SMALLEST).t
+    t = np.unique(np.concatenate([shaft.steps, np.linspace(shaft.steps[0], shaft.steps[-1], SAMPLES), turns]))
+    speeds = size(t)
+    reached = int(np.argmax(speeds >= goal))
+    if reached == 0:
+        return 0.0
+    rests = np.flatnonzero(shaft.rests(speeds[:reached]))
+    start = crossing(shaft.standstill, int(rests[-1])) if rests.size else float(t[0])
+    return crossing(goal, reached - 1) - start
