@@ -16,6 +16,30 @@ from shaftwork.components.slopes import slope
 from shaftwork.reduction.rows import Rows
 
 
+class Values:
+    """Expressions as a function of times, states and parameters.
+
+    Args:
+        rows: whose states and parameters are the arguments.
+        expressions: k of them.
+    """
+
+    def __init__(self, rows: Rows, expressions: Sequence[Expr]) -> None:
+        self._expressions, self._arguments = tuple(expressions), (TIME, *rows.states, *rows.parameters)
+
+    @cached_property
+    def _function(self) -> Callable[..., Any]:
+        return vectorised_list(self._arguments, self._expressions)
+
+    def __call__(self, times: Array, states: Array, p: Array) -> Array:
+        """(s, k) at times (s,) in s, states (s, n), parameters (p,)."""
+        made = np.empty((len(times), len(self._expressions)))
+        with np.errstate(all="ignore"):  # the pieces of a law that do not hold may have no value
+            for k, values in enumerate(self._function(times, *states.T, *p.tolist()) if self._expressions else ()):
+                made[:, k] = values
+        return made
+
+
 class SlopeMatrix:
     """Derivatives of expressions by symbols, as a function of time, states and parameters.
 
@@ -30,21 +54,22 @@ class SlopeMatrix:
         self.entries = {
             (k, m): made
             for k, expression in enumerate(expressions)
+            for free in (expression.free_symbols,)
             for m, symbol in enumerate(symbols)
-            if symbol in expression.free_symbols and (made := slope(expression, symbol)) != 0
+            if symbol in free and (made := slope(expression, symbol)) != 0
         }
-        self._arguments = (TIME, *rows.states, *rows.parameters)
-
-    @cached_property
-    def _function(self) -> Callable[..., Any]:
-        return vectorised_list(self._arguments, tuple(self.entries.values()))
+        self._values = Values(rows, tuple(self.entries.values()))
 
     def __call__(self, t: float, x: Array, p: Array) -> Array:
         """(k, m) at a time in s, states (n,), parameters (p,)."""
-        made = np.zeros(self.shape)
+        return np.asarray(self.along(np.array([t]), x[None, :], p)[0])
+
+    def along(self, times: Array, states: Array, p: Array) -> Array:
+        """(s, k, m) at times (s,) in s, states (s, n), parameters (p,)."""
+        made = np.zeros((len(times), *self.shape))
         if self.entries:
-            places = tuple(np.array(list(self.entries)).T)
-            made[places] = self._function(t, *x.tolist(), *p.tolist())
+            rows, columns = np.array(list(self.entries)).T
+            made[:, rows, columns] = self._values(times, states, p)
         return made
 
 

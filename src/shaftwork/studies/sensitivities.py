@@ -21,7 +21,8 @@ def frequency_sensitivities(
     Args:
         net: the network.
         at: the point about which it moves, as for `Network.modes`; it is held while a parameter changes.
-        parameters: names, "shaft.c"; by default all that are not exactly zero.
+        parameters: names, "shaft.c"; by default all in which the equations are smooth: not what is exactly zero, whole
+            or the seed of a noise.
         t: time at which laws are read, s.
 
     Raises:
@@ -43,17 +44,22 @@ def motion_sensitivities(
 ) -> MotionSensitivities:
     """Derivatives of measures of a motion by the parameters of the network, exact, by its sensitivity equations.
 
+    They go through all that changes on the way: modes of parts, impacts, laws that switch with the time or the motion.
+
     Args:
-        net: the network; no part changes its mode and no law switches.
-        measures: as in `sweep`, of which "max", "min", "peak" and "end" are known here.
+        net: the network.
+        measures: as in `sweep`; all but "damage".
         t_end: end of the motion, s.
-        parameters: names, "shaft.c"; by default all that are not exactly zero.
+        parameters: names, "shaft.c"; by default all in which the motion is smooth.
         initial: start values of states.
-        rtol: relative tolerance.
+        rtol: relative tolerance of the derivatives; the motion is computed a hundred times closer.
 
     Raises:
-        CompileError: the equations change on the way, or there are no symbolic ones.
-        ParameterError: there is no such parameter or measure.
+        CompileError: there are no symbolic equations for a part of the way.
+        ParameterError: there is no such parameter or measure, or nothing is smooth in it.
+        SignalError: there is no such quantity.
+        SimulationError: there is no derivative: something is only touched, what comes together has no order, a
+            prescribed speed jumps against an inertia, or two extremes are of one height.
     """
     if not isinstance(measures, Mapping):
         measures = {text: text for text in ((measures,) if isinstance(measures, str) else measures)}

@@ -1,0 +1,164 @@
+"""What parameters do to a motion that is known: the variational equation, linear, by Gauss collocation.
+
+All steps are made at once: a step takes Y to (1 + P) Y + Q, whatever Y is, so P and Q of every step come from one stack
+of linear systems, and only their products follow one after another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shaftwork.core.errors import SimulationError
+from shaftwork.integrate.problem import Array
+
+STAGES = 6
+"""Of a step: order 12, and no stage on its ends, where laws jump."""
+CLOSER = 64
+"""Two halves are closer to the solution than their difference from the whole by more than this."""
+MOST_STEPS = 1_000_000
+EVERY = 8
+"""So many steps of the run are one at first: implicit, it need not follow what has died away."""
+MOST_AT_ONCE = 4_000_000
+"""Numbers in the matrices that are solved at once."""
+
+Coefficients = Callable[[Array], tuple[Array, Array]]
+"""From times (k,) to A (k, N, n) and B (k, N, m) of Y' = A Y[:n] + B; rows behind the first n are mere integrals."""
+
+_ROOTS, _WEIGHTS = np.polynomial.legendre.leggauss(STAGES)
+NODES = (_ROOTS + 1) / 2
+_POWERS = np.arange(STAGES)
+# of the polynomials that are one at one node and zero at the others: integrals up to each node, and over the step
+_LAGRANGE = np.linalg.inv(NODES[:, None] ** _POWERS)
+_TO_NODES = (NODES[:, None] ** (_POWERS + 1) / (_POWERS + 1)) @ _LAGRANGE
+_TO_END = _WEIGHTS / 2
+
+
+@dataclass(frozen=True, eq=False)
+class Variation:
+    """The solution of the variational equation over a span of time.
+
+    Args:
+        coefficients: A and B.
+        ends: (s,) ends of the steps, s.
+        values: (s, N, m) Y there.
+    """
+
+    coefficients: Coefficients
+    ends: Array
+    values: Array
+
+    def at(self, t: float) -> Array:
+        """(N, m) Y at a time in s."""
+        k = int(np.clip(np.searchsorted(self.ends, t, side="right") - 1, 0, len(self.ends) - 1))
+        length = t - self.ends[k]
+        if length == 0.0 or k == len(self.ends) - 1:
+            return np.asarray(self.values[k])
+        return _stepped(_maps(self.coefficients, self.ends[k : k + 1], np.array([length]))[0], self.values[k])
+
+
+def variation(
+    coefficients: Coefficients, ends: Array, start: Array, sizes: Array, least: Array, rtol: float
+) -> Variation:
+    """Solve Y' = A Y[:n] + B; steps are halved until the halves say the same.
+
+    Args:
+        coefficients: A and B, smooth between the first and the last of the ends; never asked for there.
+        ends: (s,) ends of the steps of the run, increasing, s.
+        start: (N, m) Y at the first of them.
+        sizes: (N,) sizes of what Y are the slopes of: those of one parameter are held against each other by them.
+        least: (m,) slopes, as parts of those sizes, below which all is rounding.
+        rtol: error of a step, as a part of the largest slope by the same parameter so far.
+
+    Raises:
+        SimulationError: it takes too many steps, or there is no value.
+    """
+    ends = np.append(ends[:-1:EVERY], ends[-1])
+    begins, lengths = ends[:-1], np.diff(ends)
+    steps = _Steps(begins, lengths, _maps(coefficients, begins, lengths), np.zeros(len(lengths), dtype=bool))
+    while True:
+        parts, whole = _parted(coefficients, steps)
+        values = _passed(parts.maps, start)
+        errors = np.abs(_stepped(steps.maps[~steps.right], values[whole]) - values[whole + 2])
+        largest = np.maximum.accumulate((np.abs(values) / sizes[:, None]).max(axis=1, initial=0.0), axis=0)
+        scale = sizes[:, None] * np.maximum(largest, least)[:, None]
+        found = (errors <= CLOSER * rtol * scale[whole + 2]).all(axis=(1, 2))
+        parts.right[whole] = parts.right[whole + 1] = found
+        if parts.right.all():
+            return Variation(coefficients, np.append(parts.begins, ends[-1]), values)
+        if len(parts.begins) > MOST_STEPS or not np.isfinite(values).all():
+            worst = int(np.argmin(parts.right))
+            raise SimulationError(f"The sensitivities could not be integrated beyond t = {parts.begins[worst]:.9g} s.")
+        steps = parts
+
+
+class _Steps(NamedTuple):
+    """Steps in a row.
+
+    Args:
+        begins: (s,) s.
+        lengths: (s,) s.
+        maps: (s, N, n + m) see `_maps`.
+        right: (s,) which of them need no smaller ones.
+    """
+
+    begins: Array
+    lengths: Array
+    maps: Array
+    right: NDArray[np.bool_]
+
+
+def _parted(coefficients: Coefficients, steps: _Steps) -> tuple[_Steps, NDArray[np.intp]]:
+    """Two halves for each step that is not right, and where the first ones are."""
+    order = np.repeat(np.arange(len(steps.begins)), np.where(steps.right, 1, 2))
+    first, halved = np.append(True, order[1:] != order[:-1]), ~steps.right[order]
+    lengths = np.where(halved, steps.lengths[order] / 2, steps.lengths[order])
+    begins = np.where(first, steps.begins[order], steps.begins[order] + lengths)
+    maps = steps.maps[order]
+    maps[halved] = _maps(coefficients, begins[halved], lengths[halved])
+    return _Steps(begins, lengths, maps, ~halved), np.flatnonzero(first & halved)
+
+
+def _passed(maps: Array, start: Array) -> Array:
+    """(s + 1, N, m) Y before the first step and after each."""
+    values = np.empty((len(maps) + 1, *start.shape))
+    values[0] = start
+    for k, one in enumerate(maps):
+        values[k + 1] = _stepped(one, values[k])
+    return values
+
+
+def _stepped(maps: Array, before: Array) -> Array:
+    """(..., N, m) Y after steps, from Y before them."""
+    size = maps.shape[-1] - before.shape[-1]
+    return np.asarray(before + maps[..., :size] @ before[..., :size, :] + maps[..., size:])
+
+
+def _maps(coefficients: Coefficients, begins: Array, lengths: Array) -> Array:
+    """(s, N, n + m) of each step P and, beside it, Q."""
+    A, B = coefficients((begins[:, None] + lengths[:, None] * NODES).ravel())
+    (_, every, size), columns = A.shape, A.shape[2] + B.shape[2]
+    both = np.concatenate([A, B], axis=2).reshape(len(begins), STAGES, every, columns)
+    made = np.empty((len(begins), every, columns))
+    count = max(1, MOST_AT_ONCE // max(1, (STAGES * size) ** 2))
+    for k in range(0, len(begins), count):
+        made[k : k + count] = _solved(both[k : k + count], size, lengths[k : k + count])
+    return made
+
+
+def _solved(both: Array, size: int, lengths: Array) -> Array:
+    """The same for as many steps as are solved at once, from A and B (s, stages, N, n + m)."""
+    count, columns = len(both), both.shape[-1]
+    h = lengths[:, None, None, None]
+    # K_i = A_i (Y + h sum_j a_ij K_j) + B_i for the slopes K at the stages
+    system = -np.einsum("s,ij,sipq->sipjq", lengths, _TO_NODES, both[:, :, :size, :size])
+    system = system.reshape(count, STAGES * size, STAGES * size) + np.eye(STAGES * size)
+    right = both[:, :, :size].reshape(count, STAGES * size, columns)
+    K = np.linalg.solve(system, right).reshape(count, STAGES, size, columns)
+    moved = h * np.einsum("ij,sjpc->sipc", _TO_NODES, K)
+    beside = both[:, :, size:] + both[:, :, size:, :size] @ moved
+    return np.asarray(lengths[:, None, None] * np.einsum("i,sipc->spc", _TO_END, np.concatenate([K, beside], axis=2)))

@@ -1,0 +1,183 @@
+"""Derivatives of states that go over into other equations: parts that become joined, let go, or hit each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from sympy import Expr
+
+from shaftwork.codegen.differentiated import Differentiated
+from shaftwork.codegen.elements import Array
+from shaftwork.core.errors import NetworkError, SimulationError
+from shaftwork.pipeline.assemblies import Assembly, ModeNames
+from shaftwork.pipeline.legs import Leg
+from shaftwork.pipeline.model import Model
+from shaftwork.pipeline.moments import Change
+from shaftwork.pipeline.phases import Phases
+from shaftwork.pipeline.regimes import with_modes
+
+CLOSE = 1e-5
+"""The run went a way whose states differ from its own by no more than this part of their size: it meets hard stops late
+by what rounding moves them, which is much for what hardly moves any more."""
+ALIKE = 1e-10
+"""Ways lead to the same states where these differ by no more than this part of their size."""
+
+
+class _Step(NamedTuple):
+    """Into other modes; where something is thrown back, for an instant alone, and then into others.
+
+    Args:
+        modes: that take up what is stored.
+        rebound: element and its share of the speed that comes back, or None.
+        parted: the modes in which it flies on.
+    """
+
+    modes: ModeNames
+    rebound: tuple[int, Expr] | None = None
+    parted: ModeNames = ()
+
+
+class _Held(NamedTuple):
+    """All that is stored by name, and its total derivatives (m,)."""
+
+    values: Mapping[str, float]
+    slopes: Mapping[str, Array]
+
+
+class Carrying:
+    """Takes states and their derivatives over from one set of equations to another.
+
+    Args:
+        phases: the sets of equations.
+        equations: those of a model, ready for sensitivities.
+        sizes: (n,) of the states of a model.
+    """
+
+    def __init__(
+        self, phases: Phases, equations: Callable[[Model], Differentiated], sizes: Callable[[Model], Array]
+    ) -> None:
+        self._phases, self._equations, self._sizes = phases, equations, sizes
+
+    def over(self, before: Leg, after: Leg, slopes: Array, changes: Sequence[Change], shift: Array) -> Array:
+        """Total derivatives (n', m) of the new states.
+
+        The modes that a run goes through within an instant are tried as they may follow each other; what leads to the
+        states of the run is the way that it went.
+
+        Args:
+            before: the leg that ends.
+            after: the next one.
+            slopes: (n, m) total derivatives of the states at its end.
+            changes: of mode, at that time.
+            shift: (m,) derivatives of the time.
+
+        Raises:
+            SimulationError: none of them leads there.
+        """
+        x, sizes, ways = after.at(after.low)[1], self._sizes(after.model), list[tuple[float, Array]]()
+        for steps in self._ways(before, after, changes):
+            try:
+                found, made = self._along(steps, before, after.low, slopes, shift)
+            except NetworkError:
+                continue
+            ways.append((float((np.abs(found - x) / sizes).max(initial=0.0)), made))
+        nearest = min((away for away, _ in ways), default=np.inf)
+        if nearest <= CLOSE:
+            return next(made for away, made in ways if away <= nearest + ALIKE)
+        names = ", ".join(dict.fromkeys(f"'{change.element.name}'" for change in changes)) or "parts"
+        raise SimulationError(
+            f"At t = {after.start:.9g} s {names} change together, and how the derivatives pass that is not known here. "
+            "Take the difference of two variants, studies.sweep(...)."
+        )
+
+    def _ways(self, before: Leg, after: Leg, changes: Sequence[Change]) -> Iterator[tuple[_Step, ...]]:
+        """Ways to the modes that follow, the plainest first."""
+        seen: list[tuple[_Step, ...]] = []
+        for every in (False, True):
+            for besides in (False, True):
+                made = self._way(before.modes, after.modes, changes, every=every, besides=besides)
+                if made not in seen:
+                    seen.append(made)
+                    yield made
+
+    def _way(
+        self, modes: ModeNames, last: ModeNames, changes: Sequence[Change], *, every: bool, besides: bool
+    ) -> tuple[_Step, ...]:
+        """One way.
+
+        Args:
+            modes: before.
+            last: after.
+            changes: in their order.
+            every: each change takes up what is stored by itself; else impacts alone do, and in the end all.
+            besides: in an impact other elements are already in the modes that follow.
+        """
+        numbers = {id(element): k for k, element in enumerate(self._phases.elements)}
+        steps: list[_Step] = []
+        for place, change in enumerate(changes):
+            number = numbers[id(change.element)]
+            if not change.impact:
+                modes = with_modes(modes, {number: change.after})
+                steps += [_Step(modes)] if every else []
+                continue
+            others = {numbers[id(made.element)]: made.after for made in changes[place + 1 :] if not made.impact}
+            modes = with_modes(modes, {**(others if besides else {}), number: change.after})
+            if not change.rebound:
+                steps.append(_Step(modes))
+                continue
+            leaves = change.element.modes[change.before].leaves
+            share = next(leave.rebound for leave in leaves if leave.rebound is not None and leave.to == change.after)
+            parted = with_modes(modes, {number: change.before})
+            steps.append(_Step(modes, (number, share), parted))
+            modes = parted
+        if not steps or (steps[-1].parted or steps[-1].modes) != last:
+            steps.append(_Step(last))
+        return tuple(steps)
+
+    def _along(self, steps: Sequence[_Step], before: Leg, t: float, slopes: Array, shift: Array) -> tuple[Array, Array]:
+        """States (n',) and their total derivatives (n', m) at the end of a way."""
+        model, p, x, made = before.model, before.p, before.at(before.high)[1], slopes
+        for step in steps:
+            assembly, old = self._phases.assembly(step.modes), p
+            p = assembly.vector({}, self._phases.numbers(step.modes))
+            if assembly.model is model and step.rebound is None:
+                continue
+            held = self._held(model, t, x, old, made, shift)
+            x, made = self._taken(assembly, t, p, held, shift)
+            if step.rebound is not None:
+                held = self._thrown(assembly, p, held, self._held(assembly.model, t, x, p, made, shift), step.rebound)
+                assembly = self._phases.assembly(step.parted)
+                p = assembly.vector({}, self._phases.numbers(step.parted))
+                x, made = self._taken(assembly, t, p, held, shift)
+            model = assembly.model
+        return x, made
+
+    def _held(self, model: Model, t: float, x: Array, p: Array, slopes: Array, shift: Array) -> _Held:
+        takeover = self._equations(model).takeover
+        values, made = takeover.given(t, x, p, slopes, shift)
+        return _Held(
+            dict(zip(takeover.names, values.tolist(), strict=True)), dict(zip(takeover.names, made, strict=True))
+        )
+
+    def _taken(self, assembly: Assembly, t: float, p: Array, held: _Held, shift: Array) -> tuple[Array, Array]:
+        takeover = self._equations(assembly.model).takeover
+        x = assembly.stores.states(assembly.bound(p), t, held.values)
+        values = np.array([held.values[name] for name in takeover.names])
+        slopes = np.array([held.slopes[name] for name in takeover.names]).reshape(len(values), shift.size)
+        return x, takeover.taken(t, x, p, values, slopes, shift)
+
+    def _thrown(self, assembly: Assembly, p: Array, held: _Held, joined: _Held, rebound: tuple[int, Expr]) -> _Held:
+        """After an impact that throws back: v_joined + e (v_joined - v_before)."""
+        expression = assembly.of_element(*rebound)
+        shown, nowhere = self._equations(assembly.model).shown(expression), np.zeros(len(assembly.model.states))
+        share = float(shown.value(np.zeros(1), nowhere[None, :], p)[0, 0])
+        by_parameters = shown.slopes(0.0, nowhere, p)[1]
+        change = {name: value - held.values[name] for name, value in joined.values.items()}
+        values = {name: value + share * change[name] for name, value in joined.values.items()}
+        slopes = {
+            name: slope + share * (slope - held.slopes[name]) + by_parameters * change[name]
+            for name, slope in joined.slopes.items()
+        }
+        return _Held(values, slopes)
