@@ -13,9 +13,9 @@ import sympy
 
 import shaftwork as sw
 from shaftwork.integrate.problem import SeriesError
-from shaftwork.pipeline.moments import Moment
-from shaftwork.pipeline.passing import Passing
-from shaftwork.pipeline.settling import Settling
+from shaftwork.pipeline.phases.moments import Moment
+from shaftwork.pipeline.phases.passing import Passing
+from shaftwork.pipeline.phases.settling import Settling
 
 ENGINES = ("heyoka", "scipy", "sundials")
 

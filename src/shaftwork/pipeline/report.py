@@ -13,7 +13,7 @@ from scipy import sparse
 from shaftwork.core.errors import SimulationError
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.network import Network
-from shaftwork.pipeline.phase_names import whole_name
+from shaftwork.pipeline.phases.names import whole_name
 
 LARGEST_DENSE = 1500
 """States up to which all eigenvalues are computed."""

@@ -22,7 +22,7 @@ from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
-    from shaftwork.pipeline.ensemble import Ensemble
+    from shaftwork.pipeline.ensemble.ensemble import Ensemble
 
 SIDE_BY_SIDE = 16
 """Variants from which on it is worth while to compile a program for many of them."""
@@ -118,7 +118,7 @@ class Worker:
         self.why = next((reason for reason, holds in reasons.items() if holds), "")
         if self.why:
             return None
-        from shaftwork.pipeline.ensemble import Ensemble
+        from shaftwork.pipeline.ensemble.ensemble import Ensemble
 
         span, names = (0.0, task.t_end), tuple(task.columns)
         for first in (task.values(0), {}):  # the network itself, where the first variant fails

@@ -14,13 +14,13 @@ from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import ParameterError, SimulationError
 from shaftwork.pipeline.analysis import Given, Point, Time, operating_point
 from shaftwork.pipeline.arguments import relative_tolerance, time_span
-from shaftwork.pipeline.differentiable import rows_of, smooth_parameters
-from shaftwork.pipeline.measure_slopes import integrand, measured
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.motion_legs import motion_of
-from shaftwork.pipeline.motion_slopes import MotionSlopes
-from shaftwork.pipeline.phased import PhasedModel
-from shaftwork.pipeline.settling import Settling
+from shaftwork.pipeline.phases.model import PhasedModel
+from shaftwork.pipeline.phases.settling import Settling
+from shaftwork.pipeline.sensitivities.differentiable import rows_of, smooth_parameters
+from shaftwork.pipeline.sensitivities.measure_slopes import integrand, measured
+from shaftwork.pipeline.sensitivities.motion_legs import motion_of
+from shaftwork.pipeline.sensitivities.motion_slopes import MotionSlopes
 from shaftwork.results.measures import Measure
 from shaftwork.results.sensitivities import FrequencySensitivities, MotionSensitivities
 from shaftwork.results.slopes import Complex

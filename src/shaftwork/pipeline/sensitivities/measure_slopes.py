@@ -8,7 +8,7 @@ import numpy as np
 
 from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import ParameterError, SimulationError
-from shaftwork.pipeline.motion_slopes import MotionSlopes
+from shaftwork.pipeline.sensitivities.motion_slopes import MotionSlopes
 from shaftwork.results.measures import KINDS, SMALLEST, Measure
 from shaftwork.results.solution import Solution
 from shaftwork.results.turning import turning_points

@@ -15,13 +15,13 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.expressed import Expressed
 from shaftwork.core.errors import AccuracyWarning, ParameterError, SimulationError
 from shaftwork.integrate.variation import Coefficients, Variation, variation
-from shaftwork.pipeline.carrying import Carrying
-from shaftwork.pipeline.differentiable import rows_of
-from shaftwork.pipeline.jump_conditions import ADVICE, TOGETHER, Jump, JumpConditions, by_chance
-from shaftwork.pipeline.legs import Leg, parted
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.moments import Change
-from shaftwork.pipeline.motion_legs import Motion
+from shaftwork.pipeline.phases.moments import Change
+from shaftwork.pipeline.sensitivities.carrying import Carrying
+from shaftwork.pipeline.sensitivities.differentiable import rows_of
+from shaftwork.pipeline.sensitivities.jump_conditions import ADVICE, TOGETHER, Jump, JumpConditions, by_chance
+from shaftwork.pipeline.sensitivities.legs import Leg, parted
+from shaftwork.pipeline.sensitivities.motion_legs import Motion
 
 ROUNDING = 1e-3
 """What a change of a parameter by all of itself does to a state is rounding below this part of the state's size."""

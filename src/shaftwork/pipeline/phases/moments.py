@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from shaftwork.codegen.elements import Array
-from shaftwork.pipeline.assemblies import Assembly, Element, Limits, ModeNames, Motion, Watched
+from shaftwork.pipeline.phases.assemblies import Assembly, Element, Limits, ModeNames, Motion, Watched
 from shaftwork.pipeline.prepared import NOMINAL
 
 # A guard within so many rounding units of zero is on its limit, and only its further course tells its side.

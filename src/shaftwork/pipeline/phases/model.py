@@ -14,10 +14,11 @@ from shaftwork.core.errors import SimulationError
 from shaftwork.pipeline.analysis import Given, Names, Point, Time, input_names, operating_point
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.moments import Moment
-from shaftwork.pipeline.phase_solution import solution
-from shaftwork.pipeline.phases import Phases, Run
-from shaftwork.pipeline.settling import Settling
+from shaftwork.pipeline.phases.moments import Moment
+from shaftwork.pipeline.phases.phases import Phases
+from shaftwork.pipeline.phases.run import Run
+from shaftwork.pipeline.phases.settling import Settling
+from shaftwork.pipeline.phases.solution import solution
 from shaftwork.results.linear import LinearModel, linear_model
 from shaftwork.results.solution import Solution
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.codegen.elements import Array
-from shaftwork.pipeline.assemblies import ModeNames
+from shaftwork.pipeline.phases.assemblies import ModeNames
 
 LEARNED = 32
 """Variants, and steps of each, from which it is learned what makes for many steps."""

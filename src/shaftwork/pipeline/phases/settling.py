@@ -13,13 +13,13 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.components.branches import ACROSS
 from shaftwork.core.errors import NetworkError, SimulationError
-from shaftwork.pipeline.assemblies import ModeNames, Watched
-from shaftwork.pipeline.impacts import NO_IMPACT, Impacts
-from shaftwork.pipeline.moments import ROUNDINGS, Change, Course, Moment, Regime, clear_of_limits, together
-from shaftwork.pipeline.regimes import Regimes, refuse_beyond, with_modes
+from shaftwork.pipeline.phases.assemblies import ModeNames, Watched
+from shaftwork.pipeline.phases.impacts import NO_IMPACT, Impacts
+from shaftwork.pipeline.phases.moments import ROUNDINGS, Change, Course, Moment, Regime, clear_of_limits, together
+from shaftwork.pipeline.phases.regimes import Regimes, refuse_beyond, with_modes
 
 if TYPE_CHECKING:
-    from shaftwork.pipeline.phases import Phases
+    from shaftwork.pipeline.phases.phases import Phases
 
 # How far ahead that course is looked at: parts of the time in which a state moves by its nominal size, and of the run.
 AHEAD, AHEAD_OF_RUN = 1e-3, 1e-7

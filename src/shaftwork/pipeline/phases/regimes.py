@@ -11,11 +11,11 @@ from sympy import Integer
 from shaftwork.codegen.elements import Array
 from shaftwork.components.branches import INTEGRAL
 from shaftwork.core.errors import NetworkError, ParameterError
-from shaftwork.pipeline.assemblies import Element, ModeNames
-from shaftwork.pipeline.moments import Moment, Regime
+from shaftwork.pipeline.phases.assemblies import Element, ModeNames
+from shaftwork.pipeline.phases.moments import Moment, Regime
 
 if TYPE_CHECKING:
-    from shaftwork.pipeline.phases import Phases
+    from shaftwork.pipeline.phases.phases import Phases
 
 # How far in rad a motion may start beyond a rigid limit: what errors and printed digits of another run leave there.
 BEYOND = 1e-6

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 from shaftwork.codegen.elements import Array
 from shaftwork.integrate.problem import Reaction, SeriesError
-from shaftwork.pipeline.assemblies import ModeNames
-from shaftwork.pipeline.moments import Change, Moment, Regime, clear_of_limit
-from shaftwork.pipeline.settling import Settling
+from shaftwork.pipeline.phases.assemblies import ModeNames
+from shaftwork.pipeline.phases.moments import Change, Moment, Regime, clear_of_limit
+from shaftwork.pipeline.phases.settling import Settling
 
 # Of so many roundings of the time a guard may be late that is met together with another one.
 LATE = 1e4

@@ -13,12 +13,13 @@ from shaftwork.codegen.timeline import Timeline
 from shaftwork.core.errors import SimulationError
 from shaftwork.pipeline.analysis import Given
 from shaftwork.pipeline.arguments import Demand
-from shaftwork.pipeline.legs import Leg
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.moments import Change
-from shaftwork.pipeline.phase_solution import solution
-from shaftwork.pipeline.phased import PhasedModel
-from shaftwork.pipeline.phases import Phases, Run, Span
+from shaftwork.pipeline.phases.model import PhasedModel
+from shaftwork.pipeline.phases.moments import Change
+from shaftwork.pipeline.phases.phases import Phases
+from shaftwork.pipeline.phases.run import Run, Span
+from shaftwork.pipeline.phases.solution import solution
+from shaftwork.pipeline.sensitivities.legs import Leg
 from shaftwork.results.solution import Solution
 
 MOST_STEPS = 10_000_000

@@ -21,15 +21,15 @@ from shaftwork.core.errors import CompileError, NetworkError
 from shaftwork.integrate.lanes import Lanes, run_lanes
 from shaftwork.network.graph import GraphPart
 from shaftwork.pipeline.arguments import Demand
-from shaftwork.pipeline.assemblies import Assembly, ModeNames, conditional
-from shaftwork.pipeline.ensemble_code import EXTREMES, EnsembleCode
-from shaftwork.pipeline.ensemble_equations import Entry, Equations
-from shaftwork.pipeline.ensemble_extremes import NODES, largest
-from shaftwork.pipeline.ensemble_groups import Group, Mask, Pace, joined
+from shaftwork.pipeline.ensemble.equations import Entry, Equations
+from shaftwork.pipeline.ensemble.extremes import NODES, largest
+from shaftwork.pipeline.ensemble.groups import Group, Mask, Pace, joined
+from shaftwork.pipeline.ensemble.programs import EXTREMES, EnsembleCode
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.phased import PhasedModel
-from shaftwork.pipeline.phases import Run
-from shaftwork.pipeline.regimes import with_modes
+from shaftwork.pipeline.phases.assemblies import Assembly, ModeNames, conditional
+from shaftwork.pipeline.phases.model import PhasedModel
+from shaftwork.pipeline.phases.regimes import with_modes
+from shaftwork.pipeline.phases.run import Run
 from shaftwork.results.measures import Measure
 
 SAMPLES = (50, 4000)

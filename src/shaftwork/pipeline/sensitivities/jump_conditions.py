@@ -22,10 +22,10 @@ from sympy import Expr
 from shaftwork.codegen.differentiated import Differentiated
 from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import SimulationError
-from shaftwork.pipeline.carrying import Carrying
-from shaftwork.pipeline.legs import Leg
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.moments import Change
+from shaftwork.pipeline.phases.moments import Change
+from shaftwork.pipeline.sensitivities.carrying import Carrying
+from shaftwork.pipeline.sensitivities.legs import Leg
 
 TOGETHER = 1e-9
 """Two causes act at once where the guard of the second is so near, as a part of the run."""

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from shaftwork.codegen.elements import Array
 from shaftwork.integrate.lanes import Lanes
-from shaftwork.pipeline.assemblies import Assembly, ModeNames
-from shaftwork.pipeline.ensemble_code import EnsembleCode
-from shaftwork.pipeline.moments import CLEAR, EPS, GOLDEN, NOTHING, ROUNDINGS
+from shaftwork.pipeline.ensemble.programs import EnsembleCode
+from shaftwork.pipeline.phases.assemblies import Assembly, ModeNames
+from shaftwork.pipeline.phases.moments import CLEAR, EPS, GOLDEN, NOTHING, ROUNDINGS
+from shaftwork.pipeline.phases.settling import AHEAD, AHEAD_OF_RUN, FEW
 from shaftwork.pipeline.prepared import NOMINAL
-from shaftwork.pipeline.settling import AHEAD, AHEAD_OF_RUN, FEW
 
 WITHIN = 1e-9
 """A guard that is beyond its limit by more than this part of its largest value has been missed."""

@@ -11,12 +11,12 @@ from sympy import Expr
 from shaftwork.codegen.differentiated import Differentiated
 from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import NetworkError, SimulationError
-from shaftwork.pipeline.assemblies import Assembly, ModeNames
-from shaftwork.pipeline.legs import Leg
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.moments import Change
-from shaftwork.pipeline.phases import Phases
-from shaftwork.pipeline.regimes import with_modes
+from shaftwork.pipeline.phases.assemblies import Assembly, ModeNames
+from shaftwork.pipeline.phases.moments import Change
+from shaftwork.pipeline.phases.phases import Phases
+from shaftwork.pipeline.phases.regimes import with_modes
+from shaftwork.pipeline.sensitivities.legs import Leg
 
 CLOSE = 1e-5
 """The run went a way whose states differ from its own by no more than this part of their size: it meets hard stops late

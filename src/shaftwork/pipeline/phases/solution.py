@@ -10,10 +10,10 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.phase_observer import PhaseObserver, Stretch, Stretches
-from shaftwork.pipeline.assemblies import ModeNames
-from shaftwork.pipeline.moments import Change
-from shaftwork.pipeline.passing import Phase
-from shaftwork.pipeline.phases import Run, Span
+from shaftwork.pipeline.phases.assemblies import ModeNames
+from shaftwork.pipeline.phases.moments import Change
+from shaftwork.pipeline.phases.passing import Phase
+from shaftwork.pipeline.phases.run import Run, Span
 from shaftwork.results.solution import PhaseRow, Solution
 
 

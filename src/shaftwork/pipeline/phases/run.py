@@ -6,44 +6,28 @@ after another until all of them are consistent with the motion that follows, and
 
 from __future__ import annotations
 
-import warnings
 from bisect import bisect_right
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.timeline import Timeline
-from shaftwork.components.modes import Choice
-from shaftwork.core.errors import NetworkError, NetworkWarning, ParameterError, SimulationError
+from shaftwork.core.errors import SimulationError
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import Problem, SeriesError, Trajectory
-from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import Demand, absolute_tolerances, watched_by
-from shaftwork.pipeline.assemblies import Assembly, ModeNames, elements_of
 from shaftwork.pipeline.implicit import at_rest
-from shaftwork.pipeline.moments import Change, Moment
-from shaftwork.pipeline.passing import Passing, Phase
-from shaftwork.pipeline.settling import Settling
-
-if TYPE_CHECKING:
-    from shaftwork.pipeline.model import Model
+from shaftwork.pipeline.phases.assemblies import Assembly
+from shaftwork.pipeline.phases.moments import Change, Moment
+from shaftwork.pipeline.phases.passing import Passing, Phase
+from shaftwork.pipeline.phases.phases import FOLLOWING, Phases
+from shaftwork.pipeline.phases.settling import Settling
 
 # So many changes of mode, each within this part of the run of the one before, are chatter.
 CHATTER_EVENTS, CHATTER_SPAN = 200, 1e-9
-# Engines that follow guards. An error grows with every change of mode, by some hundreds through sixty contacts, so
-# they run with this part of the tolerance that is asked for, and with no looser one than the second number.
-FOLLOWING = {
-    "heyoka": (1.0, 1e-12),  # the cost grows only with the logarithm
-    "scipy": (1 / 30, 1e-7),
-    "scipy-radau": (1 / 30, 1e-7),
-    "sundials": (1 / 300, 1e-8),
-    choice.ADAMS: (1 / 100, 1e-8),
-}
 TIGHTEST_RTOL = 1e-14
-_ENGINES = ", ".join(name for name in FOLLOWING if name != choice.ADAMS)
 STILL = "Nothing moves, and what holds is known at every time."
 
 
@@ -77,85 +61,13 @@ class Known:
     begins: list[tuple[Moment, list[Change]]] = field(default_factory=list)
 
 
-class Phases:
-    """All sets of equations of a network whose parts change their mode; each is made when a motion first needs it.
-
-    Args:
-        base: the model in the first mode of each element, in which no mode joins anything rigidly.
-        rebuild: makes the model of a changed netlist.
-    """
-
-    def __init__(self, base: Model, rebuild: Callable[[Netlist], Model]) -> None:
-        self.netlist, self._rebuild = base.netlist, rebuild
-        self.elements = elements_of(base)
-        self.first: ModeNames = tuple(element.modes.options[0].name for element in self.elements)
-        self._assemblies: dict[tuple[str, ...], Assembly | NetworkError] = {}
-        self._engines: dict[Any, tuple[str, str]] = {}
-        self._known: tuple[Any, Known] | None = None
-
-    def assembly(self, modes: ModeNames) -> Assembly:
-        """The equations for a combination of modes.
-
-        Raises:
-            NetworkError: they contradict each other, as where a stuck brake is turned by a prescribed speed.
-        """
-        forms = tuple(element.modes[name].form for element, name in zip(self.elements, modes, strict=True))
-        if forms not in self._assemblies:
-            try:
-                with warnings.catch_warnings():  # of the network as it is wired compilation has warned
-                    warnings.simplefilter("ignore", NetworkWarning)
-                    model = self._rebuild(self._netlist(forms))
-                self._assemblies[forms] = Assembly(model, self.elements, forms)
-            except NetworkError as error:
-                self._assemblies[forms] = error
-        made = self._assemblies[forms]
-        if isinstance(made, NetworkError):
-            raise made
-        return made
-
-    def _netlist(self, forms: tuple[str, ...]) -> Netlist:
-        chosen: dict[str, tuple[Choice, ...]] = {}
-        for element, form in zip(self.elements, forms, strict=True):
-            chosen[element.part.name] = (*chosen.get(element.part.name, ()), Choice(form))
-        return self.netlist.with_choices(chosen)
-
-    def numbers(self, modes: ModeNames) -> dict[str, float]:
-        """The number of each element's mode by the name of its parameter."""
-        pairs = zip(self.elements, modes, strict=True)
-        return {element.number: element.modes[name].value for element, name in pairs}
-
-    def known(self, values: Mapping[str, float], span: tuple[float, float]) -> Known:
-        """What the last run with these values over the same time has found out, or nothing yet."""
-        key = tuple(sorted(values.items())), span
-        if self._known is None or self._known[0] != key:
-            self._known = key, Known(Settling(self, values, span))
-        return self._known[1]
-
-    def engine(self, assembly: Assembly, problem: Problem, asked: str) -> tuple[str, str]:
-        """The engine for a phase, and why.
-
-        Raises:
-            ParameterError: the one that is asked for follows no modes.
-        """
-        if asked != "auto":
-            choice.check(asked)
-            if asked not in FOLLOWING:
-                raise ParameterError(
-                    f"The engine '{asked}' follows no parts that change their mode "
-                    f"({', '.join(element.name for element in self.elements)}). Take one of: {_ENGINES}."
-                )
-            if asked != "sundials":
-                return asked, "asked for"
-            if (assembly, asked) not in self._engines:
-                adams = choice.ADAMS, "asked for; the motion is not stiff, so Adams' formulas are taken."
-                self._engines[assembly, asked] = (asked, "asked for") if choice.is_stiff(problem) else adams
-            return self._engines[assembly, asked]
-        if assembly not in self._engines:
-            name, why = choice.choose(problem)
-            if name not in FOLLOWING:  # that of long chains
-                name = "sundials" if choice.available("sundials") else "scipy-radau"
-            self._engines[assembly] = name, why
-        return self._engines[assembly]
+def _known(phases: Phases, values: Mapping[str, float], span: tuple[float, float]) -> Known:
+    """What the last run with these values over the same time has found out, or nothing yet."""
+    key = tuple(sorted(values.items())), span
+    if phases.found is None or phases.found[0] != key:
+        phases.found = key, Known(Settling(phases, values, span))
+    made: Known = phases.found[1]
+    return made
 
 
 class Run:
@@ -169,7 +81,7 @@ class Run:
 
     def __init__(self, phases: Phases, values: Mapping[str, float], demand: Demand) -> None:
         self.phases, self.demand = phases, demand
-        self._known = phases.known(values, demand.span)
+        self._known = _known(phases, values, demand.span)
         self.settling = self._known.settling
         self.spans: list[Span] = []
         self.changes: list[Change] = []

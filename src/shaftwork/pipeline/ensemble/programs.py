@@ -15,7 +15,7 @@ from shaftwork.codegen.stores import Stores
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import slope
 from shaftwork.core.errors import CompileError
-from shaftwork.pipeline.ensemble_extremes import DATA
+from shaftwork.pipeline.ensemble.extremes import DATA
 from shaftwork.pipeline.model import Model
 from shaftwork.reduction.rows import Rows
 from shaftwork.results.measures import Measure

@@ -8,9 +8,9 @@ import numpy as np
 
 from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError
-from shaftwork.pipeline.assemblies import Element, ModeNames
-from shaftwork.pipeline.moments import CLEAR, Change, Moment
-from shaftwork.pipeline.regimes import Regimes, with_modes
+from shaftwork.pipeline.phases.assemblies import Element, ModeNames
+from shaftwork.pipeline.phases.moments import CLEAR, Change, Moment
+from shaftwork.pipeline.phases.regimes import Regimes, with_modes
 
 # A speed across what is joined, as part of the largest one or of one, up to which it is an error of the run, no impact.
 NO_IMPACT = 1e-8

@@ -1,0 +1,1 @@
+"""Variants of a network side by side."""

@@ -1,0 +1,1 @@
+"""Motions through the phases of a network whose parts change their mode."""

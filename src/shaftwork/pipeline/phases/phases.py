@@ -1,0 +1,103 @@
+"""The sets of equations of a network whose parts change their mode, and the engines that follow them."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from shaftwork.components.modes import Choice
+from shaftwork.core.errors import NetworkError, NetworkWarning, ParameterError
+from shaftwork.integrate import choice
+from shaftwork.integrate.problem import Problem
+from shaftwork.network.netlist import Netlist
+from shaftwork.pipeline.phases.assemblies import Assembly, ModeNames, elements_of
+
+if TYPE_CHECKING:
+    from shaftwork.pipeline.model import Model
+
+# Engines that follow guards. An error grows with every change of mode, by some hundreds through sixty contacts, so
+# they run with this part of the tolerance that is asked for, and with no looser one than the second number.
+FOLLOWING = {
+    "heyoka": (1.0, 1e-12),  # the cost grows only with the logarithm
+    "scipy": (1 / 30, 1e-7),
+    "scipy-radau": (1 / 30, 1e-7),
+    "sundials": (1 / 300, 1e-8),
+    choice.ADAMS: (1 / 100, 1e-8),
+}
+_ENGINES = ", ".join(name for name in FOLLOWING if name != choice.ADAMS)
+
+
+class Phases:
+    """All sets of equations of a network whose parts change their mode; each is made when a motion first needs it.
+
+    Args:
+        base: the model in the first mode of each element, in which no mode joins anything rigidly.
+        rebuild: makes the model of a changed netlist.
+    """
+
+    def __init__(self, base: Model, rebuild: Callable[[Netlist], Model]) -> None:
+        self.netlist, self._rebuild = base.netlist, rebuild
+        self.elements = elements_of(base)
+        self.first: ModeNames = tuple(element.modes.options[0].name for element in self.elements)
+        self._assemblies: dict[tuple[str, ...], Assembly | NetworkError] = {}
+        self._engines: dict[Any, tuple[str, str]] = {}
+        self.found: tuple[Any, Any] | None = None
+        """Of which values and times the last run was, and what it has found out: the next like it goes on with that."""
+
+    def assembly(self, modes: ModeNames) -> Assembly:
+        """The equations for a combination of modes.
+
+        Raises:
+            NetworkError: they contradict each other, as where a stuck brake is turned by a prescribed speed.
+        """
+        forms = tuple(element.modes[name].form for element, name in zip(self.elements, modes, strict=True))
+        if forms not in self._assemblies:
+            try:
+                with warnings.catch_warnings():  # of the network as it is wired compilation has warned
+                    warnings.simplefilter("ignore", NetworkWarning)
+                    model = self._rebuild(self._netlist(forms))
+                self._assemblies[forms] = Assembly(model, self.elements, forms)
+            except NetworkError as error:
+                self._assemblies[forms] = error
+        made = self._assemblies[forms]
+        if isinstance(made, NetworkError):
+            raise made
+        return made
+
+    def _netlist(self, forms: tuple[str, ...]) -> Netlist:
+        chosen: dict[str, tuple[Choice, ...]] = {}
+        for element, form in zip(self.elements, forms, strict=True):
+            chosen[element.part.name] = (*chosen.get(element.part.name, ()), Choice(form))
+        return self.netlist.with_choices(chosen)
+
+    def numbers(self, modes: ModeNames) -> dict[str, float]:
+        """The number of each element's mode by the name of its parameter."""
+        pairs = zip(self.elements, modes, strict=True)
+        return {element.number: element.modes[name].value for element, name in pairs}
+
+    def engine(self, assembly: Assembly, problem: Problem, asked: str) -> tuple[str, str]:
+        """The engine for a phase, and why.
+
+        Raises:
+            ParameterError: the one that is asked for follows no modes.
+        """
+        if asked != "auto":
+            choice.check(asked)
+            if asked not in FOLLOWING:
+                raise ParameterError(
+                    f"The engine '{asked}' follows no parts that change their mode "
+                    f"({', '.join(element.name for element in self.elements)}). Take one of: {_ENGINES}."
+                )
+            if asked != "sundials":
+                return asked, "asked for"
+            if (assembly, asked) not in self._engines:
+                adams = choice.ADAMS, "asked for; the motion is not stiff, so Adams' formulas are taken."
+                self._engines[assembly, asked] = (asked, "asked for") if choice.is_stiff(problem) else adams
+            return self._engines[assembly, asked]
+        if assembly not in self._engines:
+            name, why = choice.choose(problem)
+            if name not in FOLLOWING:  # that of long chains
+                name = "sundials" if choice.available("sundials") else "scipy-radau"
+            self._engines[assembly] = name, why
+        return self._engines[assembly]

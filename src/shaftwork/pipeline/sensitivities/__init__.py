@@ -1,0 +1,1 @@
+"""Derivatives of frequencies and motions by parameters."""
