@@ -30,8 +30,8 @@ class EnergyBalance:
         supplied: (s,) work of all sources since the start, J.
         lost: (s,) heat since the start, J.
         work: work that went through the sources, both ways counted as positive, J.
-        lost_in: heat of the whole run by part, J; an impact's is that of the part whose change of mode it came with. The
-            balance begins after what happens at the very start.
+        lost_in: heat of the whole run by part, J; an impact's is that of the part whose change of mode it came with.
+            The balance begins after what happens at the very start.
         supplied_by: work of the whole run by source, J.
     """
 
