@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import cache
 
 import numpy as np
@@ -131,3 +132,18 @@ def test_the_back_emf_is_a_trapezoid_with_flat_tops_of_the_asked_width(flat: flo
     wanted = Motor(1, 0, 1, 1, 1, 1, abs, flat=flat)
     np.testing.assert_allclose(made(angle), [wanted.shapes(at)[0] for at in angle], atol=1e-14)
     assert np.mean(np.abs(made(angle)) > 1 - 1e-12) == pytest.approx(flat / np.pi, abs=0.01)
+
+
+def test_copper_is_lost_in_the_motor_and_all_that_its_source_gives_is_supplied() -> None:
+    """A locked rotor: two windings in series at U, i = U / 2R (1 - exp(-R t / L))."""
+    U, R, L, t = 48.0, 0.7, 2e-3, 0.02
+    net = sw.Network("locked")
+    net.add(sw.BLDCMotor("motor", U=U, R=R, L=L, k=0.08, pole_pairs=2), "rotor")
+    net.add(sw.SpeedSource("lock", omega=0.0), "rotor")
+    energy = net.simulate(t).energy
+    rise, current = L / R, U / (2 * R)
+    once, twice = (1 - math.exp(-k * t / rise) for k in (1, 2))
+    assert energy.lost_in["motor"] == pytest.approx(
+        2 * R * current**2 * (t - 2 * rise * once + rise / 2 * twice), rel=1e-9
+    )
+    assert energy.supplied_by["motor"] == pytest.approx(U * current * (t - rise * once), rel=1e-9)

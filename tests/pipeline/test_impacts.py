@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import shaftwork as sw
+from shaftwork.core.errors import SimulationError
 
 ENGINES = ("heyoka", "scipy", "sundials")
 # Between impacts every motion is a polynomial of time, and events are located far below the tolerance of the run.
@@ -294,3 +295,39 @@ def test_no_motion_starts_beyond_a_rigid_limit(part: sw.Component, initial: dict
     net.add(part, "a", "b")
     with pytest.raises(sw.ParameterError, match=says):
         net.simulate(2.0, initial={"J.omega": 0.2, **initial})
+
+
+def pressed() -> sw.Model:
+    """Five masses: a stop that throws back, and a gap that does not, pressed against each other."""
+    net = sw.Network("pressed")
+    for number, J in enumerate((1.5892128336542986, 2.216969704464396, 0.3346968332061752, 0.2362585753905525)):
+        net.add(sw.Inertia(f"J{number}", J=J), f"n{number}")
+    net.add(sw.Inertia("J4", J=0.21132514115829443), "n4")
+    steps = sw.Step(8.76574600623634), sw.Step(-54.742562493844, start=0.501944124301275)
+    net.add(sw.TorqueSource("m", tau=steps[0] + steps[1]), "n0")
+    net.add(sw.Spring("c0", c=1408.576063908498, d=0.4905751005959569), "n0", "n1")
+    limits = {"upper": 0.3413892336975171, "lower": -0.12063797860319042}
+    net.add(sw.HardStop("c1", **limits, restitution=0.4129001235032102), "n1", "n2")
+    net.add(sw.Backlash("c2", gap=0.0022155318944598653), "n2", "n3")
+    limits = {"upper": 0.49710803155026817, "lower": -0.3810826013364473}
+    net.add(sw.HardStop("c3", **limits, restitution=0.3786360634846357), "n3", "n4")
+    friction = {"tau_c": 2.479653261703887, "tau_s": 6.897765453296293, "d": 0.2607803354458401}
+    net.add(sw.DryFriction("x0", **friction), "n3")
+    net.add(sw.Brake("x1", tau=9.458010294942493, t_on=1.1296492548011792), "n1")
+    net.add(sw.HardStop("x2", upper=1.7163860631233132, lower=-2.292273970161299, c=596.7380482041723, d=0.546), "n2")
+    return net.compile()
+
+
+def test_thousands_of_small_impacts_take_no_time_from_the_motion() -> None:
+    """What hits late is moved back to its limit; the time that it is back is given again, whatever the impact does."""
+    chattering, other = (pressed().simulate(1.4009, engine=engine, t_eval=2) for engine in ("heyoka", "sundials"))
+    assert len(chattering.events) > 1000 > len(other.events)
+    for name in ("J0.omega", "J1.omega"):  # within what the small impacts themselves, of 1e-6 rad/s, leave open
+        assert chattering[name][-1] == pytest.approx(other[name][-1], rel=1e-6)
+
+
+def test_small_impacts_without_an_end_are_an_error_with_the_part_and_the_time() -> None:
+    with pytest.raises(
+        SimulationError, match=r"HardStop 'c1' changes again and again .* at t = 1\.40\d* s, 3000 times"
+    ):
+        pressed().simulate(3.0, engine="heyoka")

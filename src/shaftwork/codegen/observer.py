@@ -157,11 +157,16 @@ class ModelObserver:
         return any(kind in (Kind.ACROSS_STORE, Kind.THROUGH_STORE) for kind in kinds)
 
     def powers(self, t: Array, x: Array) -> tuple[dict[str, Array], dict[str, Array]]:
-        """Lost power and supplied power by part."""
+        """Lost power and supplied power by part; of sources that have resistors or dampers of their own both."""
         history = History(self._bind(), self._instants.one_sided(t), x)
         parts = self._graph.parts
-        lost = {part.name: history.lost(part) for part in parts if part.component.role != "source"}
-        supplied = {part.name: -history.lost(part) for part in parts if part.component.role == "source"}
+        sources = [part for part in parts if part.component.role == "source"]
+        lost = {part.name: history.lost(part) for part in parts if part not in sources}
+        supplied = {part.name: -history.lost(part) for part in sources}
+        for part in sources:
+            if any(self._graph.branches[k].template.kind is Kind.CONDUCTANCE for k in part.branches):
+                lost[part.name] = history.heat(part)
+                supplied[part.name] = supplied[part.name] + lost[part.name]
         return lost, supplied
 
     def part(self, name: str) -> Component:

@@ -120,6 +120,11 @@ class History:
         templates = ((k, branches[k].template) for k in part.branches)
         return self._power(part, (k for k, t in templates if t.through or (t.kind in kinds and not t.line)))
 
+    def heat(self, part: GraphPart) -> Array:
+        """(k,) power that a part's own dampers and resistors take in, W; the windings of a motor are such."""
+        branches = self.form.graph.branches
+        return self._power(part, (k for k in part.branches if branches[k].template.kind is Kind.CONDUCTANCE))
+
     def _power(self, part: GraphPart, branches: Iterable[int]) -> Array:
         powers = (self.acted_on(part, k) * self.through[k] for k in branches)
         return np.asarray(sum(powers, start=np.zeros(len(self.t))))

@@ -25,8 +25,9 @@ from shaftwork.pipeline.phases.passing import Passing, Phase
 from shaftwork.pipeline.phases.phases import FOLLOWING, Phases
 from shaftwork.pipeline.phases.settling import Settling
 
-# So many changes of mode, each within this part of the run of the one before, are chatter.
-CHATTER_EVENTS, CHATTER_SPAN = 200, 1e-9
+# So many changes of mode, each within this part of the run of the one before, are chatter. Rebounds come ever faster,
+# too, before they end: a thousand of them where nearly all speed is given back.
+CHATTER = ((200, 1e-9), (3000, 1e-6))
 TIGHTEST_RTOL = 1e-14
 STILL = "Nothing moves, and what holds is known at every time."
 
@@ -86,7 +87,7 @@ class Run:
         self.spans: list[Span] = []
         self.changes: list[Change] = []
         self.engine, self.why, self.steps = "", "", 0
-        self._soon = 0
+        self._soon = [0 for _ in CHATTER]
 
     def march(self, initial: Mapping[str, float] | None) -> None:
         """Go through all phases from the start values."""
@@ -146,17 +147,17 @@ class Run:
         """
         if not changes:
             return
-        span = self.demand.span[1] - self.demand.span[0]
-        soon = bool(self.changes) and t - self.changes[-1].time < CHATTER_SPAN * span
-        self._soon = self._soon + 1 if soon else 0
+        passed = (t - self.changes[-1].time) / (self.demand.span[1] - self.demand.span[0]) if self.changes else 1.0
         self.changes += changes
-        if self._soon > CHATTER_EVENTS:
-            last = changes[-1]
-            raise SimulationError(
-                f"{type(last.element.part.component).__name__} '{last.element.name}' changes again and again between "
-                f"'{last.before}' and '{last.after}' at t = {t:.9g} s, {CHATTER_EVENTS} times without time going on. "
-                "Give it damping or its neighbours an inertia, or let it rest."
-            )
+        for number, (most, part) in enumerate(CHATTER):
+            self._soon[number] = self._soon[number] + 1 if passed < part else 0
+            if self._soon[number] > most:
+                last = changes[-1]
+                raise SimulationError(
+                    f"{type(last.element.part.component).__name__} '{last.element.name}' changes again and again "
+                    f"between '{last.before}' and '{last.after}' at t = {t:.9g} s, {most} times with hardly any time "
+                    "going on. Give it damping or its neighbours an inertia, or let it rest (omega_rest)."
+                )
 
     def _problem(self, t: float, moment: Moment, passing: Passing | None = None) -> Problem:
         """The motion from a time on, up to the next instant at which an input jumps."""
@@ -209,7 +210,7 @@ class Run:
 
     def _passed(self, t: float, moment: Moment) -> tuple[Trajectory, Passing]:
         """One run of the engine; where a Taylor series cannot go on, another engine begins it anew."""
-        passing, noted, soon = Passing(self.settling, moment, t, self.note), len(self.changes), self._soon
+        passing, noted, soon = Passing(self.settling, moment, t, self.note), len(self.changes), [*self._soon]
         problem = self._problem(t, moment, passing)
         if not problem.x0.size:
             made, _, _ = at_rest(problem)

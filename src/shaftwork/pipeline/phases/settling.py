@@ -279,7 +279,7 @@ class Settling:
         since = 0.0 if ended.leave.rebound is None else self._since(after, moment, ended)
         new, changes = self._impacts.hit(t, after, _moved(moment, after, -since), number, ended.leave)
         if not changes[0].rebound:
-            return new, changes
+            return _moved(new, after, since), changes
         old, made, x = moment.regime, new.regime, new.x
         share = old.assembly.constant(number, ended.leave.rebound, old.p)
         speed = old.assembly.across(number, after, moment.x, old.p)
