@@ -178,3 +178,32 @@ def test_what_was_not_referred_is_not_found_by_name() -> None:
         small.ratio("gear")
     with pytest.raises(sw.SignalError, match=r"No parameter 'gear\.ratio'"):
         small.table["gear.ratio"]
+
+
+def test_a_viscous_load_is_a_damper_to_the_frame_where_the_reference_translates() -> None:
+    net = sw.Network("lift")
+    net.add(sw.TorqueSource("motor", tau=5.0), "a")
+    net.add(sw.Inertia("J", J=2.0), "a")
+    net.add(sw.ViscousLoad("bearing", d=0.4), "a")
+    net.add(sw.Drum("drum", radius=-0.2), "a", "b")
+    net.add(sw.Mass("load", m=10.0), "b")
+    small = sw.reduce.refer(net, "b")
+    (damper,) = (part for part in small.network.parts if part.name == "bearing")
+    assert isinstance(damper, sw.TranslationalDamper)
+    assert damper.d == pytest.approx(0.4 / 0.2**2, rel=1e-14)
+    before, after = net.simulate(20.0), small.network.simulate(20.0)
+    assert after["load.v"] == pytest.approx(before["load.v"], rel=1e-8)
+    net.add(sw.CoulombLoad("seal", tau=1.0), "a")
+    assert "CoulombLoad 'seal' cannot be referred: there is no translation part that does what it does" in refused(
+        net, "b"
+    )
+
+
+def test_what_is_no_train_and_no_side_is_refused() -> None:
+    for drives in ("a", ["gear"], 5):
+        with pytest.raises(sw.ParameterError, match=r"drives = .* must say the side of each gear by its name"):
+            sw.reduce.refer(base(), "a", drives=drives)  # type: ignore[arg-type]
+    with pytest.raises(sw.ParameterError, match="'x' is no network"):
+        sw.reduce.refer("x", to="a")  # type: ignore[arg-type]
+    with pytest.raises(sw.ParameterError, match="'x' is no network"):
+        sw.reduce.simplify("x", 3)  # type: ignore[arg-type]

@@ -209,3 +209,10 @@ def test_a_catalogue_that_is_not_there_or_no_text_is_refused(tmp_path: Path) -> 
     for path in (tmp_path / "nothing.csv", tmp_path, binary):
         with pytest.raises(sw.ParameterError, match="cannot be read"):
             sw.sizing.catalogue(path)
+
+
+def test_what_is_no_path_of_a_catalogue_is_refused() -> None:
+    made = sw.sizing.duty(motion(100.0, 0.1, 10.0, (1.0, 1.0, 1.0, 1.0)), "drive")
+    for ask in (lambda: sw.sizing.catalogue(5), lambda: sw.sizing.choose(made, 3)):  # type: ignore[arg-type]
+        with pytest.raises(sw.ParameterError, match="is no path of one"):
+            ask()

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy
 from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
@@ -183,6 +184,60 @@ def test_torque_at_standstill_counts_unless_a_brake_holds() -> None:
     assert 6 * (holds.tau_rms**2 - released.tau_rms**2) == pytest.approx(4 * 9.0, rel=TOLERANCE)
     assert "at_rest='released'" in str(holds)
     assert "at_rest" not in str(released)
+
+
+@pytest.mark.parametrize("at_rest", ["holds", "released"])
+def test_the_torque_at_the_moment_of_stopping_is_in_the_figures(at_rest: str) -> None:
+    times, speeds = [0.0, 1.0, 2.0, 4.0, 5.0], [0.0, 20.0, 20.0, 0.0, 0.0]
+    made = sw.sizing.duty(rigid(times, speeds, 3.0, 0.4, 0.0), "drive", at_rest=at_rest)
+    assert close(made.tau_min, -30.0, 68.0)
+    assert close(made.tau_max, 68.0, 68.0)
+    assert close(made.loaded, 4.0, 4.0)
+
+
+U = (sw.t - 1.0) / 2.0
+SOFT = {
+    "cosine": 5.0 * (1 - sympy.cos(sympy.pi * U)),
+    "ninth degree": 10.0 * (70 * U**9 - 315 * U**8 + 540 * U**7 - 420 * U**6 + 126 * U**5),
+}
+
+
+@pytest.mark.parametrize("shape", SOFT)
+@pytest.mark.parametrize("elastic", [False, True])
+def test_a_soft_start_counts_from_its_begin_to_the_begin_of_the_plateau(shape: str, *, elastic: bool) -> None:
+    """However flat the speed begins and ends: it is under way, and it is half way after half of the time."""
+    net = sw.Network("soft")
+    law = sympy.Piecewise((0, sw.t < 1), (SOFT[shape], sw.t < 3), (10, True))
+    net.add(sw.SpeedSource("drive", omega=law), "shaft")
+    net.add(sw.Inertia("J", J=3.0), "shaft")
+    if elastic:  # many steps
+        net.add(sw.Spring("c", c=1e4, d=10.0), "shaft", "end")
+        net.add(sw.Inertia("J1", J=1.0), "end")
+        net.add(sw.ViscousLoad("load", d=0.1), "end")
+    made = sw.sizing.duty(net.simulate(4.0), "drive")
+    assert close(made.acceleration_time(), 2.0, 2.0)
+    assert close(made.acceleration_time(0.5), 1.0, 1.0)
+    assert close(made.loaded, 3.0, 3.0)
+
+
+def test_a_motion_from_rest_to_rest_of_ninth_degree_is_under_load_all_the_time() -> None:
+    net = sw.Network("rest to rest")
+    way = SOFT["ninth degree"].subs(sw.t, sw.t + 1.0)
+    net.add(sw.SpeedSource("drive", omega=sympy.diff(way, sw.t)), "shaft")
+    net.add(sw.Inertia("J", J=3.0), "shaft")
+    made = sw.sizing.duty(net.simulate(2.0), "drive")
+    assert close(made.loaded, 2.0, 2.0)
+    assert close(made.acceleration_time(), 1.0, 1.0)
+    assert close(made.thermal("S3"), made.tau_rms, made.tau_rms)
+
+
+def test_a_reversal_and_a_touch_of_standstill_begin_an_acceleration() -> None:
+    turned = sw.sizing.duty(rigid([0.0, 1.0, 2.0, 3.0], [-5.0, -5.0, 5.0, 10.0], 1.0, 0.1, 0.0), "drive")
+    assert close(turned.acceleration_time(), 1.5, 1.5)
+    touched = sw.sizing.duty(rigid([0.0, 1.0, 2.0, 5.0], [0.0, 4.0, 0.0, 6.0], 1.0, 0.1, 0.0), "drive")
+    assert close(touched.acceleration_time(), 3.0, 3.0)
+    at_once = sw.sizing.duty(rigid([0.0, 1.0], [10.0, 5.0], 1.0, 0.1, 0.0), "drive")
+    assert at_once.acceleration_time() == at_once.acceleration_time(0.6) == 0.0
 
 
 def test_friction_at_standstill_is_released_and_a_jump_of_the_speed_is_said() -> None:

@@ -76,7 +76,7 @@ def test_measures_equal_closed_forms(count: int) -> None:
         "end": 5.0 * (1 - np.cos(omega * end)),
     }
     for kind, values in expected.items():
-        # the engines follow the motion to 1e-8 of its size, and a peak is refined to 1e-7 of it
+        # one by one a peak is refined to 1e-7 of its size
         np.testing.assert_allclose(made.measures[f"{kind} shaft.tau"], values, atol=2e-6, err_msg=kind)
 
 
@@ -131,7 +131,7 @@ def test_what_runs_side_by_side_runs_one_by_one_where_it_must() -> None:
     stiffness, damping = np.linspace(500.0, 900.0, 16), np.full(16, 2.0)
     damping[3] = 0.0  # has other equations
     made = sweep(swing(1.0), samples={"shaft.c": stiffness, "shaft.d": damping}, t_end=1.0, measures=["max shaft.tau"])
-    assert made.why == ""
+    assert made.why.startswith("1 of 16 variants ran one by one: ")
     assert made.measures["max shaft.tau"][3] == pytest.approx(10.0, abs=1e-6)
     assert (np.delete(made.measures["max shaft.tau"], 3) < 9.9).all()
 
@@ -151,6 +151,12 @@ def test_a_variant_that_fails_is_a_row_with_its_reason() -> None:
     assert made.reasons == ("measure 'own': ZeroDivisionError: float division by zero", "")
     assert np.isnan(made.measures["own"][0])
     assert "ZeroDivisionError" in str(made)
+
+
+def test_a_variant_that_cannot_be_assembled_says_its_first_problem() -> None:
+    made = sweep(swing(), {"J.J": [1.0, 0.0], "shaft.c": [800.0, 0.0]}, t_end=0.1, measures=["end J.omega"])
+    assert made.failed.tolist() == [False, False, False, True]
+    assert made.reasons[3].startswith("'swing' cannot be assembled: 1 problem: massless node: ")
 
 
 def test_a_variant_that_runs_away_leaves_those_beside_it_alone() -> None:
@@ -201,12 +207,27 @@ def test_requirements_filter_and_a_measure_ranks() -> None:
         ({"parameters": {"J.J": [1.0]}, "measures": ["damage shaft.tau"]}, r"needs an S-N line"),
         ({"parameters": {"J.J": [1.0]}, "require": {"max": (0, 1)}}, r"there is no measure 'max'"),
         ({"parameters": {"J.J": [1.0]}, "require": {"end J.omega": 1.0}}, r"must be \(low, high\)"),
+        ({"parameters": {"J.J": [1.0]}, "require": {"end J.omega": (400, 100)}}, r"at least 400.0 and at most 100.0"),
+        ({"parameters": {"J.J": [1.0]}, "require": {"end J.omega": (float("nan"), 1)}}, r"at least nan"),
+        ({"parameters": {"J.J": [1.0]}, "initial": {"zz": 1}}, r"No quantity 'zz' in 'swing'"),
+        ({"parameters": {"J.J": [1.0]}, "initial": 3}, r"initial = 3 must map"),
+        ({"parameters": {"J.J": [1.0]}, "measures": None}, r"measures = None must be a list of names"),
         ({"parameters": {"J.J": [1.0]}, "processes": 0}, r"processes = 0"),
     ],
 )
 def test_what_is_wrong_is_refused_at_once(given: dict[str, object], message: str) -> None:
     with pytest.raises(sw.ShaftworkError, match=message):
         sweep(swing(), **({"t_end": 1.0, "measures": ["end J.omega"]} | given))  # type: ignore[arg-type]
+
+
+def test_studies_refuse_what_is_no_network() -> None:
+    for study in (
+        lambda: sweep(3, {"J.J": [1.0]}, t_end=1.0, measures=["end J.omega"]),  # type: ignore[arg-type]
+        lambda: sw.studies.frequency_sensitivities(3),  # type: ignore[arg-type]
+        lambda: sw.studies.motion_sensitivities(3, ["end J.omega"], t_end=1.0),  # type: ignore[arg-type]
+    ):
+        with pytest.raises(sw.ParameterError, match="3 is no network"):
+            study()
 
 
 def test_damage_is_that_of_the_solution() -> None:
@@ -269,14 +290,14 @@ def test_a_store_of_another_sweep_is_refused_by_what_differs(
     call: dict[str, object] = {"parameters": {"J.J": [1.0, 2.0]}, "t_end": 0.2, "measures": ["max shaft.tau"]}
     call["store"] = tmp_path / "store.jsonl"
     sweep(swing(), **call)  # type: ignore[arg-type]
-    with pytest.raises(sw.ParameterError, match=f"another sweep: its {what} differs"):
+    with pytest.raises(sw.ParameterError, match=f"differs in its {what}"):
         sweep(swing(), **(call | changed))  # type: ignore[arg-type]
 
 
 def test_a_store_of_another_network_and_what_is_no_store_are_refused(tmp_path: Path) -> None:
     call: dict[str, object] = {"parameters": {"J.J": [1.0]}, "t_end": 0.2, "measures": ["max shaft.tau"]}
     sweep(swing(), store=tmp_path / "a", **call)  # type: ignore[arg-type]
-    with pytest.raises(sw.ParameterError, match="its network differs"):
+    with pytest.raises(sw.ParameterError, match="differs in its network"):
         sweep(swing(2.0), store=tmp_path / "a", **call)  # type: ignore[arg-type]
     (tmp_path / "b").write_text("c = 3\n")
     with pytest.raises(sw.ParameterError, match="is no file of a sweep"):
@@ -296,6 +317,8 @@ def test_results_are_a_table_a_file_and_a_picture(tmp_path: Path) -> None:
     made = small()
     assert str(made).splitlines()[0] == f"swing: 2 variants, {int(made.passed.sum())} passed, 0 failed"
     made.to_csv(tmp_path / "t.csv")
+    with pytest.raises(sw.ParameterError, match="cannot be written"):
+        made.to_csv(tmp_path / "missing" / "t.csv")
     assert (tmp_path / "t.csv").read_text().splitlines()[0] == "shaft.c,max shaft.tau,passed,reason"
     frame = pytest.importorskip("pandas").DataFrame
     assert isinstance(made.table(), frame)
@@ -312,3 +335,50 @@ def test_processes_give_the_same() -> None:
     call = {"samples": {"shaft.c": np.linspace(500.0, 900.0, 9)}, "t_end": 0.2, "measures": ["max shaft.tau"]}
     one, two = (sweep(swing(), processes=count, **call) for count in (1, 2))  # type: ignore[arg-type]
     np.testing.assert_array_equal(one.measures["max shaft.tau"], two.measures["max shaft.tau"])
+
+
+def test_the_largest_torque_of_a_motor_is_its_pull_out_torque_to_1e_8() -> None:
+    """Shafts of many kinds make the slip pass that of the pull-out torque once or, swinging, several times."""
+    pytest.importorskip("heyoka")
+    random, count = np.random.default_rng(3), 400
+    samples = {
+        "shaft.c": 24206.0 * random.uniform(0.5, 1.5, count),
+        "shaft.d": 14.0 * random.uniform(0.5, 1.5, count),
+        "motor.tau_k": random.uniform(6.0, 10.0, count),
+    }
+    made = sweep(sw.scenes.crane_start(), samples=samples, t_end=6.5, measures=["max motor.tau"], processes=1)
+    assert made.why == ""
+    np.testing.assert_allclose(made.measures["max motor.tau"], samples["motor.tau_k"] * 35.5 * 0.95, rtol=1e-8)
+
+
+def test_a_guard_that_is_met_just_after_a_sample_leaves_extremes_right() -> None:
+    """A clutch closes at 1 s, within rounding of a sample: from there to the guard it is 1e-14 s."""
+    pytest.importorskip("heyoka")
+    net = sw.Network("clutch")
+    net.add(sw.TorqueSource("motor", tau=100.0), "a")
+    net.add(sw.Inertia("J1", J=27.0), "a")
+    net.add(sw.Spring("shaft", c=2e4, d=14.0), "a", "b")
+    net.add(sw.Inertia("J2", J=60.0), "b")
+    net.add(sw.Clutch("clutch", tau=100.0, t_on=1.0), "b", "c")
+    net.add(sw.Inertia("J3", J=30.0), "c")
+    samples = {"shaft.c": np.linspace(6e3, 4e4, 24)[:16]}
+    names = ["max J1.omega", "min shaft.tau"]
+    fast = sweep(net, samples=samples, t_end=2.5, measures=names)
+    slow = sweep(net, samples=samples, t_end=2.5, measures=names, engine="scipy", rtol=1e-10)
+    assert fast.why == ""
+    for name in names:
+        np.testing.assert_allclose(fast.measures[name], slow.measures[name], rtol=1e-8, err_msg=name)
+
+
+def test_what_none_passes_is_a_table_of_no_rows() -> None:
+    made = sweep(
+        swing(), {"shaft.c": [500.0]}, t_end=0.5, measures=["max shaft.tau"], require={"max shaft.tau": (99, None)}
+    )
+    best = made.best("max shaft.tau", 1)
+    assert len(best) == 0
+    assert str(best).splitlines()[0] == "swing: 0 variants, 0 passed, 0 failed"
+    assert [len(column) for column in best.columns.values()] == [0, 0, 0, 0]
+    assert len(made.rows([0]).best("max shaft.tau", 99)) == 0
+    for count in (0, "a", 1.5):
+        with pytest.raises(sw.ParameterError, match="must be a number, 1 or more"):
+            made.best("max shaft.tau", count)  # type: ignore[arg-type]

@@ -117,6 +117,14 @@ class Stores:
             x += by_inputs @ np.where(inputs.of_time, u, 0.0)
         return np.asarray(x)
 
+    def energy(self, bound: BoundArrays, held: Mapping[str, float]) -> float:
+        """What is stored, in J: k v^2 / 2 in inertias and masses, tau^2 / 2 c in springs."""
+        energy = 0.0
+        for name, branch in self._branches.items():
+            coefficient = float(bound.part.coefficients[branch])
+            energy += 0.5 * held[name] ** 2 * (1 / coefficient if name in self.through else coefficient)
+        return energy
+
     def given(
         self, bound: BoundArrays, t: float, before: Mapping[str, float], after: Mapping[str, float]
     ) -> dict[str, float]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from shaftwork.components.contacts import Backlash
 from shaftwork.components.rotation import Damper, Inertia, Spring
+from shaftwork.components.sources import SpeedSource
 from shaftwork.core.domains import ROTATION
 from shaftwork.core.errors import NetworkError, Problem
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
@@ -39,6 +40,11 @@ class Station:
     def heaviest(self) -> str:
         """The name of its largest inertia."""
         return max(self.inertias, key=lambda own: own[1])[0]
+
+    @property
+    def prescribed_by(self) -> tuple[str, ...]:
+        """Names of the sources that prescribe its speed: to what swings it is a clamp."""
+        return tuple(item.part.name for item in self.riders if isinstance(item.part, SpeedSource))
 
 
 @dataclass(frozen=True)
@@ -75,8 +81,16 @@ class Chain:
     circuits: tuple[Placed, ...] = ()
 
     def frequencies(self) -> Array:
-        """(n,) natural frequencies without damping in Hz, ascending, 0 for the turning of the whole."""
+        """(m,) natural frequencies without damping in Hz, ascending, 0 for the turning of the whole.
+
+        There is one for each station whose speed is not prescribed.
+        """
         return modes_of(self)[0]
+
+    @property
+    def prescribed(self) -> tuple[bool, ...]:
+        """(n,) whether a source prescribes the speed of each station."""
+        return tuple(bool(station.prescribed_by) for station in self.stations)
 
 
 def series(links: Sequence[Link]) -> Link:
@@ -94,11 +108,17 @@ def series(links: Sequence[Link]) -> Link:
 
 
 def modes_of(chain: Chain) -> tuple[Array, Array]:
-    """(n,) natural frequencies in Hz and (n, n) shapes in columns, with a modal inertia of 1 kg m^2."""
+    """(m,) natural frequencies in Hz and (n, m) shapes in columns, with a modal inertia of 1 kg m^2.
+
+    Where the speed of a station is prescribed, it stands still in every shape.
+    """
     inertias, stiffness = matrices_of(chain)
-    root = 1 / np.sqrt(inertias)
-    squares, shapes = np.linalg.eigh(root[:, None] * stiffness * root)
-    return hertz(squares, chain), root[:, None] * shapes
+    free = np.flatnonzero(~np.array(chain.prescribed))
+    root = 1 / np.sqrt(inertias[free])
+    squares, inner = np.linalg.eigh(root[:, None] * stiffness[np.ix_(free, free)] * root)
+    shapes = np.zeros((len(inertias), len(free)))
+    shapes[free] = root[:, None] * inner
+    return hertz(squares, chain), shapes
 
 
 def matrices_of(chain: Chain) -> tuple[Array, Array]:
@@ -119,7 +139,7 @@ def row_matrix(values: Sequence[float]) -> Array:
 def hertz(squares: Array, chain: Chain) -> Array:
     """(n,) frequencies in Hz of ascending squares of rates; the first is exactly 0 where the whole chain turns."""
     rates = np.sqrt(np.maximum(squares, 0.0))
-    if not any(station.support for station in chain.stations):
+    if not any(station.support or station.prescribed_by for station in chain.stations):
         rates[0] = 0.0
     return np.asarray(rates / (2 * np.pi))
 

@@ -17,33 +17,35 @@ class Comparison:
         t: (k,) times, s.
         before: (k,) torque of the train at the reference shaft, N m.
         after: (k,) torque of the small model of groups, N m.
+        extremes: largest torque in size of these, in this order, N m; between the times as well.
         by_modes: (k,) torque of the one with modes, N m; None where there is none, as of a single mass.
     """
 
     t: Array
     before: Array
     after: Array
+    extremes: tuple[float, ...]
     by_modes: Array | None = None
 
     @property
     def peaks(self) -> tuple[float, float]:
         """Largest torque in size before and after, N m."""
-        return _peak(self.before), _peak(self.after)
+        return self.extremes[0], self.extremes[1]
 
     @property
     def peak_error(self) -> float:
         """Of the largest torque, relative; negative where the small model says less."""
-        return self._peak_error(self.after)
+        return self._peak_error(1)
 
     @property
     def rms_error(self) -> float:
-        """Root mean square of the difference over that of the torque of the train."""
+        """Root mean square of the difference over that of the torque of the train, at the times."""
         return self._rms_error(self.after)
 
     @property
     def peak_error_by_modes(self) -> float | None:
         """As `peak_error`, of the model with modes."""
-        return None if self.by_modes is None else self._peak_error(self.by_modes)
+        return None if self.by_modes is None else self._peak_error(2)
 
     @property
     def rms_error_by_modes(self) -> float | None:
@@ -51,19 +53,15 @@ class Comparison:
         return None if self.by_modes is None else self._rms_error(self.by_modes)
 
     def __str__(self) -> str:
-        lines = ["model       peak N m     error  rms error", f"train     {_peak(self.before):10.6g}"]
+        lines = ["model       peak N m     error  rms error", f"train     {self.extremes[0]:10.6g}"]
         models = {"groups": self.after, **({} if self.by_modes is None else {"modes": self.by_modes})}
-        for name, torque in models.items():
-            errors = f"{self._peak_error(torque):+10.2%}{self._rms_error(torque):11.2%}"
-            lines.append(f"{name:10}{_peak(torque):10.6g}{errors}")
+        for place, (name, torque) in enumerate(models.items(), 1):
+            errors = f"{self._peak_error(place):+10.2%}{self._rms_error(torque):11.2%}"
+            lines.append(f"{name:10}{self.extremes[place]:10.6g}{errors}")
         return "\n".join(lines)
 
-    def _peak_error(self, torque: Array) -> float:
-        return _peak(torque) / _peak(self.before) - 1
+    def _peak_error(self, place: int) -> float:
+        return self.extremes[place] / self.extremes[0] - 1
 
     def _rms_error(self, torque: Array) -> float:
         return float(np.sqrt(np.mean((torque - self.before) ** 2) / np.mean(self.before**2)))
-
-
-def _peak(torque: Array) -> float:
-    return float(np.abs(torque).max())

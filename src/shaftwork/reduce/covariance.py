@@ -96,6 +96,12 @@ class _View:
         ends = [end for end in branch.ends if end is not None]
         return self.scale_at(ends[0], scale) if ends else scale
 
+    def ends_beside(self, other: _View, branch: BranchTemplate) -> tuple[End | None, ...]:
+        """The ends of a branch; an optional port that the other part does not have is left at the frame."""
+        kept = {port.name for port in other.part.ports}
+        frame = [port.name for port in self.part.ports if port.optional and port.name not in kept]
+        return tuple(None if end in frame else end for end in branch.ends)
+
     def labelled(self, label: str, scale: Scale) -> Scale:
         """What the branch of a label is scaled by."""
         found = (self.scale_of(branch, scale) for branch in self.template.branches if branch.label == label)
@@ -122,7 +128,9 @@ def _samples(symbols: Sequence[Symbol], modes: Sequence[Modes]) -> Iterator[dict
 
 def _agree(old: _View, new: _View, scale: Scale) -> bool:
     pairs = tuple(zip(old.template.branches, new.template.branches, strict=True))
-    return all(a.kind is b.kind and a.ends == b.ends and _same_branch(old, new, a, b, scale) for a, b in pairs)
+    return all(
+        a.kind is b.kind and a.ends == new.ends_beside(old, b) and _same_branch(old, new, a, b, scale) for a, b in pairs
+    )
 
 
 def _same_branch(old: _View, new: _View, before: BranchTemplate, after: BranchTemplate, scale: Scale) -> bool:

@@ -11,7 +11,7 @@ from math import comb
 import numpy as np
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.reduce.chain import Chain, Station, modes_of, series
+from shaftwork.reduce.chain import Chain, Station, matrices_of, modes_of, series
 
 MOST = 20_000
 """Groupings that are tried one by one."""
@@ -39,32 +39,52 @@ def groupings(chain: Chain, masses: int, keep: str, driven: int) -> tuple[Groupi
 
     The best one has the smallest error of the lowest natural frequency, and among equal ones that of the torque: a
     group boundary at the kept shaft keeps the inertia on either side of it, and with it the torque that accelerates
-    what is beyond, whatever the other boundaries are. What they change is how it swings.
+    what is beyond, whatever the other boundaries are. What they change is how it swings. A station whose speed is
+    prescribed is a group of its own, for its group moves as prescribed; one mass for all moves so as a whole.
 
     Args:
         chain: stations with inertia.
         masses: the number of groups.
         keep: a part of one link; empty for none.
-        driven: place of the station at which a step of torque acts.
+        driven: place of the station at which a step of torque acts, or of the prescribed acceleration.
 
     Raises:
-        ParameterError: there are fewer stations than groups, or too many groupings.
+        ParameterError: there are fewer stations than groups, too few groups for a speed that is prescribed, or too many
+            groupings.
     """
     count = len(chain.stations)
     if isinstance(masses, bool) or not isinstance(masses, int) or not 1 <= masses <= count:
         raise ParameterError(f"masses = {masses!r} must be a whole number from 1 to the {count} inertias of the chain.")
     kept = next((k for k, link in enumerate(chain.links) if keep and link.has(keep)), None) if masses > 1 else None
-    free = [k for k in range(count - 1) if k != kept]
-    chosen = masses - 1 - (kept is not None)
+    fixed = _fixed(chain, masses, kept)
+    free = [k for k in range(count - 1) if k not in fixed]
+    chosen = masses - 1 - len(fixed)
     if comb(len(free), chosen) > MOST:
         raise ParameterError(
             f"masses = {masses} of {count} inertias: {comb(len(free), chosen)} groupings are more than the {MOST} that "
             "are tried. Take fewer masses, or simplify in two steps."
         )
     true = _swing(chain, driven, kept)
-    cuts = (tuple(sorted((*some, *(() if kept is None else (kept,))))) for some in combinations(free, chosen))
+    cuts = (tuple(sorted((*some, *fixed))) for some in combinations(free, chosen))
     found = (_measured(chain, each, kept, driven, true) for each in cuts)
     return tuple(sorted(found, key=lambda made: (made.frequency_error, made.torque_error)))
+
+
+def _fixed(chain: Chain, masses: int, kept: int | None) -> tuple[int, ...]:
+    """Links at which groups end in every grouping: the kept one, and those beside a speed that is prescribed."""
+    held = [k for k, prescribed in enumerate(chain.prescribed) if prescribed]
+    beside = [k for place in held for k in (place - 1, place)] if masses > 1 or len(held) > 1 else []
+    asked = (*beside, *(() if kept is None else (kept,)))
+    fixed = tuple(k for k in range(len(chain.links)) if k in asked)
+    if len(fixed) < masses:
+        return fixed
+    sources = ", ".join(f"'{name}'" for k in held for name in chain.stations[k].prescribed_by)
+    nodes = ", ".join(f"'{chain.stations[k].node}'" for k in held)
+    rigid = ", or 1 for the rigid train" if len(held) == 1 else ""
+    raise ParameterError(
+        f"masses = {masses}: a speed is prescribed at {nodes} ({sources}), and what is grouped with it moves as "
+        f"prescribed and swings no more. Take masses = {len(fixed) + 1} or more{rigid}."
+    )
 
 
 def _measured(
@@ -78,7 +98,11 @@ def _measured(
 
 
 def _swing(chain: Chain, driven: int, kept: int | None) -> tuple[float, float]:
-    """The lowest natural frequency, and the torque amplitude of a link in that mode after a unit step of torque."""
+    """The lowest natural frequency, and the torque amplitude of a link in that mode after a unit step at a station.
+
+    Law: |c twist shape| / omega^2 for a step of torque; where the speed is prescribed the step is one of acceleration,
+    and the stiffness there gives what the shape does not, |c twist (K shape)| / omega^4.
+    """
     frequencies, shapes = modes_of(chain)
     elastic = np.flatnonzero(frequencies > 0)
     if not elastic.size:
@@ -86,8 +110,9 @@ def _swing(chain: Chain, driven: int, kept: int | None) -> tuple[float, float]:
     frequency, shape = float(frequencies[elastic[0]]), shapes[:, elastic[0]]
     if kept is None:
         return frequency, 0.0
-    twist = shape[kept] - shape[kept + 1]
-    return frequency, float(abs(chain.links[kept].c * twist * shape[driven])) / (2 * np.pi * frequency) ** 2
+    twist, square = shape[kept] - shape[kept + 1], (2 * np.pi * frequency) ** 2
+    pushed = matrices_of(chain)[1][driven] @ shape / square if chain.prescribed[driven] else shape[driven]
+    return frequency, float(abs(chain.links[kept].c * twist * pushed)) / square
 
 
 def grouped(chain: Chain, cuts: tuple[int, ...], kept: int | None) -> tuple[Chain, tuple[tuple[str, ...], ...]]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from shaftwork.components.lossy_gear import LossyGear
 from shaftwork.core.domains import ELECTRICAL
@@ -82,13 +84,13 @@ def refer(net: Network, to: str, *, drives: Mapping[str, str] | None = None) -> 
             sources, where all of them are on one.
 
     Raises:
-        ParameterError: there is no such node, it cannot move, or `drives` names no lossy gear.
+        ParameterError: `net` is no network, there is no such node, it cannot move, or `drives` names no lossy gear.
         NetworkError: the network cannot be assembled, or parts cannot be referred; lists every one with its reason.
 
     Source: Abdelkader 2016, (4)-(17), with (3) and (6) put right; Marinkovic 2012, 2.2 and (18).
     """
-    graph, netlist = net.graph(), net.netlist()
-    known = _checked_sides(graph, drives or {})
+    graph, netlist = checked(net).graph(), net.netlist()
+    known = _checked_sides(graph, {} if drives is None else drives)
     node = _checked_node(graph, to)
     found = kinematics(graph, known)
     title = f"'{net.name}' cannot be referred to '{to}'"
@@ -111,6 +113,17 @@ def refer(net: Network, to: str, *, drives: Mapping[str, str] | None = None) -> 
     return Referred(made, table, to, scales, view.nodes(), absorbed, at_rest)
 
 
+def checked(net: Any) -> Network:
+    """A network.
+
+    Raises:
+        ParameterError: it is none.
+    """
+    if not isinstance(net, Network):
+        raise ParameterError(f"{reprlib.repr(net)} is no network. Give the train, net = sw.Network('train').")
+    return net
+
+
 def _checked_node(graph: CircuitGraph, to: str) -> int:
     nodes = [name for name, domain in zip(graph.nodes, graph.domains, strict=True) if domain is not ELECTRICAL]
     if to not in nodes:
@@ -119,6 +132,8 @@ def _checked_node(graph: CircuitGraph, to: str) -> int:
 
 
 def _checked_sides(graph: CircuitGraph, drives: Mapping[str, str]) -> Mapping[str, str]:
+    if not isinstance(drives, Mapping):
+        raise ParameterError(f"drives = {drives!r} must say the side of each gear by its name: drives={{'gear': 'a'}}.")
     gears = [part.name for part in graph.parts if isinstance(part.component, LossyGear)]
     for name, side in drives.items():
         if name not in gears:

@@ -11,6 +11,7 @@ from sympy import Abs, Expr, Float, Rational, S, Symbol
 
 from shaftwork.components.base import Component
 from shaftwork.components.laws import Table, as_expression, omega, phi, s, v
+from shaftwork.components.loads import ViscousLoad
 from shaftwork.components.rotation import Damper, Inertia, Spring
 from shaftwork.components.sources import ForceSource, TorqueSource
 from shaftwork.components.translation import Mass, TranslationalDamper, TranslationalSpring
@@ -71,6 +72,7 @@ COUNTERPARTS: Mapping[type[Component], tuple[type[Component], Mapping[str, str]]
     Inertia: (Mass, {"J": "m"}),
     Spring: (TranslationalSpring, {}),
     Damper: (TranslationalDamper, {}),
+    ViscousLoad: (TranslationalDamper, {}),
     TorqueSource: (ForceSource, {"tau": "f"}),
 }
 """What a part becomes behind a drum or wheel, and the names of its parameters there."""

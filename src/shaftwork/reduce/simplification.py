@@ -13,14 +13,16 @@ import numpy as np
 from shaftwork.components.rotation import Gear
 from shaftwork.core.domains import ROTATION
 from shaftwork.core.errors import ParameterError
+from shaftwork.core.parameters import in_si
 from shaftwork.network.netlist import REFERENCE, Placed
 from shaftwork.pipeline.network import Network
 from shaftwork.reduce.chain import Chain, read_chain
 from shaftwork.reduce.comparison import Comparison
 from shaftwork.reduce.grouping import Grouping, grouped, groupings
 from shaftwork.reduce.groups import GroupTable, add_chain
-from shaftwork.reduce.reference_shaft import Referred, refer
+from shaftwork.reduce.reference_shaft import Referred, checked, refer
 from shaftwork.reduce.truncation import ModalChain, truncated
+from shaftwork.results.measures import Measure
 from shaftwork.results.solution import Solution
 
 KEPT = 0.05
@@ -55,7 +57,8 @@ class Simplified:
 
     Args:
         network: of the small model; the kept shaft and everything but inertias and other springs has its name.
-        by_modes: as many inertias by modes (Craig and Bampton), a network; None of one mass, or with no shaft kept.
+        by_modes: as many inertias by modes (Craig and Bampton), a network; None of one mass, with no shaft kept, or
+            where a source prescribes a speed.
         table: the groups.
         frequencies: before and after.
         keep: the kept shaft; empty for none.
@@ -105,21 +108,26 @@ class Simplified:
             **options: of `Network.simulate`, for all.
 
         Raises:
-            ParameterError: no shaft was kept, or the motion that is known has another end.
+            ParameterError: no shaft was kept, `t_end` is no time, or the motion that is known has another end.
         """
         if not self.keep:
             raise ParameterError("compare: there is no kept shaft. Simplify with keep='...', the name of one.")
+        end = in_si("t_end", t_end, "s", above=0)
         if before is None:
-            before = self.train.simulate(t_end, **{"t_eval": np.linspace(0.0, t_end, POINTS), **options})
-        elif not math.isclose(float(before.t[-1]), t_end):
-            raise ParameterError(f"compare: the motion `before` ends at {before.t[-1]:g} s, and t_end is {t_end:g} s.")
+            before = self.train.simulate(end, **{"t_eval": np.linspace(0.0, end, POINTS), **options})
+        elif not math.isclose(float(before.t[-1]), end):
+            raise ParameterError(f"compare: the motion `before` ends at {before.t[-1]:g} s, and t_end is {end:g} s.")
         options |= {"t_eval": before.t}
         own = f"{self.keep}.tau" if f"{self.keep}.tau" in before.names else f"{self.keep}.f"
         small = self.network if len(self.groupings[0].groups) > 1 else _split(self.chain, self.keep)
-        after = small.simulate(t_end, **options)
         torque = f"{self.keep}.{'tau' if small is self.network else 'tau_a'}"
-        modal = self.by_modes.simulate(t_end, **options)[f"{self.keep}.tau"] if modes and self.by_modes else None
-        return Comparison(before.t, before[own] * self.referred.torque_ratio(self.keep), after[torque], modal)
+        after = small.simulate(end, **options)
+        modal = self.by_modes.simulate(end, **options) if modes and self.by_modes else None
+        ratio = self.referred.torque_ratio(self.keep)
+        largest = [Measure("peak", own).of(before) * abs(ratio), Measure("peak", torque).of(after)]
+        largest += [Measure("peak", torque).of(modal)] if modal else []
+        by_modes = modal[torque] if modal else None
+        return Comparison(before.t, before[own] * ratio, after[torque], tuple(largest), by_modes)
 
 
 def _split(chain: Chain, keep: str) -> Network:
@@ -146,7 +154,8 @@ def simplify(
     Law: after `refer`, a group is the sum of its inertias, at the kept shaft if it is beside it and else at its largest
     inertia; between two groups there are the springs from centre to centre in series, 1/c = sum 1/c_k with
     d = sum d_k (c/c_k)^2. The kept shaft is between two groups and keeps its own stiffness, damping and gap. What is
-    beyond the outer centres is rigid. Motors, loads and brakes act on the group of their node.
+    beyond the outer centres is rigid. Motors, loads and brakes act on the group of their node. A node whose speed a
+    `SpeedSource` prescribes is a group of its own, and frequencies are those with this speed prescribed.
 
     Every contiguous grouping is tried, and the one with the smallest error of the lowest natural frequency is taken;
     among equal ones the error of the torque in the kept shaft decides, when a step of torque at the motor swings it in
@@ -161,12 +170,13 @@ def simplify(
         drives: as for `refer`.
 
     Raises:
-        ParameterError: there is no such shaft, or not so many masses.
+        ParameterError: `net` is no network, there is no such shaft, not so many masses, or too few for a speed that is
+            prescribed.
         NetworkError: the train cannot be referred, or is no chain; lists every reason.
 
     Source: Abdelkader 2016, 2.3, (15)-(17), figures 3 to 7; Marinkovic 2012, 2.1, figure 3.
     """
-    referred = refer(net, to or _reference(net, keep), drives=drives)
+    referred = refer(net, to or _reference(checked(net), keep), drives=drives)
     chain = read_chain(referred.network.netlist(), keep)
     if keep and not any(link.has(keep) for link in chain.links):
         known = ", ".join(item.part.name for link in chain.links for item in link.placed)
@@ -177,7 +187,8 @@ def simplify(
     rows = add_chain(made, tried[0].chain)
     used = {name for row in rows for name in row.made_of}
     rigid = tuple(name for link in chain.links for name in link.parts if name not in used)
-    modal = truncated(chain, masses, _place(chain, keep)) if keep and masses > 1 else None
+    by_ends = keep and masses > 1 and not any(chain.prescribed)  # its modes let every place but the ends swing freely
+    modal = truncated(chain, masses, _place(chain, keep)) if by_ends else None
     by_modes = modal.network(f"{title}, by modes") if modal else None
     losses = _losses(chain, tried[0].chain, modal)
     return Simplified(made, by_modes, GroupTable(rows, rigid), losses, keep, tried, net, referred, chain)

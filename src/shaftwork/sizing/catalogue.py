@@ -138,6 +138,8 @@ def catalogue(path: str | Path | None = None) -> tuple[CatalogueMotor, ...]:
     Raises:
         ParameterError: there is no such file, columns are missing or unknown, or rows are wrong; names them all.
     """
+    if path is not None and not isinstance(path, str | Path):
+        raise ParameterError(f"A catalogue is a file, and {path!r} is no path of one. Give that of a CSV file.")
     file = OWN if path is None else Path(path)
     try:
         text = file.read_text(encoding="utf-8-sig")

@@ -14,7 +14,7 @@ from shaftwork.results.observer import Array
 from shaftwork.results.quadrature import Panels, integrate
 from shaftwork.results.turning import turning_points
 from shaftwork.sizing.duty_cycle import Duty, Flow, cooling_at
-from shaftwork.sizing.motor_shaft import REST, RPM, SMALLEST, MotorShaft, motor_shaft
+from shaftwork.sizing.motor_shaft import RPM, SMALLEST, MotorShaft, motor_shaft
 
 
 def duty(
@@ -67,7 +67,7 @@ def _measured(shaft: MotorShaft, motion: float, whole: float, cold: float, n_ful
     """The figures of a motion in a longer or equal cycle; durations in s, the speed of full cooling in 1/min."""
     tau = turning_points(lambda t: shaft.read(t)[0], shaft.steps, smallest=SMALLEST).values
     power = turning_points(lambda t: np.multiply(*shaft.read(t)), shaft.steps, smallest=SMALLEST).values
-    total, panels = integrate(_Integrand(shaft, REST * float(np.abs(tau).max()), cold, n_full), shaft.steps)
+    total, panels = integrate(_Integrand(shaft, cold, n_full), shaft.steps)
     way, heat, power_square, turned, loaded, held, cooled, *flows = total.tolist()
     return Duty(
         title=shaft.solution.name,
@@ -99,20 +99,19 @@ class _Integrand:
 
     Args:
         shaft: where torque and speed are read.
-        no_torque: size up to which a torque is rounding, N m.
         cooling: at standstill.
         n_cooling: speed of full cooling, 1/min.
     """
 
     shaft: MotorShaft
-    no_torque: float
     cooling: float
     n_cooling: float
 
     def __call__(self, panels: Panels) -> Array:
         """(13, p, 8) rows in the order in which `_measured` takes them."""
-        tau, omega = self.shaft.read(panels.times.ravel())
-        power, still, loads = tau * omega, self.shaft.rests(omega), np.abs(tau) > self.no_torque
+        times = panels.times.ravel()
+        (tau, omega), step = self.shaft.read(times), self.shaft.step_at(times)
+        power, still, loads = tau * omega, self.shaft.resting[step], ~self.shaft.unloaded[step]
         cools = cooling_at(np.abs(omega) * RPM, self.cooling, self.n_cooling)
         rows = [tau, tau**2, power**2, np.abs(omega), ~still | loads, still & loads, cools]
         for one_way in (np.maximum(power, 0.0), np.maximum(-power, 0.0)):

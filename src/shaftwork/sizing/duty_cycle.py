@@ -8,15 +8,14 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from shaftwork.core.errors import MissingExtraError, ParameterError
 from shaftwork.core.parameters import in_si
 from shaftwork.results.observer import Array
 from shaftwork.results.quadrature import Panels
-from shaftwork.results.turning import turning_points
-from shaftwork.sizing.motor_shaft import REST, SMALLEST, MotorShaft
+from shaftwork.sizing.motor_shaft import MotorShaft
 from shaftwork.sizing.reserve import Limit, Reserve, reserve_of
+from shaftwork.sizing.run_up import run_up
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,8 +26,6 @@ LONG_CYCLE = 600.0
 """Duration of a duty cycle in s that IEC 60034-1, 4.2.3, takes where none is agreed on."""
 BRIEF = 1e-9
 """Part of a cycle that is no time: at the ends of standstill a torque may be read that jumps there."""
-SAMPLES, FINE = 4001, 4 * float(np.finfo(float).eps)
-"""Times among which a speed is looked for, and how exactly its time is found."""
 
 
 @dataclass(frozen=True)
@@ -152,7 +149,8 @@ class Duty:
     def acceleration_time(self, share: Any = 1.0) -> float:
         """Time in s from standstill until the speed first has a share of its highest value in size.
 
-        It counts from the last standstill before, or from the start of the motion. A motor that settles asymptotically
+        It counts from the last standstill before, or from the start of the motion. The highest speed is reached where
+        it peaks, or where it begins to stay as it is. A motor that settles asymptotically
         comes to its highest speed late: ask for a share such as 0.95.
 
         Args:
@@ -164,7 +162,7 @@ class Duty:
         part = in_si("share", share, above=0, at_most=1)
         if not self.n_top:
             raise ParameterError(f"'{self.motor}' does not move in '{self.title}'; there is no acceleration.")
-        return _run_up(self.shaft, part)
+        return run_up(self.shaft, part)
 
     def reserve(self, limit: Limit = None) -> Reserve:
         """How far the torque stays below a limit, at the worst instant of the motion.
@@ -273,26 +271,3 @@ def _jumps(shaft: MotorShaft) -> Array:
     ends = shaft.steps[1:]
     (_, before), (_, after) = shaft.read(np.nextafter(ends, -np.inf)), shaft.read(ends)
     return ends[np.abs(after - before) > BRIEF * shaft.omega_top]
-
-
-def _run_up(shaft: MotorShaft, share: float) -> float:
-    """Time from the last standstill to the first time at a share of the highest speed."""
-
-    def size(times: Array) -> Array:
-        return np.abs(shaft.read(times)[1])
-
-    def crossing(level: float, first: int) -> float:
-        """Where the speed comes to a level between two samples."""
-        bracket = float(t[first]), float(t[first + 1])
-        return float(brentq(lambda time: float(size(np.array([time]))[0]) - level, *bracket, xtol=1e-300, rtol=FINE))
-
-    goal = share * shaft.omega_top * (1 - REST)
-    turns = turning_points(size, shaft.steps, smallest=SMALLEST).t
-    t = np.unique(np.concatenate([shaft.steps, np.linspace(shaft.steps[0], shaft.steps[-1], SAMPLES), turns]))
-    speeds = size(t)
-    reached = int(np.argmax(speeds >= goal))
-    if reached == 0:
-        return 0.0
-    rests = np.flatnonzero(shaft.rests(speeds[:reached]))
-    start = crossing(shaft.standstill, int(rests[-1])) if rests.size else float(t[0])
-    return crossing(goal, reached - 1) - start

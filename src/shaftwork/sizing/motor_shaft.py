@@ -16,6 +16,7 @@ from shaftwork.components.base import Component
 from shaftwork.core.errors import ParameterError, SignalError
 from shaftwork.core.parameters import in_si
 from shaftwork.results.observer import Array
+from shaftwork.results.quadrature import Panels
 from shaftwork.results.solution import Solution
 from shaftwork.results.turning import turning_points
 
@@ -24,7 +25,9 @@ BLOCK = 50_000
 SMALLEST = 1e-9
 """Ups and downs of less than this part of the range make no peak."""
 REST = 1e-12
-"""A speed up to this part of the highest one is standstill, a torque up to it none: both are rounding."""
+"""A speed that stays within this part of the highest one may be standstill, such a torque none: see `is_nothing`."""
+CONSTANT = 4 * float(np.finfo(float).eps)
+"""What changes by no more than this part of itself is constant."""
 RPM = 30 / math.pi
 """1/min for a rad/s."""
 GEARED = ("ratio", "efficiency")
@@ -70,27 +73,60 @@ class MotorShaft:
         """(s,) times between which the motion is smooth, s."""
         return self.solution.steps
 
-    @property
-    def standstill(self) -> float:
-        """Speed in rad/s up to which the motor is at rest."""
-        return REST * self.omega_top
+    @cached_property
+    def within(self) -> Panels:
+        """Every step as a panel."""
+        return Panels(self.steps[:-1], self.steps[1:])
 
-    def rests(self, omega: Array) -> NDArray[np.bool_]:
-        """(k,) whether speeds are standstill."""
-        return np.abs(omega) <= self.standstill
+    @cached_property
+    def speeds_within(self) -> Array:
+        """(s - 1, 8) speed of the motor at the nodes of every step, rad/s."""
+        times = self.within.times
+        return np.asarray(self.ratio * self._speeds(times.ravel()).reshape(times.shape))
+
+    @cached_property
+    def resting(self) -> NDArray[np.bool_]:
+        """(s - 1,) whether the motor is at standstill from one end of a step to the other."""
+        return is_nothing(self.speeds_within, REST * self.omega_top)
+
+    @cached_property
+    def unloaded(self) -> NDArray[np.bool_]:
+        """(s - 1,) whether the motor has no torque from one end of a step to the other."""
+        times = self.within.times
+        tau = self.read(times.ravel())[0].reshape(times.shape)
+        return is_nothing(tau, REST * float(np.abs(tau).max()))
+
+    def step_at(self, times: Array) -> NDArray[np.intp]:
+        """(k,) the step in which each time is; the end of one is the start of the next."""
+        return np.clip(np.searchsorted(self.steps, times, side="right") - 1, 0, len(self.steps) - 2)
 
     def read(self, times: Array) -> tuple[Array, Array]:
         """Torque in N m and speed in rad/s of the motor at ascending times (k,)."""
         tau, omega = np.concatenate([[here[self.torque], here[self.speed]] for here in self._blocks(times)], axis=1)
         drives = self.own_gear | (tau * omega >= 0)
         made, turns = tau / self.ratio * np.where(drives, 1 / self.efficiency, self.efficiency), self.ratio * omega
-        return (np.where(self.rests(turns), 0.0, made) if self.released else made), turns
+        return (np.where(self.resting[self.step_at(times)], 0.0, made) if self.released else made), turns
 
     def _speeds(self, times: Array) -> Array:
         return np.concatenate([here[self.speed] for here in self._blocks(times)])
 
     def _blocks(self, times: Array) -> Iterator[Solution]:
         return (self.solution.at(times[first : first + BLOCK]) for first in range(0, len(times), BLOCK))
+
+
+def is_nothing(values: Array, rounding: float) -> NDArray[np.bool_]:
+    """(p,) whether a quantity is zero throughout a step, to rounding.
+
+    A soft start is below any threshold for a while and no rest. What rests does not change; or it is the rounding of
+    something that balances, which goes to and fro.
+
+    Args:
+        values: (p, 8) at the nodes of the steps.
+        rounding: size up to which it may be zero.
+    """
+    size = np.abs(values).max(axis=1)
+    swings = (values.min(axis=1) < 0) & (values.max(axis=1) > 0)
+    return np.asarray((size <= rounding) & (swings | (np.ptp(values, axis=1) <= CONSTANT * size)))
 
 
 def motor_shaft(

@@ -11,6 +11,7 @@ from shaftwork.pipeline.sensitivities.derivatives import frequency_sensitivities
 from shaftwork.pipeline.sensitivities.derivatives import motion_sensitivities as of_motion
 from shaftwork.results.measures import Measure
 from shaftwork.results.sensitivities import FrequencySensitivities, MotionSensitivities
+from shaftwork.studies.arguments import network_of
 
 
 def frequency_sensitivities(
@@ -30,7 +31,7 @@ def frequency_sensitivities(
         ParameterError: there is no such parameter.
         SimulationError: two modes have the same rate.
     """
-    return of_frequencies(net.compile(), at, parameters=_listed(parameters), t=t)
+    return of_frequencies(network_of(net).compile(), at, parameters=_listed(parameters), t=t)
 
 
 def motion_sensitivities(
@@ -66,7 +67,7 @@ def motion_sensitivities(
     if not measures:
         raise ParameterError("Name a measure, such as 'max shaft.tau'.")
     read = {name: Measure.read(text) for name, text in measures.items()}
-    model = net.compile()
+    model = network_of(net).compile()
     return of_motion(model, read, t_end, parameters=_listed(parameters), initial=initial, rtol=rtol)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -18,11 +19,14 @@ from shaftwork.results.fatigue import SNLine
 from shaftwork.results.measures import Measure
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
-from shaftwork.studies.arguments import engine_names
+from shaftwork.studies.arguments import engine_names, network_of
 from shaftwork.studies.sweep_processes import chunks
 from shaftwork.studies.sweep_result import Limits, Sweep
 from shaftwork.studies.sweep_store import Store
 from shaftwork.studies.sweep_task import Reader, Task, Worker
+
+LEFT = "a zero, an impact or a change of mode that is not beyond doubt is left to `simulate`"
+"""Why variants have left those beside them."""
 
 Measures = Mapping[str, "str | Callable[[Solution], float]"] | Iterable[str]
 
@@ -71,7 +75,7 @@ def sweep(
         NetworkError: the network cannot be assembled.
         SignalError: a measure is of a quantity that does not exist.
     """
-    columns = _columns(net.netlist(), parameters, samples)
+    columns = _columns(network_of(net).netlist(), parameters, samples)
     readers = _readers(measures)
     limits = _limits(require, readers)
     _, end = time_span(0.0, t_end)
@@ -83,34 +87,37 @@ def sweep(
         options["t_eval"] = 2  # they read the motion between these
     task = Task(net, columns, readers, _lines(sn, readers), end, options)
     worker = Worker(task)
-    values, reasons = _run(task, worker, processes, None if store is None else Store(store, task))
+    values, reasons, left = _run(task, worker, processes, None if store is None else Store(store, task))
+    why = worker.why or (f"{left} of {len(task)} variants ran one by one: {LEFT}" if left else "")
     measured = dict(zip(readers, values.T, strict=True))
-    return Sweep(net.name, columns, measured, limits, reasons, worker.why)
+    return Sweep(net.name, columns, measured, limits, reasons, why)
 
 
-def _run(task: Task, worker: Worker, processes: int | None, store: Store | None) -> tuple[Array, tuple[str, ...]]:
-    """(variants, measures), and why variants failed."""
+def _run(task: Task, worker: Worker, processes: int | None, store: Store | None) -> tuple[Array, tuple[str, ...], int]:
+    """(variants, measures), why variants failed, and how many could not be followed side by side."""
     values, reasons = np.full((len(task), len(task.measures)), np.nan), [""] * len(task)
-    left, progress = np.ones(len(task), dtype=bool), Progress()
+    open_, progress, alone = np.ones(len(task), dtype=bool), Progress(), 0
 
     def take(variants: Any, found: Array, why: Iterable[str]) -> None:
-        values[variants], left[variants] = found, False
+        values[variants], open_[variants] = found, False
         for variant, reason in zip(variants.tolist(), why, strict=True):
             reasons[variant] = reason
 
     for chunk in [] if store is None else store.chunks:
         take(chunk.variants, chunk.values, chunk.reasons)
+        alone += chunk.left
     try:
-        for chunk in chunks(worker, task, np.flatnonzero(left), processes):
+        for chunk in chunks(worker, task, np.flatnonzero(open_), processes):
             if store is not None:
                 store.append(chunk)
             take(chunk.variants, chunk.values, chunk.reasons)
+            alone += chunk.left
             failed = sum(map(bool, reasons))
-            done, remark = len(task) - int(left.sum()), f", {failed} failed" if failed else ""
+            done, remark = len(task) - int(open_.sum()), f", {failed} failed" if failed else ""
             progress.show(done / len(task), f"{done} of {len(task)} variants{remark}")
     finally:
         progress.close()
-    return values, tuple(reasons)
+    return values, tuple(reasons), alone
 
 
 def _columns(netlist: Netlist, parameters: Any, samples: Any) -> dict[str, Array]:
@@ -168,6 +175,8 @@ def _telling(values: Array) -> list[float]:
 def _readers(measures: Measures) -> dict[str, Reader]:
     if isinstance(measures, str):
         measures = [measures]
+    if not isinstance(measures, Iterable):
+        raise ParameterError(f"measures = {measures!r} must be a list of names, such as ['max shaft.tau'].")
     if not isinstance(measures, Mapping):
         measures = {str(name): str(name) for name in measures}
     readers: dict[str, Reader] = {}
@@ -191,6 +200,10 @@ def _limits(require: Mapping[str, Any] | None, readers: Mapping[str, Reader]) ->
             raise ParameterError(
                 f"require['{name}'] = {pair!r} must be (low, high); None leaves a side open."
             ) from None
+        if not (-math.inf if low is None else low) <= (math.inf if high is None else high):
+            raise ParameterError(
+                f"require['{name}'] = {pair!r}: no value is at least {low} and at most {high}. Write (low, high)."
+            )
         limits[name] = (low, high)
     return limits
 

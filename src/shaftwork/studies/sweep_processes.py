@@ -6,10 +6,12 @@ import multiprocessing
 import os
 import signal
 import sys
+import threading
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,7 +67,8 @@ def _in_processes(task: Task, parts: Sequence[Index], count: int) -> Iterator[Ch
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(min(count, len(parts)) or 1, context, _begin, (task,))
     try:
-        pending: set[Future[Chunk]] = {pool.submit(_run, part) for part in parts}
+        with _uninterrupted():
+            pending: set[Future[Chunk]] = {pool.submit(_run, part) for part in parts}
         while pending:
             done, pending = wait(pending, return_when=FIRST_COMPLETED)
             for future in done:
@@ -79,13 +82,36 @@ def _in_processes(task: Task, parts: Sequence[Index], count: int) -> Iterator[Ch
         pool.shutdown(wait=True, cancel_futures=True)
 
 
+@contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Processes that start meanwhile ignore Ctrl-C from their first moment: that which a user stops ends them."""
+    before = signal.getsignal(signal.SIGINT)
+    if before is None or threading.current_thread() is not threading.main_thread():  # not to be changed from here
+        yield
+        return
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 _worker: Worker | None = None
 
 
 def _begin(task: Task) -> None:
     global _worker  # noqa: PLW0603 (a process has one task)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process that a user stops says what happens
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     _worker = Worker(task)
+
+
+def _end_with_parent() -> None:
+    """An idle process waits for work, which comes no more once its parent has been killed."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None  # noqa: S101 (a process of a sweep has one)
+    parent.join()
+    os._exit(1)
 
 
 def _run(part: Index) -> Chunk:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
+from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,7 +36,7 @@ class Sweep:
         measures: (k,) by measure; NaN where the variant failed.
         require: limits by measure.
         reasons: why each variant failed; empty where it did not.
-        why: why variants ran one by one; empty where they ran side by side.
+        why: why variants ran one by one, and how many, where some did; empty where all ran side by side.
     """
 
     name: str
@@ -51,7 +52,7 @@ class Sweep:
     @property
     def failed(self) -> NDArray[np.bool_]:
         """(k,) whether a variant failed."""
-        return np.array([bool(reason) for reason in self.reasons])
+        return np.array([bool(reason) for reason in self.reasons], dtype=bool)
 
     @property
     def passed(self) -> NDArray[np.bool_]:
@@ -89,10 +90,12 @@ class Sweep:
             largest: the largest comes first.
 
         Raises:
-            ParameterError: there is no such measure.
+            ParameterError: there is no such measure, or the count is no number of variants.
         """
         if measure not in self.measures:
             raise ParameterError(f"There is no measure '{measure}'. There are: {', '.join(self.measures)}.")
+        if count is not None and (isinstance(count, bool) or not isinstance(count, Integral) or count < 1):
+            raise ParameterError(f"count = {count!r} must be a number, 1 or more; leave it out for all that pass.")
         rows = np.flatnonzero(self.passed)
         values = self.measures[measure][rows]
         return self.rows(rows[np.argsort(-values if largest else values, kind="stable")][:count])
@@ -110,12 +113,21 @@ class Sweep:
         )
 
     def to_csv(self, path: str | Path) -> None:
-        """Write all columns."""
+        """Write all columns.
+
+        Raises:
+            ParameterError: the file cannot be written.
+        """
         columns = self.columns
-        with Path(path).open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(columns)
-            writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
+        try:
+            with Path(path).open("w", newline="", encoding="utf-8") as file:
+                writer = csv.writer(file)
+                writer.writerow(columns)
+                writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
+        except OSError as error:
+            raise ParameterError(
+                f"'{path}' cannot be written: {error.strerror}. Give a file in a folder that exists."
+            ) from None
 
     def plot(self, *names: str) -> Figure:
         """Parallel coordinates: a line for each variant, through its parameters and measures (extra `plot`).

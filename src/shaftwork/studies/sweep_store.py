@@ -60,8 +60,8 @@ class Store:
         for what, own in self._title.items():
             if known.get(what) != own:
                 raise ParameterError(
-                    f"store = '{self._path}' holds another sweep: its {what} differs, so its results are not those of "
-                    "this one. Give another name, or repeat the call that made it."
+                    f"store = '{self._path}' holds another sweep, which differs in its {what}, so its results are "
+                    "not those of this one. Give another name, or repeat the call that made it."
                 )
 
     def _read(self, line: str, measures: int) -> Chunk:
@@ -71,12 +71,18 @@ class Store:
             np.array(made["variants"], dtype=np.intp),
             np.array(values, dtype=float).reshape(-1, measures),
             tuple(made["reasons"]),
+            made.get("left", 0),
         )
 
     def append(self, chunk: Chunk) -> None:
         """Write what has been done."""
         values = [[value if math.isfinite(value) else None for value in row] for row in chunk.values.tolist()]
-        made = {"variants": chunk.variants.tolist(), "values": values, "reasons": list(chunk.reasons)}
+        made = {
+            "variants": chunk.variants.tolist(),
+            "values": values,
+            "reasons": list(chunk.reasons),
+            "left": chunk.left,
+        }
         with self._path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(made) + "\n")
 

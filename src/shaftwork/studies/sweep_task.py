@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from shaftwork.codegen.observer import ModelObserver
 from shaftwork.components.base import Component
-from shaftwork.core.errors import CompileError, ParameterError, ShaftworkError, SignalError
+from shaftwork.core.errors import CompileError, NetworkError, ParameterError, ShaftworkError, SignalError
 from shaftwork.integrate.choice import available
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.network import Network
@@ -68,11 +68,13 @@ class Chunk:
         variants: (k,) their numbers.
         values: (k, measures); NaN where a variant failed.
         reasons: k texts; empty where it did not.
+        left: how many could not be followed side by side and ran one by one.
     """
 
     variants: NDArray[np.intp]
     values: Array
     reasons: tuple[str, ...]
+    left: int = 0
 
 
 class Worker:
@@ -83,7 +85,8 @@ class Worker:
 
     Raises:
         NetworkError: the network cannot be assembled.
-        SignalError: a measure is of a quantity that does not exist.
+        ParameterError: the start values are no mapping.
+        SignalError: a measure or a start value is of a quantity that does not exist.
     """
 
     def __init__(self, task: Task) -> None:
@@ -97,13 +100,17 @@ class Worker:
 
     def _refuse_unknown(self) -> None:
         observer = ModelObserver(self._model.form, self._model.bind)
-        for reader in self._task.measures.values():
-            if isinstance(reader, Measure) and reader.quantity not in {**observer.units, **observer.profiles}:
-                owner = reader.quantity.rpartition(".")[0]
+        initial = self._task.options["initial"] or {}
+        if not isinstance(initial, Mapping):
+            raise ParameterError(f"initial = {initial!r} must map quantities to values, such as {{'J1.omega': 3.0}}.")
+        read = [reader.quantity for reader in self._task.measures.values() if isinstance(reader, Measure)]
+        for quantity in (*read, *map(str, initial)):
+            if quantity not in {**observer.units, **observer.profiles}:
+                owner = quantity.rpartition(".")[0]
                 own = [name for name in observer.units if name.rpartition(".")[0] == owner]
                 owners = dict.fromkeys(name.rpartition(".")[0] for name in observer.units)
                 there = f"'{owner}' has: {', '.join(own)}" if own else f"Parts and nodes are: {', '.join(owners)}"
-                raise SignalError(f"No quantity '{reader.quantity}' in '{self._model.name}'. {there}.")
+                raise SignalError(f"No quantity '{quantity}' in '{self._model.name}'. {there}.")
 
     def _side_by_side(self) -> Ensemble | None:
         task, options = self._task, self._task.options
@@ -143,9 +150,10 @@ class Worker:
             found, done = self._ensemble.run(columns)
             values[here[done]] = found[:, done].T
             open_[here[done]] = False
+        left = 0 if self._ensemble is None else int(open_.sum())
         for row in np.flatnonzero(open_).tolist():
             values[row], reasons[row] = self._alone(int(variants[row]))
-        return Chunk(variants, values, tuple(reasons))
+        return Chunk(variants, values, tuple(reasons), left)
 
     @cached_property
     def _choosy(self) -> list[tuple[Component, list[tuple[str, Array]]]]:
@@ -189,4 +197,6 @@ class Worker:
 
 
 def _first_line(error: Exception) -> str:
-    return (str(error).splitlines() or [""])[0]
+    """What an error says in one line; of a network that cannot be assembled, its first problem."""
+    lines = str(error).splitlines() or [""]
+    return f"{lines[0]}: {error.problems[0]}" if isinstance(error, NetworkError) and error.problems else lines[0]

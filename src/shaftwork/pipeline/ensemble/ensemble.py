@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -22,8 +22,8 @@ from shaftwork.integrate.lanes import Lanes, run_lanes
 from shaftwork.network.graph import GraphPart
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.ensemble.equations import Entry, Equations
-from shaftwork.pipeline.ensemble.extremes import NODES, largest
-from shaftwork.pipeline.ensemble.groups import Group, Mask, Pace, joined
+from shaftwork.pipeline.ensemble.extremes import largest
+from shaftwork.pipeline.ensemble.groups import Group, Index, Mask, Pace, joined
 from shaftwork.pipeline.ensemble.programs import EXTREMES, EnsembleCode
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.assemblies import Assembly, ModeNames, conditional
@@ -34,8 +34,8 @@ from shaftwork.results.measures import Measure
 
 SAMPLES = (50, 4000)
 """Of the whole motion, at least and at most."""
-FEWEST = 16
-"""Samples of a phase."""
+FEWEST, FEWEST_SEEN = 16, 6
+"""Samples of a phase, and those before the guard of a lane that has an extreme."""
 STEPS, MOST_STEPS = 2.0, 2.6
 """Steps for a sample in the first variant. A lane that takes more than the second runs again with twice the samples."""
 MOST_HALVINGS = 10
@@ -278,7 +278,7 @@ class _Way:
         jets = equations.code.jets(lanes.t, states, p) if self.ensemble.looks else {}
         coarse = good & _coarse(lanes, jets) if group.halvings < MOST_HALVINGS else np.zeros_like(good)
         good &= ~coarse
-        self._measure(equations, group, lanes, jets, good)
+        self._measure(_Followed(equations, lanes, p, self.ensemble.rtol), group, jets, good)
         t, x = lanes.t[-1], lanes.x[-1, : len(group.x)]
         over = good & (lanes.met < 0) & (t >= self.ensemble.span[1])
         self._end(equations, group, x, p, over)
@@ -306,16 +306,16 @@ class _Way:
             made.append(Group(modes, group.lanes[there], t, x).some(same))
         return made
 
-    def _measure(self, equations: Equations, group: Group, lanes: Lanes, jets: Mapping[int, Array], good: Mask) -> None:
+    def _measure(self, followed: _Followed, group: Group, jets: Mapping[int, Array], good: Mask) -> None:
         """What the stretch adds to the measures."""
-        size, own = len(group.x), group.lanes
+        equations, lanes, size, own = followed.equations, followed.lanes, len(group.x), group.lanes
         for row, measure in enumerate(self.ensemble.measures):
             if measure.kind in ("mean", "rms"):
                 added = lanes.x[-1, size + equations.code.integral_of[row]]
                 self.values[row, own[good]] += added[good]
             for sign in EXTREMES.get(measure.kind, ()):
                 jet = jets[row] if sign > 0 else -jets[row]
-                found = largest(lanes.t, jet, self.values[row, own])
+                found = largest(lanes.t, jet, self.values[row, own], partial(followed.jets, row, sign))
                 self.values[row, own[good]] = found[good]
 
     def _end(self, equations: Equations, group: Group, x: Array, p: Array, over: Mask) -> None:
@@ -340,11 +340,46 @@ class _Way:
         return made
 
 
+@dataclass(frozen=True, eq=False)
+class _Followed:
+    """A stretch of the motion of some variants, to go to any time in it.
+
+    Args:
+        equations: of its modes.
+        lanes: the stretch.
+        p: (parameters, k).
+        rtol: relative tolerance.
+    """
+
+    equations: Equations
+    lanes: Lanes
+    p: Array
+    rtol: float
+
+    def jets(self, row: int, sign: float, at: Index, own: Index, times: Array) -> Array:
+        """(3, c) what a measure reads, times a sign, and its derivatives at times (c,), from samples (c,) before.
+
+        Args:
+            row: of the measure.
+            sign: of what is read.
+            at: (c,) samples.
+            own: (c,) lanes.
+            times: (c,) s.
+        """
+        equations, p = self.equations, self.p[:, own]
+        program = equations.code.program
+        start, grid = self.lanes.x[at, : len(program.variables), own].T, np.array([self.lanes.t[at, own], times])
+        unguarded, offsets = np.zeros_like(equations.sides), np.zeros((equations.sides.size, own.size))
+        made = run_lanes(program, start, p, unguarded, offsets, grid, self.rtol)
+        x = made.x[-1:, : len(start)].swapaxes(0, 1)
+        return np.asarray(sign * equations.code.jets(grid[-1:], x, p)[row][:, 0])
+
+
 def _coarse(lanes: Lanes, jets: Mapping[int, Array]) -> Mask:
     """(k,) lanes of which there are too few samples to know their extremes, where there are any."""
     seen = 1 + np.count_nonzero(lanes.t[1:] > lanes.t[:-1], axis=0)
     coarse = (lanes.steps > MOST_STEPS * (len(lanes.t) - 1)) & bool(jets)
-    if (few := np.flatnonzero(seen < NODES)).size:
+    if (few := np.flatnonzero(seen < FEWEST_SEEN)).size:
         for jet in jets.values():
             slopes = jet[1][:, few]
             coarse[few] |= (slopes[:-1] * slopes[1:] < 0).any(axis=0)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from shaftwork.components.modes import Leave, Mode
-from shaftwork.core.errors import NetworkError
+from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.pipeline.phases.assemblies import Element, ModeNames
 from shaftwork.pipeline.phases.moments import CLEAR, Change, Moment
 from shaftwork.pipeline.phases.regimes import Regimes, with_modes
@@ -72,10 +72,30 @@ class Impacts:
         hits = Change(t, self._elements[number], regime.modes[number], leave.to, rebound, impact=True, given=given)
         changes = [hits, *self._differences(t, regime.modes, joined.regime.modes, number)]
         if not rebound:
+            self._refuse_gain(t, moment, held, plastic, hits)
             return joined, changes
         thrown = {name: plastic[name] + share * (plastic[name] - value) for name, value in held.items()}
         parted = with_modes(joined.regime.modes, {number: regime.modes[number]})
-        return self._regimes.taking(parted, after, thrown), changes
+        new = self._regimes.taking(parted, after, thrown)
+        self._refuse_gain(t, moment, held, self._regimes.held(new, after), hits)
+        return new, changes
+
+    def _refuse_gain(
+        self, t: float, moment: Moment, before: Mapping[str, float], after: Mapping[str, float], hits: Change
+    ) -> None:
+        """Refuse an impact that would leave more energy than there was.
+
+        Raises:
+            SimulationError: the impulse goes the other way through a gear with losses than the power did before it.
+        """
+        stores, bound = moment.regime.assembly.stores, moment.regime.assembly.bound(moment.regime.p)
+        had, has = stores.energy(bound, before), stores.energy(bound, after)
+        if has - had > sum(hits.given.values()) + NO_IMPACT * max(had, has):
+            raise SimulationError(
+                f"The impact of '{hits.element.name}' at t = {t:.9g} s would raise the stored energy from {had:.6g} to "
+                f"{has:.6g} J: it turns the flow of power round in a part whose losses depend on its direction, and a "
+                "rigid impact is followed with the direction before it. Give the contact a stiffness c and a damping d."
+            )
 
     def jumped(self, t: float, moment: Moment, before: float, after: float) -> tuple[Moment, list[Change]]:
         """After a source has jumped that is rigidly joined to inertias.
