@@ -164,7 +164,8 @@ class ModelObserver:
         lost = {part.name: history.lost(part) for part in parts if part not in sources}
         supplied = {part.name: -history.lost(part) for part in sources}
         for part in sources:
-            if any(self._graph.branches[k].template.kind is Kind.CONDUCTANCE for k in part.branches):
+            kinds = {self._graph.branches[k].template.kind for k in part.branches}
+            if Kind.CONDUCTANCE in kinds and len(kinds) > 1:  # a law that is linear in the speed is still a source
                 lost[part.name] = history.heat(part)
                 supplied[part.name] = supplied[part.name] + lost[part.name]
         return lost, supplied
