@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import gc
+import reprlib
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -253,6 +254,17 @@ class Network(NetworkBuilder):
         for placed in netlist.placed:
             made.add(placed.part, *placed.nodes)
         return made
+
+
+def network_of(given: Any) -> Network:
+    """A network that a user gave.
+
+    Raises:
+        ParameterError: it is none.
+    """
+    if not isinstance(given, Network):
+        raise ParameterError(f"{reprlib.repr(given)} is no network. Give the train, net = sw.Network('train').")
+    return given
 
 
 def _sound(netlist: Netlist, accepted: str = "") -> StateForm:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import reprlib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from shaftwork.components.lossy_gear import LossyGear
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import NetworkError, ParameterError, Problem, SignalError
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
-from shaftwork.pipeline.network import Network
+from shaftwork.pipeline.network import Network, network_of
 from shaftwork.reduce.kinematics import Kinematics, kinematics
 from shaftwork.reduce.referred_parts import ReferredPart, referred_part
 from shaftwork.reduce.scales import Scale
@@ -89,7 +87,7 @@ def refer(net: Network, to: str, *, drives: Mapping[str, str] | None = None) -> 
 
     Source: Abdelkader 2016, (4)-(17), with (3) and (6) put right; Marinkovic 2012, 2.2 and (18).
     """
-    graph, netlist = checked(net).graph(), net.netlist()
+    graph, netlist = network_of(net).graph(), net.netlist()
     known = _checked_sides(graph, {} if drives is None else drives)
     node = _checked_node(graph, to)
     found = kinematics(graph, known)
@@ -111,17 +109,6 @@ def refer(net: Network, to: str, *, drives: Mapping[str, str] | None = None) -> 
     absorbed = tuple(graph.parts[place].name for place in found.absorbed)
     at_rest = tuple(part.name for part in graph.parts if part.name not in scales and part.name not in absorbed)
     return Referred(made, table, to, scales, view.nodes(), absorbed, at_rest)
-
-
-def checked(net: Any) -> Network:
-    """A network.
-
-    Raises:
-        ParameterError: it is none.
-    """
-    if not isinstance(net, Network):
-        raise ParameterError(f"{reprlib.repr(net)} is no network. Give the train, net = sw.Network('train').")
-    return net
 
 
 def _checked_node(graph: CircuitGraph, to: str) -> int:

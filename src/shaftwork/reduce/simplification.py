@@ -15,12 +15,12 @@ from shaftwork.core.domains import ROTATION
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
 from shaftwork.network.netlist import REFERENCE, Placed
-from shaftwork.pipeline.network import Network
+from shaftwork.pipeline.network import Network, network_of
 from shaftwork.reduce.chain import Chain, read_chain
 from shaftwork.reduce.comparison import Comparison
 from shaftwork.reduce.grouping import Grouping, grouped, groupings
 from shaftwork.reduce.groups import GroupTable, add_chain
-from shaftwork.reduce.reference_shaft import Referred, checked, refer
+from shaftwork.reduce.reference_shaft import Referred, refer
 from shaftwork.reduce.truncation import ModalChain, truncated
 from shaftwork.results.measures import Measure
 from shaftwork.results.solution import Solution
@@ -176,7 +176,7 @@ def simplify(
 
     Source: Abdelkader 2016, 2.3, (15)-(17), figures 3 to 7; Marinkovic 2012, 2.1, figure 3.
     """
-    referred = refer(net, to or _reference(checked(net), keep), drives=drives)
+    referred = refer(net, to or _reference(network_of(net), keep), drives=drives)
     chain = read_chain(referred.network.netlist(), keep)
     if keep and not any(link.has(keep) for link in chain.links):
         known = ", ".join(item.part.name for link in chain.links for item in link.placed)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import reprlib
 from collections.abc import Iterable
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from shaftwork.components.shaft_models import ShaftModel
 from shaftwork.core.errors import ParameterError
 from shaftwork.integrate.choice import ENGINES
-from shaftwork.pipeline.network import Network
 
 NAMES = ("auto", *ENGINES, "wave")
 """What an engine may be called in a study."""
@@ -26,17 +24,6 @@ def several(name: str, given: Iterable[Item]) -> tuple[Item, ...]:
     if isinstance(given, str) or not isinstance(given, Iterable):
         raise ParameterError(f"{name} = {given!r} must be a sequence. Write {name}=[{given!r}].")
     return tuple(given)
-
-
-def network_of(given: Any) -> Network:
-    """A network that a user gave.
-
-    Raises:
-        ParameterError: it is none.
-    """
-    if not isinstance(given, Network):
-        raise ParameterError(f"{reprlib.repr(given)} is no network. Give the train, net = sw.Network('train').")
-    return given
 
 
 def engine_names(given: Iterable[str]) -> tuple[str, ...]:

@@ -14,12 +14,12 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.core.progress import Progress
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import OutputTimes, checked_parameter, relative_tolerance, time_span
-from shaftwork.pipeline.network import Network
+from shaftwork.pipeline.network import Network, network_of
 from shaftwork.results.fatigue import SNLine
 from shaftwork.results.measures import Measure
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
-from shaftwork.studies.arguments import engine_names, network_of
+from shaftwork.studies.arguments import engine_names
 from shaftwork.studies.sweep_processes import chunks
 from shaftwork.studies.sweep_result import Limits, Sweep
 from shaftwork.studies.sweep_store import Store
