@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,6 +22,22 @@ from shaftwork.reduction.form import StateForm
 
 LARGEST_HISTORY = 2_000_000
 """Values, branches by times, of a trajectory whose branch quantities are made all at once."""
+
+
+class Impact(NamedTuple):
+    """An instant at which energy is lost at once.
+
+    Args:
+        time: s.
+        part: that is hit; it loses what no other does.
+        given: what sources give then, in J by part.
+        lost: what others lose, in J by part.
+    """
+
+    time: float
+    part: str
+    given: Mapping[str, float]
+    lost: Mapping[str, float]
 
 
 class ModelObserver:
@@ -141,7 +158,7 @@ class ModelObserver:
         return self._read(t, x, lambda history: history.profile(part, profile))
 
     @property
-    def impacts(self) -> tuple[tuple[float, str, Mapping[str, float]], ...]:
+    def impacts(self) -> tuple[Impact, ...]:
         """Times at which energy is lost at once; only changes of mode do that."""
         return ()
 
@@ -157,7 +174,7 @@ class ModelObserver:
         return any(kind in (Kind.ACROSS_STORE, Kind.THROUGH_STORE) for kind in kinds)
 
     def powers(self, t: Array, x: Array) -> tuple[dict[str, Array], dict[str, Array]]:
-        """Lost power and supplied power by part; of sources that have resistors or dampers of their own both."""
+        """Lost power and supplied power by part; of sources with resistors or dampers of their own, and weights, both."""
         history = History(self._bind(), self._instants.one_sided(t), x)
         parts = self._graph.parts
         sources = [part for part in parts if part.component.role == "source"]

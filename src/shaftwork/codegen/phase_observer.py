@@ -11,7 +11,7 @@ import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array, Index
-from shaftwork.codegen.observer import ModelObserver
+from shaftwork.codegen.observer import Impact, ModelObserver
 from shaftwork.codegen.stores import Stores
 from shaftwork.codegen.timeline import Timeline
 from shaftwork.codegen.waves import Dense
@@ -92,20 +92,20 @@ class PhaseObserver:
     Args:
         names: of all that is stored.
         stretches: makes the phases when a quantity is first read.
-        impacts: finds the times in s at which energy may be lost at once, the part, and what sources give then, in J.
+        impacts: finds the impacts.
     """
 
     def __init__(
         self,
         names: tuple[str, ...],
         stretches: Callable[[], Stretches],
-        impacts: Callable[[], tuple[tuple[float, str, Mapping[str, float]], ...]],
+        impacts: Callable[[], tuple[Impact, ...]],
     ) -> None:
         self._names, self._make, self._find_impacts = names, stretches, impacts
 
     @cached_property
-    def impacts(self) -> tuple[tuple[float, str, Mapping[str, float]], ...]:
-        """Times in s at which energy may be lost at once, the part that loses it, and what sources give then, in J."""
+    def impacts(self) -> tuple[Impact, ...]:
+        """Instants at which energy may be lost at once."""
         return self._find_impacts()
 
     @property

@@ -11,8 +11,10 @@ import numpy as np
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.components.base import Profile, Signal
+from shaftwork.components.branches import End
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart
-from shaftwork.network.templates import Kind
+from shaftwork.network.templates import BranchTemplate, Kind
+from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.readings import Quantity
 
 
@@ -174,23 +176,38 @@ class History:
         return next(k for k, made in stores if label in ("", made.label))
 
     def _through_port(self, part: GraphPart, port: str) -> Array:
-        """What the node at a port gives to the part: the sum over the branches that begin or end there."""
-        total = np.zeros(len(self.t))
-        for index in part.branches:
-            template = self.form.graph.branches[index].template
-            for factor in self._factors(part, index, port) if template.terms else _ends(template.ends, port):
-                total += factor * self.through[index]
-        return total
+        return into(part, port, self.through, self.form, self.bound.p)
 
     def _factors(self, part: GraphPart, index: int, port: str) -> Iterator[float]:
-        template = self.form.graph.branches[index].template
-        values = {s: float(self.bound.p[part.parameters[s.name]]) for s in template.symbols}
-        for coefficient, plus, minus in template.balances:
-            for sign in _ends((plus, minus), port):
-                yield sign * float(coefficient.xreplace(values))
+        return _factors(part, self.form.graph.branches[index].template, port, self.bound.p)
 
 
-def _ends(ends: tuple[str | None, str | None], port: str) -> Iterator[float]:
+def into(part: GraphPart, port: End, through: Array, form: StateForm, p: Array) -> Array:
+    """What the node at a port gives to a part: the sum over the branches that begin or end there.
+
+    Args:
+        part: the part.
+        port: one of its ports.
+        through: (branches, ...) what passes through each branch.
+        form: the equations.
+        p: (p,) their parameters.
+    """
+    total = np.zeros(through.shape[1:])
+    for index in part.branches:
+        template = form.graph.branches[index].template
+        for factor in _factors(part, template, port, p) if template.terms else _ends(template.ends, port):
+            total += factor * through[index]
+    return total
+
+
+def _factors(part: GraphPart, template: BranchTemplate, port: End, p: Array) -> Iterator[float]:
+    values = {s: float(p[part.parameters[s.name]]) for s in template.symbols}
+    for coefficient, plus, minus in template.balances:
+        for sign in _ends((plus, minus), port):
+            yield sign * float(coefficient.xreplace(values))
+
+
+def _ends(ends: tuple[str | None, str | None], port: End) -> Iterator[float]:
     if ends[0] == port:
         yield 1.0
     if ends[1] == port:

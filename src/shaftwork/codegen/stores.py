@@ -125,22 +125,28 @@ class Stores:
             energy += 0.5 * held[name] ** 2 * (1 / coefficient if name in self.through else coefficient)
         return energy
 
-    def given(
-        self, bound: BoundArrays, t: float, before: Mapping[str, float], after: Mapping[str, float]
-    ) -> dict[str, float]:
-        """What ideal sources of speed give at once, in J by part, where stores change all at once in these equations.
+    def impulses(self, bound: BoundArrays, gained: Mapping[str, float]) -> Array:
+        """(branches,) what passes through every branch at once where stores gain so much; of a coupling its lambda.
 
-        Law: E = e F_EK K (v_K - v_K'), the momentum that what is joined to a source takes, times the source's speed.
+        Law: i_K = K (v_K' - v_K), and -Q_K i_K in the tree; beside it no torque counts.
         """
-        form, k = self._form, bound.part.coefficients
-        stores = [branch for branch in form.dependent_across if branch in self._branches.values()]
-        if not (form.across_inputs and stores):
+        links = np.zeros(len(self._form.graph.branches))
+        for name, branch in self._branches.items():
+            if branch in self._form.dependent_across:
+                links[branch] = bound.part.coefficients[branch] * gained[name]
+        return np.asarray(links - self._matrices(bound.part)[1] @ links)
+
+    def given(self, bound: BoundArrays, t: float, gained: Mapping[str, float]) -> dict[str, float]:
+        """What ideal sources of speed give at once, in J by part, where stores gain so much in these equations.
+
+        Law: E = -e i_E, the impulse that passes through a source times its speed.
+        """
+        form = self._form
+        if not (form.across_inputs and form.dependent_across):
             return {}
-        names = {branch: name for name, branch in self._branches.items()}
         inputs = bound.program.inputs
         u = inputs.values(t, np.zeros(inputs.outputs), np.zeros(len(self._states)), bound.p)[len(form.laws) :]
-        gained = k[stores] * np.array([after[names[branch]] - before[names[branch]] for branch in stores])
-        energy = u * (self._matrices(bound.part)[0][np.ix_(list(form.across_inputs), stores)] @ gained)
+        energy = -u * self.impulses(bound, gained)[list(form.across_inputs)]
         found: dict[str, float] = {}
         for branch, value in zip(form.across_inputs, energy.tolist(), strict=True):
             part = form.graph.part_of(branch).name

@@ -30,9 +30,8 @@ class LossyGear(Component):
 
     A self-locking gear that would have to brake more inertia than there is on the side of a has no motion with b
     driving: it stops at once. Behind a bare spring, with no inertia at node a, it would stop and start without end;
-    a run refuses that. A rigid impact passes with the torques of the mode that it meets, whichever way it goes: a gear
-    at rest holds it, and one that would raise the energy is refused. Give such contacts a stiffness. Shafts of
-    travelling waves know no modes, so it cannot stand beside them.
+    a run refuses that. A rigid impact turns the gear as torques would, on, to rest and round, and what the gear loses
+    then is its own. Shafts of travelling waves know no modes, so it cannot stand beside them.
     Analogue: a transformer with different ratios of voltages and currents. Source: Pelchen, Schweiger and Otter 2002.
     """
 

@@ -104,6 +104,12 @@ class Modes:
     def _by_name(self) -> dict[str, Mode]:
         return {mode.name: mode for mode in self.options}
 
+    @cached_property
+    def passes_on(self) -> bool:
+        """Whether torques within the part end its modes: it passes them on by their direction, as a gear that rubs."""
+        leaves = (leave for mode in self.options for leave in mode.leaves)
+        return any(leave.by_torque and not leave.when.has(THROUGH) for leave in leaves)
+
     @property
     def symbol(self) -> str:
         """Name of the number in laws."""

@@ -14,7 +14,7 @@ from shaftwork.core.errors import Problem
 from shaftwork.network.graph import CircuitGraph, GraphBranch
 from shaftwork.network.wording import at_nodes, listed
 from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.gains import Gain, value_of
+from shaftwork.reduction.gains import Gain, Number, fold
 from shaftwork.reduction.tree import Row, balance_of, column_of
 from shaftwork.reduction.view import View
 
@@ -31,11 +31,15 @@ def numeric_problems(form: StateForm) -> tuple[Problem, ...]:
         return (extreme_ratios(graph, (branch for link in wild for branch in (link, *loops[link]))),)
     groups = ((form.tree_conductances, form.link_conductances), (form.across_states, form.dependent_across))
     found = (problem for own, beside in groups for problem in _cancelling(form, own, beside))
-    return (*found, *(_jamming(form) if cutsets is not loops else ()))
+    return (*found, *jamming(form, graph.parameters))
 
 
-def _jamming(form: StateForm) -> Iterator[Problem]:
+def jamming(form: StateForm, parameters: Mapping[str, float]) -> Iterator[Problem]:
     """A coupling that brakes by more than the inertia (or damping, or compliance) in its way can answer: it jams.
+
+    Args:
+        form: the equations.
+        parameters: values by name.
 
     The rates follow from the matrices of `form` and from the tree's own columns in speeds and torques. The product of
     all determinants is positive without losses; a loss that grows takes it through zero, where the rates are infinite.
@@ -45,32 +49,46 @@ def _jamming(form: StateForm) -> Iterator[Problem]:
         (form.across_states, form.dependent_across),
         (form.dependent_through, form.through_states),
     )
-    sign = _sign_of_tree(form, column_of) * _sign_of_tree(form, balance_of)
+    if form.tree.cutsets is form.tree.loops:
+        return
+    sign = _sign_of_tree(form, column_of, parameters) * _sign_of_tree(form, balance_of, parameters)
     for trees, links in groups:
-        values = _coefficients(form.graph, (*trees, *links))
+        values = _coefficients(form.graph, (*trees, *links), parameters)
         if min(values.values(), default=1.0) <= 0:
             return  # negative values need no coupling to cancel
-        F, Q = (_block(rows, trees, links) for rows in (form.tree.loops, form.tree.cutsets))
+        F, Q = (_block(rows, trees, links, parameters) for rows in (form.tree.loops, form.tree.cutsets))
         own, others = (np.array([values[branch] for branch in group]) for group in (trees, links))
         sign *= np.linalg.slogdet(np.diag(own) + Q * others @ F.T).sign
     if sign <= 0:
         yield _jammed(View(form), tuple(branch.index for branch in form.graph.branches if branch.template.through))
 
 
-def _sign_of_tree(form: StateForm, column: Callable[[CircuitGraph, GraphBranch], Row]) -> float:
+def _sign_of_tree(
+    form: StateForm, column: Callable[[CircuitGraph, GraphBranch], Row], parameters: Mapping[str, float]
+) -> float:
     """The sign of the determinant of the tree's columns."""
     branches = [branch for branch in form.graph.branches if branch.index not in form.tree.loops]
-    matrix = np.zeros((len(form.graph.nodes), len(branches)))
-    for k, branch in enumerate(branches):
-        for node, entry in column(form.graph, branch).items():
-            matrix[node, k] = value_of(entry)
-    return float(np.linalg.slogdet(matrix).sign) if len(branches) == len(matrix) else 1.0
+    columns = [column(form.graph, branch) for branch in branches]
+    nodes = range(len(form.graph.nodes))
+    matrix = _matrix([[made.get(node, 0) for made in columns] for node in nodes], parameters)
+    return float(np.linalg.slogdet(matrix).sign) if len(branches) == len(nodes) else 1.0
 
 
-def _block(rows: Mapping[int, Row], trees: Sequence[int], links: Sequence[int]) -> Any:
+def _block(rows: Mapping[int, Row], trees: Sequence[int], links: Sequence[int], parameters: Mapping[str, float]) -> Any:
     """(trees, links) the factors of tree branches and links in loops or cutsets."""
-    factors = [[value_of(rows[link].get(tree, 0)) for link in links] for tree in trees]
-    return np.array(factors, dtype=float).reshape(len(trees), len(links))
+    return _matrix([[rows[link].get(tree, 0) for link in links] for tree in trees], parameters, len(links))
+
+
+def _matrix(numbers: Sequence[Sequence[Number]], parameters: Mapping[str, float], columns: int = 0) -> Any:
+    """Gains in numbers."""
+    gains = [number for row in numbers for number in row if isinstance(number, Gain)]
+
+    def leaf(expression: sympy.Expr) -> float:
+        return float(expression.xreplace({s: sympy.Float(parameters[s.name]) for s in expression.free_symbols}))
+
+    known = dict(zip(map(id, gains), fold(gains, leaf), strict=True))
+    made = [[known[id(number)] if isinstance(number, Gain) else number for number in row] for row in numbers]
+    return np.array(made, dtype=float).reshape(len(numbers), -1 if made and made[0] else columns)
 
 
 def _jammed(view: View, lossy: Sequence[int]) -> Problem:
@@ -92,7 +110,7 @@ def extreme_ratios(graph: CircuitGraph, branches: Iterable[int]) -> Problem:
 
 def _cancelling(form: StateForm, own: Sequence[int], beside: Sequence[int]) -> Iterator[Problem]:
     """Coupled conductances (or inertias) of which a negative one cancels others, block by block."""
-    values = _coefficients(form.graph, (*own, *beside))
+    values = _coefficients(form.graph, (*own, *beside), form.graph.parameters)
     if all(value > 0 for value in values.values()):
         return  # positive values cannot cancel
     blocks: nx.Graph[int] = nx.Graph()
@@ -101,20 +119,20 @@ def _cancelling(form: StateForm, own: Sequence[int], beside: Sequence[int]) -> I
     blocks.add_edges_from((tree, link) for link in beside for tree in form.tree.loops[link] if tree in members)
     for found in nx.connected_components(blocks):
         trees, links = sorted(found & members), sorted(found - members)
-        F, Q = (_block(rows, trees, links) for rows in (form.tree.loops, form.tree.cutsets))
+        F, Q = (_block(rows, trees, links, form.graph.parameters) for rows in (form.tree.loops, form.tree.cutsets))
         matrix = np.diag([values[tree] for tree in trees]) + Q * [values[link] for link in links] @ F.T
         if min(values[branch] for branch in found) <= 0 and _is_singular(matrix):
             yield _cancelling_block(View(form), (*trees, *links))
 
 
-def _coefficients(graph: CircuitGraph, branches: Iterable[int]) -> dict[int, float]:
+def _coefficients(graph: CircuitGraph, branches: Iterable[int], parameters: Mapping[str, float]) -> dict[int, float]:
     made: dict[tuple[Any, ...], Any] = {}
     values: dict[int, float] = {}
     for index in branches:
         template, part = graph.branches[index].template, graph.part_of(index)
         if (key := (template.law, template.symbols)) not in made:
             made[key] = sympy.lambdify(template.symbols, template.law, "math")
-        numbers = (graph.parameters[f"{part.name}.{symbol.name}"] for symbol in template.symbols)
+        numbers = (parameters[f"{part.name}.{symbol.name}"] for symbol in template.symbols)
         values[index] = float(made[key](*numbers))
     return values
 

@@ -27,12 +27,12 @@ class EnergyBalance:
     Args:
         t: (s,) times.
         stored: (s,) energy in all stores, J.
-        supplied: (s,) work of all sources since the start, J.
+        supplied: (s,) work of all sources and weights since the start, J; a weight's is negative while it is lifted.
         lost: (s,) heat since the start, J.
-        work: work that went through the sources, both ways counted as positive, J.
+        work: work that went through the sources and weights, both ways counted as positive, J.
         lost_in: heat of the whole run by part, J; an impact's is that of the part whose change of mode it came with.
             The balance begins after what happens at the very start.
-        supplied_by: work of the whole run by source, J.
+        supplied_by: work of the whole run by source and weight, J.
     """
 
     t: Array
@@ -93,10 +93,12 @@ def _impulses(
     impulses = jumps.copy()
     lost: dict[str, Array] = {}
     given: dict[str, float] = {}
-    for time, part, sources in observer.impacts:
+    for time, part, sources, others in observer.impacts:
         places = np.flatnonzero(steps == time)[-1:]
-        energy = lost.setdefault(part, np.zeros(len(steps)))
-        energy[places] += sum(sources.values()) - impulses[places]
+        own = sum(sources.values()) - impulses[places] - sum(others.values())
+        lost.setdefault(part, np.zeros(len(steps)))[places] += own
+        for other, energy in others.items():
+            lost.setdefault(other, np.zeros(len(steps)))[places] += energy
         impulses[places] = sum(sources.values())
         for source, supplied in sources.items():
             given[source] = given.get(source, 0.0) + supplied

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -33,8 +33,11 @@ class Observer(Protocol):
         ...
 
     @property
-    def impacts(self) -> tuple[tuple[float, str, Mapping[str, float]], ...]:
-        """Times in s at which energy may be lost at once, the part that loses it, and what sources give then, in J."""
+    def impacts(self) -> Sequence[tuple[float, str, Mapping[str, float], Mapping[str, float]]]:
+        """Times in s at which energy may be lost at once.
+
+        Of each the part that is hit, what sources give then and what others lose of it, in J by part.
+        """
         ...
 
     def stored(self, t: Array, x: Array, dense: Dense) -> dict[str, Array]:

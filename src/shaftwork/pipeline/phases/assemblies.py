@@ -100,9 +100,9 @@ class Assembly:
         rows = model.rows
         self._readings = readings = NamedReadings(model.form) if rows is None else Readings(model.form, rows)
         self._parameters = tuple(Symbol(name, real=True) for name in model.parameters)
-        self._parts = {part.name: part for part in model.form.graph.parts}
+        self.parts = {part.name: part for part in model.form.graph.parts}
         for number, (element, form) in enumerate(zip(elements, forms, strict=True)):
-            part = self._parts[element.part.name]
+            part = self.parts[element.part.name]
             for mode in element.modes.options:
                 if mode.form == form:
                     self._watched[number, mode.name] = tuple(self._leaves(number, readings, part, mode))
@@ -228,7 +228,7 @@ class Assembly:
         """Of each element the speed across it, its twist and the parameters in its conditions, one after another."""
         shown = []
         for number, element in enumerate(self.elements):
-            part = self._parts[element.part.name]
+            part = self.parts[element.part.name]
             reads = any(mode.starts.has(INTEGRAL) for mode in element.modes.options)
             for symbol in (ACROSS, INTEGRAL, *self._symbols(number)):
                 known = symbol != INTEGRAL or reads
@@ -256,7 +256,7 @@ class Assembly:
     def of_element(self, number: int, expression: Expr | None) -> Expr:
         """What is made of an element's parameters, in those of the network; zero where there is nothing."""
         element, made = self.elements[number], as_expression(0 if expression is None else expression)
-        return self._readings.guard(self._parts[element.part.name], element.modes, made)
+        return self._readings.guard(self.parts[element.part.name], element.modes, made)
 
     def problem(
         self, p: Array, modes: ModeNames, x: Array, bands: Sequence[float], span: tuple[float, float], times: Timeline

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.pipeline.phases.assemblies import Element, ModeNames
+from shaftwork.pipeline.phases.impulses import Blow, Impulses, Stage
 from shaftwork.pipeline.phases.moments import CLEAR, Change, Moment
 from shaftwork.pipeline.phases.regimes import Regimes, with_modes
 
@@ -27,6 +29,7 @@ class Impacts:
 
     def __init__(self, regimes: Regimes, elements: Sequence[Element], tick: float) -> None:
         self._regimes, self._elements, self._tick = regimes, elements, tick
+        self._impulses = Impulses(regimes, elements)
 
     def meets(self, moment: Moment, t: float, to: Mode, number: int) -> float:
         """The speed across an element that is joined from now on; zero where it is no more than an error of the run."""
@@ -55,30 +58,65 @@ class Impacts:
     def hit(self, t: float, after: float, moment: Moment, number: int, leave: Leave) -> tuple[Moment, list[Change]]:
         """An impact: the element is joined for an instant, and for good where nothing throws it back.
 
-        Law: v = v_joined + e (v_joined - v_before), which gives e times the speed back and keeps every momentum.
+        Law: v = v_joined + e (v_joined - v_before), which gives e times the speed back and keeps every momentum; with
+        gears that rub as in `Impulses`.
         """
         regime = moment.regime
         speed = abs(regime.assembly.across(number, after, moment.x, regime.p))
         share, rest = (regime.assembly.constant(number, given, regime.p) for given in (leave.rebound, leave.rest))
-        held = self._regimes.held(moment, after)
+        held, apart = self._regimes.held(moment, after), {number: regime.modes[number]}
         # what moves more slowly than the rest of an impact stays as it is: two contacts would part and meet for ever
-        joined = self._joined(regime.modes, held, after, {number: leave.to}, max(rest, NO_IMPACT * speed))
-        plastic = self._regimes.held(joined, after)
+        least = max(rest, NO_IMPACT * speed)
+
+        def joined(start: Moment, _: Sequence[Stage]) -> Blow:
+            modes, stored = start.regime.modes, self._regimes.held(start, after)
+            met = self._joined(modes, stored, after, {number: leave.to}, least)
+            return Blow(met, met.regime)
+
+        stages = self._impulses.stages(after, moment, joined, apart)
+        new = stages[-1].blow.after
+        plastic = self._regimes.held(new, after)
         # nothing throws back what has no inertia: a damper's end against a stop
         moved = any(abs(plastic[name] - value) > NO_IMPACT * speed for name, value in held.items())
         rebound = leave.rebound is not None and moved and share * speed > rest
-        taken = joined.regime.assembly.stores.given(joined.regime.assembly.bound(joined.regime.p), after, held, plastic)
-        given = {part: energy * (1 + share if rebound else 1) for part, energy in taken.items()}
-        hits = Change(t, self._elements[number], regime.modes[number], leave.to, rebound, impact=True, given=given)
-        changes = [hits, *self._differences(t, regime.modes, joined.regime.modes, number)]
-        if not rebound:
-            self._refuse_gain(t, moment, held, plastic, hits)
-            return joined, changes
-        thrown = {name: plastic[name] + share * (plastic[name] - value) for name, value in held.items()}
-        parted = with_modes(joined.regime.modes, {number: regime.modes[number]})
-        new = self._regimes.taking(parted, after, thrown)
+        if rebound:
+            stages += self._thrown_back(after, stages, number, leave.to, share, apart)
+        given, lost = self._impulses.given(after, stages), self._impulses.lost(after, stages)
+        modes = regime.modes[number], leave.to
+        hits = Change(t, self._elements[number], *modes, rebound, impact=True, given=given, lost=lost)
+        new = stages[-1].blow.after
+        changes = [hits, *self._differences(t, regime.modes, new.regime.modes, number)]
         self._refuse_gain(t, moment, held, self._regimes.held(new, after), hits)
         return new, changes
+
+    def _thrown_back(
+        self, t: float, pressed: tuple[Stage, ...], number: int, to: str, share: float, apart: Mapping[int, str]
+    ) -> tuple[Stage, ...]:
+        """From the end of the compression on, until what it took up comes back but for the loss.
+
+        Law: the work that comes back is e^2 of what was taken up (Stronge 1990), which is Newton's share e of the speed
+        as long as no gear turns round. Speeds change as they would if the same impulse closed what now parts.
+        """
+        last, work = pressed[-1], self._impulses.work
+
+        def thrown(start: Moment, made: Sequence[Stage]) -> Blow:
+            modes = start.regime.modes
+            ways = start, self._regimes.changed(last.start, t, modes)
+            closing = max(ways, key=lambda moment: abs(self._impulses.across(moment, t, number)))
+            joined = self._regimes.changed(closing, t, with_modes(modes, {number: to}))
+            held, before, after = (self._regimes.held(moment, t) for moment in (start, closing, joined))
+            closed = work(t, number, (Stage(closing, Blow(joined, joined.regime), 1.0),))
+            if not closed > 0:  # both sides are held
+                return Blow(start, joined.regime)
+            speed, now = (self._impulses.across(moment, t, number) for moment in (closing, start))
+            left = share**2 * work(t, number, pressed) + work(t, number, made)
+            gains = math.sqrt((now / speed) ** 2 + max(left, 0.0) / closed) - abs(now / speed)
+            gains *= math.copysign(1.0, speed * self._impulses.across(pressed[0].start, t, number))
+            parts = {name: value + gains * (after[name] - before[name]) for name, value in held.items()}
+            return Blow(self._regimes.taking(modes, t, parts), joined.regime)
+
+        compressed = self._regimes.changed(last.blow.after, t, with_modes(last.blow.after.regime.modes, apart))
+        return self._impulses.stages(t, compressed, thrown, apart)
 
     def _refuse_gain(
         self, t: float, moment: Moment, before: Mapping[str, float], after: Mapping[str, float], hits: Change
@@ -86,15 +124,15 @@ class Impacts:
         """Refuse an impact that would leave more energy than there was.
 
         Raises:
-            SimulationError: the impulse goes the other way through a gear with losses than the power did before it.
+            SimulationError: no combination of modes that was tried passes the impulse on without a gain.
         """
         stores, bound = moment.regime.assembly.stores, moment.regime.assembly.bound(moment.regime.p)
         had, has = stores.energy(bound, before), stores.energy(bound, after)
         if has - had > sum(hits.given.values()) + NO_IMPACT * max(had, has):
             raise SimulationError(
                 f"The impact of '{hits.element.name}' at t = {t:.9g} s would raise the stored energy from {had:.6g} to "
-                f"{has:.6g} J: it turns the flow of power round in a part whose losses depend on its direction, and a "
-                "rigid impact is followed with the direction before it. Give the contact a stiffness c and a damping d."
+                f"{has:.6g} J: it passes through several parts at once in no way that is known. Give the contact a "
+                "stiffness c and a damping d."
             )
 
     def jumped(self, t: float, moment: Moment, before: float, after: float) -> tuple[Moment, list[Change]]:
@@ -109,10 +147,16 @@ class Impacts:
             after: the same just after it.
         """
         regime = moment.regime
-        if not self.limited(regime.modes):
+        if not (self._impulses.gears or self.limited(regime.modes)):
             bound = regime.assembly.bound(regime.p)
             return moment._replace(x=bound.impulse(moment.x, before, after)), []
-        new = self._joined(regime.modes, self._regimes.held(moment, before), after, {}, NO_IMPACT)
+
+        def pulled(start: Moment, _: Sequence[Stage]) -> Blow:
+            held = self._regimes.held(start, before if start is moment else after)
+            new = self._joined(start.regime.modes, held, after, {}, NO_IMPACT)
+            return Blow(new, new.regime)
+
+        new = self._impulses.stages(after, moment, pulled, {})[-1].blow.after
         return new, self._differences(t, regime.modes, new.regime.modes)
 
     def limited(self, modes: ModeNames) -> dict[int, tuple[tuple[float, str], ...]]:

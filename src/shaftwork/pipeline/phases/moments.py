@@ -28,7 +28,7 @@ GOLDEN = (5**0.5 - 1) / 2
 class Change(NamedTuple):
     """A change of mode: when in s, of which element, from which mode to which; or a rebound, back to the one before.
 
-    With an impact speeds jump, and sources of speed have given energy at once, in J by part.
+    With an impact speeds jump; sources of speed have given energy at once, and gears have lost some, in J by part.
     """
 
     time: float
@@ -38,6 +38,7 @@ class Change(NamedTuple):
     rebound: bool = False
     impact: bool = False
     given: Mapping[str, float] = MappingProxyType({})
+    lost: Mapping[str, float] = MappingProxyType({})
 
 
 def together(changes: list[Change]) -> list[Change]:

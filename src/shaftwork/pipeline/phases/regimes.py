@@ -13,6 +13,7 @@ from shaftwork.components.branches import INTEGRAL
 from shaftwork.core.errors import NetworkError, ParameterError
 from shaftwork.pipeline.phases.assemblies import Element, ModeNames
 from shaftwork.pipeline.phases.moments import Moment, Regime
+from shaftwork.reduction.cancelling import jamming
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.phases.phases import Phases
@@ -37,11 +38,13 @@ class Regimes:
         """A combination of modes.
 
         Raises:
-            NetworkError: the equations of these modes contradict each other.
+            NetworkError: the equations of these modes contradict each other, or a gear jams in them.
         """
         if modes not in self._made:
             assembly = self._phases.assembly(modes)
-            p = assembly.vector(self._values, self._phases.numbers(modes))
+            form, p = assembly.model.form, assembly.vector(self._values, self._phases.numbers(modes))
+            if self._values and (jammed := tuple(jamming(form, {**assembly.model.parameters, **self._values}))):
+                raise NetworkError(f"'{form.graph.name}' cannot be assembled", jammed)
             made = Regime(
                 modes,
                 assembly,

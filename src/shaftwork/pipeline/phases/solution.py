@@ -8,7 +8,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.observer import ModelObserver
+from shaftwork.codegen.observer import Impact, ModelObserver
 from shaftwork.codegen.phase_observer import PhaseObserver, Stretch, Stretches
 from shaftwork.pipeline.phases.assemblies import ModeNames
 from shaftwork.pipeline.phases.moments import Change
@@ -91,16 +91,17 @@ def _stretch(run: Run, span: Span, phase: Phase) -> Stretch:
     )
 
 
-def _impacts(run: Run) -> tuple[tuple[float, str, Mapping[str, float]], ...]:
-    """Changes at which speeds may jump, of several at one time the first; and what sources give in all of them."""
-    found: dict[float, tuple[str, dict[str, float]]] = {}
+def _impacts(run: Run) -> tuple[Impact, ...]:
+    """Changes at which speeds may jump, those of one time in one, with the part of the first."""
+    found: dict[float, tuple[str, dict[str, float], dict[str, float]]] = {}
     for change in run.changes:
         modes = change.element.modes
         if change.rebound or modes[change.before].form != modes[change.after].form:
-            _, given = found.setdefault(change.time, (change.element.part.name, {}))
-            for source, energy in change.given.items():
-                given[source] = given.get(source, 0.0) + energy
-    return tuple((time, *at_once) for time, at_once in found.items())
+            _, *totals = found.setdefault(change.time, (change.element.part.name, {}, {}))
+            for total, energies in zip(totals, (change.given, change.lost), strict=True):
+                for part, energy in energies.items():
+                    total[part] = total.get(part, 0.0) + energy
+    return tuple(Impact(time, *at_once) for time, at_once in found.items())
 
 
 def _events(changes: Iterable[Change]) -> Iterator[tuple[float, str, str, str]]:

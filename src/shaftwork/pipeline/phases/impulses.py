@@ -1,0 +1,227 @@
+"""An impulse on its way through parts that pass torques on by their direction: gears that rub.
+
+While an impulse grows, all speeds change in proportion to it as long as each gear turns the way it did and the same
+side drives it. A gear that comes to rest is held by the rest of the impulse, or turned on or back. So an impact is a
+motion of its own, with the impulse in the place of time (Routh, Dynamics of a System of Rigid Bodies, part I, 1905,
+article 198); it is what a contact does that is stiff enough.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from shaftwork.codegen.elements import Array
+from shaftwork.codegen.recovery import History, into
+from shaftwork.components.branches import ACROSS, through_of
+from shaftwork.components.modes import Leave
+from shaftwork.core.errors import SimulationError
+from shaftwork.pipeline.phases.assemblies import Assembly, Element, ModeNames
+from shaftwork.pipeline.phases.moments import EPS, ROUNDINGS, Moment, Regime
+from shaftwork.pipeline.phases.regimes import Regimes, with_modes
+
+# So many times gears may come to rest in one impact.
+MOST_STAGES = 100
+# What rounding leaves of speeds and impulses, as part of the largest.
+NOTHING_OF = ROUNDINGS * EPS
+
+
+class Blow(NamedTuple):
+    """What an impulse leads to, and the modes in which it passes."""
+
+    after: Moment
+    passing: Regime
+
+
+class Stage(NamedTuple):
+    """A part of an impact in which speeds change in proportion: from where, what it leads to, how much of that."""
+
+    start: Moment
+    blow: Blow
+    share: float
+
+
+class Impulses:
+    """Follows impulses through gears.
+
+    Args:
+        regimes: combinations of modes.
+        elements: of the network.
+    """
+
+    def __init__(self, regimes: Regimes, elements: Sequence[Element]) -> None:
+        self._regimes, self._elements = regimes, elements
+        self.gears = tuple(k for k, element in enumerate(elements) if element.modes.passes_on)
+        """Elements that pass torques on by their direction."""
+
+    def stages(
+        self, t: float, start: Moment, blow: Callable[[Moment, Sequence[Stage]], Blow], apart: Mapping[int, str]
+    ) -> tuple[Stage, ...]:
+        """All parts of an impulse, of which the last leads to its end.
+
+        Args:
+            t: time in s at which inputs are read.
+            start: before it.
+            blow: the rest of it from a moment on, all in the modes that gears have there, and after what stages.
+            apart: modes in which a stage starts of elements that are joined in it.
+
+        Raises:
+            SimulationError: gears come to rest again and again.
+        """
+        made: list[Stage] = []
+        while len(made) < MOST_STAGES:
+            start, found = self._consistent(t, start, lambda moment: blow(moment, made))
+            share, number = min(self._coming_to_rest(t, start, found.after), default=(1.0, -1))
+            made.append(Stage(start, found, share))
+            if number < 0:
+                return tuple(made)
+            modes = self._at_rest(with_modes(found.after.regime.modes, apart), number)
+            start = self._regimes.taking(modes, t, self._reached(t, made[-1]))
+        raise SimulationError(
+            f"'{self._elements[number].name}' comes to rest again and again in one impact at t = {t:.9g} s. Give the "
+            "contact that is hit a stiffness c and a damping d."
+        )
+
+    def _consistent(self, t: float, start: Moment, blow: Callable[[Moment], Blow]) -> tuple[Moment, Blow]:
+        """The modes of gears in which an impulse passes as they say; a gear that turns, and has none, jams at once."""
+        found, jammed = blow(start), set[int]()
+        seen = {start.regime.modes}
+        while turn := self._turned(t, start, found):
+            number, to = turn
+            modes = self._led(start.regime.modes, number, to)
+            if modes in seen:
+                if number in jammed:
+                    break
+                jammed.add(number)
+                seen.clear()
+                modes = self._at_rest(modes, number)
+            start = self._regimes.changed(start, t, modes)
+            found = blow(start)
+            seen.add(modes)
+        return start, found
+
+    def _turned(self, t: float, start: Moment, found: Blow) -> tuple[int, str] | None:
+        """The gear that an impulse brings out of its mode at once, and the mode that follows."""
+        if not self.gears:
+            return None
+        assembly, p = found.passing.assembly, found.passing.p
+        impulses = self._impulses(t, start, found)
+        least = NOTHING_OF * np.abs(impulses).max(initial=0.0)
+        ways = [
+            (_guard(assembly, k, leave, impulses, p), k, leave.to)
+            for k in self.gears
+            for leave in self._elements[k].modes[start.regime.modes[k]].leaves
+            if leave.by_torque
+        ]
+        ways = [way for way in ways if way[0] > least]
+        ways = ways or [(ends, k, to) for began, ends, k, to in self._stopping(t, start, found.after) if began >= 0]
+        return max(ways)[1:] if ways else None
+
+    def _coming_to_rest(self, t: float, start: Moment, after: Moment) -> Iterator[tuple[float, int]]:
+        """The share of an impulse after which a gear is at rest, and which one."""
+        return ((began / (began - ends), k) for began, ends, k, _ in self._stopping(t, start, after) if began < 0)
+
+    def _stopping(self, t: float, start: Moment, after: Moment) -> Iterator[tuple[float, float, int, str]]:
+        """Gears that would turn round: their speeds before and after, negative the way they turn, and what follows."""
+        for k in self.gears:
+            speeds = [self.across(made, t, k) for made in (start, after)]
+            least = NOTHING_OF * max(np.abs(made.x).max(initial=0.0) for made in (start, after))
+            for leave in self._elements[k].modes[start.regime.modes[k]].leaves:
+                way = float(leave.when.diff(ACROSS))
+                began, ends = (0.0 if abs(speed) <= least else way * speed for speed in speeds)
+                if way and ends > 0:
+                    yield began, ends, k, leave.to
+
+    def _at_rest(self, modes: ModeNames, number: int) -> ModeNames:
+        """Modes with a gear at rest, or as it then goes on where it cannot be held."""
+        leaves = self._elements[number].modes[modes[number]].leaves
+        return self._led(modes, number, next((leave.to for leave in leaves if leave.when.has(ACROSS)), modes[number]))
+
+    def _led(self, modes: ModeNames, number: int, to: str) -> ModeNames:
+        """Modes with another one of a gear; where its equations contradict others, one to which it leads."""
+        ways = (to, *(leave.to for leave in self._elements[number].modes[to].leaves if leave.to != modes[number]))
+        return next(filter(self._regimes.possible, (with_modes(modes, {number: name}) for name in ways)), modes)
+
+    def _gained(self, t: float, start: Moment, after: Moment) -> dict[str, float]:
+        before, then = self._regimes.held(start, t), self._regimes.held(after, t)
+        return {name: then[name] - value for name, value in before.items()}
+
+    def _reached(self, t: float, stage: Stage) -> dict[str, float]:
+        """All that is stored at the end of a stage."""
+        gained, share = self._gained(t, stage.start, stage.blow.after), stage.share
+        return {name: value + share * gained[name] for name, value in self._regimes.held(stage.start, t).items()}
+
+    def given(self, t: float, stages: Sequence[Stage]) -> dict[str, float]:
+        """What ideal sources of speed give in an impulse, in J by part."""
+        found: dict[str, float] = {}
+        for stage in stages:
+            assembly, p = stage.blow.passing.assembly, stage.blow.passing.p
+            change = self._gained(t, stage.start, stage.blow.after)
+            for part, energy in assembly.stores.given(assembly.bound(p), t, change).items():
+                found[part] = found.get(part, 0.0) + stage.share * energy
+        return found
+
+    def lost(self, t: float, stages: Sequence[Stage]) -> dict[str, float]:
+        """What gears lose in an impulse, in J by part: what passes through the mesh at the mean of the speeds there."""
+        found: dict[str, float] = {}
+        for stage in stages if self.gears else ():
+            impulses = self._impulses(t, stage.start, stage.blow)
+            for k in self.gears:
+                name, passing = self._elements[k].part.name, stage.blow.passing.assembly
+                began, ends = (_across_meshes(moment, t, name) for moment in (stage.start, stage.blow.after))
+                speeds = (v + stage.share / 2 * (w - v) for v, w in zip(began, ends, strict=True))
+                pairs = zip(_meshes(passing, name), speeds, strict=True)
+                lost = sum(stage.share * impulses[branch] * speed for branch, speed in pairs)
+                found[name] = found.get(name, 0.0) + float(lost)
+        return found
+
+    def work(self, t: float, number: int, stages: Sequence[Stage]) -> float:
+        """The work in J that an impulse does against an element: what passes, at the mean of the speeds across it."""
+        total = 0.0
+        for start, blow, share in stages:
+            passes = _into(blow.passing.assembly, number, self._impulses(t, start, blow), blow.passing.p)
+            began, ends = (self.across(moment, t, number) for moment in (start, blow.after))
+            total += share * passes * (began + share / 2 * (ends - began))
+        return total
+
+    @staticmethod
+    def across(moment: Moment, t: float, number: int) -> float:
+        """The speed across an element."""
+        return moment.regime.assembly.across(number, t, moment.x, moment.regime.p)
+
+    def _impulses(self, t: float, start: Moment, found: Blow) -> Array:
+        """(branches,) what passes through every branch at once."""
+        assembly, p = found.passing.assembly, found.passing.p
+        return assembly.stores.impulses(assembly.bound(p), self._gained(t, start, found.after))
+
+
+def _guard(assembly: Assembly, number: int, leave: Leave, impulses: Array, p: Array) -> float:
+    """A guard by torques where impulses (branches,) act, beside which nothing else counts."""
+    graph, total = assembly.model.form.graph, 0.0
+    for branch in assembly.parts[assembly.elements[number].part.name].branches:
+        share = leave.when.diff(through_of(graph.branches[branch].template.label))
+        total += assembly.constant(number, share, p) * float(impulses[branch]) if share else 0.0
+    return total
+
+
+def _into(assembly: Assembly, number: int, impulses: Array, p: Array) -> float:
+    """What passes into an element at the first end of its speed, of impulses (branches,)."""
+    element = assembly.elements[number]
+    part = assembly.parts[element.part.name]
+    port = element.modes.ends[0] if element.modes.ends else part.component.ports[0].name
+    return float(into(part, port, impulses, assembly.model.form, p))
+
+
+def _meshes(assembly: Assembly, name: str) -> list[int]:
+    """The branches of a part in which power is lost on its way."""
+    branches = assembly.model.form.graph.branches
+    return [branch for branch in assembly.parts[name].branches if branches[branch].template.through]
+
+
+def _across_meshes(moment: Moment, t: float, name: str) -> list[float]:
+    """The speeds on which the lambdas of a gear's meshes act."""
+    assembly = moment.regime.assembly
+    history = History(assembly.bound(moment.regime.p), np.array([t]), moment.x[None, :])
+    return [float(history.acted_on(assembly.parts[name], branch)[0]) for branch in _meshes(assembly, name)]

@@ -1,0 +1,136 @@
+"""Claims about rigid impacts through gears that rub, checked by the impulse followed by hand."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any
+
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+import shaftwork as sw
+
+J_H, J_B, J_C = 1.0, 0.5, 2.0
+
+
+@cache
+def train(hit: str, **contact: Any) -> sw.Model:
+    """A hammer before a gear with an inertia on either side; it hits the one at node b or at node c."""
+    net = sw.Network("impact")
+    net.add(sw.Inertia("H", J=J_H), "a")
+    net.add(sw.Backlash("gap", gap=0.2, **contact), "a", hit)
+    net.add(sw.Inertia("B", J=J_B), "b")
+    net.add(sw.LossyGear("gear", ratio=2.0, efficiency=0.8, efficiency_back=0.6), "b", "c")
+    net.add(sw.Inertia("C", J=J_C), "c")
+    net.add(sw.TorqueSource("push", tau=0.0), "c")
+    return net.compile()
+
+
+def followed(v: float, w: float, e: float, onward: float, braking: float) -> tuple[float, float]:
+    """Speeds of the hammer and of what it hits after an impact, followed along its impulse p up and down again.
+
+    Args:
+        v: speed of the hammer before it.
+        w: of what is hit.
+        e: restitution, of which the square is the share of the work that comes back.
+        onward: inertia that an impulse feels that turns the gear on; infinite where the gear holds.
+        braking: inertia that it feels while it brakes the gear; one below zero jams.
+    """
+    way = math.copysign(1.0, v - w)
+    if way * w < 0 and braking <= 0:
+        w = 0.0
+    taken = 0.0
+    for back in (False, True):
+        goal = 0.0 if not back else None
+        while True:
+            closing = way * (v - w)
+            felt = braking if way * w < 0 else onward
+            mass = 1 / (1 / J_H + 1 / felt)
+            if back:
+                goal = -math.sqrt(closing**2 + 2 * e**2 * taken / mass)
+            assert goal is not None
+            p = (closing - goal) * mass
+            rests = way * w < 0 and way * w + p / felt > 0
+            if rests:
+                p = -way * w * felt
+            then = closing - p / mass
+            taken += (
+                (closing**2 - then**2) * mass / 2 if not back else (closing**2 - then**2) * mass / 2 / e**2 if e else 0
+            )
+            v, w = v - way * p / J_H, 0.0 if rests else w + way * p / felt
+            if not rests:
+                break
+    return v, w
+
+
+def felt(hit: str, ratio: float, efficiency: float, back: float) -> tuple[float, float]:
+    """The inertia that an impulse feels, turning the gear on and braking it."""
+    if hit == "b":
+        return J_B + J_C / (ratio**2 * efficiency), J_B + back * J_C / ratio**2
+    return J_C + ratio**2 * J_B / back if back > 0 else math.inf, J_C + efficiency * ratio**2 * J_B
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    hit=st.sampled_from("bc"),
+    ratio=st.sampled_from([2.0, -2.0, 0.5, -7.0]),
+    efficiency=st.floats(0.3, 1.0),
+    back=st.sampled_from([-0.9, -0.2, 0.3, 0.8]),
+    e=st.sampled_from([0.0, 0.5, 1.0]),
+    v=st.floats(3.0, 20.0),
+    w=st.floats(-10.0, 2.0).map(lambda w: round(w, 3)),
+    way=st.sampled_from([1, -1]),
+)
+def test_an_impact_through_a_gear_follows_its_impulse(
+    hit: str, ratio: float, efficiency: float, back: float, e: float, v: float, w: float, way: int
+) -> None:
+    """The gear may be braked, come to rest within the impact, be held there or turned on, or jam."""
+    assume(hit == "b" or back > 0 or w <= 0)  # driven on from its locked side it has no motion
+    v, w = way * v, way * w
+    after = followed(v, w, e, *felt(hit, ratio, efficiency, back))
+    start = {"H.omega": v, "B.omega": w * (1 if hit == "b" else ratio), "C.omega": w / (ratio if hit == "b" else 1)}
+    met = 0.1 / abs(v - w)
+    values = {"gear.ratio": ratio, "gear.efficiency": efficiency, "gear.efficiency_back": back, "gap.restitution": e}
+    sol = train(hit, restitution=0.5).simulate(1.01 * met, initial=start, parameters=values)
+    now = sol.at([sol.events[-1][0]])
+    assert [now["H.omega"][0], now[f"{hit.upper()}.omega"][0]] == pytest.approx(after, abs=1e-9 * abs(v - w))
+    assert sol.energy_residual < 1e-12
+
+
+@pytest.mark.parametrize("push", [0.0, 1e-9, -1e-9])
+def test_a_gear_at_rest_that_is_hit_is_no_wall_whichever_side_drove_before(push: float) -> None:
+    sol = train("b").simulate(0.0101, initial={"H.omega": 10.0}, parameters={"push.tau": push})
+    inertia = J_B + J_C / (2.0**2 * 0.8)
+    assert sol["B.omega"][-1] == pytest.approx(10.0 * J_H / (J_H + inertia), rel=1e-9)
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5])
+def test_what_a_gear_loses_in_an_impact_is_its_own(e: float) -> None:
+    sol = train("b", restitution=e).simulate(0.0101, initial={"H.omega": 10.0})
+    impulse = (1 + e) * 10.0 / (1 / J_H + 1 / (J_B + J_C / (2.0**2 * 0.8)))
+    c = sol["C.omega"][-1]
+    mesh = J_C * c / (2.0 * 0.8)  # what B gives to the gear: its torque times the ratio and the efficiency drives C
+    assert sol.energy.lost_in["gear"] == pytest.approx(0.2 * mesh * 2.0 * c / 2, rel=1e-12)
+    assert sol.energy.lost_in["gap"] == pytest.approx(impulse * (1 - e) * 10.0 / 2, rel=1e-12)
+
+
+def test_an_impact_through_a_gear_is_the_limit_of_a_stiff_contact() -> None:
+    """Braked, at rest and turned round within it: the contact is damped 60 times as much as it takes not to swing."""
+    start = {"H.omega": 10.0, "B.omega": -4.0, "C.omega": -2.0}
+    rigid, stiff = (train("b", **contact).simulate(0.012, initial=start) for contact in ({}, {"c": 1e7, "d": 1e6}))
+    for name in ("H.omega", "B.omega", "C.omega"):
+        assert stiff[name][-1] == pytest.approx(rigid[name][-1], abs=1e-3)
+        assert abs(rigid[name][-1] - start[name]) > 1.0
+
+
+def test_a_jump_of_a_prescribed_speed_turns_a_gear_round_with_the_torques_of_both_ways() -> None:
+    """The source takes all that it needs: speeds follow the ratio, whatever is lost."""
+    net = sw.Network("jump")
+    net.add(sw.SpeedSource("drive", omega=sw.Step(-6.0, 0.1, before=2.0)), "a")
+    net.add(sw.LossyGear("gear", ratio=2.0, efficiency=0.8), "a", "b")
+    net.add(sw.Inertia("J", J=3.0), "b")
+    with pytest.warns(sw.NetworkWarning, match="jumps at t = 0.1 s"):
+        sol = net.simulate(0.2)
+    assert sol["J.omega"][-1] == pytest.approx(-2.0, rel=1e-12)
