@@ -174,7 +174,7 @@ class ModelObserver:
         return any(kind in (Kind.ACROSS_STORE, Kind.THROUGH_STORE) for kind in kinds)
 
     def powers(self, t: Array, x: Array) -> tuple[dict[str, Array], dict[str, Array]]:
-        """Lost power and supplied power by part; of sources with resistors or dampers of their own, and weights, both."""
+        """Lost power and supplied power by part; of sources that have resistors or dampers of their own both."""
         history = History(self._bind(), self._instants.one_sided(t), x)
         parts = self._graph.parts
         sources = [part for part in parts if part.component.role == "source"]

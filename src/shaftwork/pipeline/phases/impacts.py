@@ -6,7 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from sympy import Integer
 
+from shaftwork.components.branches import INTEGRAL
 from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.pipeline.phases.assemblies import Element, ModeNames
@@ -85,9 +87,47 @@ class Impacts:
         modes = regime.modes[number], leave.to
         hits = Change(t, self._elements[number], *modes, rebound, impact=True, given=given, lost=lost)
         new = stages[-1].blow.after
+        if not rebound:
+            new = self._at_limit(new, number, leave)
+        new = self._kept(after, regime.modes, new)
         changes = [hits, *self._differences(t, regime.modes, new.regime.modes, number)]
         self._refuse_gain(t, moment, held, self._regimes.held(new, after), hits)
         return new, changes
+
+    def _kept(self, t: float, before: ModeNames, moment: Moment) -> Moment:
+        """Contacts that part in an impact of others, and are pushed back before they could be found again, stay closed.
+
+        Without it they would open and close for ever, each time as far beyond their limit as rounding hides it.
+        """
+        regime, x = moment.regime, moment.x.tolist()
+        parted = [
+            (k, made)
+            for k, made in regime.watched
+            if before[k] != regime.modes[k] and made.leave.to == before[k] and made.leave.rebound is not None
+        ]
+        if not parted:
+            return moment
+        rates, now = regime.motion(t, x)
+        near = regime.limits(t + self._tick, regime.rounded(x, rates, self._tick))
+        kept = {}
+        for k, made in parted:
+            way = float(made.leave.when.diff(INTEGRAL))
+            speeds = (moment.x, moment.x + np.array(rates))
+            speed, later = (way * regime.assembly.across(k, t, at, regime.p) for at in speeds)
+            if speed**2 < 4 * (later - speed) * CLEAR * abs(near[made.guard] - now[made.guard]):
+                kept[k] = before[k]
+        return self._regimes.changed(moment, t, with_modes(regime.modes, kept)) if kept else moment
+
+    @staticmethod
+    def _at_limit(moment: Moment, number: int, leave: Leave) -> Moment:
+        """What stays in contact is on its limit: from a little beyond it each flight would gain speed."""
+        assembly, slope = moment.regime.assembly, leave.when.diff(INTEGRAL)
+        place = assembly.twist(number)
+        if place is None or not slope:
+            return moment
+        x = moment.x.copy()
+        x[place] = -assembly.constant(number, leave.when.xreplace({INTEGRAL: Integer(0)}) / slope, moment.regime.p)
+        return moment._replace(x=x)
 
     def _thrown_back(
         self, t: float, pressed: tuple[Stage, ...], number: int, to: str, share: float, apart: Mapping[int, str]
