@@ -271,12 +271,13 @@ def _latex(options: argparse.Namespace) -> None:
 
 
 def _typeset(equations: Equations, options: argparse.Namespace) -> str:
-    if options.document:
-        return equations.document(values=options.values)
     if options.form == "lagrange":
         from shaftwork.equations.lagrange import lagrangian
 
-        return lagrangian(equations).latex(values=options.values)
+        made = lagrangian(equations)
+        return made.document(values=options.values) if options.document else made.latex(values=options.values)
+    if options.document:
+        return equations.document(values=options.values)
     return equations.latex(form=options.form, values=options.values)
 
 

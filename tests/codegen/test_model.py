@@ -69,7 +69,7 @@ def test_a_law_that_cannot_be_evaluated_ends_in_a_named_error() -> None:
     net.add(sw.Inertia("J", J=1.0), "r")
     model = net.compile()
     assert np.isnan(model.rhs(0.0, np.array([-1.0]))).all()
-    with pytest.raises(sw.SimulationError, match=r"J\.omega"):
+    with pytest.raises(sw.SimulationError, match=r"tau = .*sqrt\(omega\).* of TorqueSource 'brake' has no real value"):
         model.simulate(1.0)
 
 

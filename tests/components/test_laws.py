@@ -24,9 +24,9 @@ from shaftwork.components.laws import (
     breakpoints,
     omega,
     phi,
-    pieces_degree,
     t,
 )
+from shaftwork.components.pieces import pieces_degree
 from shaftwork.core.errors import ParameterError
 
 TABLE = Table([0, 1, 3], [0.0, 5.0, -1.0])

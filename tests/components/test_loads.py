@@ -11,6 +11,7 @@ from statistics import NormalDist
 
 import numpy as np
 import pytest
+import sympy
 
 import shaftwork as sw
 from shaftwork.components import noise
@@ -79,6 +80,56 @@ def test_a_hoist_holds_between_what_it_takes_to_lift_and_to_lower() -> None:
         net.add(sw.Hoist("load", m=1000.0, radius=0.2, ratio=40.0, efficiency=0.8), "drum")
         speed = net.simulate(1.0)["J.omega"]
         assert speed[-1] == pytest.approx(surplus * weight / J, rel=1e-9, abs=0.0)
+
+
+WEIGHT = 1000.0 * 9.81 * 0.2 / 40.0
+"""At the shaft of the hoist below, N m."""
+
+
+def hoist(**rounded: float) -> sw.Hoist:
+    return sw.Hoist("load", m=1000.0, radius=0.2, ratio=40.0, efficiency=0.8, **rounded)
+
+
+@pytest.mark.parametrize(("pull", "takes", "friction"), [(1.6, 1.25, 0.25), (0.6, 0.8, 0.2)])
+@pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials"])
+def test_the_weight_of_a_hoist_is_lifted_and_only_its_friction_lost(
+    pull: float, takes: float, friction: float, engine: str
+) -> None:
+    """From rest under a constant torque it turns by a t^2 / 2, up or down; friction is a share of the weight."""
+    net, J = sw.Network("hoist"), 0.5
+    net.add(sw.TorqueSource("motor", tau=pull * WEIGHT), "drum")
+    net.add(sw.Inertia("J", J=J), "drum")
+    net.add(hoist(), "drum")
+    energy = net.simulate(2.0, engine=engine, rtol=1e-10).energy
+    turned = (pull - takes) * WEIGHT / J * 2.0**2 / 2
+    assert energy.supplied_by["motor"] == pytest.approx(pull * WEIGHT * turned, rel=1e-8)  # 100 rtol
+    assert energy.supplied_by["load"] == pytest.approx(-WEIGHT * turned, rel=1e-8)
+    assert energy.lost_in["load"] == pytest.approx(friction * WEIGHT * abs(turned), rel=1e-8)
+    assert np.diff(energy.lost).min() >= 0.0
+    assert energy.residual < 1e-9
+
+
+@pytest.mark.parametrize("load", [hoist(), sw.Conveyor("load", m=800.0, radius=0.25, friction=0.02, incline=0.1)])
+def test_what_is_lifted_and_lowered_again_has_taken_nothing_but_friction(load: sw.Component) -> None:
+    """A whole swing of the speed, 2 rad up and 2 rad down."""
+    net = sw.Network("swing")
+    net.add(sw.SpeedSource("drive", omega=sympy.sin(sw.t)), "shaft")
+    net.add(load, "shaft")
+    energy = net.simulate(2 * math.pi, rtol=1e-10).energy
+    along = 0.02 * 800.0 * 9.81 * 0.25 * math.cos(0.1)
+    both_ways = (1 / 0.8 - 0.8) * WEIGHT if isinstance(load, sw.Hoist) else 2 * along
+    assert energy.lost_in["load"] == pytest.approx(2.0 * both_ways, rel=1e-10)
+    assert energy.supplied_by["drive"] == pytest.approx(energy.lost_in["load"], rel=1e-10)
+    assert energy.supplied_by["load"] == pytest.approx(0.0, abs=1e-8 * WEIGHT)
+
+
+def test_a_rounded_hoist_carries_its_weight_at_rest_and_loses_at_every_speed() -> None:
+    load = hoist(omega_s=0.1)
+    assert torque_at(load, 0.0) == pytest.approx(-WEIGHT, rel=1e-14)
+    assert torque_at(load, FAST) == pytest.approx(-WEIGHT / 0.8)
+    assert torque_at(load, -FAST) == pytest.approx(-WEIGHT * 0.8)
+    for omega in (-0.2, -0.01, 0.01, 0.2):
+        assert (-torque_at(load, omega) - WEIGHT) * omega > 0
 
 
 def random_load(kind: str, *, intervals: int, seed: float = 1.0, std: float = 10.0) -> np.ndarray:

@@ -230,6 +230,27 @@ def test_resistance_in_the_rotor_moves_the_pull_out_point_and_keeps_its_torque()
     assert curve(wound, 3000.0 * (1 - 0.9)) == pytest.approx(8.0, rel=1e-12)
 
 
+@pytest.mark.parametrize("value", [-2.0, 0.0, 0.5, math.nan])
+def test_a_rotor_circuit_of_less_resistance_than_the_rotor_is_refused(value: float) -> None:
+    net = sw.Network("wound")
+    net.add(sw.WoundRotorMotor("m", **KLOSS, resistance=value), "shaft")
+    net.add(sw.Inertia("J", J=1.0), "shaft")
+    (problem,) = net.check()
+    assert problem.kind == "parameter"
+    assert "at least 1" in str(problem)
+    sound = alone(sw.WoundRotorMotor("m", **KLOSS, resistance=3.0))
+    with pytest.raises(sw.ParameterError, match="WoundRotorMotor 'm': resistance"):
+        sound.simulate(0.1, parameters={"m.resistance": value})
+
+
+def test_a_rotor_resistance_that_falls_below_that_of_the_rotor_leaves_the_slip_rings_closed() -> None:
+    """3 - 4 t is 1 at half a second: from there on it is the motor alone."""
+    falling = alone(sw.WoundRotorMotor("m", **KLOSS, resistance=3.0 - 4.0 * sw.t), inertia=0.1)
+    stopped = alone(sw.WoundRotorMotor("m", **KLOSS, resistance=sw.Ramp(-2.0, 0.5, before=3.0)), inertia=0.1)
+    found, wanted = (model.simulate(2.0, rtol=1e-11, t_eval=21)["J.omega"] for model in (falling, stopped))
+    np.testing.assert_allclose(found, wanted, rtol=1e-9)  # 100 rtol
+
+
 def test_a_start_over_resistors_takes_the_time_of_the_closed_form_of_each_step() -> None:
     """As for the Kloss motor, from slip to slip: the resistor is taken out when the slip is 0.4."""
     synchronous, inertia = 3000.0 * PER_MINUTE, 0.02

@@ -16,7 +16,8 @@ import sympy
 
 import shaftwork as sw
 from shaftwork.components import noise
-from shaftwork.components.laws import breakpoints, pieces_degree
+from shaftwork.components.laws import breakpoints
+from shaftwork.components.pieces import pieces_degree
 from shaftwork.components.slopes import slope
 from shaftwork.network import expressions
 

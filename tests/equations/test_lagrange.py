@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-import shutil
-import subprocess
 from collections.abc import Callable
 from itertools import chain
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -17,14 +14,12 @@ from hypothesis import strategies as st
 from sympy import Rational, Symbol, cancel, expand, powsimp
 
 import shaftwork as sw
-from shaftwork.core.errors import CompileError
 from shaftwork.equations.lagrange import Lagrangian, lagrangian
 from shaftwork.equations.quantities import rate_of
-from shaftwork.equations.report import PREAMBLE
 from shaftwork.equations.second_order import second_order
 from shaftwork.reduction.tree import normal_tree
 from tests.beds import bed_of, registered
-from tests.equations.networks import MECHANICAL, dc_drive, equations_of, from_pieces, graph_of, mixed_train, shaft
+from tests.equations.networks import MECHANICAL, dc_drive, equations_of, from_pieces, mixed_train, shaft
 from tests.strategies import Network, networks
 from tests.trains import Train, trains
 
@@ -375,34 +370,6 @@ def test_a_rigid_train_has_the_inertia_and_torque_of_abdelkader_16_and_17() -> N
     assert vanishes(row.force - torque)
 
 
-@pytest.mark.parametrize("name", ["planetary hoist", "prescribed speed behind gears", "torque of angle and speed"])
-def test_the_print_is_balanced_and_has_no_marks(name: str) -> None:
-    for text in (of(name).latex(), of(name).latex(values=True), of(name)._repr_latex_()):
-        assert text.count(r"\begin{align*}") == text.count(r"\end{align*}") >= 4
-        assert text.count("{") == text.count("}")
-        assert text.count(r"\left") == text.count(r"\right")
-        assert not any("\ue000" <= character <= "\ue003" for character in text)
-
-
-def test_a_shaft_with_weights_is_printed_as_sums() -> None:
-    text = WHOLE["spectral"]().lagrangian().latex()
-    assert r"\frac{1}{2} \, L \, J' \, \sum_{i = 0}^{8} h_{i} \, \dot{\varphi}_{i}^{2}" in text
-    assert r"\Bigl( \sum_{i = 0}^{8} w_{k,i} \, \varphi_{i} \Bigr)^{2}" in text
-    assert r"\frac{w_{k,0}}{\lambda_{k}}" in text  # what it gives to its end
-    assert text.count(r"\\") < 30
-
-
-@pytest.mark.skipif(shutil.which("pdflatex") is None, reason="pdflatex is not installed")
-def test_pdflatex_takes_the_print(tmp_path: Path) -> None:
-    nets = (WHOLE["spectral"](), WHOLE["wave with losses"](), WHOLE["induction machine"](), closed_gears(1.8))
-    texts = [net.lagrangian().latex() for net in nets] + [of("planetary hoist").latex()]
-    lines = (PREAMBLE, r"\begin{document}", *texts, r"\end{document}")
-    (tmp_path / "report.tex").write_text("\n".join(lines), encoding="utf-8")
-    command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "report.tex"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout[-2000:]
-
-
 def test_shafts_are_written_out_where_that_is_asked_for() -> None:
     net = shaft_of(sw.Lumped(3))
     made = net.lagrangian(expand=True)
@@ -415,27 +382,3 @@ def test_what_cannot_be_assembled_or_named_is_refused() -> None:
         sw.Network("empty").lagrangian()
     with pytest.raises(sw.ParameterError, match="There is no phase 'load gone'"):
         sw.scenes.crane_start().lagrangian(phase="load gone")
-
-
-@pytest.mark.parametrize("name", MECHANICAL)
-def test_mass_damping_and_stiffness_are_symmetric(name: str) -> None:
-    form = second_order(graph_of(MECHANICAL[name]()))
-    for entries in (form.mass, form.damping, form.stiffness):
-        assert all(cancel(entry - entries[j, i]) == 0 for (i, j), entry in entries.items())
-
-
-def test_a_node_without_inertia_keeps_an_empty_row_of_m() -> None:
-    form = second_order(graph_of(MECHANICAL["springs in series"]()))
-    assert [str(q) for q in form.coordinates] == ["J1.phi", "J2.phi", "phi(m)"]
-    assert not any(2 in place for place in form.mass)
-
-
-def test_referred_inertias_are_divided_by_the_square_of_the_ratio() -> None:
-    form = second_order(graph_of(MECHANICAL["geared inertias"]()))
-    first, second, ratio = (quantity(name) for name in ("J1.J", "J2.J", "g.ratio"))
-    assert form.mass == {(0, 0): first + second / ratio**2}
-
-
-def test_an_electrical_network_has_no_second_order_form() -> None:
-    with pytest.raises(CompileError, match=r"electrical nodes p, M\.resistor"):
-        second_order(graph_of(dc_drive()))

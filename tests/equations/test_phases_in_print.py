@@ -90,9 +90,12 @@ def test_what_holds_beside_another_torque_of_its_part_has_a_letter_of_its_own() 
     net = sw.Network("hoist")
     net.add(sw.Inertia("J", J=2.0), "a")
     net.add(sw.Hoist("load", m=5.0, radius=0.1, efficiency=0.5), "a")
-    (balance,) = net.equations(phase="load stuck").nodes
+    stuck = net.equations(phase="load stuck")
+    (balance,) = stuck.nodes
     assert {"load.tau_1", "load.tau_2"} < {symbol.name for symbol in balance.expression.free_symbols}
     assert "load.tau" not in {symbol.name for symbol in balance.expression.free_symbols}
+    (weight,) = (row.right for row in stuck.laws)  # what a locked brake holds before it
+    assert str(weight) == "-load.tau_h"
 
 
 def test_equations_without_modes_name_no_phase() -> None:

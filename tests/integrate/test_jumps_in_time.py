@@ -323,9 +323,9 @@ def test_a_power_of_a_negative_base_ends_the_run_where_it_is_met(engine: str, la
     if time is None:
         z = 0.5 ** (1 / 3)
         time = 3 * (-z - z**2 / 2 - np.log(1 - z))
-    with pytest.raises(sw.SimulationError, match=r"not finite|was nan") as caught:
+    with pytest.raises(sw.SimulationError, match=r"tau = .* of TorqueSource .* has no real value") as caught:
         body(law).simulate(3.0, engine=engine)
-    assert float(str(caught.value).split("at t = ")[1].split(" s")[0]) == pytest.approx(time, abs=1e-5)
+    assert float(str(caught.value).split("At t = ")[1].split(" s")[0]) == pytest.approx(time, abs=1e-5)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

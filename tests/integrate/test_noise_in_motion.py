@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import sys
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import sympy
+from scipy import sparse
 from scipy.integrate import solve_ivp
 
 import shaftwork as sw
 from shaftwork.components import noise
 from shaftwork.core.errors import ParameterError
+from shaftwork.integrate import choice
+from shaftwork.integrate.problem import Problem
 
 ENGINES = ["heyoka", "scipy", "sundials"]
 # Of the largest value, in tolerances. The stiff shaft makes 100 of scipy's out of 10 of a speed, and the errors of
@@ -168,3 +174,41 @@ def test_noise_of_time_leaves_a_linear_network_to_the_exact_engine() -> None:
 def test_too_many_steps_are_refused_with_their_part() -> None:
     with pytest.raises(ParameterError, match=r"'m': .* switches too often"):
         body(sw.HeldNoise(1e6 * sw.t, 1)).simulate(10.0)
+
+
+class Instant(float):
+    """A time that counts how often it is compared."""
+
+    def __eq__(self, other: object) -> bool:
+        return float(self) == other
+
+    def __hash__(self) -> int:
+        return super().__hash__()
+
+
+def _work(engine: str, samples: int) -> int:
+    """Calls of functions in a run whose input steps so many times."""
+    calls = 0
+
+    def count(_frame: object, event: str, _argument: object) -> None:
+        nonlocal calls
+        calls += event == "call"
+
+    steps = tuple(Instant(k / samples) for k in range(1, samples))
+    rhs = {"rhs": lambda t, x: np.cos(samples * t) - x, "jacobian": lambda _t, _x: sparse.csc_array([[-1.0]])}
+    problem = Problem(
+        **rhs, x0=np.zeros(1), t0=0.0, t_end=1.0, names=("x",), atol=np.array([1e-6]), rtol=1e-4, breakpoints=steps
+    )
+    choice.solve(replace(problem, t_eval=np.array([1.0])), engine)
+    sys.setprofile(count)
+    try:
+        choice.solve(replace(problem, t_eval=np.array([1.0])), engine)
+    finally:
+        sys.setprofile(None)
+    return calls
+
+
+@pytest.mark.parametrize("engine", ["scipy", "sundials"])
+def test_a_run_of_many_samples_takes_no_more_work_for_each_of_them(engine: str) -> None:
+    """Four times as many samples are four times the calls; what looked back at all before would make it more."""
+    assert _work(engine, 800) < 4.2 * _work(engine, 200)

@@ -8,6 +8,7 @@ from functools import lru_cache
 import mpmath
 import numpy as np
 import pytest
+import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
@@ -186,3 +187,27 @@ def test_an_ordinary_run_is_not_made_twice() -> None:
     run = net.simulate(10.0, engine="scipy")
     # A second run would add as many steps again: stability alone takes decay * duration / 6.
     assert run.statistics["steps"] < 1.2 * (10.0 / 0.1) * 10.0 / 6
+
+
+@pytest.mark.parametrize("ratio", [0.5, 30.0, 1000.0])
+@pytest.mark.parametrize("engine", EXPLICIT)
+def test_beside_a_part_with_modes_it_is_as_right(engine: str, ratio: float) -> None:
+    """A gap that never closes makes phases of the motion, and changes nothing else."""
+    net, t_end = two_inertias(ratio, 1.0)
+    net.add(sw.Backlash("gap", gap=1e6, c=1.0, d=1.0), "b", "c")
+    net.add(sw.Inertia("J3", J=1.0), "c")
+    times = np.linspace(0.0, t_end, 50)[1:]
+    found, wanted = net.simulate(t_end, engine=engine).at(times)["spring.tau"], coupling_torque(ratio, 1.0, times)
+    np.testing.assert_allclose(found, wanted, rtol=0, atol=BOUND[engine] * np.abs(wanted).max())
+
+
+def test_a_phase_is_made_twice_only_where_stability_bounds_its_steps() -> None:
+    """Flanks that strike each other again and again: every oscillation has many steps of its own."""
+    net = sw.Network("rattle")
+    net.add(sw.TorqueSource("motor", tau=TORQUE * sympy.sin(30 * sw.t)), "a")
+    net.add(sw.Inertia("J1", J=0.1), "a")
+    net.add(sw.Backlash("gap", gap=0.02, c=STIFFNESS, d=0.5), "a", "b")
+    net.add(sw.Inertia("J2", J=0.1), "b")
+    run = net.simulate(1.0, engine="scipy")
+    assert len(run.events) > 10
+    assert run.statistics["steps"] == len(run.steps) - 1

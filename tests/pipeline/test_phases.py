@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import traceback
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -215,3 +216,50 @@ def test_an_end_of_a_mode_that_the_series_have_hidden_is_told() -> None:
     with pytest.raises(SeriesError, match="has not seen that 'gap' ceased to be open before t = 1 s"):
         passing.refuse_missed(None, 1.0, beyond)
     passing.refuse_missed(next(made.guard for _, made in regime.watched if made.leave.to == "forward"), 1.0, beyond)
+
+
+@pytest.mark.parametrize("engine", ["auto", "sundials", "scipy-radau"])
+def test_a_light_wheel_is_pushed_along_without_a_step_for_each_of_its_transients(engine: str) -> None:
+    """Free it is no trouble; in contact it follows within 1e-9 s, and an explicit method would take 2e8 steps.
+
+    The momentum of both is tau t, and they have one speed when the springing of the contact has died down.
+    """
+    net = sw.Network("light")
+    net.add(sw.TorqueSource("motor", tau=1.0), "heavy")
+    net.add(sw.Inertia("J1", J=1.0), "heavy")
+    net.add(sw.Backlash("gap", gap=0.02, c=1e3, d=1.0), "heavy", "light")
+    net.add(sw.Inertia("J2", J=1e-9), "light")
+    sol = net.simulate(t_end=1.0, engine=engine, rtol=1e-9, max_steps=5000)
+    ((time, *event),) = sol.events
+    assert event == ["gap", "open", "in contact"]
+    assert time == pytest.approx(math.sqrt(0.02), abs=1e-9)
+    for wheel in ("J1.omega", "J2.omega"):
+        assert sol[wheel][-1] == pytest.approx(1.0 / (1.0 + 1e-9), abs=1e-8)
+
+
+def test_auto_stays_with_heyoka_where_a_stiff_contact_is_over_before_it_costs_much() -> None:
+    """A wheel of 1e-6 kg m2 is thrown off in 0.03 ms, which takes an implicit method some hundred steps."""
+    net = sw.Network("thrown")
+    net.add(sw.Inertia("J1", J=1.0), "heavy")
+    net.add(sw.Backlash("gap", gap=0.02, c=1e3, d=0.3), "heavy", "light")
+    net.add(sw.Inertia("J2", J=1e-6), "light")
+    auto, implicit = (
+        net.simulate(t_end=1.0, engine=name, rtol=1e-10, initial={"J1.omega": 1.0}) for name in ("auto", "scipy-radau")
+    )
+    assert 2 * auto.statistics["steps"] < 100 < implicit.statistics["steps"]
+    assert [event[1:] for event in auto.events] == [event[1:] for event in implicit.events]
+    assert auto["J2.omega"][-1] == pytest.approx(implicit["J2.omega"][-1], rel=1e-9)
+
+
+def test_modes_that_contradict_each_other_keep_no_frames_of_those_who_asked() -> None:
+    """They are looked at again and again in a long motion: each time would leave its frames behind."""
+    net = sw.Network("belt")
+    net.add(sw.SpeedSource("belt", omega=1.0), "wheel")
+    net.add(sw.DryFriction("shoe", tau_c=1.0), "wheel")
+    phases = net.compile().phases
+    depths = []
+    for _ in range(3):
+        with pytest.raises(sw.NetworkError) as refused:
+            phases.assembly(("stuck",))
+        depths.append(len(list(traceback.walk_tb(refused.value.__traceback__))))
+    assert depths[1] == depths[2]

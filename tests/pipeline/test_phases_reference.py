@@ -179,6 +179,27 @@ def test_an_inertia_bounces_on_a_stop_at_the_times_of_a_geometric_series(engine:
     np.testing.assert_allclose(flights["J.omega"], 0.0, atol=1e-8)  # half-way through a flight it turns
 
 
+@pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials", "scipy-radau"])
+@pytest.mark.parametrize("rtol", [1e-3, 1e-5, 1e-7, 1e-9, 1e-12])
+@pytest.mark.parametrize(("restitution", "omega_rest"), [(0.9, 2e-3), (0.85, 1e-4), (0.6, 1e-5)])
+def test_no_engine_ends_a_series_of_bounces_early(
+    engine: str, rtol: float, restitution: float, omega_rest: float
+) -> None:
+    """The last flights are some 1e-9 rad high, far below the loose tolerances."""
+    ball = friction.Bounces(J=2.0, tau=5.0, height=0.7, restitution=restitution)
+    count = next(n for n in range(1, 100) if ball.speed_after(n) <= omega_rest)
+    net = sw.Network("bounces")
+    net.add(sw.TorqueSource("weight", tau=ball.tau), "wheel")
+    net.add(sw.Inertia("J", J=ball.J), "wheel")
+    net.add(sw.HardStop("stop", upper=ball.height, restitution=restitution, omega_rest=omega_rest), "wheel")
+    sol = net.simulate(t_end=1.1 * ball.rest, engine=engine, rtol=rtol, t_eval=2)
+    hits = [event for event in sol.events if event[1] == "stop"]
+    assert [hit[3] for hit in hits] == ["rebound"] * (count - 1) + ["in contact"]
+    # by a part of 1e-5 of its own flight each may come early, and all later ones with it
+    wanted = [ball.impact(n) for n in range(1, count + 1)]
+    np.testing.assert_allclose([hit[0] for hit in hits], wanted, atol=1e-4)
+
+
 @pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials"])
 def test_a_clutch_engages_at_the_time_and_the_speed_of_the_momentum_balance(engine: str) -> None:
     made = friction.Engagement(J1=2.0, J2=3.0, omega_1=100.0, omega_2=20.0, tau=50.0, tau_1=30.0, tau_2=-10.0)

@@ -202,64 +202,6 @@ def test_a_massless_end_and_a_shaft_without_a_spring_are_named() -> None:
         sw.reduce.simplify(net, 2, "c0")
 
 
-def servo(*places: int, inertias: list[float] | None = None) -> sw.Network:
-    """The train of the first five masses, with speeds prescribed at some of them."""
-    net = sw.Network("servo")
-    for place in places:
-        net.add(sw.SpeedSource(f"servo{place}", omega=sw.Table([0, 1, 2], [0, 10, 10])), f"{place}")
-    stiffnesses = [2e3, 1e3, 4e3, 1e3]
-    for k, size in enumerate(inertias or [1.0, 0.5, 2.0, 1.0, 3.0]):
-        net.add(sw.Inertia(f"J{k}", J=size), f"{k}")
-    for k, c in enumerate(stiffnesses):
-        net.add(sw.Spring(f"s{k}", c=c), f"{k}", f"{k + 1}")
-    return net
-
-
-def own_frequencies(net: sw.Network) -> list[float]:
-    return [float(f) for f in net.modes().frequencies if f > 1e-6]
-
-
-@pytest.mark.parametrize(
-    ("places", "masses", "keep"), [((0,), 3, "s1"), ((0,), 3, "s0"), ((2,), 4, "s1"), ((0, 4), 4, "s2"), ((4,), 2, "")]
-)
-def test_a_prescribed_speed_is_a_clamp_to_what_swings(places: tuple[int, ...], masses: int, keep: str) -> None:
-    net = servo(*places)
-    small = sw.reduce.simplify(net, masses, keep)
-    assert [row.before for row in small.frequencies] == pytest.approx(own_frequencies(net), rel=1e-9)
-    after = [row.after for row in small.frequencies if row.after is not None]
-    assert after == pytest.approx(own_frequencies(small.network), rel=1e-9)
-    assert small.by_modes is None
-    for tried in small.groupings:
-        assert {(f"{place}",) for place in places} <= set(tried.groups)
-    errors = [made.frequency_error for made in small.groupings]
-    assert errors == sorted(errors)
-    assert abs(small.frequencies[0].error or 0.0) == pytest.approx(errors[0], abs=1e-12)
-
-
-def test_the_torque_of_a_prescribed_acceleration_is_that_of_the_relative_motion() -> None:
-    """One mass on a spring behind a speed: a step of acceleration a swings the spring by J a."""
-    net = sw.Network("one mass")
-    net.add(sw.SpeedSource("servo", omega=5.0 * sw.t), "0")
-    net.add(sw.Inertia("J0", J=1.0), "0")
-    net.add(sw.Spring("s0", c=2e3), "0", "1")
-    net.add(sw.Inertia("J1", J=0.7), "1")
-    net.add(sw.Spring("stiff", c=1e9), "1", "2")
-    net.add(sw.Inertia("J2", J=1.3), "2")
-    small = sw.reduce.simplify(net, 2, "s0")
-    assert small.groupings[0].torque_error < 1e-5
-    assert small.compare(0.5).peaks[1] == pytest.approx(2 * 2.0 * 5.0, rel=1e-4)
-
-
-def test_too_few_groups_for_a_prescribed_speed_are_refused_and_one_mass_moves_as_prescribed() -> None:
-    with pytest.raises(sw.ParameterError, match=r"prescribed at '0' \('servo0'\).*masses = 3 or more, or 1 for"):
-        sw.reduce.simplify(servo(0), 2, "s1")
-    with pytest.raises(sw.ParameterError, match=r"at '0', '4' \('servo0', 'servo4'\).*masses = 3 or more\."):
-        sw.reduce.simplify(servo(0, 4), 1, "s1")
-    rigid = sw.reduce.simplify(servo(0), 1, "s1")
-    assert [row.after for row in rigid.frequencies] == [None] * 4
-    assert rigid.compare(2.0).peaks[1] == pytest.approx(6.0 * 10.0, rel=1e-9)
-
-
 def test_the_peaks_that_are_compared_lie_between_the_output_times_too() -> None:
     """As many masses as there are: with the output times far apart both must find the peak of the closed form."""
     net = chain([1.0, 2.0], [1e8])

@@ -99,3 +99,23 @@ def test_a_network_by_modes_is_saved_and_read(tmp_path: Path) -> None:
     small = sw.reduce.simplify(chain(INERTIAS, STIFFNESSES), 4, "c2")
     small.by_modes.save(tmp_path / "modes.toml")
     assert sw.Network.load(tmp_path / "modes.toml").netlist() == small.by_modes.netlist()
+
+
+def test_a_brake_that_locks_a_place_which_all_modes_move_leaves_equations_to_compile() -> None:
+    """Its place is held by the sum of all speeds there. The train, whose brake holds one of them, moves alike."""
+    net = sw.Network("braked")
+    net.add(sw.TorqueSource("motor", tau=sw.Step(9.0) - sw.Step(9.0, start=1.0)), "0")
+    for k, size in enumerate((2.0, 0.2, 0.5, 1.0, 0.3, 3.0)):
+        net.add(sw.Inertia(f"J{k}", J=size), f"{k}")
+    for k, c in enumerate(STIFFNESSES):
+        net.add(sw.Spring(f"c{k}", c=c, d=1e-3 * c), f"{k}", f"{k + 1}")
+    net.add(sw.Brake("brake", tau=30.0, t_on=1.0), "1")
+    small = sw.reduce.simplify(net, len(INERTIAS), "c3")
+    model = small.by_modes.compile()
+    before, after = (each.simulate(2.0, t_eval=2001) for each in (net, model))
+    held = [row.modes for row in after.phases if row.modes["brake"] == "locked"]
+    assert held == [row.modes for row in before.phases if row.modes["brake"] == "locked"]
+    assert held
+    assert model.phases.assembly(("stuck",)).model.rows is not None
+    # two runs of an engine at 1e-8, with the instant of locking found by each
+    assert after["c3.tau"] == pytest.approx(before["c3.tau"], abs=1e-6 * np.abs(before["c3.tau"]).max())

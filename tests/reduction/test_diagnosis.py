@@ -9,7 +9,7 @@ import pytest
 import sympy
 from hypothesis import HealthCheck, given, settings
 
-from shaftwork.components import electrical, loads, machines, rotation, sources, translation  # noqa: F401 - registers all
+from shaftwork.components import bldc, electrical, induction_machine, loads, machines, rotation, sources, translation  # noqa: F401 - registers all
 from shaftwork.components.base import REGISTRY
 from shaftwork.components.laws import Ramp, Step, Table, omega, phi, t
 from shaftwork.core.errors import ParameterError, Problem
@@ -47,6 +47,27 @@ def test_a_sound_network_has_a_graph_a_form_and_no_problems() -> None:
     assert form is not None
     assert form.graph is graph
     assert said == ()
+
+
+WINDINGS = {
+    "BLDCMotor": {"U": 24.0, "R": 0.5, "L": 1e-3, "k": 0.05},
+    "AveragedBLDC": {"U": 24.0, "R": 0.5, "L": 1e-3, "k": 0.05},
+    "InductionMachine": {"U": 400.0, "f": 50.0, "L_m": 0.1, "L_s_sigma": 0.01, "L_r_sigma": 0.01, "R_r": 1.0},
+}
+
+
+@pytest.mark.parametrize("beside", ["nothing", "a damper", "a spring"])
+@pytest.mark.parametrize("kind", WINDINGS)
+def test_a_motor_with_windings_at_a_node_without_inertia_is_one_problem_for_all_of_them(kind: str, beside: str) -> None:
+    others = {
+        "nothing": (),
+        "a damper": (part("Damper", "d", "bare", d=0.1),),
+        "a spring": (part("Spring", "s", "bare", "rotor", c=100.0, d=1.0),),
+    }
+    problem = only(part(kind, "m", "bare", **WINDINGS[kind]), *others[beside])
+    assert (problem.kind, problem.parts, problem.nodes) == ("controlled source", ("m",), ("bare",))
+    assert "the speed of node 'bare', which has no inertia" in problem.message
+    assert problem.hint.startswith("Give the node some inertia")
 
 
 def test_two_speed_sources_on_one_rigid_group_are_named_with_the_gear_between() -> None:

@@ -14,6 +14,7 @@ from sympy.printing.numpy import NumPyPrinter
 from sympy.printing.pycode import PythonCodePrinter
 
 from shaftwork.components.laws import NUMERICAL
+from shaftwork.components.pieces import parts
 from shaftwork.core.errors import CompileError
 
 # Terms are printed as sympy keeps them, the same in every process; to sort them would take longer than the rest.
@@ -174,7 +175,7 @@ def _reading(
     """A printer that knows the symbols of arguments by name, and the lines that read them from lists."""
     known: dict[Symbol, str] = {}
     lines = []
-    used = set[Basic]().union(*(made.free_symbols for made in expressions))
+    used = set(parts(expressions))
     for name, given in arguments.items():
         if isinstance(given, Symbol):
             known[given] = name

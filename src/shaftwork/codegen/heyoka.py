@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from shaftwork.codegen.heyoka_held import HeldParameters
 from shaftwork.components.noise import HeldNoise, SmoothNoise
+from shaftwork.components.pieces import parts
 from shaftwork.core.errors import MissingExtraError
 
 Array = NDArray[np.float64]
@@ -225,7 +226,7 @@ def build(
     from shaftwork.codegen.heyoka_expressions import Translator
 
     rows, guards = _in_pieces(rows), _in_pieces(guards)
-    held = len(set[sympy.Expr]().union(*(row.atoms(sympy.floor, HeldNoise) for row in (*rows, *guards))))
+    held = sum(isinstance(part, sympy.floor | HeldNoise) for part in parts((*rows, *guards)))
     translator = Translator(states, time, parameters, held)
     translated = tuple(translator.expression(row) for row in rows)
     watched = tuple(translator.expression(guard) for guard in guards)
@@ -245,7 +246,8 @@ def build(
 
 def _in_pieces(rows: tuple[sympy.Expr, ...]) -> tuple[sympy.Expr, ...]:
     """Rows with smooth noise written in what is held between whole numbers."""
-    return tuple(row.xreplace({node: node.pieces for node in row.atoms(SmoothNoise)}) for row in rows)
+    noises = {node: node.pieces for node in parts(rows) if isinstance(node, SmoothNoise)}
+    return tuple(row.xreplace(noises) for row in rows) if noises else rows
 
 
 def _go_on(_integrator: Any, _direction: int) -> bool:

@@ -55,9 +55,11 @@ class HeldParameters:
             parameters: (p,) of the program, up to the held ones at least; changed in place.
         """
         values = parameters[self.first : self.first + len(self.functions)]
+        all_timed = all(held.timed for held in self.functions)
         for _ in self.functions:  # one may be an argument of the next
             before = values.copy()
-            at_start, inside = self._arguments(t, x, parameters), self._arguments(middle, x, parameters)
+            inside = self._arguments(middle, x, parameters)
+            at_start = inside if all_timed else self._arguments(t, x, parameters)
             for k, held in enumerate(self.functions):
                 values[k] = held.value(*(inside if held.timed else at_start)[k])
             if np.array_equal(before, values, equal_nan=True):

@@ -12,11 +12,12 @@ import numpy as np
 from shaftwork.codegen.arrays import ArrayProgram, BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.scalar import ScalarProgram
-from shaftwork.components.laws import pieces_degree
+from shaftwork.components.pieces import pieces_degree
 from shaftwork.core.errors import ParameterError
 from shaftwork.network.templates import Kind
+from shaftwork.reduction.blocks import BlockTooLargeError
 from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.rows import BlockTooLargeError, Rows, explicit_rows
+from shaftwork.reduction.rows import Rows, explicit_rows
 
 SCALAR_STATES, SCALAR_BRANCHES = 64, 400
 """Above this many states or branches the unrolled code costs more to make than it saves."""

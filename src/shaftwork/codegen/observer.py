@@ -173,8 +173,11 @@ class ModelObserver:
         kinds = (self._graph.branches[k].template.kind for k in part.branches)
         return any(kind in (Kind.ACROSS_STORE, Kind.THROUGH_STORE) for kind in kinds)
 
+    def _gives_back(self, part: GraphPart) -> bool:
+        return any(self._graph.branches[k].template.conservative for k in part.branches)
+
     def powers(self, t: Array, x: Array) -> tuple[dict[str, Array], dict[str, Array]]:
-        """Lost power and supplied power by part; of sources that have resistors or dampers of their own both."""
+        """Lost and supplied power by part; of weights, and of sources with resistors or dampers of their own, both."""
         history = History(self._bind(), self._instants.one_sided(t), x)
         parts = self._graph.parts
         sources = [part for part in parts if part.component.role == "source"]
@@ -185,6 +188,9 @@ class ModelObserver:
             if Kind.CONDUCTANCE in kinds and len(kinds) > 1:  # a law that is linear in the speed is still a source
                 lost[part.name] = history.heat(part)
                 supplied[part.name] = supplied[part.name] + lost[part.name]
+        for part in (part for part in parts if part not in sources and self._gives_back(part)):
+            supplied[part.name] = -history.lifted(part)
+            lost[part.name] = lost[part.name] + supplied[part.name]
         return lost, supplied
 
     def part(self, name: str) -> Component:

@@ -10,8 +10,10 @@ import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
+from shaftwork.codegen.valueless import without_value
 from shaftwork.components.base import Profile, Signal
 from shaftwork.components.branches import End
+from shaftwork.core.errors import no_value
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart
 from shaftwork.network.templates import BranchTemplate, Kind
 from shaftwork.reduction.form import StateForm
@@ -33,8 +35,14 @@ class History:
 
     @cached_property
     def _inputs(self) -> tuple[Array, Array, Array]:
-        """u, its derivative by time alone, and x', each (., k)."""
+        """u, its derivative by time alone, and x', each (., k).
+
+        Raises:
+            SimulationError: a law has no value.
+        """
         y, u = self.bound.values(self.t, self.x)
+        if np.isnan(u).any() and (law := without_value(self.bound, self.t, self.x.T)) is not None:
+            raise no_value(*law)
         inputs = self.bound.program.inputs
         slopes = inputs.of_time[:, None] * inputs.time_slopes(self.t, y, self.x, self.bound.p)
         return u, slopes, self.bound.rates(self.t, self.x, y, u)
@@ -121,6 +129,11 @@ class History:
         branches = self.form.graph.branches
         templates = ((k, branches[k].template) for k in part.branches)
         return self._power(part, (k for k, t in templates if t.through or (t.kind in kinds and not t.line)))
+
+    def lifted(self, part: GraphPart) -> Array:
+        """(k,) power that the weights of a part take in, W, and give back when they come down."""
+        branches = self.form.graph.branches
+        return self._power(part, (k for k in part.branches if branches[k].template.conservative))
 
     def heat(self, part: GraphPart) -> Array:
         """(k,) power that a part's own dampers and resistors take in, W; the windings of a motor are such."""

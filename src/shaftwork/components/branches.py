@@ -88,12 +88,14 @@ class ThroughStore:
 class ThroughLaw:
     """Through = f(across, integral of across, t): damper, friction, motor curve, load, resistor, source of torque.
 
-    It may read other ports and branches of its part besides, and is then a controlled source.
+    It may read other ports and branches of its part besides, and is then a controlled source. A `conservative` one, as
+    a weight, gives back what it takes: in a part that loses energy its work is supplied, and not lost.
     """
 
     through: Expr
     ends: tuple[End, End] | None = None
     label: str = ""
+    conservative: bool = False
 
 
 @dataclass(frozen=True)

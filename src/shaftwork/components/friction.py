@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any, ClassVar
 
 from sympy import And, Expr, Min, Ne, Not, exp, false, tanh
 
 from shaftwork.components.base import Component, Port, Role, component
+from shaftwork.components.bounds import no_less
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, Branch, End, ThroughLaw, rigid
 from shaftwork.components.laws import t
 from shaftwork.components.modes import ANEW, Leave, Mode, Modes
@@ -23,17 +24,20 @@ ROUNDED = 0.01
 """Speed in rad/s over which friction is rounded where nothing chooses modes, beside shafts of travelling waves."""
 
 
-def rubbing(limit: Any, *, held: str = "stuck", moves: str = "slipping", apart: tuple[Leave, ...] = ()) -> Modes:
+def rubbing(
+    limit: Any, back: Any = None, *, held: str = "stuck", moves: str = "slipping", apart: tuple[Leave, ...] = ()
+) -> Modes:
     """Slipping forward and backward, and stuck until the torque through it exceeds a limit.
 
     Args:
         limit: the torque up to which it holds, N m.
+        back: the same backward, where it is another.
         held: what the mode of rest is called.
         moves: what the modes of motion are called, before "forward" and "backward".
         apart: what else ends each of these modes, where they lead to one that is called "apart".
     """
-    most = limit * GIVES_WAY
-    gives_way = (Leave(THROUGH - most, "forward"), Leave(-THROUGH - most, "backward"))
+    most, least = (size * GIVES_WAY for size in (limit, limit if back is None else back))
+    gives_way = (Leave(THROUGH - most, "forward"), Leave(-THROUGH - least, "backward"))
     return Modes(
         (
             Mode("forward", (Leave(-ACROSS, "stuck"), *apart), 1.0, SLIPPING, ACROSS > 0, f"{moves} forward"),
@@ -45,12 +49,17 @@ def rubbing(limit: Any, *, held: str = "stuck", moves: str = "slipping", apart: 
 
 def rubs(size: Any, p: Any, second: End = "b") -> Iterator[Branch]:
     """The branches of what has the modes of `rubbing`, with a torque of a given size against the motion."""
+    yield from slips(lambda way: way * size, p, second)
+
+
+def slips(torque: Callable[[Any], Expr], p: Any, second: End = "b") -> Iterator[Branch]:
+    """The same for any torque of the way: 1 forward, -1 backward, and between them where friction is rounded."""
     if p.form is None:
-        yield ThroughLaw(size * tanh(ACROSS / ROUNDED))
+        yield ThroughLaw(torque(tanh(ACROSS / ROUNDED)))
     elif p.form == STUCK:
         yield rigid(("a", second))
     else:
-        yield ThroughLaw(p.mode * size)
+        yield ThroughLaw(torque(p.mode))
 
 
 @component
@@ -103,7 +112,7 @@ class Brake(Component):
     Law: on from t_on, or from when `on` rises above zero, to t_off. While slipping the torque is sign(omega) tau, with
     tau constant; rising along a straight line over t_rise; or as tau (1 - exp(-(t - t_on) / t_lag)). While locked
     omega = 0 exactly, and the torque is whatever holds, up to tau in size. Any other course of tau is a law of time,
-    which must not fall below zero: there it would drive. Only a plain number is checked for that.
+    speed or angle; where it falls below zero the torque is zero, max(0, tau), since what rubs cannot drive.
     Modes: released, slipping forward or backward, locked. Source: Marinkovic 2012, (4)-(6).
     """
 
@@ -129,9 +138,10 @@ class Brake(Component):
             raise ParameterError(f"{type(self).__name__} '{self.name}': give t_rise or t_lag, not both.")
 
     def _capacity(self, p: Any) -> Expr:
+        tau = no_less(p, "tau", 0)
         if p.t_rise != 0:
-            return p.tau * Min(1, (t - p.t_on) / p.t_rise)
-        return p.tau if p.t_lag == 0 else p.tau * (1 - exp(-(t - p.t_on) / p.t_lag))
+            return tau * Min(1, (t - p.t_on) / p.t_rise)
+        return tau if p.t_lag == 0 else tau * (1 - exp(-(t - p.t_on) / p.t_lag))
 
     def modes(self, p: Any) -> Iterator[Modes]:
         released, moves, held = self.words

@@ -287,43 +287,6 @@ def switches(expression: sympy.Basic) -> Iterator[tuple[sympy.Expr, Sequence[flo
         yield from ((argument, levels) for argument, levels in switches_of(node) if not _only_steps(argument))
 
 
-def pieces_degree(expression: sympy.Expr) -> int | None:
-    """Degree in `t` of an expression between its breakpoints: 0 constant, 1 linear, None anything else.
-
-    Every symbol other than `t` counts as a constant.
-    """
-    degree = _degree(expression)
-    return int(degree) if degree <= 1 else None
-
-
-def _degree(expression: sympy.Expr) -> float:
-    """Degree in t between breakpoints; infinite where the expression is no polynomial there."""
-    if t not in expression.free_symbols:
-        return 0
-    if t not in between_steps(expression):
-        return 0 if all(line(step.args[0]) is not None for step in expression.atoms(sympy.floor)) else math.inf
-    if any(line(argument) is None for argument, _ in switches_of(expression)):
-        return math.inf
-    match expression:
-        case sympy.Symbol():
-            return 1
-        case sympy.Add() | sympy.Max() | sympy.Min():
-            return max(_degree(argument) for argument in expression.args)
-        case sympy.Mul():
-            return sum(_degree(factor) for factor in expression.args)
-        case sympy.Pow(exp=sympy.Integer(is_positive=True) as exponent):
-            return _degree(expression.base) * int(exponent)
-        case sympy.Piecewise():
-            relations = [relation for _, condition in expression.args for relation in condition.atoms(Relational)]
-            located = all(line(relation.lhs - relation.rhs) is not None for relation in relations)
-            return max(_degree(value) for value, _ in expression.args) if located else math.inf
-        case sympy.Heaviside() | sympy.sign() | InterpolationSlope():
-            return 0
-        case sympy.Abs() | Interpolation():
-            return 1
-    return math.inf
-
-
 def switches_of(node: sympy.Basic) -> Iterable[tuple[sympy.Expr, Sequence[float]]]:
     """Arguments of a node and the levels at which the node is not smooth in them."""
     match node:
@@ -363,10 +326,10 @@ def _only_steps(argument: sympy.Expr) -> bool:
 
 def line(expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr] | None:
     """Slope and offset of an expression that is linear in t, else None."""
-    polynomial = expression.as_poly(t)
-    if polynomial is None or polynomial.degree() > 1:
+    still, moving = expression.as_independent(t, as_Add=True)  # no polynomial need expand what is still
+    if (polynomial := moving.as_poly(t)) is None or polynomial.degree() > 1:
         return None
-    return polynomial.coeff_monomial(t), polynomial.coeff_monomial(1)
+    return polynomial.coeff_monomial(t), still + polynomial.coeff_monomial(1)
 
 
 def _latex_call(name: str, node: _TableFunction, printer: Any, exponent: str | None) -> str:

@@ -11,7 +11,7 @@ from sympy import Abs, Expr, Float, Integer, Max, Symbol, cos, pi, sin, tanh
 
 from shaftwork.components.base import Component, Derived, Port, Role, component
 from shaftwork.components.branches import ACROSS, THROUGH, Branch, ThroughLaw
-from shaftwork.components.friction import rubbing, rubs
+from shaftwork.components.friction import rubbing, rubs, slips
 from shaftwork.components.laws import t
 from shaftwork.components.modes import Leave, Modes
 from shaftwork.components.noise import HeldNoise, SmoothNoise
@@ -38,27 +38,35 @@ class Resistance(Component):
     role: ClassVar[Role] = "loss"
     ports: ClassVar = (Port("a"),)
 
-    def against(self, p: Any) -> Expr:
-        """The size of the torque against the motion, in parameters and time."""
+    def against(self, p: Any, way: Any) -> Expr:
+        """The torque against the motion, in parameters and time; `way` is 1 forward, -1 backward, 0 at rest."""
         raise NotImplementedError
+
+    def weight(self, p: Any) -> Expr:  # noqa: ARG002
+        """The torque of what is lifted, in parameters; by default nothing is."""
+        return Integer(0)
 
     def besides(self, p: Any) -> Expr:  # noqa: ARG002
         """What the load takes besides, in parameters and speed; by default nothing."""
         return Integer(0)
 
     def modes(self, p: Any) -> Iterator[Modes]:
-        size, besides = self.against(p), self.besides(p).subs(ACROSS, 0)
-        if p.omega_s == 0 and size != 0:
-            letters = {Symbol(made.name, real=True): made.law for made in self.derived(p)}
-            yield _loaded(rubbing(size.xreplace(letters)), besides.xreplace(letters))
+        if p.omega_s != 0 or self.against(p, 1) == 0:
+            return
+        letters = {Symbol(made.name, real=True): made.law for made in self.derived(p)}
+        ahead, back = (way * self.against(p, way) for way in (1, -1))
+        others = self.weight(p) + self.besides(p).subs(ACROSS, 0)
+        yield _loaded(rubbing(ahead.xreplace(letters), back.xreplace(letters)), others.xreplace(letters))
 
     def branches(self, p: Any) -> Iterator[Branch]:
-        size, besides = self.against(p), self.besides(p)
-        yield ThroughLaw(besides)
-        if size != 0 and p.omega_s == 0:
-            yield from rubs(size, p, None)
-        elif size != 0:
-            yield ThroughLaw(size * tanh(ACROSS / p.omega_s))
+        yield ThroughLaw(self.weight(p), conservative=True)
+        yield ThroughLaw(self.besides(p))
+        if self.against(p, 1) == 0:
+            return
+        if p.omega_s == 0:
+            yield from slips(lambda way: self.against(p, way), p, None)
+        else:
+            yield ThroughLaw(self.against(p, tanh(ACROSS / p.omega_s)))
 
 
 def _loaded(modes: Modes, besides: Expr) -> Modes:
@@ -131,8 +139,8 @@ class CraneTravel(Resistance):
         size = p.m * GRAVITY * (p.w + p.kappa) * p.diameter / 2
         yield Derived("tau_w", size, "N*m", "travel resistance", r"\tau_w")
 
-    def against(self, p: Any) -> Expr:
-        return p.tau_w
+    def against(self, p: Any, way: Any) -> Expr:
+        return way * p.tau_w
 
     @staticmethod
     def wheel_friction(diameter: float, lever_arm: float, bearing_friction: float, bearing_diameter: float) -> float:
@@ -159,9 +167,12 @@ class CraneTravel(Resistance):
 class Hoist(Resistance):
     """A load that hangs on the rope of a drum, behind a gear: it pulls downwards whichever way it moves.
 
-    Law: torque on the node -tau_h / efficiency while it is hoisted, -efficiency tau_h while it is lowered, with
-    tau_h = m g radius / ratio: the mean of the two always, and half their difference against the motion. A positive
-    speed hoists. The efficiency holds for the weight; that of accelerating the load is left out, and its mass is no
+    Law: torque on the node -tau_h / efficiency while it is hoisted, -efficiency tau_h while it is lowered, and whatever
+    holds between the two at rest, with tau_h = m g radius / ratio: the weight always, and besides a friction against
+    the motion, which takes (1 / efficiency - 1) tau_h upwards and (1 - efficiency) tau_h downwards. With omega_s it is
+    -tau_h efficiency^(-tanh(omega / omega_s)). A positive speed hoists. A locked brake before it in the network holds
+    tau_h, one behind it efficiency tau_h. The friction alone is lost; the weight's work is supplied, and negative while
+    it is hoisted. The efficiency holds for the weight; that of accelerating the load is left out, and its mass is no
     part of it: give the node an Inertia of m (radius / ratio)^2.
     """
 
@@ -174,11 +185,11 @@ class Hoist(Resistance):
     def derived(self, p: Any) -> Iterator[Derived]:
         yield Derived("tau_h", p.m * GRAVITY * p.radius / p.ratio, "N*m", "weight at the shaft", r"\tau_h")
 
-    def against(self, p: Any) -> Expr:
-        return p.tau_h * (1 / p.efficiency - p.efficiency) / 2
+    def against(self, p: Any, way: Any) -> Expr:
+        return p.tau_h * (p.efficiency**-way - 1)
 
-    def besides(self, p: Any) -> Expr:
-        return p.tau_h * (1 / p.efficiency + p.efficiency) / 2
+    def weight(self, p: Any) -> Expr:
+        return p.tau_h
 
 
 def _rising(p: Any) -> Expr:
@@ -199,8 +210,8 @@ class FanLoad(Resistance):
     static: float = parameter("1", "share of friction in it", at_least=0, at_most=1, default=0.0, latex=r"\sigma")
     omega_s: float = rounding()
 
-    def against(self, p: Any) -> Expr:
-        return p.static * p.tau_n
+    def against(self, p: Any, way: Any) -> Expr:
+        return way * p.static * p.tau_n
 
     def besides(self, p: Any) -> Expr:
         return _rising(p)
@@ -219,8 +230,8 @@ class PumpLoad(Resistance):
     static: float = parameter("1", "share of the height in it", at_least=0, at_most=1, default=0.5, latex=r"\sigma")
     omega_s: float = rounding()
 
-    def against(self, p: Any) -> Expr:
-        return p.static * p.tau_n
+    def against(self, p: Any, way: Any) -> Expr:
+        return way * p.static * p.tau_n
 
     def besides(self, p: Any) -> Expr:
         return _rising(p)
@@ -231,8 +242,9 @@ class Conveyor(Resistance):
     """A belt that carries a mass up or along: its weight, friction against the motion, and drag that rises with speed.
 
     Law: torque on the node -radius (m g sin(incline) + friction m g cos(incline) sign(omega)
-    + d radius omega). A positive speed carries upwards where the incline is positive. The mass itself is no part of it:
-    give the node an Inertia of m radius^2.
+    + d radius omega). A positive speed carries upwards where the incline is positive. Friction and drag are lost; the
+    weight's work is supplied, and negative upwards. The mass itself is no part of it: give the node an Inertia of
+    m radius^2.
     """
 
     m: float = parameter("kg", "mass on the belt and of the belt", at_least=0)
@@ -242,11 +254,14 @@ class Conveyor(Resistance):
     d: float = parameter("N*s/m", "drag per belt speed", at_least=0, default=0.0)
     omega_s: float = rounding()
 
-    def against(self, p: Any) -> Expr:
-        return p.friction * p.m * GRAVITY * p.radius * cos(p.incline)
+    def against(self, p: Any, way: Any) -> Expr:
+        return way * p.friction * p.m * GRAVITY * p.radius * cos(p.incline)
+
+    def weight(self, p: Any) -> Expr:
+        return p.m * GRAVITY * p.radius * sin(p.incline)
 
     def besides(self, p: Any) -> Expr:
-        return p.m * GRAVITY * p.radius * sin(p.incline) + p.d * p.radius**2 * ACROSS
+        return p.d * p.radius**2 * ACROSS
 
 
 class NoiseKind(Enum):
@@ -288,6 +303,6 @@ class RandomLoad(Resistance):
     kind: NoiseKind | str = parameter("1", "held or band-limited", default=NoiseKind.HELD, record=NoiseKind)
     omega_s: float = rounding()
 
-    def against(self, p: Any) -> Expr:
+    def against(self, p: Any, way: Any) -> Expr:
         noise = HeldNoise if p.kind is NoiseKind.HELD else SmoothNoise
-        return Max(0, p.mean + p.std * noise(t / p.interval, p.seed)) if p.std != 0 else p.mean
+        return way * (Max(0, p.mean + p.std * noise(t / p.interval, p.seed)) if p.std != 0 else p.mean)

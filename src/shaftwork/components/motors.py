@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 from sympy import Expr, Piecewise, pi
 
 from shaftwork.components.base import Component, Derived, Port, Role, component
+from shaftwork.components.bounds import no_less
 from shaftwork.components.branches import ACROSS, Branch, ThroughLaw
 from shaftwork.components.laws import Interpolation, Table
 from shaftwork.components.switching import number_of, off_time, on_time, refuse_no_time_on, while_on
@@ -79,14 +80,17 @@ class WoundRotorMotor(Component):
 
     Law: Kloss' tau = ratio efficiency 2 tau_k s S / (s^2 + S^2), with the slip s = 1 - ratio omega / (2 pi n_sync / 60)
     and S = s_k r, r the resistance of the rotor circuit over that of the rotor alone, a law of time or of speed:
-    resistance moves the pull-out point and keeps the pull-out torque.
+    resistance moves the pull-out point and keeps the pull-out torque. Where the law falls below 1 the slip rings are
+    closed and r = 1.
     Analogue: a voltage-controlled current source. Source: Marinkovic 2012, (2), (18).
     """
 
     tau_k: float = parameter("N*m", "pull-out torque at the motor shaft", above=0, latex=r"\tau_k")
     s_k: float = parameter("1", "slip at the pull-out torque with slip rings closed", above=0)
     n_sync: float = parameter("1/min", "synchronous speed", above=0, latex=r"n_{sync}")
-    resistance: Any = parameter("1", "resistance of the rotor circuit over that of the rotor", law=True, latex="r")
+    resistance: Any = parameter(
+        "1", "resistance of the rotor circuit over that of the rotor", at_least=1, law=True, latex="r"
+    )
     ratio: float = parameter("1", "motor speed over node speed", nonzero=True, default=1.0, latex="i")
     efficiency: float = parameter("1", "efficiency of the gear", above=0, at_most=1, default=1.0, latex=r"\eta")
     t_on: float | None = on_time()
@@ -100,7 +104,9 @@ class WoundRotorMotor(Component):
 
     def branches(self, p: Any) -> Iterator[Branch]:
         slip = 1 - p.ratio * ACROSS / (2 * pi * p.n_sync / 60)
-        yield ThroughLaw(-while_on(p.ratio * p.efficiency * kloss(p.tau_k, slip, p.s_k * p.resistance), p))
+        yield ThroughLaw(
+            -while_on(p.ratio * p.efficiency * kloss(p.tau_k, slip, p.s_k * no_less(p, "resistance", 1)), p)
+        )
 
 
 @component

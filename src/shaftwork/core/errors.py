@@ -70,6 +70,19 @@ class SimulationError(ShaftworkError, RuntimeError):
     """An integration failed: says when, in which state and why."""
 
 
+def no_value(t: float, law: str) -> SimulationError:
+    """The error of a law that has no real value at a time in s of a motion.
+
+    Args:
+        t: s.
+        law: in words, "tau = sqrt(1 - t) of TorqueSource 'pull'".
+    """
+    return SimulationError(
+        f"At t = {t:.9g} s {law} has no real value. Give a law that has one at all times, speeds and angles of the "
+        "motion: a root or a logarithm of Max(0, ...), a power of Abs(...), a Piecewise that ends with True."
+    )
+
+
 class MissingExtraError(ShaftworkError, ImportError):
     """An optional library is needed; the message names the extra that brings it."""
 

@@ -153,7 +153,8 @@ class Assembly:
 
     def referred(self, row: Mapping[int, Number]) -> tuple[tuple[int, Expr], ...]:
         """A sum of tree branches as pairs of branch and factor, without couplings."""
-        return tuple((tree, simplified(gain)) for tree, gain in row.items() if self.kind(tree) is not Kind.COUPLING)
+        trees = [tree for tree in row if self.kind(tree) is not Kind.COUPLING]
+        return tuple(zip(trees, simplified(row[tree] for tree in trees), strict=True))
 
     def around(self, link: int, without: Kind | None = None) -> Terms:
         """The across variables in a link's loop, but for those of a kind."""
@@ -214,10 +215,11 @@ class Assembly:
     @cached_property
     def cutsets(self) -> dict[int, tuple[tuple[int, Expr], ...]]:
         """For each tree branch the links of its cutset with their factors, in the order of the branch table."""
-        found: dict[int, list[tuple[int, Expr]]] = {}
-        for link in sorted(self.form.tree.cutsets):
-            for tree, gain in self.form.tree.cutsets[link].items():
-                found.setdefault(tree, []).append((link, simplified(gain)))
+        rows, found = sorted(self.form.tree.cutsets.items()), dict[int, list[tuple[int, Expr]]]()
+        gains = iter(simplified(gain for _, row in rows for gain in row.values()))
+        for link, row in rows:
+            for tree in row:
+                found.setdefault(tree, []).append((link, next(gains)))
         return {tree: tuple(members) for tree, members in found.items()}
 
     @cached_property

@@ -164,6 +164,16 @@ class Lagrangian:
 
         return body(self, values=values)
 
+    def document(self, *, values: bool = False) -> str:
+        """A complete LaTeX document: energies, generalised forces and equations, and the nomenclature with the values.
+
+        Args:
+            values: print the parameters' values instead of their symbols.
+        """
+        from shaftwork.equations.lagrange_print import document
+
+        return document(self, values=values)
+
     def _repr_latex_(self) -> str:
         from shaftwork.equations.lagrange_print import notebook
 

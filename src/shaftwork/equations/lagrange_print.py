@@ -10,9 +10,10 @@ from sympy import Integer
 
 from shaftwork.equations.assembly import Group, Sides, sides, terms_of
 from shaftwork.equations.blocks import Block, Blocks
+from shaftwork.equations.nomenclature import nomenclature, unit
 from shaftwork.equations.printing import Line
 from shaftwork.equations.quantities import rate_of
-from shaftwork.equations.report import rendered, typeset
+from shaftwork.equations.report import in_sections, rendered, section, typeset
 from shaftwork.equations.sums import Sums
 
 if TYPE_CHECKING:  # the record prints itself through this module
@@ -30,6 +31,36 @@ def body(lagrangian: Lagrangian, *, values: bool = False) -> str:
 def notebook(lagrangian: Lagrangian) -> str:
     """The body with headings that a notebook renders."""
     return rendered(lagrangian.kirchhoff, _blocks(lagrangian, values=False))
+
+
+def document(lagrangian: Lagrangian, *, values: bool = False) -> str:
+    """A LaTeX document that compiles as it is."""
+    made, coordinates = lagrangian, {symbol.name: "coordinate" for symbol in lagrangian.coordinates}
+    energies = {
+        KINETIC: ("kinetic energy", "J", made.inertias),
+        POTENTIAL: ("potential energy", "J", made.springs),
+        LOSS: ("Rayleigh's function, half of the power lost", "W", made.dampers),
+    }
+    besides = [(f"${letter}$", of, "--", unit(size)) for letter, (of, size, squares) in energies.items() if squares]
+    sections = {
+        "Lagrange's equations": section(_blocks(made, values=values)),
+        "Nomenclature": nomenclature(made.kirchhoff, _names(made) | coordinates.keys(), coordinates, besides),
+    }
+    return in_sections(made.kirchhoff, sections)
+
+
+def _names(lagrangian: Lagrangian) -> set[str]:
+    """The names of all symbols in the equations; of a rate, of that of which it is the rate as well."""
+    rows = (*lagrangian.equations, *lagrangian.constraints)
+    positions = {rate_of(symbol): symbol for symbol in (*lagrangian.motion, *lagrangian.prescribed)}
+    quantities = lagrangian.kirchhoff.assembly.quantities
+    angles = {quantities.angle(number) for number in range(len(quantities.graph.nodes))}
+    found = {symbol for row in rows for symbol in row.left.free_symbols | row.right.free_symbols}
+    for symbol, law in (*lagrangian.laws.items(), *lagrangian.prescribed.items()):
+        found |= {symbol, *law.free_symbols}
+    for symbol in angles & lagrangian.motion.keys():
+        found |= {symbol, *lagrangian.motion[symbol].free_symbols}
+    return {symbol.name for symbol in found | {positions[rate] for rate in found & positions.keys()}}
 
 
 def _blocks(lagrangian: Lagrangian, *, values: bool) -> tuple[Block, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from shaftwork.equations.notation import INDEX_CLOSES, INDEX_OPENS, Letter, split_index, without_marks
@@ -18,13 +18,20 @@ UNITS = {"1": "--", "ohm": r"$\Omega$"}
 Cells = tuple[str, ...]
 
 
-def nomenclature(equations: Equations) -> str:
-    """The table of the variables that the equations contain, and that of the parameters."""
+def nomenclature(
+    equations: Equations, used: Container[str], noted: Mapping[str, str], besides: Sequence[Cells] = ()
+) -> str:
+    """The table of the variables that equations contain, and that of the parameters.
+
+    Args:
+        equations: what knows all letters.
+        used: names of the variables.
+        noted: what some of them are besides, as "state", by name.
+        besides: rows before them, of quantities that belong to no part.
+    """
     names, values = equations.symbol_names, equations.values
-    states = {state.name for state in equations.form.states}
-    used = states | {symbol.name for row in equations.rows for symbol in row.left.free_symbols | row.right.free_symbols}
     variables = [
-        (_formula(names[letter.name]), _meaning(letter, states), _owner(letter), unit(letter.unit))
+        (_formula(names[letter.name]), _meaning(letter, noted), _owner(letter), unit(letter.unit))
         for letter in equations.letters
         if not letter.parameter and letter.name in used
     ]
@@ -40,7 +47,7 @@ def nomenclature(equations: Equations) -> str:
         if letter.parameter
     ]
     tables = (
-        table(_columns(48, 40, 38, 21), ("Variable", "Meaning", "Of", "Unit"), variables),
+        table(_columns(48, 40, 38, 21), ("Variable", "Meaning", "Of", "Unit"), (*besides, *variables)),
         table(_columns(34, 38, 30, 21, 20), ("Parameter", "Meaning", "Of", "Value", "Unit"), parameters),
     )
     return "\n".join(filter(None, tables))
@@ -50,20 +57,28 @@ def _formula(latex: str) -> str:
     return f"${latex}$"
 
 
-def _meaning(letter: Letter, states: set[str]) -> str:
-    return in_text(f"{letter.meaning} (state)" if letter.name in states else letter.meaning)
+def _meaning(letter: Letter, noted: Mapping[str, str]) -> str:
+    return in_text(f"{letter.meaning} ({noted[letter.name]})" if letter.name in noted else letter.meaning)
 
 
 def _owner(letter: Letter) -> str:
-    """The name of a part, which may be broken after an underscore."""
     stem, index = split_index(letter.owner)
-    text = r"\allowbreak ".join(map(in_text, re.findall("[^_]*_|[^_]+", stem)))
+    text = breakable(stem)
     return f"{text}{INDEX_OPENS}{index}{INDEX_CLOSES}" if index else text
 
 
+def breakable(name: str) -> str:
+    """The name of a part, which may be broken after an underscore."""
+    return r"\allowbreak ".join(map(in_text, re.findall("[^_]*_|[^_]+", name)))
+
+
+def column(width: int) -> str:
+    """A column of a fixed width in millimetres: LaTeX needs a second run to know the widths of others."""
+    return rf">{{\raggedright\arraybackslash}}p{{{width}mm}}"
+
+
 def _columns(*widths: int) -> str:
-    """Columns of fixed widths in millimetres: LaTeX needs a second run to know the widths of others."""
-    return "".join(rf">{{\raggedright\arraybackslash}}p{{{width}mm}}" for width in widths)
+    return "".join(map(column, widths))
 
 
 def unit(text: str) -> str:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from sympy import Expr, Float, Heaviside, Integer, Piecewise, Pow, Symbol
+from sympy import Expr, Float, Heaviside, Integer, Piecewise, Pow, Symbol, true
 from sympy.printing.latex import LatexPrinter
 
 from shaftwork.components.laws import t as TIME
@@ -17,6 +18,8 @@ LINE_WIDTH = 76
 """Characters of ordinary width that fit on a printed line beside its left side."""
 WIDEST_PIECE = 60
 """A product with a sum that is wider may be broken inside the sum: some room is left for left sides."""
+WIDEST_CASE = 36
+"""A sum that is wider is broken within the row of its case: there are the left side and the condition beside it."""
 DIGITS = 6
 """Significant digits of numbers in equations."""
 OPENS, CLOSES = "\ue002", "\ue003"
@@ -52,6 +55,29 @@ class _Printer(LatexPrinter):  # type: ignore[misc]
 
     def _print_Float(self, number: Float) -> str:
         return printed_number(float(number))
+
+    def _print_Piecewise(self, cases: Piecewise) -> str:
+        """One case a row, and a sum that is wider than that in several."""
+        rows = [
+            f"{self._case(value)} & "
+            + (r"\text{otherwise}" if holds == true else rf"\text{{for}}\: {self._print(holds)}")
+            for value, holds in cases.args
+        ]
+        return r"\begin{cases} " + r" \\".join(rows) + r" \end{cases}"
+
+    def _case(self, value: Expr) -> str:
+        whole = str(self._print(value))
+        if printed_width(whole) <= WIDEST_CASE or not value.is_Add:
+            return whole
+        rows, used = list[str](), math.inf
+        for term in self._as_ordered_terms(value):
+            text = str(self._print(term))
+            text = f"- {text[1:].lstrip()}" if text.startswith("-") else f"+ {text}" if rows else text
+            if used + (width := printed_width(text)) > WIDEST_CASE:
+                rows, used = [*rows, text], width
+            else:
+                rows[-1], used = f"{rows[-1]} {text}", used + width
+        return r"\begin{array}{@{}l@{}} " + r" \\ ".join(rows) + r" \end{array}"
 
     def _print_Heaviside(self, step: Heaviside, exp: str | None = None) -> str:
         """The unit step, whatever its value at the step is."""
@@ -195,16 +221,18 @@ def _rounded(expression: Expr) -> Expr:
 def aligned(lines: Sequence[Line]) -> str:
     """Lines as the rows of an aligned block, broken where they are too long for the page."""
     widths = [printed_width(line.left) for line in lines]
-    beside = max((width for width in widths if 2 * width <= LINE_WIDTH), default=0.0)
-    broken = [_broken(line, beside) for line in lines]
+    own = max((width for width in widths if 2 * width > LINE_WIDTH), default=0.0)
+    most = min(LINE_WIDTH / 2, LINE_WIDTH - own if own < LINE_WIDTH else math.inf)  # a row of its own begins beside it
+    beside = max((width for width in widths if width <= most), default=0.0)
+    broken = [_broken(line, beside, most) for line in lines]
     rows = [" \\\\\n".join(rows) + (r" \\[1ex]" if len(rows) > 1 else r" \\") for rows in broken]
     return "\n".join(rows).removesuffix("[1ex]").removesuffix(r" \\")
 
 
-def _broken(line: Line, beside: float) -> list[str]:
+def _broken(line: Line, beside: float, most: float) -> list[str]:
     """The rows of a line, each with as many pieces as there is room for beside the left sides."""
-    if 2 * printed_width(line.left) > LINE_WIDTH:  # a left side of its own row
-        below = (row.partition("&")[2] for row in _broken(replace(line, left=""), beside))
+    if printed_width(line.left) > most:  # a left side of its own row
+        below = (row.partition("&")[2] for row in _broken(replace(line, left=""), beside, most))
         return [f"& {line.left}", *(rf"&\qquad {row}" for row in below)]
     room = LINE_WIDTH - beside
     rows: list[list[str]] = [[]]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from shaftwork.core.errors import CompileError, ShaftworkError
@@ -91,15 +91,22 @@ def _content(block: Block) -> str:
 def document(equations: Equations, *, values: bool = False) -> str:
     """A LaTeX document that compiles as it is."""
     blocks = Blocks(equations, values)
+    states = {state.name: "state" for state in equations.form.states}
+    found = {symbol.name for row in equations.rows for symbol in row.left.free_symbols | row.right.free_symbols}
     sections = {
-        "Phase": in_text(equations.phase),
-        "Kirchhoff's equations": _section((*blocks.kirchhoff(), blocks.derived())),
-        "State form": _section(blocks.state(laws=False)),
+        "Kirchhoff's equations": section((*blocks.kirchhoff(), blocks.derived())),
+        "State form": section(blocks.state(laws=False)),
         "Second-order form": _second_order(blocks),
-        "Nomenclature": nomenclature(equations),
-        "Remarks": "\n\n".join(in_text(note) for note in equations.notes),
+        "Nomenclature": nomenclature(equations, found | states.keys(), states),
     }
-    kept = (f"\\section{{{title}}}\n{text}" for title, text in sections.items() if text)
+    return in_sections(equations, sections)
+
+
+def in_sections(equations: Equations, sections: Mapping[str, str]) -> str:
+    """A LaTeX document of sections that say anything, after the phase and before remarks."""
+    remarks = "\n\n".join(in_text(note) for note in equations.notes)
+    whole = {"Phase": in_text(equations.phase), **sections, "Remarks": remarks}
+    kept = (f"\\section{{{title}}}\n{text}" for title, text in whole.items() if text)
     title = in_text(equations.form.graph.name)
     return "\n".join((PREAMBLE, f"\\title{{{title}}}", BEGIN, *kept, r"\end{document}", ""))
 
@@ -107,10 +114,11 @@ def document(equations: Equations, *, values: bool = False) -> str:
 def _second_order(blocks: Blocks) -> str:
     """The second-order form, or why there is none."""
     try:
-        return _section(blocks.second_order())
+        return section(blocks.second_order())
     except CompileError as reason:
         return in_text(str(reason))
 
 
-def _section(blocks: Iterable[Block]) -> str:
+def section(blocks: Iterable[Block]) -> str:
+    """Blocks that say anything, each under a paragraph heading."""
     return "\n".join(_paragraph(block) for block in blocks if block.lines)

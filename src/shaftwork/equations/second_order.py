@@ -162,8 +162,9 @@ class _Writer:
         """The position across a branch: factors of coordinates by place, and of prescribed positions by branch."""
         made = self.graph.branches[branch]
         row = self.positions.reduce(column_of(self.graph, made))
-        own = {self.place[key]: simplified(gain) for key, gain in sorted(row.items()) if key >= 0}
-        return own, {~key: simplified(gain) for key, gain in sorted(row.items()) if key < 0}
+        factors = dict(zip(sorted(row), simplified(row[key] for key in sorted(row)), strict=True))
+        own = {self.place[key]: factor for key, factor in factors.items() if key >= 0}
+        return own, {~key: factor for key, factor in factors.items() if key < 0}
 
     def _add_linear(self, branch: int, kind: Kind, coefficient: Expr) -> None:
         """Add coefficient * f f' for an inertia, a damping or a stiffness; what a prescribed motion asks goes to T."""

@@ -110,6 +110,11 @@ def is_stiff(problem: Problem) -> bool:
     return _stiff(problem, compiled=False) is not None
 
 
+def patience(problem: Problem) -> int:
+    """Steps of heyoka that cost as much as a transient of an implicit engine: a stiff phase may be over by then."""
+    return int(TRANSIENT_STEPS * CVODE_STEP / (HEYOKA_STEP_PER_STATE * problem.x0.size))
+
+
 def available(name: str) -> bool:
     """Whether the engine of this name can be used here."""
     return ENGINES[name].installed

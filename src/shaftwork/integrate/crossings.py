@@ -32,6 +32,14 @@ ATTEMPTS = 4
 RESTING, LEFT = 50, 10.0
 
 
+def tolerance(problem: Problem | DaeProblem, x: Array) -> Array:
+    """How far the tolerance moves states (..., n): to both sides, and not alike."""
+    places = np.arange(x.shape[-1]) * np.sqrt(2.0) % 1.0
+    # of different sizes, lest the tolerances of two ends cancel in the twist between them
+    ways = (0.5 + places) * np.where(places * 16 % 2 < 1, 1.0, -1.0)
+    return np.asarray((problem.atol + problem.rtol * np.abs(x)) * ways)
+
+
 class Crossings:
     """Tells where the steps of a piece have to end because a law switches with the motion.
 
@@ -102,9 +110,7 @@ class Crossings:
 
     def _band(self, t: float, x: Array, values: Array) -> Array:
         """How far (m,) the tolerance of the states moves the switches: nearer to zero they have no side."""
-        places = np.arange(x.size) * np.sqrt(2.0) % 1.0
-        # of different sizes, lest the tolerances of two ends cancel in the twist between them
-        moved = self._scale(x) * (0.5 + places) * np.where(places * 16 % 2 < 1, 1.0, -1.0)
+        moved = tolerance(self._problem, x)
         return np.asarray(np.abs(self._values(np.array([t]), (x + moved)[None, :])[0] - values))
 
     def _longest(self, look: Look, row: int) -> float:

@@ -7,15 +7,19 @@ from collections.abc import Callable
 import numpy as np
 from scipy.optimize import brentq
 
-from shaftwork.integrate.crossings import FIRST, LOOKS, Look
+from shaftwork.core.errors import no_value
+from shaftwork.integrate.crossings import FIRST, LOOKS, Look, tolerance
 from shaftwork.integrate.problem import Array, DaeProblem, Problem
 
 Dense = Callable[[Array], Array]
 
+# What the tolerance moves a guard, as part of its course in a run of a few steps, may be no more.
+KNOWN, BRIEF = 1e-5, 100
+
 # No step is shorter than so many rounding units of the time.
 CLEARANCE = 8
 # A step that meets a guard is looked at in panels that are halved towards it, so many times; Gauss' nodes in each.
-PANELS, NODES = 14, 4
+PANELS, (NODES, WEIGHTS) = 14, np.polynomial.legendre.leggauss(4)
 # By so many tolerances what the equations say along it may differ from what it has found.
 APART = 100.0
 # One that does not is made again in so many steps, unless it is shorter than this part of the whole run.
@@ -50,14 +54,19 @@ class GuardWatch:
             end: of the step, s.
             y: (n,) state there.
             dense: its dense output, times (k,) to states (k, n).
+
+        Raises:
+            SimulationError: a guard has no value there.
         """
         if not self._columns.size:
             return None
-        look = Look(self._values, np.array([start, end]), np.vstack([x, y]), dense, -np.ones(self._columns.size))
-        look.add(start + FIRST * (end - start))
+        first = start + FIRST * (end - start)
+        times, states = np.array([start, *first, end]), np.vstack([x, dense(first), y])
+        look = Look(self._values, times, states, dense, -np.ones(self._columns.size))
         if look.is_far() and (look.values[0] < 0).all():
             return None
         look.add(start + LOOKS * (end - start))
+        self._refuse_none(look)
         if (look.values[0] >= 0).any():  # what is above zero by rounding may fall and rise again ere the first look
             look.add(start + NEARER * (look.times[1] - start))
         noise = np.maximum(look.values[0], 0.0) + self._offsets
@@ -85,16 +94,26 @@ class GuardWatch:
         """
         if isinstance(self._problem, DaeProblem):
             return True
-        nodes, weights = np.polynomial.legendre.leggauss(NODES)
         edges = end - (end - start) * np.append(0.5 ** np.arange(PANELS), 0.0)
         half = np.diff(edges)[:, None] / 2
-        times = (edges[:-1, None] + half * (nodes + 1)).ravel()
+        times = (edges[:-1, None] + half * (NODES + 1)).ravel()
         states = dense(times)
         pairs = zip(np.clip(times, self._low, self._high).tolist(), states, strict=True)
         rates = np.array([self._problem.rhs(t, y) for t, y in pairs])
-        wanted, found = (half * weights).ravel() @ rates, dense(np.array([end]))[0] - x
+        wanted, found = (half * WEIGHTS).ravel() @ rates, dense(np.array([end]))[0] - x
         size = self._problem.rtol * np.abs(states).max(axis=0) + self._problem.atol
         return bool((np.abs(wanted - found) <= APART * size).all())
+
+    def _refuse_none(self, look: Look) -> None:
+        """Refuse a guard that has no value in a step: nobody can tell whether it is met.
+
+        Raises:
+            SimulationError: names the law in it.
+        """
+        if np.isnan(look.values).any() and self._problem.explain is not None:
+            law = self._problem.explain(look.times, look.states)
+            if law is not None:
+                raise no_value(*law)
 
     def _values(self, times: Array, states: Array) -> Array:
         assert self._guards is not None  # noqa: S101 (asked only then)
@@ -121,3 +140,21 @@ class GuardWatch:
         if value(look.times[before]) * value(look.times[row]) > 0:  # an end that is rounding away from the dense output
             return float(look.times[row])
         return float(brentq(value, look.times[before], look.times[row], xtol=float(np.spacing(look.times[-1]))))
+
+
+def share_of_tolerance(problem: Problem | DaeProblem, times: Array, states: Array) -> float:
+    """The part of its tolerance with which a brief run knows the courses of all guards; 1 where it does now.
+
+    Args:
+        problem: what was solved.
+        times: (k,) ends of the steps, s.
+        states: (k, n) then.
+    """
+    guards = problem.guards
+    if guards is None or times.size > BRIEF:
+        return 1.0
+    moved = states[-1:] + tolerance(problem, states[-1:])
+    values = guards.values(np.append(times, times[-1]), np.vstack([states, moved]))
+    bands, courses = np.abs(values[-1] - values[-2]), np.abs(values[:-1]).max(axis=0)
+    goes = (guards.sides != 0) & (courses > 0) & (bands > 0)
+    return float(np.min(KNOWN * courses[goes] / bands[goes], initial=1.0))

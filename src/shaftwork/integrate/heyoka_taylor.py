@@ -29,6 +29,8 @@ Advance = Callable[[Any, Watch | None, int, float], tuple[Any, str, int]]
 GUARD = "guard"
 # Output times that heyoka is given at once where a guard is likely to be met before the last of them.
 CHUNK = 32
+# What is the least that rounding moves a guard of size 1.
+ROUNDING = 8 * float(np.finfo(float).eps)
 # heyoka's outcomes proper are below this number; those above are events that have ended a run.
 FIRST_OUTCOME = -(2**32)
 
@@ -88,6 +90,8 @@ class _Run:
         integrator.pars[:used] = self.parameters[:used]
         integrator.reset_cooldowns() if integrator.with_events else None
         if self.problem.guards is not None:
+            values = self.program.guard_values(piece.start, integrator.state, integrator.pars)
+            self._sizes = np.maximum(np.where(np.isfinite(values), np.abs(values), 0.0), 1.0)
             self._guard(integrator.pars, self.problem.guards.sides, self.problem.guards.offsets)
         watch = self._watch(piece)
         self.program.listeners.clear()
@@ -121,10 +125,16 @@ class _Run:
             self.problem.react.refuse_missed(self.met, integrator.time, self.state)
 
     def _guard(self, pars: Array, sides: Array, offsets: Array | Sequence[float]) -> None:
-        """Watch the guards from here on, by their sides and offsets."""
+        """Watch the guards from here on, by their sides and offsets.
+
+        heyoka's tolerance is relative to the largest of states and events: a torque of 1e6 N m in one would cost six
+        digits. So guards count in parts of their size, which their first values tell, and how far rounding moves them.
+        """
         first = self.program.parameter_count + len(self.program.switches)
-        pars[first : first + len(sides)] = sides
-        pars[first + len(sides) :] = offsets
+        offsets = np.asarray(offsets)
+        sizes = np.maximum(self._sizes, offsets / ROUNDING)
+        pars[first : first + len(sides)] = sides / sizes
+        pars[first + len(sides) :] = offsets / sizes
 
     def _guard_met(self, raw: Any, outcome: str, watch: Watch | None) -> int | None:
         """The guard at which the run has stopped, by its own event or at that of a switch at the very same instant."""
@@ -167,7 +177,7 @@ class _Run:
         for _ in range(FIRST_TRIALS):
             integrator.step(max_delta_t=min(longest, piece.end - piece.start), write_tc=True)
             step = integrator.time - start
-            good = not np.isfinite(integrator.state).all() or (
+            good = not (step > 0.0 and np.isfinite(integrator.state).all()) or (
                 self._satisfied(piece, start, 0.9 * step) and keeps_sides(self.program, integrator, parameters, start)
             )
             integrator.time = start
@@ -196,6 +206,8 @@ class _Run:
         first = program.parameter_count
         self.integrator.pars[first : first + len(program.switches)] = 0.0
         settle(program, self.integrator, piece.end - piece.start)
+        if np.isnan(self.integrator.pars[first : first + len(program.switches)]).any():
+            raise self._failure(piece, "err_nf_state", None)
         if program.timed.all():
             return None
         integrator = self.integrator
@@ -205,7 +217,8 @@ class _Run:
     def _failure(self, piece: Piece, outcome: str, watch: Watch | None) -> SimulationError:
         time, state = self._last_good(piece, watch)
         made = failure(self.problem, "heyoka", time, state, self._reason(outcome, watch))
-        return SeriesError(*made.args) if outcome == "err_nf_state" else made
+        no_number = outcome == "err_nf_state" or (watch is not None and watch.valueless)
+        return SeriesError(*made.args) if no_number else made
 
     def _last_good(self, piece: Piece, watch: Watch | None) -> tuple[float, Array]:
         """Time and state at the end of the last good step of a run that has failed in a piece."""

@@ -9,13 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from shaftwork.core.errors import SimulationError
+from shaftwork.core.errors import SimulationError, no_value
 from shaftwork.integrate.problem import Array, Problem, Timed
 
 # A run has stalled when so many steps together advance by less than so many times this part of the whole time.
 STALL_STEPS, STALL_SPAN = 2000, 1e-10
 # Where the motion rests at a switch of a law, this part is enough: ten million such steps would make a run.
 STUCK_SPAN = 1e-7
+# Where a run has failed its further course is looked at for laws without a value, over this part of the whole time.
+AHEAD = 1e-6 * 0.5 ** np.arange(30, -1, -1)
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,8 @@ class GuardedFunctions:
         self._problem = problem
         self._jacobian: Callable[[float, Array], Any] = problem.jacobian or _no_jacobian
         self._low, self._high = piece.low, piece.high
-        self.not_finite: tuple[float, Array] | None = None
+        self.not_finite: tuple[float, Array, Array] | None = None
+        """Time, state and derivative where it was last not finite."""
 
     def rhs(self, t: float, x: Array) -> Array:
         """The right-hand side, asked inside the piece."""
@@ -55,7 +58,7 @@ class GuardedFunctions:
         # The sum is a cheap test that cannot miss a NaN or an infinity. A trial stage that is too bold may meet one
         # and recover with a smaller step, so it is only remembered here.
         if not np.isfinite(derivative.sum()):
-            self.not_finite = (t, derivative)
+            self.not_finite = (t, x.copy(), derivative)
         return derivative
 
     def jacobian(self, t: float, x: Array) -> Any:
@@ -73,7 +76,7 @@ class GuardedFunctions:
         """The solver's reason, with the first equation that was not finite when there was one."""
         if self.not_finite is None:
             return reason
-        t, derivative = self.not_finite
+        t, _, derivative = self.not_finite
         bad = np.flatnonzero(~np.isfinite(derivative))
         if bad.size == 0:
             return reason
@@ -144,8 +147,10 @@ def reached(times: Array, end: float) -> Array:
     return np.asarray(times, dtype=float)[: int(np.searchsorted(times, end, side="right"))]
 
 
-def failure(problem: Timed, engine: str, t: float, x: Array, reason: str) -> SimulationError:
-    """The error of a failed run: when, in which state, why, and what to try.
+def failure(
+    problem: Timed, engine: str, t: float, x: Array, reason: str, guard: GuardedFunctions | None = None
+) -> SimulationError:
+    """The error of a failed run: when, in which state, why, and what to try; or the law that has no value there.
 
     Args:
         problem: what was to be solved.
@@ -153,7 +158,11 @@ def failure(problem: Timed, engine: str, t: float, x: Array, reason: str) -> Sim
         t: last time reached, in s.
         x: (n,) state there.
         reason: the solver's own reason.
+        guard: what the solver has called.
     """
+    if (law := _law_without_value(problem, t, x, guard)) is not None:
+        return no_value(*law)
+    reason = reason if guard is None else guard.reason(reason)
     if problem.names:
         bad = np.flatnonzero(~np.isfinite(x))
         worst = int(bad[0]) if bad.size else int(np.argmax(np.abs(x) / np.maximum(problem.atol, np.finfo(float).tiny)))
@@ -166,6 +175,19 @@ def failure(problem: Timed, engine: str, t: float, x: Array, reason: str) -> Sim
         f"{reason.strip().rstrip('.')}.{state} "
         "Check the parameters and laws that act on this state, or try another engine or a looser rtol."
     )
+
+
+def _law_without_value(problem: Timed, t: float, x: Array, guard: GuardedFunctions | None) -> tuple[float, str] | None:
+    """A law that has no value where a run has failed, or just after: the time in s, and the law in words."""
+    if problem.explain is None:
+        return None
+    rates = problem.rhs(t, x) if isinstance(problem, Problem) else np.zeros_like(x)
+    steps = np.append(0.0, AHEAD * (problem.t_end - problem.t0))[:, None]
+    found = problem.explain(t + steps[:, 0], x + steps * np.where(np.isfinite(rates), rates, 0.0))
+    if found is not None or guard is None or guard.not_finite is None:
+        return found
+    at, state, _ = guard.not_finite
+    return problem.explain(np.array([at]), state[None, :]) if np.isfinite(at) and np.isfinite(state).all() else None
 
 
 class Pace:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from shaftwork.core.errors import SimulationError
 from shaftwork.core.times import around
 
 Array = NDArray[np.float64]
+Explain = Callable[[Array, Array], tuple[float, str] | None]
 
 
 @dataclass(frozen=True)
@@ -120,7 +121,10 @@ class Problem:
         driven: the same system in linear form, where it is one and its input is another smooth function; else None.
         symbolic: the same system as a heyoka program with its parameters (`codegen.heyoka.BoundProgram`), a function
             that makes this where an engine asks for it, or None where there is none.
+        explain: from times (k,) and states (k, n) to the first of these times at which a law has no value, and that law
+            in words; None where all have one. It is asked for messages.
         max_steps: an engine gives up, with a reason, after this many steps.
+        found: what an engine has found out about the equations, for its next run with them.
     """
 
     rhs: Callable[[float, Array], Array]
@@ -141,7 +145,9 @@ class Problem:
     linear: LinearInputs | None = None
     driven: LinearInputs | None = None
     symbolic: Any = None
+    explain: Explain | None = None
     max_steps: int = 10_000_000
+    found: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property
     def program(self) -> Any:
@@ -158,7 +164,8 @@ class DaeProblem:
         x0: (n,) start values; the algebraic ones are a first guess.
         derivative0: (n,) first guess of dx/dt at the start.
         algebraic: indices of the unknowns whose derivative does not appear.
-        t0, t_end, names, atol, rtol, breakpoints, jump, sides, switches, guards, t_eval, max_steps: as in `Problem`.
+        t0, t_end, names, atol, rtol, breakpoints, jump, sides, switches, guards, t_eval, explain, max_steps: as in
+            `Problem`.
     """
 
     residual: Callable[[float, Array, Array], Array]
@@ -176,7 +183,16 @@ class DaeProblem:
     switches: Callable[[Array, Array], Array] | None = None
     guards: Guards | None = None
     t_eval: Array | None = None
+    explain: Explain | None = None
     max_steps: int = 10_000_000
+
+
+AnyProblem = TypeVar("AnyProblem", bound=Problem | DaeProblem)
+
+
+def tightened(problem: AnyProblem, share: float) -> AnyProblem:
+    """The same problem with a part of its tolerances."""
+    return replace(problem, rtol=share * problem.rtol, atol=share * problem.atol)
 
 
 class Timed(Protocol):
@@ -215,6 +231,11 @@ class Timed(Protocol):
     @property
     def sides(self) -> Callable[[float], tuple[float, float]]:
         """Times just before and after a breakpoint."""
+        ...
+
+    @property
+    def explain(self) -> Explain | None:
+        """Finds laws without a value."""
         ...
 
 

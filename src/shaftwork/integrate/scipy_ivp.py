@@ -25,7 +25,7 @@ from shaftwork.integrate.pieces import (
     reached,
     start_of_piece,
 )
-from shaftwork.integrate.problem import Array, Problem, Trajectory
+from shaftwork.integrate.problem import Array, Problem, Trajectory, tightened
 from shaftwork.integrate.stiffness import rates
 
 Method = Literal["DOP853", "Radau", "BDF", "LSODA"]
@@ -41,6 +41,8 @@ BEARABLE, EDGE = 2.0, 50.0
 # DOP853 is stable up to about this product of step and decay rate. A longer step may well end right, because what is
 # left of the fast motion is tiny at its start, and yet be off inside by much more than the torque of a damper bears.
 STABLE = 6.0
+# With shorter ones it is far from that edge, and every fast motion has steps of its own.
+INSIDE, BRIEF = 1.0, 100
 
 
 @dataclass(frozen=True)
@@ -70,14 +72,14 @@ def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
     Source: scipy.integrate; Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I (DOP853) and II (Radau).
     """
     runs = _march(problem, method)
-    if method == "DOP853":
+    if method == "DOP853" and (problem.guards is None or _on_edge(problem, runs)):
         # On the edge of its stability it leaves errors of the tolerance in what an implicit method damps.
         times, states = _samples(runs)
         few = slice(None) if problem.guards is None else [0, -1]  # of many short runs, each tells a little
         factor = cancellation(problem, times[few], states[few])
         if BEARABLE < factor < 1 / np.finfo(float).eps:  # it is beyond all bounds where nothing has moved yet
             share = max(1 / (EDGE * factor), TIGHTEST_RTOL / problem.rtol)
-            tight = replace(problem, rtol=share * problem.rtol, atol=share * problem.atol)
+            tight = tightened(problem, share)
             decay = rates(problem).decay
             again = _march(tight, method, longest=STABLE / decay if decay > 0 else np.inf)
             runs = [replace(new, counts=_sums([new, old])) for new, old in zip(again, runs, strict=True)]
@@ -94,18 +96,28 @@ def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
 
 def _march(problem: Problem, method: Method, longest: float = np.inf) -> list[_Run]:
     """All pieces, one after another."""
-    x, pace = np.asarray(problem.x0, dtype=float), Pace(problem)
+    x, pace, taken = np.asarray(problem.x0, dtype=float), Pace(problem), 0
     runs: list[_Run] = []
     with np.errstate(all="ignore"):
         for piece in pieces(problem):
-            taken = sum(run.counts["steps"] for run in runs)
             start = start_of_piece(problem, piece, x)
             run = _piece(problem, piece, start, method, problem.max_steps - taken, pace, longest)
             runs.append(run)
-            x = run.states[-1]
+            x, taken = run.states[-1], taken + run.counts["steps"]
             if run.met is not None:
                 break
     return runs
+
+
+def _on_edge(problem: Problem, runs: list[_Run]) -> bool:
+    """Whether a step is so long that it may be stability which bounds it.
+
+    The decay is looked at once for many brief phases in the same modes, and anew for a long one.
+    """
+    if "decay" not in problem.found or sum(run.counts["steps"] for run in runs) > BRIEF:
+        problem.found["decay"] = rates(problem).decay
+    longest = max(float(np.diff(run.times).max()) for run in runs)
+    return bool(longest * problem.found["decay"] > INSIDE)
 
 
 def _samples(runs: list[_Run]) -> tuple[Array, Array]:
@@ -158,7 +170,7 @@ def _piece(
     except SimulationError:
         raise
     except (ValueError, RuntimeError) as error:  # a factorisation that met a NaN, or a singular one
-        raise failure(problem, "scipy", times[-1], states[-1], guard.reason(f"{method}: {error}")) from error
+        raise failure(problem, "scipy", times[-1], states[-1], f"{method}: {error}", guard) from error
     solution = OdeSolution(times, interpolants)
     calls, jacobians = retired.tolist()
     counts = {"steps": len(interpolants), "rhs": calls, "jacobians": jacobians}
@@ -172,12 +184,14 @@ def _advance(problem: Problem, solver: Any, method: Method, guard: GuardedFuncti
     Raises:
         SimulationError: it failed; says when and why.
     """
+    if np.isnan(getattr(solver, "h_abs", 0.0)):  # scipy would look for a first step without end
+        raise failure(problem, "scipy", t, x, f"{method}: no first step was found", guard)
     reason = _step(solver, method)
     if solver.status == "failed":
         good = x if np.isfinite(x).all() else solver.y
-        raise failure(problem, "scipy", t, good, guard.reason(f"{method}: {reason}"))
+        raise failure(problem, "scipy", t, good, f"{method}: {reason}", guard)
     if not np.isfinite(solver.y.sum()):
-        raise failure(problem, "scipy", solver.t, solver.y, guard.reason(f"{method}: the state is not finite"))
+        raise failure(problem, "scipy", solver.t, solver.y, f"{method}: the state is not finite", guard)
     if solver.t <= t:  # LSODA goes on with steps below the spacing of numbers
         raise failure(problem, "scipy", solver.t, solver.y, f"{method}: the step became too small")
 

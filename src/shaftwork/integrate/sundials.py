@@ -11,13 +11,11 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy import sparse
-from scipy.interpolate import BarycentricInterpolator
 
 from shaftwork.core.errors import MissingExtraError
+from shaftwork.integrate.chebyshev import Polynomial, points
 from shaftwork.integrate.crossings import Crossings
-from shaftwork.integrate.guards import LEAST, SHORTER, GuardWatch
+from shaftwork.integrate.guards import CLEARANCE, LEAST, SHORTER, GuardWatch, share_of_tolerance
 from shaftwork.integrate.pieces import (
     GuardedFunctions,
     Pace,
@@ -29,7 +27,8 @@ from shaftwork.integrate.pieces import (
     pieces,
     start_of_piece,
 )
-from shaftwork.integrate.problem import Array, DaeProblem, Problem, Trajectory
+from shaftwork.integrate.problem import Array, DaeProblem, Problem, Trajectory, tightened
+from shaftwork.integrate.sparsity import Pattern
 
 Method = Literal["BDF", "Adams"]
 
@@ -38,6 +37,9 @@ DEGREES = {"BDF": 5, "Adams": 12}
 # Up to here a dense factorisation beats SuperLU. A band solver is not used: the binding passes its Jacobian as a full
 # matrix, which costs more than the factorisation saves.
 LARGEST_DENSE = 100
+# A run up to a guard is made again where this part of its tolerance would not do, and where it is not as tight already:
+# absolute tolerances of small twists may be that tight. A relative one near the rounding of numbers SUNDIALS refuses.
+ENOUGH, TIGHTEST_ATOL, TIGHTEST_RTOL = 0.5, 1e-17, 8 * float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
@@ -47,21 +49,50 @@ class _Opened:
     Args:
         solver: CVODE or IDA, with its first step still to take.
         start: (n,) consistent start state.
-        explain: text of a failure from SUNDIALS' reason.
+        guard: what CVODE calls.
         outgrown: whether the solver must be opened anew, because its pattern misses entries of the Jacobian.
+        degree: of its polynomials inside a step, at most.
     """
 
     solver: Any
     start: Array
-    explain: Callable[[str], str] = str
+    guard: GuardedFunctions | None = None
     outgrown: Callable[[], bool] = lambda: False
+    degree: int = DEGREES["BDF"]
 
     def inside(self, times: Array) -> Array:
         """States (k, n) at times (k,) inside the last step."""
         return np.array([self.solver.step(time).y.copy() for time in times]).reshape(times.size, self.start.size)
 
 
+class _Inside:
+    """The states inside the last step: for many times from a polynomial, as each costs a call of SUNDIALS.
+
+    Args:
+        opened: the solver.
+        start: of the step, s.
+        x: (n,) state there.
+        end: of the step, s.
+        y: (n,) state there.
+    """
+
+    def __init__(self, opened: _Opened, start: float, x: Array, end: float, y: Array) -> None:
+        self._opened, self._ends, self._states = opened, (start, end), (x, y)
+        self._made: Polynomial | None = None
+
+    def __call__(self, times: Array) -> Array:
+        if self._made is None:
+            if times.size < self._opened.degree - 1:
+                return self._opened.inside(times)
+            (start, end), (x, y) = self._ends, self._states
+            inner = self._opened.inside(start + (end - start) * points(self._opened.degree)[1:-1])
+            self._made = Polynomial(start, end, np.vstack([x, inner, y]))
+        return self._made(times)
+
+
 Opener = Callable[[Piece, Array], _Opened]
+Opening = Callable[[float], Opener]
+"""From the part of its tolerance with which a problem is solved."""
 
 
 def solve(problem: Problem, method: Method = "BDF") -> Trajectory:
@@ -81,11 +112,11 @@ def solve(problem: Problem, method: Method = "BDF") -> Trajectory:
     """
     _require("engine='sundials'")
 
-    def opener() -> Opener:
-        pattern = _Pattern(len(problem.x0))
-        return lambda piece, x: _open_cvode(problem, piece, x, method, pattern)
+    def opening(share: float) -> Opener:
+        tight, pattern = tightened(problem, share), Pattern(len(problem.x0))
+        return lambda piece, x: _open_cvode(tight, piece, x, method, pattern)
 
-    return _trajectory(problem, opener, DEGREES[method])
+    return _trajectory(problem, opening, DEGREES[method])
 
 
 def solve_dae(problem: DaeProblem) -> Trajectory:
@@ -98,7 +129,12 @@ def solve_dae(problem: DaeProblem) -> Trajectory:
     Source: as `solve`.
     """
     _require("A nonlinear algebraic loop")
-    return _trajectory(problem, lambda: lambda piece, x: _open_ida(problem, piece, x), DEGREES["BDF"])
+
+    def opening(share: float) -> Opener:
+        tight = tightened(problem, share)
+        return lambda piece, x: _open_ida(tight, piece, x)
+
+    return _trajectory(problem, opening, DEGREES["BDF"])
 
 
 def _require(purpose: str) -> None:
@@ -106,7 +142,7 @@ def _require(purpose: str) -> None:
         raise MissingExtraError("scikit-sundae", "stiff", purpose)
 
 
-def _open_cvode(problem: Problem, piece: Piece, x: Array, method: Method, pattern: _Pattern) -> _Opened:
+def _open_cvode(problem: Problem, piece: Piece, x: Array, method: Method, pattern: Pattern) -> _Opened:
     from sksundae.cvode import CVODE
 
     guard = GuardedFunctions(problem, piece)
@@ -114,18 +150,30 @@ def _open_cvode(problem: Problem, piece: Piece, x: Array, method: Method, patter
     def rhs(t: float, y: Array, derivative: Array) -> None:
         derivative[:] = guard.rhs(t, y)
 
-    options: dict[str, Any] = {"method": method, "rtol": problem.rtol, "atol": problem.atol}
+    options: dict[str, Any] = {"method": method, "rtol": max(problem.rtol, TIGHTEST_RTOL), "atol": problem.atol}
     if problem.jacobian is not None:
         options |= _linear_solver(guard, piece, x, pattern)
+    least = CLEARANCE * float(np.spacing(abs(piece.start)))
+    if _first_change(problem, x, guard.rhs(piece.start, x)) < least:
+        options["first_step"] = least
     with warnings.catch_warnings():
         # It says that the pattern is only used as a pattern, since the Jacobian is given.
         warnings.filterwarnings("ignore", message="Custom sparse Jacobian")
         solver = CVODE(rhs, **options)
     solver.init_step(piece.start, x)
-    return _Opened(solver, x, guard.reason, lambda: pattern.grown)
+    return _Opened(solver, x, guard, lambda: pattern.grown, DEGREES[method])
 
 
-def _linear_solver(guard: GuardedFunctions, piece: Piece, x: Array, pattern: _Pattern) -> dict[str, Any]:
+def _first_change(problem: Problem, x: Array, rates: Array) -> float:
+    """The time in s in which a state (n,) moves by its tolerance or a tenth of itself.
+
+    SUNDIALS takes no longer first step, and the time would stand still where a light wheel at rest is hit.
+    """
+    with np.errstate(all="ignore"):
+        return float(np.min((problem.atol + 0.1 * np.abs(x)) / np.abs(rates), initial=np.inf))
+
+
+def _linear_solver(guard: GuardedFunctions, piece: Piece, x: Array, pattern: Pattern) -> dict[str, Any]:
     if x.size <= LARGEST_DENSE:
 
         def fill_dense(t: float, y: Array, _: Array, full: Array) -> None:
@@ -149,7 +197,7 @@ def _open_ida(problem: DaeProblem, piece: Piece, x: Array) -> _Opened:
 
     solver = IDA(
         residual,
-        rtol=problem.rtol,
+        rtol=max(problem.rtol, TIGHTEST_RTOL),
         atol=problem.atol,
         algebraic_idx=list(problem.algebraic),
         calc_initcond="yp0",
@@ -164,52 +212,6 @@ def _open_ida(problem: DaeProblem, piece: Piece, x: Array) -> _Opened:
     return _Opened(solver, start.y.copy())
 
 
-class _Pattern:
-    """The places of the Jacobian's entries in one run: they grow when a law starts to act, a stop that is hit.
-
-    Args:
-        size: number of states.
-    """
-
-    def __init__(self, size: int) -> None:
-        self._size = size
-        # An entry is known by its place along the columns. The diagonal belongs to the matrices that SUNDIALS makes.
-        self._places = np.arange(size, dtype=np.int64) * (size + 1)
-        self._frozen = self._places
-        self._last: tuple[Any, Any, NDArray[np.intp], NDArray[np.bool_]] | None = None
-
-    @property
-    def grown(self) -> bool:
-        """Whether entries were met that the frozen pattern has not."""
-        return self._frozen.size != self._places.size
-
-    def add(self, matrix: Any) -> NDArray[np.int64]:
-        """Add the places of a matrix, a scipy.sparse.csc_array (n, n); they are returned."""
-        columns = np.repeat(np.arange(self._size, dtype=np.int64), np.diff(matrix.indptr))
-        places: NDArray[np.int64] = columns * self._size + matrix.indices
-        self._places = np.union1d(self._places, places)
-        return places
-
-    def freeze(self) -> Any:
-        """Fix the pattern for a solver: a scipy.sparse.csc_array (n, n) of ones."""
-        self._frozen, self._last = self._places, None
-        columns, rows = np.divmod(self._frozen, self._size)
-        # SUNDIALS is built with int indices and reads these arrays as they lie in memory.
-        starts = np.searchsorted(columns, np.arange(self._size + 1)).astype(np.int32)
-        return sparse.csc_array((np.ones(rows.size), rows.astype(np.int32), starts), shape=(self._size, self._size))
-
-    def values(self, matrix: Any) -> Array:
-        """The entries of a matrix in the order of the frozen pattern; those that it has elsewhere are left out."""
-        last = self._last
-        if last is None or not (np.array_equal(last[0], matrix.indptr) and np.array_equal(last[1], matrix.indices)):
-            places = self.add(matrix)
-            found = np.minimum(np.searchsorted(self._frozen, places), self._frozen.size - 1)
-            last = self._last = matrix.indptr, matrix.indices, found, self._frozen[found] == places
-        data = np.zeros(self._frozen.size)
-        data[last[2][last[3]]] = matrix.data[last[3]]
-        return data
-
-
 @dataclass(frozen=True)
 class _Step:
     """One step: its ends in s, the state (n,) at its end, the states (k, n) at the times asked for inside it."""
@@ -220,13 +222,33 @@ class _Step:
     inside: Array
 
 
-def _march(
-    problem: Problem | DaeProblem, open_solver: Opener, ask: Callable[[float, float], Array]
-) -> tuple[list[tuple[Array, list[_Step]]], int | None]:
-    """All steps of each piece, behind the piece's start state, and the guard that ended the run.
+Ask = Callable[[float, float], Array]
+"""The times (k,) wanted in a step, from its start and end in s."""
+Marched = tuple[list[tuple[Array, list[_Step]]], int | None]
+"""All steps of each piece, behind the piece's start state, and the guard that ended the run."""
 
-    `ask` gives the times wanted in a step.
+
+def _march(problem: Problem | DaeProblem, opening: Opening, ask: Ask) -> Marched:
+    """All steps up to a guard; where they are few, they are made again with the tolerance that its course needs.
+
+    Rebounds become ever shorter. After each a method starts with low order, and errs by its tolerance however short
+    the flight is: with flights as small as the tolerance a series of rebounds would end early.
     """
+    share = 1.0
+    while True:
+        tight = tightened(problem, share)
+        found, met = _attempt(tight, opening(share), ask)
+        if met is None or tight.rtol <= TIGHTEST_ATOL:
+            return found, met
+        steps = [step for _, steps in found for step in steps]
+        times = np.array([found[0][1][0].start, *(step.end for step in steps)])
+        states = np.vstack([found[0][0], *(step.state for step in steps)])
+        if (part := share_of_tolerance(tight, times, states)) > ENOUGH:
+            return found, met
+        share = max(part * share, TIGHTEST_ATOL / problem.rtol)
+
+
+def _attempt(problem: Problem | DaeProblem, open_solver: Opener, ask: Ask) -> Marched:
     x = np.asarray(problem.x0, dtype=float)
     found: list[tuple[Array, list[_Step]]] = []
     left, pace = problem.max_steps, Pace(problem)
@@ -240,11 +262,12 @@ def _march(
                 raise failure(problem, "sundials", t, x, f"{problem.max_steps} steps were not enough")
             end, state = _step(problem, piece, opened, t, x, longest)
             # Its formulas meet a law at the ends of steps alone, so that a step may be cut off at a switch.
-            stop = watch.cut(t, x, end, state, opened.inside)
-            cut = crossings.cut(t, x, end, state, opened.inside, again=False)
+            inside = _Inside(opened, t, x, end, state)
+            stop = watch.cut(t, x, end, state, inside)
+            cut = crossings.cut(t, x, end, state, inside, again=False)
             stops = stop is not None and (cut is None or stop <= cut)
             shortest = LEAST * (problem.t_end - problem.t0)
-            if stop is not None and stops and end - t > shortest and not watch.follows(t, x, stop, opened.inside):
+            if stop is not None and stops and end - t > shortest and not watch.follows(t, x, stop, inside):
                 longest, left = (end - t) / SHORTER, left - 1
                 opened = open_solver(replace(piece, start=t), x)
                 x = opened.start
@@ -255,7 +278,9 @@ def _march(
                 raise failure(problem, "sundials", end, x, objection)
             asked = ask(t, end)
             within = asked[asked < end]
-            states = np.vstack([opened.inside(within), np.repeat(x[None, :], asked.size - within.size, axis=0)])
+            states = np.repeat(x[None, :], asked.size, axis=0)
+            if within.size:
+                states[: within.size] = inside(within)
             found[-1][1].append(_Step(t, end, x, states))
             t, left = end, left - 1
             if stops and t < piece.end:
@@ -277,16 +302,16 @@ def _step(
     with np.errstate(all="ignore"), redirect_stdout(None):
         result = opened.solver.step(stop, method="onestep", tstop=stop)
     if not result.success:
-        raise failure(problem, "sundials", t, x, opened.explain(str(result.message)))
+        raise failure(problem, "sundials", t, x, str(result.message), opened.guard)
     end, state = float(result.t), result.y.copy()
     check_finite(problem, "sundials", end, state)
     if end <= t:
-        raise failure(problem, "sundials", t, x, opened.explain("the step became too small"))
+        raise failure(problem, "sundials", t, x, "the step became too small", opened.guard)
     return end, state
 
 
-def _trajectory(problem: Problem | DaeProblem, opener: Callable[[], Opener], degree: int) -> Trajectory:
-    dense = _Replay(problem, opener, degree)
+def _trajectory(problem: Problem | DaeProblem, opening: Opening, degree: int) -> Trajectory:
+    dense = _Replay(problem, opening, degree)
     if problem.t_eval is None:
         t, states = both_sides(problem, *dense.step_ends)
         return Trajectory(
@@ -294,14 +319,14 @@ def _trajectory(problem: Problem | DaeProblem, opener: Callable[[], Opener], deg
         )
     times = np.asarray(problem.t_eval, dtype=float)
     rows: list[Array] = []
-    steps = 0
+    steps, jumps = 0, frozenset(problem.breakpoints)  # only asked for membership
 
     def ask(start: float, end: float) -> Array:
         # An output at the end of a step is read there, except at a breakpoint: the next piece starts with it.
-        side: Literal["left", "right"] = "left" if end in problem.breakpoints else "right"
+        side: Literal["left", "right"] = "left" if end in jumps else "right"
         return times[np.searchsorted(times, start, side="right") : np.searchsorted(times, end, side=side)]
 
-    found, met = _march(problem, opener(), ask)
+    found, met = _march(problem, opening, ask)
     for piece, (start, marched) in zip(pieces(problem), found, strict=False):  # a guard may end it early
         if piece.start in times:
             rows.append(start[None, :])
@@ -316,15 +341,14 @@ def _trajectory(problem: Problem | DaeProblem, opener: Callable[[], Opener], deg
 class _Replay:
     """Dense output that runs the problem again when it is first asked, and keeps each step's own polynomial."""
 
-    def __init__(self, problem: Problem | DaeProblem, opener: Callable[[], Opener], degree: int) -> None:
+    def __init__(self, problem: Problem | DaeProblem, opening: Opening, degree: int) -> None:
         self._problem = problem
-        self._opener = opener
-        # Chebyshev points of [0, 1] with both ends: the interpolation inside a step is exact and well conditioned.
-        self._points = (1 - np.cos(np.pi * np.arange(degree + 1) / degree)) / 2
+        self._opening = opening
+        self._shares = points(degree)[1:-1]
 
     @cached_property
-    def _marched(self) -> tuple[list[tuple[Array, list[_Step]]], int | None]:
-        return _march(self._problem, self._opener(), lambda start, end: start + (end - start) * self._points[1:-1])
+    def _marched(self) -> Marched:
+        return _march(self._problem, self._opening, lambda start, end: start + (end - start) * self._shares)
 
     @property
     def _found(self) -> list[tuple[Array, list[_Step]]]:
@@ -342,7 +366,7 @@ class _Replay:
             before = state
             for step in steps:
                 nodes = np.vstack([before, step.inside, step.state])
-                parts.append(_polynomial(step.start, step.end, self._points, nodes))
+                parts.append(Polynomial(step.start, step.end, nodes))
                 starts.append(step.start)
                 before = step.state
         ends = np.array([*starts, self._found[-1][1][-1].end])
@@ -361,14 +385,3 @@ class _Replay:
 
     def __call__(self, times: Array) -> Array:
         return self._dense(times)
-
-
-def _polynomial(start: float, end: float, points: Array, nodes: Array) -> Callable[[Array], Array]:
-    weights = (-1.0) ** np.arange(points.size)
-    weights[[0, -1]] /= 2
-
-    def evaluate(times: Array) -> Array:
-        # With its weights given, scipy does not draw a random order of the points.
-        return np.asarray(BarycentricInterpolator(points, nodes, wi=weights)((times - start) / (end - start)))
-
-    return evaluate

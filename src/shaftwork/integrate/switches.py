@@ -142,9 +142,16 @@ class Watch:
         self.reason: str | None = None
         self.leaves = False
         """Whether a switch that rested at zero has stopped the run."""
+        self.valueless = False
+        """Whether a switch that is no number has stopped it."""
 
     def __call__(self, integrator: Any) -> bool:
         values = self._program.switch_values(integrator.time, integrator.state, integrator.pars)
+        if np.isnan(values.sum()):
+            condition = self._program.conditions[int(np.argmax(np.isnan(values)))]
+            self.reason, self.valueless = f"the condition {condition} is neither true nor false", True
+            self.last_good = integrator.time, integrator.state.copy()
+            return False
         signs = integrator.pars[self._signs]
         np.maximum(self._largest, np.abs(values), out=self._largest)
         inside = signs * values

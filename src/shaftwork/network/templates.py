@@ -72,6 +72,7 @@ class BranchTemplate:
         line: at an end of a line, its impedance and delay: of the conductance and of the history, whose law is
             `HISTORY`; the next two branches of a line are its other end.
         through: of a coupling that loses power, the factors of its through variable, one for each term; else empty.
+        conservative: what a through law takes in it gives back.
     """
 
     kind: Kind
@@ -83,6 +84,7 @@ class BranchTemplate:
     printed: Expr
     line: tuple[Expr, Expr] | None = None
     through: tuple[Expr, ...] = ()
+    conservative: bool = False
 
     @property
     def balances(self) -> tuple[tuple[Expr, End, End], ...]:
@@ -275,7 +277,9 @@ class _Resolver:
                 for kind, found in self._resolved(branch, law, number):
                     joint = rigid(ends or self._default).terms if kind is Kind.COUPLING else ()
                     where = (None, None) if joint else ends or self._default
-                    yield self._template(kind, found, where, joint, label)
+                    made = self._template(kind, found, where, joint, label)
+                    gives_back = isinstance(branch, ThroughLaw) and branch.conservative
+                    yield dataclasses.replace(made, conservative=gives_back) if gives_back else made
             case DelayLine(impedance, delay, ends, label):
                 impedance, delay = _law(impedance, branch, number), _law(delay, branch, number)
                 line, symbols = self._in_parameters(impedance, delay)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import warnings
-
 from shaftwork.components.friction import ROUNDED
 from shaftwork.components.modes import ALL_IN_ONE
 from shaftwork.core.errors import AccuracyWarning, ParameterError
+from shaftwork.core.notices import warn
 from shaftwork.network.graph import CircuitGraph, GraphPart, build_graph
 from shaftwork.network.netlist import Netlist
 from shaftwork.network.wording import listed, title
@@ -33,11 +32,10 @@ def with_one_law(netlist: Netlist, graph: CircuitGraph) -> Netlist:
 def warn_of_rounding(graph: CircuitGraph) -> None:
     """Say which parts do not stick, as they would without travelling waves."""
     if names := [part.name for part in graph.parts if part.branches and _joins(part, rubs=True)]:
-        warnings.warn(
+        warn(
             f"'{graph.name}': beside travelling waves ({listed(waving(graph))}) nothing sticks; the friction of "
             f"{listed(names)} is rounded over {ROUNDED:g} rad/s. {REMEDY}, where that matters.",
             AccuracyWarning,
-            stacklevel=4,
         )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
-from shaftwork.core.errors import SimulationError
+from shaftwork.core.errors import SimulationError, no_value
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import DaeProblem, DenseOutput, Problem, Trajectory
 
@@ -41,9 +41,17 @@ class _NoStates:
 
 
 def at_rest(problem: Problem) -> tuple[Trajectory, str, str]:
-    """The run of a network without states: everything follows from the sources at every instant."""
+    """The run of a network without states: everything follows from the sources at every instant.
+
+    Raises:
+        SimulationError: a law has no value at one of the times.
+    """
     steps = np.array([problem.t0, *problem.breakpoints, problem.t_end])
     t = steps if problem.t_eval is None else problem.t_eval
+    if problem.explain is not None:
+        times = np.union1d(t, steps)
+        if (law := problem.explain(times, np.zeros((len(times), 0)))) is not None:
+            raise no_value(*law)
     return Trajectory(t, np.zeros((len(t), 0)), _NoStates(steps)), "exact", "Nothing moves freely; all is prescribed."
 
 
@@ -77,7 +85,7 @@ def solve_loops(bound: BoundArrays, problem: Problem) -> tuple[Trajectory, str, 
 
     from shaftwork.integrate.sundials import solve_dae
 
-    look = problem.switches
+    look, explain = problem.switches, problem.explain
     size = float(np.abs(start).max()) or 1.0
     found = solve_dae(
         DaeProblem(
@@ -95,6 +103,7 @@ def solve_loops(bound: BoundArrays, problem: Problem) -> tuple[Trajectory, str, 
             sides=problem.sides,
             switches=None if look is None else lambda t, z: look(t, z[:, :states]),
             t_eval=problem.t_eval,
+            explain=None if explain is None else lambda t, z: explain(t, z[:, :states]),
             max_steps=problem.max_steps,
         )
     )

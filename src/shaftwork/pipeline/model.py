@@ -14,6 +14,7 @@ from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.operating import initial_state, steady_state
 from shaftwork.codegen.switching import Switching
+from shaftwork.codegen.valueless import without_value
 from shaftwork.core.errors import CompileError, ParameterError, SimulationError
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import LinearInputs, Problem, Trajectory
@@ -281,6 +282,7 @@ class Model(CompiledModel):
             linear=None if self.degree is None else prepared.linear,
             driven=prepared.linear if self.degree is None else None,
             symbolic=prepared.symbolic,
+            explain=lambda t, x: without_value(prepared.bound, t, x),
             max_steps=demand.max_steps,
         )
 

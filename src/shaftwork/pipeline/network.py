@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 import gc
 import reprlib
-import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 from shaftwork.core.errors import NetworkError, NetworkWarning, ParameterError, Problem, SignalError
+from shaftwork.core.notices import warn
 from shaftwork.equations.kirchhoff import kirchhoff
 from shaftwork.equations.records import Equations, NamedPhase
 from shaftwork.network.builder import NetworkBuilder
@@ -279,7 +279,7 @@ def _sound(netlist: Netlist, accepted: str = "") -> StateForm:
         raise NetworkError(f"'{netlist.name}' cannot be assembled", errors)
     for problem in problems:
         if problem.severity == "warning":
-            warnings.warn(str(problem), NetworkWarning, stacklevel=4)
+            warn(str(problem), NetworkWarning)
     assert form is not None  # noqa: S101 (only errors leave no form)
     return form
 

@@ -176,6 +176,7 @@ def solve_waves(
             jump=problem.jump,
             sides=problem.sides,
             t_eval=problem.t_eval,
+            explain=problem.explain,
             max_steps=problem.max_steps,
             linear=linear,
             steady=steady,

@@ -260,7 +260,7 @@ def _condensed(chain: Chain, keep: str, title: str) -> Chain:
     stations, links = list(chain.stations), list(chain.links)
     problems: list[Problem] = []
     for station in chain.stations:
-        if station.inertia:
+        if station.inertia or station.prescribed_by:
             continue
         k = stations.index(station)
         beside = links[max(k - 1, 0) : k + 1]

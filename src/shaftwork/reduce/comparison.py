@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,7 +35,7 @@ class Comparison:
 
     @property
     def peak_error(self) -> float:
-        """Of the largest torque, relative; negative where the small model says less."""
+        """Of the largest torque, relative; negative where the small model says less. Infinite where there was none."""
         return self._peak_error(1)
 
     @property
@@ -61,7 +62,14 @@ class Comparison:
         return "\n".join(lines)
 
     def _peak_error(self, place: int) -> float:
-        return self.extremes[place] / self.extremes[0] - 1
+        return _share(self.extremes[place] - self.extremes[0], self.extremes[0])
 
     def _rms_error(self, torque: Array) -> float:
-        return float(np.sqrt(np.mean((torque - self.before) ** 2) / np.mean(self.before**2)))
+        return math.sqrt(_share(float(np.mean((torque - self.before) ** 2)), float(np.mean(self.before**2))))
+
+
+def _share(difference: float, size: float) -> float:
+    """A difference over a size; where the size is zero, nothing for none and infinity for any."""
+    if not size:
+        return math.inf if difference else 0.0
+    return difference / size

@@ -43,7 +43,7 @@ def groupings(chain: Chain, masses: int, keep: str, driven: int) -> tuple[Groupi
     prescribed is a group of its own, for its group moves as prescribed; one mass for all moves so as a whole.
 
     Args:
-        chain: stations with inertia.
+        chain: stations with inertia, or with a prescribed speed.
         masses: the number of groups.
         keep: a part of one link; empty for none.
         driven: place of the station at which a step of torque acts, or of the prescribed acceleration.
@@ -54,7 +54,10 @@ def groupings(chain: Chain, masses: int, keep: str, driven: int) -> tuple[Groupi
     """
     count = len(chain.stations)
     if isinstance(masses, bool) or not isinstance(masses, int) or not 1 <= masses <= count:
-        raise ParameterError(f"masses = {masses!r} must be a whole number from 1 to the {count} inertias of the chain.")
+        held = "" if all(station.inertia for station in chain.stations) else " and prescribed speeds"
+        raise ParameterError(
+            f"masses = {masses!r} must be a whole number from 1 to the {count} inertias{held} of the chain."
+        )
     kept = next((k for k, link in enumerate(chain.links) if keep and link.has(keep)), None) if masses > 1 else None
     fixed = _fixed(chain, masses, kept)
     free = [k for k in range(count - 1) if k not in fixed]

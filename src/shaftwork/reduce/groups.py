@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from shaftwork.components.contacts import Backlash
 from shaftwork.components.rotation import Inertia, Spring
+from shaftwork.equations.nomenclature import breakable, column, unit
 from shaftwork.equations.nomenclature import table as longtable
 from shaftwork.equations.printing import printed_number
-from shaftwork.equations.spelling import in_text
 from shaftwork.pipeline.network import Network
 from shaftwork.reduce.chain import Chain, Link, Station, turning_nodes
 
@@ -39,12 +39,27 @@ class GroupTable:
         return "\n".join([*lines, f"rigid now: {', '.join(self.rigid) or 'nothing'}"])
 
     def latex(self) -> str:
-        """The table as LaTeX, a `longtable`."""
+        """The table as LaTeX, a `longtable` (packages booktabs, array, longtable); at its end what is rigid now."""
+        letters = {"gap": Backlash.declared["gap"].latex}
         rows = [
-            (in_text(row.part), f"${row.quantity}$", f"${printed_number(row.value)}$", in_text(", ".join(row.made_of)))
+            (
+                breakable(row.part),
+                f"${letters.get(row.quantity, row.quantity)}$",
+                f"${printed_number(row.value)}$",
+                unit(row.unit),
+                _listed(row.made_of),
+            )
             for row in self.rows
         ]
-        return longtable("llrl", ("Part", "Quantity", "Value in SI", "Made of"), rows)
+        if self.rigid:
+            rows.append(("rigid now", "", "", "", _listed(self.rigid)))
+        gap = r"@{\hspace{3mm}}"
+        columns = gap.join((column(30), "l", "r", "l", column(66)))
+        return longtable(columns, ("Part", "Quantity", "Value", "Unit", "Made of"), rows)
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    return ", ".join(map(breakable, names))
 
 
 def add_chain(net: Network, chain: Chain) -> tuple[Group, ...]:
@@ -53,9 +68,10 @@ def add_chain(net: Network, chain: Chain) -> tuple[Group, ...]:
     add_circuits(net, chain)
     for k, station in enumerate(chain.stations):
         add_riders(net, station, station.node)
-        name = station.heaviest
-        net.add(Inertia(name, J=station.inertia), station.node)
-        rows.append(Group(name, "J", station.inertia, "kg*m^2", tuple(own for own, _ in station.inertias)))
+        if station.inertias:
+            name = station.heaviest
+            net.add(Inertia(name, J=station.inertia), station.node)
+            rows.append(Group(name, "J", station.inertia, "kg*m^2", tuple(own for own, _ in station.inertias)))
         if k < len(chain.links):
             rows += add_link(net, chain.links[k], station, chain.stations[k + 1])
     return tuple(rows)

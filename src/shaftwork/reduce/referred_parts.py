@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sympy import Abs, Expr, Float, Rational, S, Symbol
+from sympy import Abs, Expr, Float, Rational, S, Symbol, signsimp
 
 from shaftwork.components.base import Component
 from shaftwork.components.laws import Table, as_expression, omega, phi, s, v
@@ -163,7 +163,7 @@ def _scaled(part: Component, scale: Scale, here: Domain, domain: Domain) -> tupl
             entries.append(
                 Entry(
                     *(part.name, name, value, declared.unit, scale.ratio, scale.power),
-                    *(made[0], target.unit, made[1]),
+                    *(made[0], target.unit, signsimp(made[1])),
                 )
             )
     with warnings.catch_warnings():

@@ -41,7 +41,8 @@ class FrequencyLoss:
         before: of the train, Hz.
         after: of the small model, Hz.
         error: of it, relative.
-        by_modes: of a description by as many ends of the kept shaft and modes of the rest (Craig and Bampton), Hz.
+        by_modes: of a description by as many ends of the kept shaft, prescribed speeds, and modes of the rest (Craig
+            and Bampton), Hz.
     """
 
     mode: int
@@ -57,8 +58,7 @@ class Simplified:
 
     Args:
         network: of the small model; the kept shaft and everything but inertias and other springs has its name.
-        by_modes: as many inertias by modes (Craig and Bampton), a network; None of one mass, with no shaft kept, or
-            where a source prescribes a speed.
+        by_modes: as many inertias by modes (Craig and Bampton), a network; None of one mass, or with no shaft kept.
         table: the groups.
         frequencies: before and after.
         keep: the kept shaft; empty for none.
@@ -155,7 +155,8 @@ def simplify(
     inertia; between two groups there are the springs from centre to centre in series, 1/c = sum 1/c_k with
     d = sum d_k (c/c_k)^2. The kept shaft is between two groups and keeps its own stiffness, damping and gap. What is
     beyond the outer centres is rigid. Motors, loads and brakes act on the group of their node. A node whose speed a
-    `SpeedSource` prescribes is a group of its own, and frequencies are those with this speed prescribed.
+    `SpeedSource` prescribes is a group of its own, with inertia or without, and frequencies are those with this speed
+    prescribed.
 
     Every contiguous grouping is tried, and the one with the smallest error of the lowest natural frequency is taken;
     among equal ones the error of the torque in the kept shaft decides, when a step of torque at the motor swings it in
@@ -164,7 +165,7 @@ def simplify(
 
     Args:
         net: the train: inertias and springs in a row, once its gears are referred.
-        masses: how many are left, 1 for the rigid train.
+        masses: how many groups are left, 1 for the rigid train.
         keep: a spring, or a gap with stiffness, that is worth looking at; by default none is kept as it is.
         to: node of the reference shaft; by default an end of the kept shaft.
         drives: as for `refer`.
@@ -187,8 +188,7 @@ def simplify(
     rows = add_chain(made, tried[0].chain)
     used = {name for row in rows for name in row.made_of}
     rigid = tuple(name for link in chain.links for name in link.parts if name not in used)
-    by_ends = keep and masses > 1 and not any(chain.prescribed)  # its modes let every place but the ends swing freely
-    modal = truncated(chain, masses, _place(chain, keep)) if by_ends else None
+    modal = truncated(chain, masses, _place(chain, keep)) if keep and masses > 1 else None
     by_modes = modal.network(f"{title}, by modes") if modal else None
     losses = _losses(chain, tried[0].chain, modal)
     return Simplified(made, by_modes, GroupTable(rows, rigid), losses, keep, tried, net, referred, chain)

@@ -10,14 +10,21 @@ from typing import Any
 from sympy import Expr, Symbol, latex
 
 from shaftwork.core.errors import SignalError
+from shaftwork.equations.nomenclature import breakable, column, unit
 from shaftwork.equations.nomenclature import table as longtable
-from shaftwork.equations.nomenclature import unit
 from shaftwork.equations.notation import without_marks
 from shaftwork.equations.printing import printed_number
-from shaftwork.equations.spelling import escaped, in_text
+from shaftwork.equations.spelling import escaped
+from shaftwork.equations.widths import printed_width
 from shaftwork.reduce.referred_parts import Entry
 
 HEADINGS = ("part", "quantity", "value", "unit", "ratio", "referred", "unit", "formula")
+FORMULA, LETTER = 42, 2
+"""Width of the formulas and about that of a letter in print, mm."""
+SCRIPT = 0.75
+"""Size of what is in a fraction beside text."""
+TIMES, BREAKS = r" \, ", r" \,\allowbreak "
+"""Between factors; where a line may end."""
 WIDEST = 28
 """Characters of a law in the text; a longer one is cut."""
 
@@ -62,7 +69,7 @@ class ReductionTable:
     def latex(self) -> str:
         """The table as LaTeX, a `longtable` in the letters of the equations (packages booktabs, array, longtable)."""
         titles = ("Part", "Formula", "Value", "Unit", "Ratio", "Referred", "Unit")
-        columns = "ll" + "rl" + "r" + "rl"
+        columns = r"@{\hspace{2mm}}".join((column(20), column(FORMULA), *"rlrrl"))
         return longtable(columns, titles, [self._printed(entry) for entry in self.entries])
 
     @cached_property
@@ -72,13 +79,9 @@ class ReductionTable:
         return {symbol: known.get(symbol.name) or _fallback(symbol.name) for symbol in symbols}
 
     def _printed(self, entry: Entry) -> tuple[str, ...]:
-        own = self._names[_own(entry)]
-        above, below = (self._factors(factor) for factor in entry.factor.as_numer_denom())
-        law = r" \, ".join((own, *above))
-        law = rf"\frac{{{law}}}{{{''.join(below)}}}" if below else law
         return (
-            in_text(entry.part),
-            f"${_primed(own)} = {law}$",
+            breakable(entry.part),
+            self._law(entry),
             _number(entry.value),
             unit(entry.unit),
             f"${printed_number(entry.ratio)}$",
@@ -86,12 +89,31 @@ class ReductionTable:
             unit(entry.referred_unit),
         )
 
+    def _law(self, entry: Entry) -> str:
+        """The formula, which may be broken between factors; a fraction that is too wide as a quotient on the line."""
+        own = self._names[_own(entry)]
+        above, below = entry.factor.as_numer_denom()
+        sign = "-" if above.could_extract_minus_sign() else ""
+        upper, lower = (own, *self._factors(-above if sign else above)), self._factors(below)
+        fraction = rf"\frac{{{TIMES.join(upper)}}}{{{TIMES.join(lower)}}}"
+        if not lower:
+            law = BREAKS.join(upper)
+        elif SCRIPT * printed_width(fraction) <= FORMULA / LETTER:
+            law = fraction
+        else:
+            divisor = BREAKS.join(lower)
+            law = rf"{BREAKS.join(upper)} \,/\allowbreak\, {f'({divisor})' if len(lower) > 1 else divisor}"
+        return f"${_primed(own)} = {sign}{law}$"
+
     def _factors(self, product: Expr) -> tuple[str, ...]:
-        """A product as LaTeX, nothing where it is one."""
+        """A product as LaTeX, factor by factor; nothing where it is one."""
         if product == 1:
             return ()
-        text = latex(product, symbol_names=dict(self._names), mul_symbol=r"\,")
-        return (rf"\left({text}\right)" if product.is_Add else text,)
+        names = dict(self._names)
+        factors = product.as_ordered_factors()
+        texts = (latex(factor, symbol_names=names, mul_symbol=TIMES) for factor in factors)
+        sums = (factor.is_Add for factor in factors)
+        return tuple(rf"\left({text}\right)" if total else text for text, total in zip(texts, sums, strict=True))
 
 
 def _own(entry: Entry) -> Symbol:

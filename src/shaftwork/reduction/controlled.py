@@ -14,7 +14,7 @@ from shaftwork.network.controlled import Reading, readings_of
 from shaftwork.network.graph import GROUND
 from shaftwork.network.templates import Kind
 from shaftwork.network.wording import at_nodes, title
-from shaftwork.reduction.view import View
+from shaftwork.reduction.view import View, Words, words_of
 
 
 def reads_itself(view: View, law: int) -> bool:
@@ -58,9 +58,13 @@ def controlled_problems(view: View) -> Iterator[Problem]:
     """Controlled sources that read what is not known, or that jolt a store."""
     laws = (*view.tree.tree[Kind.LAW], *view.tree.links[Kind.LAW], *view.form.controlled)
     reading = [law for law in sorted(laws) if view.graph.branches[law].template.reads]
-    for law in reading:
-        for made in readings_of(view.graph, law).values():
-            yield from _unknown(view, law, made)
+    unknown = (
+        problem
+        for law in reading
+        for made in readings_of(view.graph, law).values()
+        for problem in _unknown(view, law, made)
+    )
+    yield from dict.fromkeys(unknown)  # one cause for all windings of a motor
     for law in view.form.controlled:
         yield from _beside_a_store(view, law)
     if reading and view.form.waves:
@@ -86,9 +90,18 @@ def _unknown(view: View, law: int, reading: Reading) -> Iterator[Problem]:
     if law in view.form.controlled:
         moving = [k for k in _deciding(view, trees) if view.kind(k) is Kind.LAW or k in view.form.controlled]
         if moving:
-            message = f"{what}, and prescribes a {words.across}; but what it reads depends on {view.titles(moving)}."
-            hint = f"Give the node some {view.words(moving[0]).store}, so that what is read there is a state."
+            there = _words_of(view, reading)
+            message = (
+                f"{name} prescribes a {words.across} by the {there.across} of {at_nodes(nodes)}, which has no "
+                f"{there.store}: what it reads depends on {view.titles(moving)} at the same instant."
+            )
+            hint = f"Give the node some {there.store}, so that its {there.across} is a state."
             yield Problem("controlled source", message, hint, view.parts((law, *moving)), nodes)
+
+
+def _words_of(view: View, reading: Reading) -> Words:
+    """The words of the domain in which something is read."""
+    return words_of(view.graph.domains[reading.of]) if reading.kind == "across" else view.words(reading.of)
 
 
 def _beside_a_store(view: View, law: int) -> Iterator[Problem]:

@@ -24,7 +24,10 @@ from shaftwork.reduction.gains import value_of
 from shaftwork.reduction.tree import column_of
 from shaftwork.reduction.view import View, words_of
 
-_LACKING = ("floating part", "loose end", "massless node", "algebraic loop", "undetermined speed", "separate train")
+_LACKING = (
+    *("floating part", "loose end", "controlled source", "massless node", "algebraic loop", "undetermined speed"),
+    "separate train",
+)
 """Kinds that say that something is missing at a node; each is said only where none before it says so already."""
 _OF_VALUES = (
     *("locked gear loop", "blocked speed source", "blocked voltage source"),
@@ -64,7 +67,7 @@ def _causes(typed: Sequence[Problem], found: Sequence[Problem]) -> Iterator[Prob
     follows = {k for k, problem in enumerate(found) if problem.kind in _LACKING and covered & {*problem.nodes}}
     for kind in _LACKING:
         same = [k for k, problem in enumerate(found) if problem.kind == kind]
-        follows |= {k for k in same if covered.issuperset(found[k].nodes)}
+        follows |= {k for k in same if found[k].nodes and covered.issuperset(found[k].nodes)}
         covered.update(node for k in same if found[k].severity == "error" for node in found[k].nodes)
     for k, problem in enumerate(found):
         if k not in follows and not (problem.kind in _OF_VALUES and replaced & {*problem.parts}):

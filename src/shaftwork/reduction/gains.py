@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 from zlib import crc32
 
-from sympy import Expr, Float, Integer, Rational, Symbol, cancel
+from sympy import Expr, Float, Integer, Mul, Rational, Symbol, cancel
 
 CANCELLATION = 1e-10
 """A difference below this fraction of its terms is zero: ratios are typed to some ten digits (1.2 * 1.5 is 1.8)."""
@@ -168,11 +168,22 @@ def exact_of(numbers: Iterable[Number]) -> list[Expr]:
     return [next(expressions) if isinstance(number, Gain) else Integer(number) for number in listed]
 
 
-def simplified(number: Number) -> Expr:
-    """The expression in its shortest rational form, for equations that people read; decimals are rounded only once."""
-    if isinstance(number, int):
-        return Integer(number)
-    return in_decimals(cancel(fold((number,), exactly)[0]))
+def simplified(numbers: Iterable[Number]) -> list[Expr]:
+    """The numbers in their shortest rational form, for equations that people read; decimals are rounded only once.
+
+    Those of long gear trains are made of each other: what they share is multiplied out once for all of them.
+    """
+    listed = tuple(numbers)
+    found = iter(fold((number for number in listed if isinstance(number, Gain)), exactly))
+    return [in_decimals(_shortest(next(found))) if isinstance(number, Gain) else Integer(number) for number in listed]
+
+
+def _shortest(expression: Expr) -> Expr:
+    """Without common factors above and below; a product of powers of symbols has none."""
+    factors = (factor.as_base_exp() for factor in Mul.make_args(expression))
+    if all(exponent.is_Integer and (base.is_Symbol or base.is_Rational) for base, exponent in factors):
+        return expression
+    return cancel(expression)
 
 
 def exactly(expression: Expr) -> Expr:

@@ -17,6 +17,7 @@ from sympy import Add, Expr, Integer, Symbol, nan, oo, zoo
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, End, across_of, integral_of, through_of
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Modes
+from shaftwork.components.pieces import parts
 from shaftwork.components.slopes import slope
 from shaftwork.core.errors import NetworkError, Problem
 from shaftwork.network.graph import GROUND, GraphBranch, GraphPart
@@ -69,7 +70,7 @@ class Readings:
             else:
                 known[symbol] = self._named(part, symbol)
         made = expression.xreplace(known)
-        if made.has(zoo, oo, nan):
+        if not {zoo, oo, nan}.isdisjoint(parts((made,))):
             raise NetworkError(f"'{self.graph.name}' cannot be assembled", (_no_limit(part.name),))
         return made
 

@@ -6,11 +6,10 @@ left to the sparse matrices of the array program; both are tested to agree.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-import networkx as nx
-from sympy import Add, Dummy, Expr, Integer, Matrix, Symbol
+from sympy import Add, Dummy, Expr, Integer, Symbol
 
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.laws import t as TIME
@@ -18,16 +17,10 @@ from shaftwork.components.slopes import slope
 from shaftwork.network.controlled import Reading, readings_of
 from shaftwork.network.graph import GROUND
 from shaftwork.network.templates import Kind
+from shaftwork.reduction.blocks import BlockTooLargeError, Tie, solve_blocks, solve_tied
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.gains import exact_of
 from shaftwork.reduction.tree import Row
-
-LARGEST_BLOCK = 3
-"""Coupled unknowns that are solved symbolically; the formulas for more are longer than anyone reads."""
-
-
-class BlockTooLargeError(Exception):
-    """The rows have no closed form that anyone would read."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,18 +146,18 @@ class _Solution:
         unknowns = form.across_states
         links = (*form.link_conductances, *form.through_states, *form.laws)
         right = {tree: -self.out_of(tree, links) for tree in unknowns}
-        matrix: dict[tuple[int, int], Expr] = {(tree, tree): self.law(tree) for tree in unknowns}
-        for link in form.dependent_across:
-            capacity = self.law(link)
-            self._add_products(matrix, link, capacity, frozenset(unknowns))
-            driven = (
-                gain * slope(self.law(tree), TIME) for tree, gain in self.loops[link] if tree in form.across_sources
-            )
-            prescribed = capacity * Add(*driven)
-            for tree, gain in self.balances[link]:
-                if tree in right:
-                    right[tree] -= gain * prescribed
-        return solve_blocks(matrix, unknowns, right)
+        ties = [self._tie(link, right.keys()) for link in form.dependent_across]
+        return solve_tied({tree: self.law(tree) for tree in unknowns}, ties, right)
+
+    def _tie(self, link: int, unknowns: Container[int]) -> Tie:
+        """A dependent store as what it does to the stores that carry it."""
+        columns, row = (
+            {tree: gain for tree, gain in members[link] if tree in unknowns} for members in (self.balances, self.loops)
+        )
+        driven = (
+            gain * slope(self.law(tree), TIME) for tree, gain in self.loops[link] if tree in self.form.across_sources
+        )
+        return Tie(self.law(link), columns, row, Add(*driven))
 
     def _torque_rates(self) -> tuple[Expr, ...]:
         form = self.form
@@ -192,27 +185,6 @@ class _Solution:
                 matrix[first, second] = matrix.get((first, second), Integer(0)) + gain * coefficient * other
 
 
-def _cramer(matrix: Mapping[tuple[int, int], Expr], block: Sequence[int], right: Mapping[int, Expr]) -> Iterator[Expr]:
-    """Solve one block by cofactors.
-
-    The cofactors are made of single symbols, and the entries put in afterwards: sympy would otherwise try to cancel
-    factors of long entries, which takes minutes for a few geared inertias.
-    """
-    entries = {
-        (i, j): matrix[first, second]
-        for i, first in enumerate(block)
-        for j, second in enumerate(block)
-        if (first, second) in matrix
-    }
-    names = {place: Symbol(f"m{place[0]}{place[1]}") for place in entries}
-    square = Matrix(len(block), len(block), lambda i, j: names.get((i, j), Integer(0)))
-    put_in = {names[place]: entry for place, entry in entries.items()}
-    adjugate = square.adjugate().xreplace(put_in)
-    determinant = square.det(method="berkowitz").xreplace(put_in)
-    for i in range(len(block)):
-        yield Add(*(adjugate[i, j] * right[other] for j, other in enumerate(block))) / determinant
-
-
 def _exact(form: StateForm, rows: Mapping[int, Row]) -> dict[int, tuple[tuple[int, Expr], ...]]:
     """Loops or cutsets of the links as expressions, without couplings: their across value is zero."""
     couplings = frozenset(form.tree.tree[Kind.COUPLING])
@@ -226,28 +198,3 @@ def _exact(form: StateForm, rows: Mapping[int, Row]) -> dict[int, tuple[tuple[in
     for (link, tree, _), exact in zip(entries, exact_of(gain for _, _, gain in entries), strict=True):
         made[link].append((tree, exact))
     return {link: tuple(row) for link, row in made.items()}
-
-
-def solve_blocks(
-    matrix: Mapping[tuple[int, int], Expr], unknowns: Sequence[int], right: Mapping[int, Expr]
-) -> tuple[Expr, ...]:
-    """Solve a sparse symbolic system block by block of coupled unknowns.
-
-    Raises:
-        BlockTooLargeError: a block has more than `LARGEST_BLOCK` unknowns.
-    """
-    links: nx.Graph[int] = nx.Graph()
-    links.add_nodes_from(unknowns)
-    links.add_edges_from(matrix)
-    solution: dict[int, Expr] = {}
-    order = {unknown: k for k, unknown in enumerate(unknowns)}
-    for component in nx.connected_components(links):
-        block = sorted(component, key=order.__getitem__)
-        if len(block) > LARGEST_BLOCK:
-            raise BlockTooLargeError
-        if len(block) == 1:
-            (only,) = block
-            solution[only] = right[only] / matrix[only, only]
-            continue
-        solution.update(zip(block, _cramer(matrix, block, right), strict=True))
-    return tuple(solution[unknown] for unknown in unknowns)

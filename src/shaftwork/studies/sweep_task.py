@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -157,13 +158,17 @@ class Worker:
 
     @cached_property
     def _choosy(self) -> list[tuple[Component, list[tuple[str, Array]]]]:
-        """Parts that check whether their values go together, with the columns of those that vary."""
+        """Parts that check whether their values go together, with the columns of those that vary.
+
+        Left out are those whose check reads nothing that varies: it says the same of all variants as of the network.
+        """
         by_part: dict[str, list[tuple[str, Array]]] = {}
         for name, column in self._task.columns.items():
             owner, _, parameter = name.rpartition(".")
             by_part.setdefault(owner, []).append((parameter, column))
         parts = (placed.part for placed in self._netlist.placed)
-        return [(part, by_part[part.name]) for part in parts if part.name in by_part and hasattr(part, "__post_init__")]
+        own = [(part, by_part[part.name]) for part in parts if part.name in by_part and hasattr(part, "__post_init__")]
+        return [(part, columns) for part, columns in own if not _checked(part).isdisjoint({"__dict__", *dict(columns)})]
 
     def _objection(self, variant: int) -> str:
         """Why the values of a variant do not go together; empty where they do."""
@@ -194,6 +199,23 @@ class Worker:
                 return nothing, f"measure '{name}' is {value}"
             values.append(value)
         return np.array(values), ""
+
+
+def _checked(part: Component) -> set[str]:
+    """The names that a part's check of its values reads, for the values that it has."""
+    read = set[str]()
+
+    class Told(type(part)):  # type: ignore[misc] # the same part, which tells what is read of it
+        def __getattribute__(self, name: str) -> Any:
+            read.add(name)
+            return super().__getattribute__(name)
+
+    told: Any = object.__new__(Told)
+    object.__getattribute__(told, "__dict__").update(vars(part))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # what is odd about it was said when it was made
+        told.__post_init__()
+    return read - {"__post_init__"}
 
 
 def _first_line(error: Exception) -> str:

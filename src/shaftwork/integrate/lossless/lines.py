@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from shaftwork.core.times import around
 from shaftwork.integrate.lossless.collocation import POINTS
-from shaftwork.integrate.problem import Array, Trajectory
+from shaftwork.integrate.problem import Array, Explain, Trajectory
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,8 @@ class DelayProblem:
         delays: (q / 2,) delays in s; the ends are numbered a and b of the first line, a and b of the second, ...
         impedances: (q / 2,) impedances in N m s.
         x0: (n,) start state; n may be 0.
-        t0, t_end, names, atol, rtol, breakpoints, jump, sides, t_eval, max_steps: as in `Problem`; a step is a panel.
+        t0, t_end, names, atol, rtol, breakpoints, jump, sides, t_eval, explain, max_steps: as in `Problem`; a step is a
+            panel.
         linear: whether rhs and speeds are affine in x and h, with constant matrices.
         steady: whether, between breakpoints, rhs and speeds do not depend on the time.
         speeds0: (q,) speed of each end at t0 in rad/s, along a line straight from the one to the other; None for rest.
@@ -67,6 +68,7 @@ class DelayProblem:
     jump: Callable[[float, Array], Array] | None = None
     sides: Callable[[float], tuple[float, float]] = around
     t_eval: Array | None = None
+    explain: Explain | None = None
     max_steps: int = 10_000_000
     linear: bool = False
     steady: bool = False

@@ -13,6 +13,8 @@ from shaftwork.integrate.problem import Array
 
 # Numbers of so large a size show the matrices of an affine function without the rounding of its constant.
 PROBE = 2.0**40
+# They are seen so early in the first piece, at a share of it: later a law may have lost its value.
+EARLY = 1 / 1024
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ class Matrices:
         """The matrices of a linear problem."""
         n, q = problem.x0.size, 2 * problem.delays.size
         piece = pieces(problem)[0]
-        t = np.full(2 * (n + q), (piece.low + piece.high) / 2)
+        t = np.full(2 * (n + q), piece.low + EARLY * (piece.high - piece.low))
         both = PROBE * np.hstack([np.eye(n + q), -np.eye(n + q)])
         slopes, speeds = (np.asarray(f(t, both[:n], both[n:])) for f in (problem.rhs, problem.speeds))
         slopes, speeds = ((f[:, : n + q] - f[:, n + q :]) / (2 * PROBE) for f in (slopes, speeds))

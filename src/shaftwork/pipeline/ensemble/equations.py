@@ -12,8 +12,9 @@ from shaftwork.codegen.elements import Array
 from shaftwork.integrate.lanes import Lanes
 from shaftwork.pipeline.ensemble.programs import EnsembleCode
 from shaftwork.pipeline.phases.assemblies import Assembly, ModeNames
+from shaftwork.pipeline.phases.courses import FEW
 from shaftwork.pipeline.phases.moments import CLEAR, EPS, GOLDEN, NOTHING, ROUNDINGS
-from shaftwork.pipeline.phases.settling import AHEAD, AHEAD_OF_RUN, FEW
+from shaftwork.pipeline.phases.settling import AHEAD, AHEAD_OF_RUN
 from shaftwork.pipeline.prepared import NOMINAL
 
 WITHIN = 1e-9

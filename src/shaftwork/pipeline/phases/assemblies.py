@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
-from itertools import count
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,14 +17,17 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.recovery import History
 from shaftwork.codegen.stores import Stores
 from shaftwork.codegen.timeline import Timeline
+from shaftwork.codegen.valueless import first_missing, in_words, without_value
 from shaftwork.components.branches import ACROSS, INTEGRAL
-from shaftwork.components.laws import as_expression, pieces_degree
+from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Leave, Mode, Modes
+from shaftwork.components.pieces import pieces_degree
 from shaftwork.core.errors import CompileError
 from shaftwork.integrate.choice import available
 from shaftwork.integrate.problem import Guards, Problem
 from shaftwork.network.graph import GraphPart
+from shaftwork.pipeline.phases.rates import rates_of
 from shaftwork.pipeline.prepared import Prepared
 from shaftwork.reduction.readings import NamedReadings, Readings
 
@@ -34,8 +36,6 @@ if TYPE_CHECKING:
 
 KEPT = 64
 """Parameter vectors whose matrices are kept."""
-FEW = 50
-"""Right-hand sides that are not worth code of their own."""
 SAMPLES = 64
 """Times at which a guard is looked at to know its size."""
 
@@ -109,6 +109,7 @@ class Assembly:
         if rows is None:
             _ = self._shown  # so that all quantities are known before any function of them is made
         self._prepared: dict[bytes, Prepared] = {}
+        self._rates_made: dict[bytes, tuple[Callable[[float, Array], Array], dict[str, Any]]] = {}
         self._sides: dict[ModeNames, Array] = {}
         self._ends: dict[ModeNames, tuple[tuple[int, Watched], ...]] = {}
         self._numbers = [self._places[element.number] for element in elements if element.number in self._places]
@@ -265,8 +266,9 @@ class Assembly:
 
         Its states are those of the model and, behind them, the integrals of the guards in `clocks`.
         """
-        guards, bound, rates = self.guards(p), partial(self.bound, p), self._rates(p)
+        guards, bound, (rates, known) = self.guards(p), partial(self.bound, p), self._rates(p)
         clocks, size = list(self.clocks), x.size
+        owners = {made.guard: self.elements[k].name for (k, _), found in self._watched.items() for made in found}
         sides = self.sides(modes)
         watch = Guards(guards if not clocks else lambda t, y: guards(t, y[:, :size]), sides, np.array(bands))
 
@@ -291,29 +293,33 @@ class Assembly:
             x0=np.concatenate([x, np.zeros(len(clocks))]),
             t0=span[0],
             t_end=span[1],
-            names=(*self.model.states, *(f"guard {k}" for k in clocks)),
+            names=(*self.model.states, *(f"limit of {owners[k]}" for k in clocks)),
             atol=np.concatenate([self.prepared(p).atol, self._sizes(guards, x, span)]),
             sides=times.sides,
             switches=(lambda t, y: bound().switches(t, y[:, :size])) if self.model.arrays.inputs.switching else None,
             guards=watch,
             symbolic=lambda: None if self.program is None else self.program.bind(p),
+            explain=lambda t, y: self.without_value(p, modes, t, y[:, :size]),
+            found=known,
         )
 
-    def _rates(self, p: Array) -> Callable[[float, Array], Array]:
-        """The right-hand side; an engine that asks for it often gets code of its own."""
-        (motion, _), asked, scalar_program = self.motion(p), count(), self.model.scalar
-        if scalar_program is None:
-            return self.bound(p).rhs
-        own: list[Callable[[float, Array], Array]] = []
+    def without_value(self, p: Array, modes: ModeNames, times: Array, states: Array) -> tuple[float, str] | None:
+        """The first time at which a law or a guard of the modes has no value, and which one."""
+        law, pairs = without_value(self.bound(p), times, states), self.watched(modes)
+        found = first_missing(times, self.guards(p)(times, states)[:, [made.guard for _, made in pairs]])
+        if law is not None or found is None:
+            return law
+        number, made = pairs[found[1]]
+        return found[0], in_words(self.elements[number].part, made.leave.when)
 
-        def rates(t: float, x: Array) -> Array:
-            if next(asked) < FEW:
-                return np.array(motion(t, x.tolist())[0])
-            if not own:
-                own.append(scalar_program.bind(p))
-            return own[0](t, x)
-
-        return rates
+    def _rates(self, p: Array) -> tuple[Callable[[float, Array], Array], dict[str, Any]]:
+        """The right-hand side and what engines find out about it, for all phases with these parameters."""
+        key = p.tobytes()
+        if key not in self._rates_made:
+            while len(self._rates_made) >= KEPT:
+                del self._rates_made[next(iter(self._rates_made))]
+            self._rates_made[key] = rates_of(self.model, self.bound(p), self.motion(p)[0], p), {}
+        return self._rates_made[key]
 
     def _sizes(self, guards: Callable[[Array, Array], Array], x: Array, span: tuple[float, float]) -> Array:
         """The size of each clock over a phase, as far as the time alone tells."""
@@ -376,7 +382,7 @@ class Assembly:
 
 def _winds(guard: Expr) -> bool:
     """Whether a guard changes with time other than along straight pieces."""
-    return bool(guard.has(TIME)) and pieces_degree(guard) is None
+    return pieces_degree(guard) is None
 
 
 @lru_cache(maxsize=256)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
 from shaftwork.codegen.elements import Array
+from shaftwork.core.errors import no_value
 from shaftwork.integrate.problem import Reaction, SeriesError
 from shaftwork.pipeline.phases.assemblies import ModeNames
 from shaftwork.pipeline.phases.moments import Change, Moment, Regime, clear_of_limit
@@ -57,12 +61,18 @@ class Passing:
         moment: at the start of the engine's run.
         start: s.
         note: is told what has changed.
+        suits: whether the engine goes on well from a time on.
     """
 
     def __init__(
-        self, settling: Settling, moment: Moment, start: float, note: Callable[[float, list[Change]], None]
+        self,
+        settling: Settling,
+        moment: Moment,
+        start: float,
+        note: Callable[[float, list[Change]], None],
+        suits: Callable[[float, Moment], bool] = lambda _t, _moment: True,
     ) -> None:
-        self._settling, self.moment, self._note = settling, moment, note
+        self._settling, self.moment, self._note, self._suits = settling, moment, note, suits
         self._size = moment.x.size
         self.phases = [Phase(start, moment.regime.modes, moment.regime.p)]
         self._reactions: list[Reaction] = []
@@ -77,8 +87,12 @@ class Passing:
         found = self._direct(met, t, x) or self._settled(met, t, x)
         if found is None:
             return None
-        self.moment, changes = found
-        regime = self.moment.regime
+        moment, changes = found
+        without_clocks = moment._replace(x=x[: self._size].copy())
+        if not self._suits(t, without_clocks):
+            self.beyond = without_clocks, changes
+            return None
+        self.moment, regime = moment, moment.regime
         self._note(t, changes)
         self.phases.append(Phase(t, regime.modes, regime.p))
         reaction = Reaction(regime.p, regime.sides, self.moment.bands)
@@ -99,9 +113,14 @@ class Passing:
 
         Raises:
             SeriesError: the engine has not seen it.
+            SimulationError: a law or a guard has no value.
         """
         regime, bands, states = self.moment.regime, self.moment.bands, x[: self._size].tolist()
         rates, now = regime.motion(t, states)
+        if any(map(math.isnan, now)):
+            law = regime.assembly.without_value(regime.p, regime.modes, np.array([t]), np.array([states]))
+            if law is not None:
+                raise no_value(*law)
         late = LATE * self._settling.tick
         before = regime.limits(t - late, [v - late * rate for v, rate in zip(states, rates, strict=True)])
         for number, made in regime.watched:

@@ -41,7 +41,8 @@ class Phases:
         self.elements = elements_of(base)
         self.first: ModeNames = tuple(element.modes.options[0].name for element in self.elements)
         self._assemblies: dict[tuple[str, ...], Assembly | NetworkError] = {}
-        self._engines: dict[Any, tuple[str, str]] = {}
+        self._engines: dict[tuple[Assembly, ModeNames, str], tuple[str, str]] = {}
+        self._compiled: set[Assembly] = set()
         self.found: tuple[Any, Any] | None = None
         """Of which values and times the last run was, and what it has found out: the next like it goes on with that."""
 
@@ -62,7 +63,7 @@ class Phases:
                 self._assemblies[forms] = error
         made = self._assemblies[forms]
         if isinstance(made, NetworkError):
-            raise made
+            raise made.with_traceback(None)  # else it would keep the frames of every time that it was raised
         return made
 
     def _netlist(self, forms: tuple[str, ...]) -> Netlist:
@@ -76,12 +77,21 @@ class Phases:
         pairs = zip(self.elements, modes, strict=True)
         return {element.number: element.modes[name].value for element, name in pairs}
 
-    def engine(self, assembly: Assembly, problem: Problem, asked: str) -> tuple[str, str]:
-        """The engine for a phase, and why.
+    def engine(
+        self, assembly: Assembly, modes: ModeNames, problem: Callable[[], Problem], asked: str
+    ) -> tuple[str, str]:
+        """The engine for a phase, and why: a light wheel that runs free is no trouble, and stiff in contact.
+
+        Args:
+            assembly: the equations.
+            modes: in which they are solved.
+            problem: makes the motion from there on, which is looked at once for these modes.
+            asked: name of an engine, or "auto".
 
         Raises:
             ParameterError: the one that is asked for follows no modes.
         """
+        key = assembly, modes, asked
         if asked != "auto":
             choice.check(asked)
             if asked not in FOLLOWING:
@@ -91,13 +101,18 @@ class Phases:
                 )
             if asked != "sundials":
                 return asked, "asked for"
-            if (assembly, asked) not in self._engines:
+            if key not in self._engines:
                 adams = choice.ADAMS, "asked for; the motion is not stiff, so Adams' formulas are taken."
-                self._engines[assembly, asked] = (asked, "asked for") if choice.is_stiff(problem) else adams
-            return self._engines[assembly, asked]
-        if assembly not in self._engines:
-            name, why = choice.choose(problem)
+                self._engines[key] = (asked, "asked for") if choice.is_stiff(problem()) else adams
+            return self._engines[key]
+        if key not in self._engines:
+            name, why = choice.choose(problem())
             if name not in FOLLOWING:  # that of long chains
                 name = "sundials" if choice.available("sundials") else "scipy-radau"
-            self._engines[assembly] = name, why
-        return self._engines[assembly]
+            self._compiled |= {assembly} if name == "heyoka" else set()
+            self._engines[key] = name, why
+        return self._engines[key]
+
+    def tries_heyoka(self, assembly: Assembly) -> bool:
+        """Whether heyoka has been taken for these equations in other modes: a stiff phase may be over at once."""
+        return assembly in self._compiled

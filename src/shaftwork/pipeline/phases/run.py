@@ -7,7 +7,7 @@ after another until all of them are consistent with the motion that follows, and
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -117,11 +117,14 @@ class Run:
         """The engine for the first phase, and why."""
         moment = self._begin(None)
         problem = self._problem(self.demand.span[0], moment)
-        return (
-            self.phases.engine(moment.regime.assembly, problem, self.demand.engine)
-            if problem.x0.size
-            else ("exact", STILL)
-        )
+        return self._engine(moment, lambda: problem) if problem.x0.size else ("exact", STILL)
+
+    def _engine(self, moment: Moment, problem: Callable[[], Problem]) -> tuple[str, str]:
+        return self.phases.engine(moment.regime.assembly, moment.regime.modes, problem, self.demand.engine)
+
+    def _suits_heyoka(self, t: float, moment: Moment) -> bool:
+        """Whether heyoka goes on from a time on: it is what was asked for, or suits the modes."""
+        return self.demand.engine != "auto" or self._engine(moment, lambda: self._problem(t, moment))[0] == "heyoka"
 
     def timeline(self, assembly: Assembly, p: Array) -> Timeline:
         """The instants at which inputs jump or bend."""
@@ -162,7 +165,8 @@ class Run:
     def _problem(self, t: float, moment: Moment, passing: Passing | None = None) -> Problem:
         """The motion from a time on, up to the next instant at which an input jumps."""
         demand, regime, times = self.demand, moment.regime, self._instants(moment)
-        end = min([*times.times[bisect_right(times.times, t) :][:1], demand.span[1]])
+        following = bisect_right(times.times, t)
+        end = min([*times.times[following : following + 1], demand.span[1]])
         problem = regime.assembly.problem(regime.p, regime.modes, moment.x, moment.bands, (t, end), times)
         atol = demand.rtol * problem.atol
         if demand.atol is not None:
@@ -209,21 +213,26 @@ class Run:
         return self.demand.t_eval[first : last + (end == self.demand.span[1])]
 
     def _passed(self, t: float, moment: Moment) -> tuple[Trajectory, Passing]:
-        """One run of the engine; where a Taylor series cannot go on, another engine begins it anew."""
-        passing, noted, soon = Passing(self.settling, moment, t, self.note), len(self.changes), [*self._soon]
-        problem = self._problem(t, moment, passing)
+        """One run of the engine; where heyoka cannot go on, or a stiff phase is long, another engine begins it anew."""
+        passing, noted = Passing(self.settling, moment, t, self.note, self._suits_heyoka), len(self.changes)
+        problem, soon = self._problem(t, moment, passing), [*self._soon]
         if not problem.x0.size:
             made, _, _ = at_rest(problem)
             return replace(made, end=(problem.t_end, problem.x0)), passing
-        name, why = self.phases.engine(moment.regime.assembly, problem, self.demand.engine)
-        try:
+        name, why = self._engine(moment, lambda: problem)
+        stiff = name != "heyoka"
+        if self.demand.engine != "auto" or (stiff and not self.phases.tries_heyoka(moment.regime.assembly)):
             return self._solve(problem, name, why), passing
-        except SeriesError:
-            if self.demand.engine != "auto":
+        first = problem if not stiff else replace(problem, max_steps=min(problem.max_steps, choice.patience(problem)))
+        try:
+            return self._solve(first, "heyoka", why), passing
+        except SimulationError as error:
+            if not stiff and not isinstance(error, SeriesError):
                 raise
         del self.changes[noted:]
         self._soon = soon
-        return self._solve(problem, "scipy", choice.NOT_ANALYTIC), Passing(self.settling, moment, t, self.note)
+        again = (name, why) if stiff else ("scipy", choice.NOT_ANALYTIC)
+        return self._solve(problem, *again), Passing(self.settling, moment, t, self.note)
 
     def _solve(self, problem: Problem, name: str, why: str) -> Trajectory:
         share, loosest = FOLLOWING[name]

@@ -14,8 +14,9 @@ from shaftwork.codegen.elements import Array
 from shaftwork.components.branches import ACROSS
 from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.pipeline.phases.assemblies import ModeNames, Watched
+from shaftwork.pipeline.phases.courses import Way, later, leaving, moved
 from shaftwork.pipeline.phases.impacts import NO_IMPACT, Impacts
-from shaftwork.pipeline.phases.moments import ROUNDINGS, Change, Course, Moment, Regime, clear_of_limits, together
+from shaftwork.pipeline.phases.moments import ROUNDINGS, Change, Moment, Regime, clear_of_limits, together
 from shaftwork.pipeline.phases.regimes import Regimes, refuse_beyond, with_modes
 
 if TYPE_CHECKING:
@@ -23,9 +24,6 @@ if TYPE_CHECKING:
 
 # How far ahead that course is looked at: parts of the time in which a state moves by its nominal size, and of the run.
 AHEAD, AHEAD_OF_RUN = 1e-3, 1e-7
-
-# What a look ahead gains must be more than so many rounding units.
-FEW = 4
 # So many changes within one instant have no end: of two rigid flanks without a gap between them, say.
 MOST_AT_ONCE = 2000
 MOST_REPEATS = 2
@@ -93,7 +91,7 @@ class Settling:
         Raises:
             SimulationError: no modes are consistent; names the pair that changes for ever.
         """
-        new, changes = self._consistent(t, after, moment, met)
+        new, changes = self._fewest(t, after, moment, met)
         resting = self._resting(new, after) if changes else {}
         if not resting:
             return new, changes
@@ -124,18 +122,49 @@ class Settling:
         others = regime.limits(t + self.tick, regime.rounded(x, rates, self.tick))
         return {k: to for k, (to, guard) in found.items() if now[guard] == others[guard] == 0.0}
 
-    def _consistent(self, t: float, after: float, moment: Moment, met: int | None) -> tuple[Moment, list[Change]]:
-        """Modes that are consistent with the motion that follows, by one change after another; see `settle`."""
+    def _fewest(self, t: float, after: float, moment: Moment, met: int | None) -> tuple[Moment, list[Change]]:
+        """Of several guards that are met at one instant, rounding tells which of them ends the phase.
+
+        So each is followed first, and the fewest changes are taken: two flanks that one torque has pressed together
+        part where they have to, and not at both.
+        """
+        if met is None:
+            return self._consistent(t, after, moment, None)
+        named = next(pair for pair in moment.regime.watched if pair[1].guard == met)
+        found: list[tuple[Moment, list[Change]]] = []
+        failed: list[SimulationError] = []
+        for first in self._at_once(moment, after, named):
+            try:
+                found.append(self._consistent(t, after, moment, first))
+            except SimulationError as error:
+                failed.append(error)
+        if not found:
+            raise failed[0]
+        return min(found, key=lambda made: len(made[1]))
+
+    def _at_once(self, moment: Moment, t: float, named: Way) -> list[Way]:
+        """The guards that are met at the instant at which one is, in the order of their elements."""
+        ways = [pair for _, pair in self._exceeded(moment, t, moment, (), repeats=1)[1]]
+        if named not in ways and (not named[1].leave.by_torque or all(pair[1].leave.by_torque for pair in ways)):
+            ways.append(named)
+        return sorted(ways, key=moment.regime.watched.index)
+
+    def _consistent(self, t: float, after: float, moment: Moment, first: Way | None) -> tuple[Moment, list[Change]]:
+        """Modes that are consistent with the motion that follows, by one change after another; see `settle`.
+
+        Args:
+            t, after, moment: as there.
+            first: the element and the guard to begin with, or None.
+        """
         changes: list[Change] = []
-        still: list[tuple[int, Watched]] = []
+        still: list[Way] = []
         seen: dict[ModeNames, None] = {}
         blocked, repeats = None, 0
         # a guard is met where it is beyond zero by its band, which then still is the band of what is the same after it
         ended = moment
-        if met is None:
+        found = first
+        if found is None:
             moment, found = self._violated(moment, after, ended, still)
-        else:
-            found = next(pair for pair in moment.regime.watched if pair[1].guard == met)
         while found is not None:
             moment, made, contradiction = self._follow(t, after, moment, *found)
             changes, blocked = [*changes, *made], contradiction or blocked
@@ -152,24 +181,36 @@ class Settling:
         return moment, changes
 
     def _violated(
-        self, moment: Moment, t: float, ended: Moment, still: Sequence[tuple[int, Watched]], repeats: int = 0
-    ) -> tuple[Moment, tuple[int, Watched] | None]:
+        self, moment: Moment, t: float, ended: Moment, still: Sequence[Way], repeats: int = 0
+    ) -> tuple[Moment, Way | None]:
         """The guard that is farthest beyond its limit, or on it and about to go beyond; the moment with its bands.
+
+        Args:
+            moment, t, ended, still: as in `_exceeded`.
+            repeats: how often modes have come back. After the first time the first guard is taken. The worst leads
+                faster to modes that are consistent, as a rule; but this always does where parts hold each other
+                (Murty, Linear Complementarity, 1988, section 4.1).
+        """
+        moment, found = self._exceeded(moment, t, ended, still, repeats)
+        return moment, _chosen(found, in_order=repeats > 0)
+
+    def _exceeded(
+        self, moment: Moment, t: float, ended: Moment, still: Sequence[Way], repeats: int
+    ) -> tuple[Moment, list[tuple[float, Way]]]:
+        """The guards beyond their limits, or on them and about to go beyond, and how far; the moment with its bands.
 
         Args:
             moment: modes and states.
             t: s.
             ended: the moment before any change.
             still: elements and guards that were found here already and change nothing.
-            repeats: how often modes have come back. After the first time the first guard is taken. The worst leads
-                faster to modes that are consistent, as a rule; but this always does where parts hold each other
-                (Murty, Linear Complementarity, 1988, section 4.1). After the second time, what comes back
-                within its limit by itself, at once, is no more beyond it.
+            repeats: how often modes have come back. After the second time, what comes back within its limit by itself,
+                at once, is no more beyond it.
         """
         regime, x = moment.regime, moment.x.tolist()
         rates, now = regime.motion(t, x)
-        moved = regime.rounded(x, rates, self.tick)
-        others, near = regime.motion(t + self.tick, moved)
+        rounded = regime.rounded(x, rates, self.tick)
+        others, near = regime.motion(t + self.tick, rounded)
         bands = [abs(n - g) for n, g in zip(near, now, strict=True)]
         wide = bands
         if ended.bands and ended.regime.assembly is regime.assembly:
@@ -185,16 +226,16 @@ class Settling:
             elif value > 0:
                 beyond.append((value, pair))
         if repeats > 1 and beyond:
-            soon = _later(regime, self.ahead(regime, rates), (t, x, rates, now))[3]
+            soon = later(regime, self.ahead(regime, rates), (t, x, rates, now))[3]
             beyond = [found for found in beyond if found[1][1].side * soon[found[1][1].guard] > 0]
         # impacts come first: torques are those of the motion after them
         hits = [found for found in beyond if not found[1][1].leave.by_torque]
         if on_limit and not hits:
-            leaving = self._leaving(regime, (t, x, rates, now), (t + self.tick, moved, others, near), on_limit)
-            hits = [found for found in leaving if found[1][1].leave.rebound is not None]
-            beyond = beyond + leaving if repeats else beyond or leaving
-        chosen = _chosen(hits or beyond, in_order=repeats > 0)
-        return Moment(regime, moment.x, clear_of_limits(regime, now, bands)), chosen
+            courses = (t, x, rates, now), (t + self.tick, rounded, others, near)
+            soon_beyond = leaving(regime, self.ahead(regime, rates), *courses, on_limit)
+            hits = [found for found in soon_beyond if found[1][1].leave.rebound is not None]
+            beyond = beyond + soon_beyond if repeats else beyond or soon_beyond
+        return Moment(regime, moment.x, clear_of_limits(regime, now, bands)), hits or beyond
 
     def ahead(self, regime: Regime, rates: list[float]) -> float:
         """How far in s the further course is looked at."""
@@ -203,34 +244,6 @@ class Settling:
             if rate and AHEAD * size < step * abs(rate):
                 step = AHEAD * size / abs(rate)
         return step
-
-    def _leaving(
-        self, regime: Regime, here: Course, beside: Course, on_limit: list[tuple[int, Watched]]
-    ) -> list[tuple[float, tuple[int, Watched]]]:
-        """Of guards on their limit those that are about to go beyond it, and how far, as surely as rounding tells.
-
-        Args:
-            regime: the modes.
-            here: time, states, rates and guards of the moment.
-            beside: the same, rounding away from it.
-            on_limit: elements and guards.
-        """
-        step = self.ahead(regime, here[2])
-        ways, found = (here, beside), []
-        for _ in range(2):  # where nothing moves yet, its acceleration tells
-            ways = _later(regime, step, ways[0]), _later(regime, step, ways[1])
-            moving = []
-            for pair in on_limit:
-                made, k = pair[1], pair[1].guard
-                gain, other = made.side * (ways[0][3][k] - here[3][k]), made.side * (ways[1][3][k] - beside[3][k])
-                units = abs(beside[3][k] - here[3][k]) / ROUNDINGS
-                if abs(gain) > max(abs(gain - other), FEW * units):
-                    moving.append((gain, pair))
-            found = [one for one in moving if one[0] > 0]
-            if found:
-                break
-            on_limit = [pair for pair in on_limit if all(pair is not one for _, one in moving)]
-        return found
 
     def _follow(
         self, t: float, after: float, moment: Moment, number: int, ended: Watched
@@ -259,9 +272,9 @@ class Settling:
         """The mode of an element in which a motion would start, other than the one that ends."""
         regime, before = moment.regime, moment.regime.modes[number]
         step = self.ahead(regime, regime.motion(t, moment.x.tolist())[0])
-        for later in (0.0, step):  # by rounding, what ends the mode may not be true yet
-            x = _moved(moment, t, later).x
-            to = regime.assembly.start_of(number, before, t + later, x, regime.p)
+        for late in (0.0, step):  # by rounding, what ends the mode may not be true yet
+            x = moved(moment, t, late).x
+            to = regime.assembly.start_of(number, before, t + late, x, regime.p)
             if to:
                 return to
         element = self.elements[number]
@@ -277,9 +290,9 @@ class Settling:
         and here would add up over many rebounds.
         """
         since = 0.0 if ended.leave.rebound is None else self._since(after, moment, ended)
-        new, changes = self._impacts.hit(t, after, _moved(moment, after, -since), number, ended.leave)
+        new, changes = self._impacts.hit(t, after, moved(moment, after, -since), number, ended.leave)
         if not changes[0].rebound:
-            return _moved(new, after, since), changes
+            return moved(new, after, since), changes
         old, made, x = moment.regime, new.regime, new.x
         share = old.assembly.constant(number, ended.leave.rebound, old.p)
         speed = old.assembly.across(number, after, moment.x, old.p)
@@ -290,14 +303,14 @@ class Settling:
         pushed = math.copysign(1.0, speed) * (later - made.assembly.across(number, after, x, made.p)) / step
         if 0 < (1 - share**2) * speed**2 < 4 * late * pushed:
             return self._impacts.hit(t, after, moment, number, replace(ended.leave, rebound=None))
-        return _moved(new, after, since), changes
+        return moved(new, after, since), changes
 
     def _since(self, t: float, moment: Moment, met: Watched) -> float:
         """How long ago, in s, a guard passed through zero along a straight line."""
         regime, x = moment.regime, moment.x.tolist()
         rates, now = regime.motion(t, x)
         step, beyond = self.ahead(regime, rates), met.side * now[met.guard]
-        gain = met.side * _later(regime, step, (t, x, rates, now))[3][met.guard] - beyond
+        gain = met.side * later(regime, step, (t, x, rates, now))[3][met.guard] - beyond
         return beyond * step / gain if 0 < beyond < gain else 0.0
 
     def _commutated(self, moment: Moment, t: float, modes: ModeNames, plain: Moment) -> tuple[Moment, dict[int, str]]:
@@ -370,23 +383,8 @@ class Settling:
         )
 
 
-def _chosen(found: list[tuple[float, tuple[int, Watched]]], *, in_order: bool) -> tuple[int, Watched] | None:
+def _chosen(found: list[tuple[float, Way]], *, in_order: bool) -> Way | None:
     """Of elements and guards the first one, or else the one that is farthest beyond."""
     if not found:
         return None
     return (min(found, key=lambda one: one[1][0]) if in_order else max(found, key=lambda one: one[0]))[1]
-
-
-def _moved(moment: Moment, t: float, step: float) -> Moment:
-    """The same modes a little later or earlier, in s, along a straight line."""
-    if not step:
-        return moment
-    rates, _ = moment.regime.motion(t, moment.x.tolist())
-    return moment._replace(x=moment.x + step * np.array(rates))
-
-
-def _later(regime: Regime, step: float, course: Course) -> Course:
-    """A step further along a straight line."""
-    t, x, rates, _ = course
-    later = [v + step * rate for v, rate in zip(x, rates, strict=True)]
-    return t + step, later, *regime.motion(t + step, later)

@@ -1,0 +1,56 @@
+"""The course of a motion near an instant, along straight lines: what is about to go beyond its limit."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shaftwork.pipeline.phases.assemblies import Watched
+from shaftwork.pipeline.phases.moments import ROUNDINGS, Course, Moment, Regime
+
+# What a look ahead gains must be more than so many rounding units.
+FEW = 4
+
+Way = tuple[int, Watched]
+"""An element and a guard that may end its mode."""
+
+
+def leaving(regime: Regime, step: float, here: Course, beside: Course, on_limit: list[Way]) -> list[tuple[float, Way]]:
+    """Of guards on their limit those that are about to go beyond it, and how far, as surely as rounding tells.
+
+    Args:
+        regime: the modes.
+        step: how far ahead to look, s.
+        here: time, states, rates and guards of the moment.
+        beside: the same, rounding away from it.
+        on_limit: elements and guards.
+    """
+    ways, found = (here, beside), list[tuple[float, Way]]()
+    for _ in range(2):  # where nothing moves yet, its acceleration tells
+        ways = later(regime, step, ways[0]), later(regime, step, ways[1])
+        moving = []
+        for pair in on_limit:
+            made, k = pair[1], pair[1].guard
+            gain, other = made.side * (ways[0][3][k] - here[3][k]), made.side * (ways[1][3][k] - beside[3][k])
+            units = abs(beside[3][k] - here[3][k]) / ROUNDINGS
+            if abs(gain) > max(abs(gain - other), FEW * units):
+                moving.append((gain, pair))
+        found = [one for one in moving if one[0] > 0]
+        if found:
+            break
+        on_limit = [pair for pair in on_limit if all(pair is not one for _, one in moving)]
+    return found
+
+
+def moved(moment: Moment, t: float, step: float) -> Moment:
+    """The same modes a little later or earlier, in s, along a straight line."""
+    if not step:
+        return moment
+    rates, _ = moment.regime.motion(t, moment.x.tolist())
+    return moment._replace(x=moment.x + step * np.array(rates))
+
+
+def later(regime: Regime, step: float, course: Course) -> Course:
+    """A step further along a straight line."""
+    t, x, rates, _ = course
+    states = [v + step * rate for v, rate in zip(x, rates, strict=True)]
+    return t + step, states, *regime.motion(t + step, states)

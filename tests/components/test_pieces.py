@@ -1,0 +1,33 @@
+"""What goes through formulas looks at each part once, and leaves as it is what need not be expanded."""
+
+from __future__ import annotations
+
+import sympy
+
+from shaftwork.components.laws import line, t
+from shaftwork.components.pieces import parts, pieces_degree
+
+K, L = sympy.symbols("K L", real=True)
+
+
+def nested(inner: sympy.Expr, depth: int) -> sympy.Expr:
+    """f(f(x, x), f(x, x)) and so on: as many different parts as its depth, written out two to that power."""
+    function = sympy.Function("f")
+    for _ in range(depth):
+        inner = function(inner, inner)
+    return inner
+
+
+def test_a_part_that_stands_in_many_places_is_met_once() -> None:
+    assert len(list(parts((nested(K, 60), K)))) == 61
+
+
+def test_the_degree_of_a_formula_does_not_depend_on_how_often_its_parts_stand_in_it() -> None:
+    assert pieces_degree(t * nested(K, 60)) == 1
+    assert pieces_degree(t + nested(t, 60)) is None
+
+
+def test_what_does_not_move_is_not_expanded_to_find_a_line_in_time() -> None:
+    product = (K + L) ** 40
+    assert line(2 * t + product) == (2, product)
+    assert line((t + 1) ** 2 - t**2 + product) == (2, product + 1)

@@ -1,0 +1,73 @@
+"""Guards that are met at one instant: whichever an engine names, the same modes change in the same order."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import sympy
+
+import shaftwork as sw
+from tests.trains import Part, Train
+
+RIGID = {"gap": 0.02, "restitution": 0.0, "omega_rest": 1e-3}
+SOFT = {"gap": 0.02, "c": 5000.0, "d": 0.5}
+PULSE = sw.Step(-7.0, 0.2) - sw.Step(-7.0, 0.5)
+
+
+def chain(first: dict[str, float], second: dict[str, float], speeds: tuple[float, ...], *more: Part) -> Train:
+    """Three inertias with two gaps between them."""
+    inertias = (Part("Inertia", f"J{k}", (f"r{k}",), {"J": J}) for k, J in enumerate((2.0, 0.5, 0.5)))
+    gaps = Part("Backlash", "gap1", ("r0", "r1"), first), Part("Backlash", "gap2", ("r1", "r2"), second)
+    return Train((*inertias, *gaps, *more), {f"J{k}.omega": w for k, w in enumerate(speeds)}, 1.0)
+
+
+TRAINS = {
+    "a soft flank presses a rigid one": chain(
+        RIGID, SOFT, (0.0, 20.0, -3.3), Part("TorqueSource", "tau", ("r0",), {"tau": PULSE})
+    ),
+    "a rigid flank is pressed by a soft one": chain(
+        SOFT, RIGID, (-3.3, 20.0, 0.0), Part("TorqueSource", "tau", ("r2",), {"tau": PULSE})
+    ),
+    "both are rigid": chain(
+        RIGID,
+        {**RIGID, "restitution": 0.5},
+        (1.0, -1.0, 5.0),
+        Part("TorqueSource", "tau", ("r0",), {"tau": 30.0 * sympy.sin(8.0 * sw.t)}),
+    ),
+    "a motor drives two": chain(
+        {**RIGID, "restitution": 0.5, "omega_rest": 1e-6},
+        {"gap": 0.02, "c": 100.0, "d": 0.0},
+        (-1.0, 0.0, 20.0),
+        Part("KlossMotor", "motor", ("r2",), {"tau_k": 30.0, "s_k": 0.25, "n_sync": 300.0, "ratio": 2.0}),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", TRAINS)
+def test_every_engine_names_the_same_events_in_the_same_order(name: str) -> None:
+    model, initial = TRAINS[name].compiled(), TRAINS[name].initial
+    wanted, *others = (
+        model.simulate(1.0, engine=engine, rtol=1e-9, initial=initial).events
+        for engine in ("heyoka", "scipy", "sundials")
+    )
+    assert len(wanted) > 5
+    for events in others:
+        assert [event[1:] for event in events] == [event[1:] for event in wanted]
+        # an engine's error grows with every event
+        np.testing.assert_allclose([event[0] for event in events], [event[0] for event in wanted], rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials"])
+@pytest.mark.parametrize("driven", ["r0", "r2"])
+def test_where_a_torque_turns_round_only_the_flanks_next_to_it_part(engine: str, driven: str) -> None:
+    """At pi / 8 s the torque through both gaps is zero; behind it all goes on at one speed."""
+    sign = 1.0 if driven == "r0" else -1.0
+    source = Part("TorqueSource", "tau", (driven,), {"tau": sign * sympy.sin(8.0 * sw.t)})
+    train = chain(RIGID, RIGID, (0.0, 0.0, 0.0), source)
+    start = {"gap1.phi": 0.01, "gap2.phi": 0.01}
+    sol = train.compiled().simulate(0.4, engine=engine, rtol=1e-9, initial={**train.initial, **start})
+    (event,) = (event for event in sol.events if event[0] > 0.1)
+    assert event[1:] == ("gap1" if driven == "r0" else "gap2", "in contact", "open")
+    assert event[0] == pytest.approx(math.pi / 8, abs=1e-9)
