@@ -293,7 +293,8 @@ class RandomLoad(Resistance):
     Law: torque on the node -sign(omega) max(0, mean + std nu(t / interval)), with nu a standard normal noise:
     held for each interval (`HeldNoise`), or smooth and band-limited, its power halved at 0.22 / interval
     (`SmoothNoise`). Where the normal distribution falls below zero there is no resistance: nothing drives.
-    The same seed gives the same load, as a function of time. Source: Marinkovic 2012, section 3, figure 11.
+    The same seed gives the same load, as a function of time. Every engine starts anew at each number, so that a run
+    costs as many restarts as it has intervals. Source: Marinkovic 2012, section 3, figure 11.
     """
 
     mean: float = parameter("N*m", "mean of the resistance", at_least=0, latex=r"\bar\tau")

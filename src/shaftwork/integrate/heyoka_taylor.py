@@ -90,8 +90,6 @@ class _Run:
         integrator.pars[:used] = self.parameters[:used]
         integrator.reset_cooldowns() if integrator.with_events else None
         if self.problem.guards is not None:
-            values = self.program.guard_values(piece.start, integrator.state, integrator.pars)
-            self._sizes = np.maximum(np.where(np.isfinite(values), np.abs(values), 0.0), 1.0)
             self._guard(integrator.pars, self.problem.guards.sides, self.problem.guards.offsets)
         watch = self._watch(piece)
         self.program.listeners.clear()
@@ -132,7 +130,8 @@ class _Run:
         """
         first = self.program.parameter_count + len(self.program.switches)
         offsets = np.asarray(offsets)
-        sizes = np.maximum(self._sizes, offsets / ROUNDING)
+        assert self.problem.guards is not None  # noqa: S101 (there are some to watch)
+        sizes = np.fmax(np.fmax(1.0, self.problem.guards.sizes), offsets / ROUNDING)
         pars[first : first + len(sides)] = sides / sizes
         pars[first + len(sides) :] = offsets / sizes
 

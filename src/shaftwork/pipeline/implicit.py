@@ -40,15 +40,19 @@ class _NoStates:
         return np.zeros((len(times), 0))
 
 
-def at_rest(problem: Problem) -> tuple[Trajectory, str, str]:
+def at_rest(problem: Problem, degree: int | None) -> tuple[Trajectory, str, str]:
     """The run of a network without states: everything follows from the sources at every instant.
+
+    Args:
+        problem: with its output times.
+        degree: of the laws of time; None where one is no polynomial, and may have no value.
 
     Raises:
         SimulationError: a law has no value at one of the times.
     """
     steps = np.array([problem.t0, *problem.breakpoints, problem.t_end])
     t = steps if problem.t_eval is None else problem.t_eval
-    if problem.explain is not None:
+    if degree is None and problem.explain is not None:
         times = np.union1d(t, steps)
         if (law := problem.explain(times, np.zeros((len(times), 0)))) is not None:
             raise no_value(*law)

@@ -227,7 +227,7 @@ class Model(CompiledModel):
             return self._solve_waves(prepared, problem, waves, engine)
         choice.check(engine)
         if not self.states:
-            return at_rest(problem)
+            return at_rest(problem, self.degree)
         if self.form.loop_laws and engine in ("auto", "sundials"):
             return solve_loops(prepared.bound, problem)
         name, why = self._engine(prepared, problem, engine)

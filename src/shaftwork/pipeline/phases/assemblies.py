@@ -33,6 +33,7 @@ from shaftwork.reduction.readings import NamedReadings, Readings
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.model import Model
+    from shaftwork.pipeline.phases.moments import Moment
 
 KEPT = 64
 """Parameter vectors whose matrices are kept."""
@@ -259,18 +260,18 @@ class Assembly:
         element, made = self.elements[number], as_expression(0 if expression is None else expression)
         return self._readings.guard(self.parts[element.part.name], element.modes, made)
 
-    def problem(
-        self, p: Array, modes: ModeNames, x: Array, bands: Sequence[float], span: tuple[float, float], times: Timeline
-    ) -> Problem:
+    def problem(self, moment: Moment, span: tuple[float, float], times: Timeline) -> Problem:
         """The motion of a phase, before it is known where it ends; tolerances are for rtol = 1.
 
         Its states are those of the model and, behind them, the integrals of the guards in `clocks`.
         """
+        p, modes, x = moment.regime.p, moment.regime.modes, moment.x
         guards, bound, (rates, known) = self.guards(p), partial(self.bound, p), self._rates(p)
         clocks, size = list(self.clocks), x.size
-        owners = {made.guard: self.elements[k].name for (k, _), found in self._watched.items() for made in found}
-        sides = self.sides(modes)
-        watch = Guards(guards if not clocks else lambda t, y: guards(t, y[:, :size]), sides, np.array(bands))
+        owners = {made.guard: k for (k, _), found in self._watched.items() for made in found}
+        found = guards if not clocks else lambda t, y: guards(t, y[:, :size])
+        now = np.abs(moment.regime.limits(span[0], x.tolist()))
+        watch = Guards(found, self.sides(modes), np.array(moment.bands), now)
 
         def rhs(t: float, y: Array) -> Array:
             return rates(t, y)
@@ -293,7 +294,7 @@ class Assembly:
             x0=np.concatenate([x, np.zeros(len(clocks))]),
             t0=span[0],
             t_end=span[1],
-            names=(*self.model.states, *(f"limit of {owners[k]}" for k in clocks)),
+            names=(*self.model.states, *(f"limit of {self.elements[owners[k]].name}" for k in clocks)),
             atol=np.concatenate([self.prepared(p).atol, self._sizes(guards, x, span)]),
             sides=times.sides,
             switches=(lambda t, y: bound().switches(t, y[:, :size])) if self.model.arrays.inputs.switching else None,

@@ -167,7 +167,7 @@ class Run:
         demand, regime, times = self.demand, moment.regime, self._instants(moment)
         following = bisect_right(times.times, t)
         end = min([*times.times[following : following + 1], demand.span[1]])
-        problem = regime.assembly.problem(regime.p, regime.modes, moment.x, moment.bands, (t, end), times)
+        problem = regime.assembly.problem(moment, (t, end), times)
         atol = demand.rtol * problem.atol
         if demand.atol is not None:
             atol[: moment.x.size] = absolute_tolerances(demand.atol, moment.x.size)
@@ -217,7 +217,7 @@ class Run:
         passing, noted = Passing(self.settling, moment, t, self.note, self._suits_heyoka), len(self.changes)
         problem, soon = self._problem(t, moment, passing), [*self._soon]
         if not problem.x0.size:
-            made, _, _ = at_rest(problem)
+            made, _, _ = at_rest(problem, moment.regime.assembly.model.degree)
             return replace(made, end=(problem.t_end, problem.x0)), passing
         name, why = self._engine(moment, lambda: problem)
         stiff = name != "heyoka"

@@ -27,6 +27,8 @@ AHEAD, AHEAD_OF_RUN = 1e-3, 1e-7
 # So many changes within one instant have no end: of two rigid flanks without a gap between them, say.
 MOST_AT_ONCE = 2000
 MOST_REPEATS = 2
+# A guard that is farther from its limit than this many times what it is met by is not met now.
+NEAR = 64
 
 
 class Settling:
@@ -138,12 +140,22 @@ class Settling:
                 found.append(self._consistent(t, after, moment, first))
             except SimulationError as error:
                 failed.append(error)
+            else:
+                if len(found[-1][1]) == 1:  # none can be fewer
+                    break
         if not found:
             raise failed[0]
         return min(found, key=lambda made: len(made[1]))
 
     def _at_once(self, moment: Moment, t: float, named: Way) -> list[Way]:
         """The guards that are met at the instant at which one is, in the order of their elements."""
+        regime, others = moment.regime, [pair for pair in moment.regime.watched if pair is not named]
+        now, near = (
+            regime.limits(t, moment.x.tolist()),
+            [NEAR * band for band in moment.bands] or [math.inf] * len(others),
+        )
+        if all(pair[1].side * now[pair[1].guard] < -near[pair[1].guard] for pair in others):
+            return [named]
         ways = [pair for _, pair in self._exceeded(moment, t, moment, (), repeats=1)[1]]
         if named not in ways and (not named[1].leave.by_torque or all(pair[1].leave.by_torque for pair in ways)):
             ways.append(named)
