@@ -42,7 +42,7 @@ class Phases:
         self.first: ModeNames = tuple(element.modes.options[0].name for element in self.elements)
         self._assemblies: dict[tuple[str, ...], Assembly | NetworkError] = {}
         self._engines: dict[tuple[Assembly, ModeNames, str], tuple[str, str]] = {}
-        self._compiled: set[Assembly] = set()
+        self._easy: dict[Assembly, dict[tuple[int, str], tuple[str, str]]] = {}
         self.found: tuple[Any, Any] | None = None
         """Of which values and times the last run was, and what it has found out: the next like it goes on with that."""
 
@@ -106,13 +106,17 @@ class Phases:
                 self._engines[key] = (asked, "asked for") if choice.is_stiff(problem()) else adams
             return self._engines[key]
         if key not in self._engines:
+            easy = self._easy.setdefault(assembly, {})
+            if easy.keys() >= {*enumerate(modes)}:  # each of them was no trouble beside others
+                return next(iter(easy.values()))
             name, why = choice.choose(problem())
             if name not in FOLLOWING:  # that of long chains
                 name = "sundials" if choice.available("sundials") else "scipy-radau"
-            self._compiled |= {assembly} if name == "heyoka" else set()
+            if name == "heyoka":
+                easy |= dict.fromkeys(enumerate(modes), (name, why))
             self._engines[key] = name, why
         return self._engines[key]
 
     def tries_heyoka(self, assembly: Assembly) -> bool:
         """Whether heyoka has been taken for these equations in other modes: a stiff phase may be over at once."""
-        return assembly in self._compiled
+        return bool(self._easy.get(assembly))
