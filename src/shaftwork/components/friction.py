@@ -19,7 +19,7 @@ from shaftwork.core.parameters import parameter
 
 SLIPPING, STUCK = "", "stuck"
 # What holds gives way this much above its limit: then there is a torque that moves it, and no rounding of one.
-GIVES_WAY = 1 + 1e-12
+GIVES_WAY = 1 + 2e-14
 ROUNDED = 0.01
 """Speed in rad/s over which friction is rounded where nothing chooses modes, beside shafts of travelling waves."""
 
