@@ -90,6 +90,7 @@ class _Run:
         integrator.pars[:used] = self.parameters[:used]
         integrator.reset_cooldowns() if integrator.with_events else None
         if self.problem.guards is not None:
+            self._sizes = np.fmax(self.problem.guards.sizes, 1.0)
             self._guard(integrator.pars, self.problem.guards.sides, self.problem.guards.offsets)
         watch = self._watch(piece)
         self.program.listeners.clear()
@@ -130,8 +131,7 @@ class _Run:
         """
         first = self.program.parameter_count + len(self.program.switches)
         offsets = np.asarray(offsets)
-        assert self.problem.guards is not None  # noqa: S101 (there are some to watch)
-        sizes = np.fmax(np.fmax(1.0, self.problem.guards.sizes), offsets / ROUNDING)
+        sizes = np.fmax(self._sizes, offsets / ROUNDING)
         pars[first : first + len(sides)] = sides / sizes
         pars[first + len(sides) :] = offsets / sizes
 

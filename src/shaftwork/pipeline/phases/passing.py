@@ -76,6 +76,7 @@ class Passing:
         self._size = moment.x.size
         self.phases = [Phase(start, moment.regime.modes, moment.regime.p)]
         self._reactions: list[Reaction] = []
+        self._suited: set[Regime] = set()
         self.beyond: tuple[Moment, list[Change]] | None = None
         """What comes after the last guard, where the engine had to stop for it."""
 
@@ -88,11 +89,14 @@ class Passing:
         if found is None:
             return None
         moment, changes = found
-        without_clocks = moment._replace(x=x[: self._size].copy())
-        if not self._suits(t, without_clocks):
-            self.beyond = without_clocks, changes
-            return None
-        self.moment, regime = moment, moment.regime
+        regime = moment.regime
+        if regime not in self._suited:
+            without_clocks = moment._replace(x=x[: self._size].copy())
+            if not self._suits(t, without_clocks):
+                self.beyond = without_clocks, changes
+                return None
+            self._suited.add(regime)
+        self.moment = moment
         self._note(t, changes)
         self.phases.append(Phase(t, regime.modes, regime.p))
         reaction = Reaction(regime.p, regime.sides, self.moment.bands)
