@@ -54,3 +54,10 @@ def later(regime: Regime, step: float, course: Course) -> Course:
     t, x, rates, _ = course
     states = [v + step * rate for v, rate in zip(x, rates, strict=True)]
     return t + step, states, *regime.motion(t + step, states)
+
+
+def chosen(found: list[tuple[float, Way]], *, in_order: bool) -> Way | None:
+    """Of elements and guards the first one, or else the one that is farthest beyond."""
+    if not found:
+        return None
+    return (min(found, key=lambda one: one[1][0]) if in_order else max(found, key=lambda one: one[0]))[1]

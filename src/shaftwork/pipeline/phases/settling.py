@@ -14,7 +14,7 @@ from shaftwork.codegen.elements import Array
 from shaftwork.components.branches import ACROSS
 from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.pipeline.phases.assemblies import ModeNames, Watched
-from shaftwork.pipeline.phases.courses import Way, later, leaving, moved
+from shaftwork.pipeline.phases.courses import Way, chosen, later, leaving, moved
 from shaftwork.pipeline.phases.impacts import NO_IMPACT, Impacts
 from shaftwork.pipeline.phases.moments import ROUNDINGS, Change, Moment, Regime, clear_of_limits, together
 from shaftwork.pipeline.phases.regimes import Regimes, refuse_beyond, with_modes
@@ -204,7 +204,7 @@ class Settling:
                 (Murty, Linear Complementarity, 1988, section 4.1).
         """
         moment, found = self._exceeded(moment, t, ended, still, repeats)
-        return moment, _chosen(found, in_order=repeats > 0)
+        return moment, chosen(found, in_order=repeats > 0)
 
     def _exceeded(
         self, moment: Moment, t: float, ended: Moment, still: Sequence[Way], repeats: int
@@ -393,10 +393,3 @@ class Settling:
             f"At t = {t:.9g} s no modes of {', '.join(others)} are consistent: '{last.element.name}' changes for ever "
             f"between {before} and {after}. {advice}"
         )
-
-
-def _chosen(found: list[tuple[float, Way]], *, in_order: bool) -> Way | None:
-    """Of elements and guards the first one, or else the one that is farthest beyond."""
-    if not found:
-        return None
-    return (min(found, key=lambda one: one[1][0]) if in_order else max(found, key=lambda one: one[0]))[1]
