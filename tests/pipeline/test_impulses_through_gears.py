@@ -134,3 +134,82 @@ def test_a_jump_of_a_prescribed_speed_turns_a_gear_round_with_the_torques_of_bot
     with pytest.warns(sw.NetworkWarning, match="jumps at t = 0.1 s"):
         sol = net.simulate(0.2)
     assert sol["J.omega"][-1] == pytest.approx(-2.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("efficiency", [0.7, 0.99, 1.0])
+@pytest.mark.parametrize("side", ["a", "b"])
+def test_a_stop_on_the_frame_throws_a_geared_train_back(side: str, efficiency: float) -> None:
+    """The gear comes to rest with the contact, both held: it is turned by what the contact gives back."""
+    ratio, restitution, speed = 2.0, 0.5, 4.0
+    net = sw.Network("bounce")
+    net.add(sw.Inertia("A", J=1.0), "a")
+    net.add(sw.LossyGear("gear", ratio=ratio, efficiency=efficiency), "a", "b")
+    net.add(sw.Inertia("B", J=3.0), "b")
+    net.add(sw.HardStop("stop", upper=0.5, restitution=restitution), side)
+    own, other = (1.0, 3.0 / ratio**2) if side == "a" else (3.0, 1.0 * ratio**2)
+    hits = speed if side == "a" else speed / ratio
+    braked, thrown = own + efficiency * other, own + other / efficiency
+    sol = net.simulate(0.3, initial={"A.omega": speed})
+    after = -restitution * hits * math.sqrt(braked / thrown)
+    assert sol[f"{side.upper()}.omega"][-1] == pytest.approx(after, rel=1e-12)
+    assert sol.energy.lost_in["stop"] == pytest.approx((1 - restitution**2) * braked * hits**2 / 2, rel=1e-12)
+
+
+def test_a_prescribed_flank_that_hits_a_gear_without_losses_is_that_of_an_ideal_one() -> None:
+    ends = []
+    for gear in (sw.Gear("gear", ratio=2.0), sw.LossyGear("gear", ratio=2.0, efficiency=1.0)):
+        net = sw.Network("flank")
+        net.add(sw.SpeedSource("drive", omega=0.3), "f")
+        net.add(sw.Backlash("gap", gap=0.1, restitution=0.5), "f", "b")
+        net.add(sw.Inertia("B", J=1.0), "b")
+        net.add(gear, "b", "c")
+        net.add(sw.Inertia("C", J=2.0), "c")
+        sol = net.simulate(0.3)
+        ends.append((sol["B.omega"][-1], sol.energy.supplied_by["drive"], sol.energy.lost_in["gap"]))
+    assert ends[0] == pytest.approx((0.45, 0.3 * 1.5 * 0.45, 0.3 * 1.5 * 0.45 - 1.5 * 0.45**2 / 2), rel=1e-12)
+    assert ends[1] == pytest.approx(ends[0], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("part", "to", "supplied", "lost"),
+    # 3 rad/s at 2 kg m2 at once: 9 J; the clutch rubs 0.6 s at 1 N m, from 3 rad/s on by 1 rad/s2 less
+    [
+        (sw.Clutch("part", tau=1.0), 1.0, 9.0 + 1.8, 1.8 - 0.18),
+        (sw.LossyGear("part", ratio=2.0, efficiency=0.5), 2.0, 13.5, 2.25),
+    ],
+    ids=["clutch", "gear"],
+)
+def test_a_jump_of_a_prescribed_speed_is_supplied_and_what_a_gear_loses_in_it_is_its_own(
+    part: sw.Component, to: float, supplied: float, lost: float
+) -> None:
+    net = sw.Network("jump")
+    net.add(sw.SpeedSource("drive", omega=sw.Step(3.0, 0.4)), "a")
+    net.add(sw.Inertia("A", J=2.0), "a")
+    net.add(part, "a", "b")
+    net.add(sw.Inertia("B", J=to), "b")
+    with pytest.warns(sw.NetworkWarning, match="jumps at t = 0.4 s"):
+        sol = net.simulate(1.0)
+    assert sol.energy.supplied[-1] == pytest.approx(supplied, rel=1e-12)
+    assert sol.energy.supplied_by["drive"] == pytest.approx(supplied, rel=1e-12)
+    assert sol.energy.lost_in["part"] == pytest.approx(lost, rel=1e-12)
+
+
+def test_impacts_of_one_instant_lose_in_their_own_parts() -> None:
+    net = sw.Network("two pairs")
+    for k, J in enumerate((1.0, 2.0)):
+        net.add(sw.Inertia(f"A{k}", J=J), f"a{k}")
+        net.add(sw.Backlash(f"gap{k}", gap=0.1), f"a{k}", f"b{k}")
+        net.add(sw.Inertia(f"B{k}", J=2.0), f"b{k}")
+    sol = net.simulate(0.1, initial={"A0.omega": 2.0, "A1.omega": 2.0})
+    assert [sol.energy.lost_in[f"gap{k}"] for k in (0, 1)] == pytest.approx([4.0 / 3.0, 2.0], rel=1e-12)
+
+
+def test_what_an_impact_at_the_very_start_loses_in_a_gear_is_in_no_balance() -> None:
+    net = sw.Network("start")
+    net.add(sw.Inertia("A", J=1.0), "a")
+    net.add(sw.LossyGear("gear", ratio=2.0, efficiency=0.7), "a", "b")
+    net.add(sw.Inertia("B", J=3.0), "b")
+    net.add(sw.Freewheel("stop"), "b", "ground")
+    sol = net.simulate(0.1, initial={"A.omega": 4.0})
+    assert sol["A.omega"][-1] == 0.0
+    assert set(sol.energy.lost_in.values()) == {0.0}

@@ -94,6 +94,8 @@ def _impulses(
     lost: dict[str, Array] = {}
     given: dict[str, float] = {}
     for time, part, sources, others in observer.impacts:
+        if time <= steps[0]:  # the balance begins after it
+            continue
         places = np.flatnonzero(steps == time)[-1:]
         own = sum(sources.values()) - impulses[places] - sum(others.values())
         lost.setdefault(part, np.zeros(len(steps)))[places] += own

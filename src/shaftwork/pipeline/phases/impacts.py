@@ -12,7 +12,7 @@ from shaftwork.components.branches import INTEGRAL
 from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.pipeline.phases.assemblies import Element, ModeNames
-from shaftwork.pipeline.phases.impulses import Blow, Impulses, Stage
+from shaftwork.pipeline.phases.impulses import Blow, Impulses, Stage, Start
 from shaftwork.pipeline.phases.moments import CLEAR, Change, Moment
 from shaftwork.pipeline.phases.regimes import Regimes, with_modes
 
@@ -70,12 +70,11 @@ class Impacts:
         # what moves more slowly than the rest of an impact stays as it is: two contacts would part and meet for ever
         least = max(rest, NO_IMPACT * speed)
 
-        def joined(start: Moment, _: Sequence[Stage]) -> Blow:
-            modes, stored = start.regime.modes, self._regimes.held(start, after)
-            met = self._joined(modes, stored, after, {number: leave.to}, least)
+        def joined(start: Start, _: Sequence[Stage]) -> Blow:
+            met = self._joined(start.moment.regime.modes, start.held, after, {number: leave.to}, least)
             return Blow(met, met.regime)
 
-        stages = self._impulses.stages(after, moment, joined, apart)
+        stages = self._impulses.stages(after, self._impulses.begins(moment, after), joined, apart)
         new = stages[-1].blow.after
         plastic = self._regimes.held(new, after)
         # nothing throws back what has no inertia: a damper's end against a stop
@@ -84,8 +83,10 @@ class Impacts:
         if rebound:
             stages += self._thrown_back(after, stages, number, leave.to, share, apart)
         given, lost = self._impulses.given(after, stages), self._impulses.lost(after, stages)
+        element = self._elements[number]
+        lost[element.part.name] = lost.get(element.part.name, 0.0) + self._impulses.work(after, number, stages)
         modes = regime.modes[number], leave.to
-        hits = Change(t, self._elements[number], *modes, rebound, impact=True, given=given, lost=lost)
+        hits = Change(t, element, *modes, rebound, impact=True, given=given, lost=lost)
         new = stages[-1].blow.after
         if not rebound:
             new = self._at_limit(new, number, leave)
@@ -138,25 +139,28 @@ class Impacts:
         as long as no gear turns round. Speeds change as they would if the same impulse closed what now parts.
         """
         last, work = pressed[-1], self._impulses.work
+        first = self._impulses.across(pressed[0].start.moment, t, number)
 
-        def thrown(start: Moment, made: Sequence[Stage]) -> Blow:
-            modes = start.regime.modes
-            ways = start, self._regimes.changed(last.start, t, modes)
-            closing = max(ways, key=lambda moment: abs(self._impulses.across(moment, t, number)))
+        def thrown(start: Start, made: Sequence[Stage]) -> Blow:
+            moment = start.moment
+            modes = moment.regime.modes
+            ways = moment, self._regimes.taking(modes, t, last.start.held)
+            closing = max(ways, key=lambda one: abs(self._impulses.across(one, t, number)))
+            speed, now = (self._impulses.across(one, t, number) for one in (closing, moment))
+            if not abs(speed) > NO_IMPACT * abs(first):  # both sides are held
+                return Blow(moment, moment.regime)
+            begun = self._impulses.begins(closing, t)
             joined = self._regimes.changed(closing, t, with_modes(modes, {number: to}))
-            held, before, after = (self._regimes.held(moment, t) for moment in (start, closing, joined))
-            closed = work(t, number, (Stage(closing, Blow(joined, joined.regime), 1.0),))
-            if not closed > 0:  # both sides are held
-                return Blow(start, joined.regime)
-            speed, now = (self._impulses.across(moment, t, number) for moment in (closing, start))
+            closed = work(t, number, (Stage(begun, Blow(joined, joined.regime), 1.0),))
             left = share**2 * work(t, number, pressed) + work(t, number, made)
             gains = math.sqrt((now / speed) ** 2 + max(left, 0.0) / closed) - abs(now / speed)
-            gains *= math.copysign(1.0, speed * self._impulses.across(pressed[0].start, t, number))
-            parts = {name: value + gains * (after[name] - before[name]) for name, value in held.items()}
+            gains *= math.copysign(1.0, speed * first)
+            after = self._regimes.held(joined, t)
+            parts = {name: v + gains * (after[name] - begun.held[name]) for name, v in start.held.items()}
             return Blow(self._regimes.taking(modes, t, parts), joined.regime)
 
         compressed = self._regimes.changed(last.blow.after, t, with_modes(last.blow.after.regime.modes, apart))
-        return self._impulses.stages(t, compressed, thrown, apart)
+        return self._impulses.stages(t, self._impulses.begins(compressed, t), thrown, apart)
 
     def _refuse_gain(
         self, t: float, moment: Moment, before: Mapping[str, float], after: Mapping[str, float], hits: Change
@@ -191,13 +195,20 @@ class Impacts:
             bound = regime.assembly.bound(regime.p)
             return moment._replace(x=bound.impulse(moment.x, before, after)), []
 
-        def pulled(start: Moment, _: Sequence[Stage]) -> Blow:
-            held = self._regimes.held(start, before if start is moment else after)
-            new = self._joined(start.regime.modes, held, after, {}, NO_IMPACT)
+        def pulled(start: Start, _: Sequence[Stage]) -> Blow:
+            new = self._joined(start.moment.regime.modes, start.held, after, {}, NO_IMPACT)
             return Blow(new, new.regime)
 
-        new = self._impulses.stages(after, moment, pulled, {})[-1].blow.after
-        return new, self._differences(t, regime.modes, new.regime.modes)
+        stages = self._impulses.stages(after, self._impulses.begins(moment, before), pulled, {})
+        new = stages[-1].blow.after
+        changes = self._differences(t, regime.modes, new.regime.modes)
+        if not changes and self._impulses.gears:
+            number = self._impulses.gears[0]
+            changes = [Change(t, self._elements[number], *2 * (regime.modes[number],))]
+        if changes:
+            given = self._impulses.given(after, stages, before)
+            changes[0] = changes[0]._replace(given=given, lost=self._impulses.lost(after, stages))
+        return new, changes
 
     def limited(self, modes: ModeNames) -> dict[int, tuple[tuple[float, str], ...]]:
         """Elements that join by a torque that is limited, with the sides on which it is and the modes there."""

@@ -16,8 +16,8 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.recovery import History, into
 from shaftwork.components.branches import ACROSS, through_of
-from shaftwork.components.modes import Leave
-from shaftwork.core.errors import SimulationError
+from shaftwork.components.modes import Leave, Mode
+from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.pipeline.phases.assemblies import Assembly, Element, ModeNames
 from shaftwork.pipeline.phases.moments import EPS, ROUNDINGS, Moment, Regime
 from shaftwork.pipeline.phases.regimes import Regimes, with_modes
@@ -28,6 +28,10 @@ MOST_STAGES = 100
 NOTHING_OF = ROUNDINGS * EPS
 
 
+Held = Mapping[str, float]
+"""All that is stored, by name."""
+
+
 class Blow(NamedTuple):
     """What an impulse leads to, and the modes in which it passes."""
 
@@ -35,10 +39,19 @@ class Blow(NamedTuple):
     passing: Regime
 
 
-class Stage(NamedTuple):
-    """A part of an impact in which speeds change in proportion: from where, what it leads to, how much of that."""
+class Start(NamedTuple):
+    """Where a part of an impact begins: all that is stored, and the speeds of gears; its inputs are those of a time."""
 
-    start: Moment
+    moment: Moment
+    t: float
+    held: Held
+    speeds: Mapping[int, float]
+
+
+class Stage(NamedTuple):
+    """A part of an impact in which speeds change in proportion: from where, to what, and how much of that."""
+
+    start: Start
     blow: Blow
     share: float
 
@@ -56,15 +69,19 @@ class Impulses:
         self.gears = tuple(k for k, element in enumerate(elements) if element.modes.passes_on)
         """Elements that pass torques on by their direction."""
 
+    def begins(self, moment: Moment, t: float) -> Start:
+        """Where an impact begins, with the inputs of a time in s."""
+        return Start(moment, t, self._regimes.held(moment, t), {k: self.across(moment, t, k) for k in self.gears})
+
     def stages(
-        self, t: float, start: Moment, blow: Callable[[Moment, Sequence[Stage]], Blow], apart: Mapping[int, str]
+        self, t: float, start: Start, blow: Callable[[Start, Sequence[Stage]], Blow], apart: Mapping[int, str]
     ) -> tuple[Stage, ...]:
         """All parts of an impulse, of which the last leads to its end.
 
         Args:
-            t: time in s at which inputs are read.
+            t: time after it in s at which inputs are read.
             start: before it.
-            blow: the rest of it from a moment on, all in the modes that gears have there, and after what stages.
+            blow: the rest of it from a start on, all in the modes that gears have there, and after what stages.
             apart: modes in which a stage starts of elements that are joined in it.
 
         Raises:
@@ -72,37 +89,87 @@ class Impulses:
         """
         made: list[Stage] = []
         while len(made) < MOST_STAGES:
-            start, found = self._consistent(t, start, lambda moment: blow(moment, made))
+            start, found = self._consistent(t, start, lambda begun: blow(begun, made))
             share, number = min(self._coming_to_rest(t, start, found.after), default=(1.0, -1))
             made.append(Stage(start, found, share))
             if number < 0:
                 return tuple(made)
             modes = self._at_rest(with_modes(found.after.regime.modes, apart), number)
-            start = self._regimes.taking(modes, t, self._reached(t, made[-1]))
+            start = self._reached(t, made[-1], modes, number)
         raise SimulationError(
             f"'{self._elements[number].name}' comes to rest again and again in one impact at t = {t:.9g} s. Give the "
             "contact that is hit a stiffness c and a damping d."
         )
 
-    def _consistent(self, t: float, start: Moment, blow: Callable[[Moment], Blow]) -> tuple[Moment, Blow]:
+    def _reached(self, t: float, stage: Stage, modes: ModeNames, number: int) -> Start:
+        """The end of a stage, at which a gear is at rest, in the modes that go on."""
+        start, blow, share = stage
+        held = {
+            name: value + share * gain
+            for (name, value), gain in zip(start.held.items(), self._gained(t, start, blow).values(), strict=True)
+        }
+        speeds = {k: v + share * (self.across(blow.after, t, k) - v) for k, v in start.speeds.items()}
+        return Start(self._regimes.taking(modes, t, held), t, held, {**speeds, number: 0.0})
+
+    def _in_modes(self, t: float, start: Start, modes: ModeNames) -> Start:
+        """The same start in other modes of gears; one that jams has stopped in it."""
+        made = Start(self._regimes.taking(modes, t, start.held), t, start.held, start.speeds)
+        stops = (k for k in self._stopped(made.moment) if start.speeds[k] and k not in self._stopped(start.moment))
+        return self.begins(made.moment, t) if any(True for _ in stops) else made
+
+    def _consistent(self, t: float, start: Start, blow: Callable[[Start], Blow]) -> tuple[Start, Blow]:
         """The modes of gears in which an impulse passes as they say; a gear that turns, and has none, jams at once."""
-        found, jammed = blow(start), set[int]()
-        seen = {start.regime.modes}
-        while turn := self._turned(t, start, found):
+        found, jammed, seen = self._passed(start, blow), set[int](), {start.moment.regime.modes}
+        while True:
+            if found is None or found.after is start.moment:
+                start, found = self._released(t, start, blow) or (start, found or blow(start))
+            turn = self._turned(t, start, found)
+            if turn is None:
+                return start, found
             number, to = turn
-            modes = self._led(start.regime.modes, number, to)
+            modes = self._led(start.moment.regime.modes, number, to)
             if modes in seen:
                 if number in jammed:
-                    break
+                    return start, found
                 jammed.add(number)
                 seen.clear()
                 modes = self._at_rest(modes, number)
-            start = self._regimes.changed(start, t, modes)
-            found = blow(start)
+            start = self._in_modes(t, start, modes)
+            found = self._passed(start, blow)
             seen.add(modes)
-        return start, found
 
-    def _turned(self, t: float, start: Moment, found: Blow) -> tuple[int, str] | None:
+    def _passed(self, start: Start, blow: Callable[[Start], Blow]) -> Blow | None:
+        """What an impulse leads to; None where the equations of a gear at rest contradict what it meets."""
+        try:
+            return blow(start)
+        except NetworkError:
+            if not self._stopped(start.moment):
+                raise
+            return None
+
+    def _released(self, t: float, start: Start, blow: Callable[[Start], Blow]) -> tuple[Start, Blow] | None:
+        """Where gears at rest and what they meet hold each other, no impulse tells its way: which gear it turns.
+
+        It is one of which the modes say so as well.
+        """
+        for k in self._stopped(start.moment):
+            turning = (mode.name for mode in self._elements[k].modes.options if _turns(mode))
+            ways = (with_modes(start.moment.regime.modes, {k: name}) for name in turning)
+            for modes in filter(self._regimes.possible, ways):
+                here = self._in_modes(t, start, modes)
+                found = self._passed(here, blow)
+                if found is None or found.after is here.moment:
+                    continue
+                turned = self._turned(t, here, found)
+                if turned is None or turned[0] != k:
+                    return here, found
+        return None
+
+    def _stopped(self, moment: Moment) -> list[int]:
+        """Gears in a mode of rest."""
+        return [k for k in self.gears if not _turns(self._elements[k].modes[moment.regime.modes[k]])]
+
+    def _turned(self, t: float, start: Start, found: Blow) -> tuple[int, str] | None:
         """The gear that an impulse brings out of its mode at once, and the mode that follows."""
         if not self.gears:
             return None
@@ -112,23 +179,23 @@ class Impulses:
         ways = [
             (_guard(assembly, k, leave, impulses, p), k, leave.to)
             for k in self.gears
-            for leave in self._elements[k].modes[start.regime.modes[k]].leaves
+            for leave in self._elements[k].modes[start.moment.regime.modes[k]].leaves
             if leave.by_torque
         ]
         ways = [way for way in ways if way[0] > least]
         ways = ways or [(ends, k, to) for began, ends, k, to in self._stopping(t, start, found.after) if began >= 0]
         return max(ways)[1:] if ways else None
 
-    def _coming_to_rest(self, t: float, start: Moment, after: Moment) -> Iterator[tuple[float, int]]:
+    def _coming_to_rest(self, t: float, start: Start, after: Moment) -> Iterator[tuple[float, int]]:
         """The share of an impulse after which a gear is at rest, and which one."""
         return ((began / (began - ends), k) for began, ends, k, _ in self._stopping(t, start, after) if began < 0)
 
-    def _stopping(self, t: float, start: Moment, after: Moment) -> Iterator[tuple[float, float, int, str]]:
+    def _stopping(self, t: float, start: Start, after: Moment) -> Iterator[tuple[float, float, int, str]]:
         """Gears that would turn round: their speeds before and after, negative the way they turn, and what follows."""
-        for k in self.gears:
-            speeds = [self.across(made, t, k) for made in (start, after)]
-            least = NOTHING_OF * max(np.abs(made.x).max(initial=0.0) for made in (start, after))
-            for leave in self._elements[k].modes[start.regime.modes[k]].leaves:
+        least = NOTHING_OF * max(np.abs(made.x).max(initial=0.0) for made in (start.moment, after))
+        for k, speed in start.speeds.items():
+            speeds = speed, self.across(after, t, k)
+            for leave in self._elements[k].modes[start.moment.regime.modes[k]].leaves:
                 way = float(leave.when.diff(ACROSS))
                 began, ends = (0.0 if abs(speed) <= least else way * speed for speed in speeds)
                 if way and ends > 0:
@@ -144,23 +211,30 @@ class Impulses:
         ways = (to, *(leave.to for leave in self._elements[number].modes[to].leaves if leave.to != modes[number]))
         return next(filter(self._regimes.possible, (with_modes(modes, {number: name}) for name in ways)), modes)
 
-    def _gained(self, t: float, start: Moment, after: Moment) -> dict[str, float]:
-        before, then = self._regimes.held(start, t), self._regimes.held(after, t)
-        return {name: then[name] - value for name, value in before.items()}
+    def _gained(self, t: float, start: Start, blow: Blow) -> dict[str, float]:
+        """What all that is stored gains by the whole of an impulse."""
+        then = self._regimes.held(blow.after, t)
+        return {name: then[name] - value for name, value in start.held.items()}
 
-    def _reached(self, t: float, stage: Stage) -> dict[str, float]:
-        """All that is stored at the end of a stage."""
-        gained, share = self._gained(t, stage.start, stage.blow.after), stage.share
-        return {name: value + share * gained[name] for name, value in self._regimes.held(stage.start, t).items()}
+    def given(self, t: float, stages: Sequence[Stage], before: float | None = None) -> dict[str, float]:
+        """What ideal sources of speed give in an impulse, in J by part, their impulse times the mean of their speeds.
 
-    def given(self, t: float, stages: Sequence[Stage]) -> dict[str, float]:
-        """What ideal sources of speed give in an impulse, in J by part."""
+        Args:
+            t: time after it in s at which they are read.
+            stages: of the impulse.
+            before: time before it, where it is they that jump; they do so in proportion to the impulse.
+        """
         found: dict[str, float] = {}
+        jumped = 0.0
         for stage in stages:
             assembly, p = stage.blow.passing.assembly, stage.blow.passing.p
-            change = self._gained(t, stage.start, stage.blow.after)
-            for part, energy in assembly.stores.given(assembly.bound(p), t, change).items():
-                found[part] = found.get(part, 0.0) + stage.share * energy
+            bound, gained = assembly.bound(p), self._gained(t, stage.start, stage.blow)
+            then = jumped + stage.share * (1.0 - jumped)
+            late = 1.0 if before is None else (jumped + then) / 2
+            for time, weight in ((t, late), (before, 1.0 - late)):
+                for part, energy in assembly.stores.given(bound, time, gained).items() if time is not None else ():
+                    found[part] = found.get(part, 0.0) + stage.share * weight * energy
+            jumped = then
         return found
 
     def lost(self, t: float, stages: Sequence[Stage]) -> dict[str, float]:
@@ -168,12 +242,14 @@ class Impulses:
         found: dict[str, float] = {}
         for stage in stages if self.gears else ():
             impulses = self._impulses(t, stage.start, stage.blow)
-            for k in self.gears:
+            for k, began in stage.start.speeds.items():
                 name, passing = self._elements[k].part.name, stage.blow.passing.assembly
-                began, ends = (_across_meshes(moment, t, name) for moment in (stage.start, stage.blow.after))
-                speeds = (v + stage.share / 2 * (w - v) for v, w in zip(began, ends, strict=True))
-                pairs = zip(_meshes(passing, name), speeds, strict=True)
-                lost = sum(stage.share * impulses[branch] * speed for branch, speed in pairs)
+                ends = self.across(stage.blow.after, t, k)
+                moment, time, speed = (stage.blow.after, t, ends) if ends else (*stage.start[:2], began)
+                # the speeds of a mesh are in proportion to that of its gear
+                mean = (began + stage.share / 2 * (ends - began)) / speed if speed else 0.0
+                pairs = zip(_meshes(passing, name), _across_meshes(moment, time, name), strict=True)
+                lost = sum(stage.share * impulses[branch] * mean * across for branch, across in pairs)
                 found[name] = found.get(name, 0.0) + float(lost)
         return found
 
@@ -182,7 +258,7 @@ class Impulses:
         total = 0.0
         for start, blow, share in stages:
             passes = _into(blow.passing.assembly, number, self._impulses(t, start, blow), blow.passing.p)
-            began, ends = (self.across(moment, t, number) for moment in (start, blow.after))
+            began, ends = (self.across(moment, t, number) for moment in (start.moment, blow.after))
             total += share * passes * (began + share / 2 * (ends - began))
         return total
 
@@ -191,10 +267,15 @@ class Impulses:
         """The speed across an element."""
         return moment.regime.assembly.across(number, t, moment.x, moment.regime.p)
 
-    def _impulses(self, t: float, start: Moment, found: Blow) -> Array:
+    def _impulses(self, t: float, start: Start, found: Blow) -> Array:
         """(branches,) what passes through every branch at once."""
         assembly, p = found.passing.assembly, found.passing.p
-        return assembly.stores.impulses(assembly.bound(p), self._gained(t, start, found.after))
+        return assembly.stores.impulses(assembly.bound(p), self._gained(t, start, found))
+
+
+def _turns(mode: Mode) -> bool:
+    """Whether a gear turns in a mode: then its speed ends it."""
+    return any(leave.when.has(ACROSS) for leave in mode.leaves)
 
 
 def _guard(assembly: Assembly, number: int, leave: Leave, impulses: Array, p: Array) -> float:

@@ -349,12 +349,12 @@ class Settling:
             if leave.when == ACROSS and leave.to
         ]
         for count in (1, 2):
-            for chosen in combinations(ways, count):
-                if not self._regimes.possible(with_modes(modes, dict(chosen))):
+            for pair in combinations(ways, count):
+                if not self._regimes.possible(with_modes(modes, dict(pair))):
                     continue
-                other = self._regimes.changed(moment, t, with_modes(modes, dict(chosen)))
+                other = self._regimes.changed(moment, t, with_modes(modes, dict(pair)))
                 if lost(other) <= least and not self._violated(other, t, other, ())[1]:
-                    return other, dict(chosen)
+                    return other, dict(pair)
         return plain, {}
 
     def _around(
