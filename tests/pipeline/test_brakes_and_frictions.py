@@ -359,3 +359,16 @@ def test_what_a_strong_brake_stops_stays_although_rounding_of_the_time_is_a_spee
     assert words(sol) == [("brake", "slipping forward", "locked")]
     assert times(sol) == pytest.approx([1e3 / tau], rel=1e-4)
     assert sol["J.omega"].tolist()[1:] == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_brake_whose_torque_falls_with_the_angle_stops_where_it_should_and_lets_go_again(engine: str) -> None:
+    """J phi'' = -(8 - 2 phi) from 5 rad/s; then what it holds is what it had left, which a rising torque exceeds."""
+    pull = sw.TorqueSource("pull", tau=sw.Ramp(10.0, duration=10.0, start=2.0))
+    net = wheel(pull, sw.Brake("brake", tau=8.0 - 2.0 * sw.phi), J=1.0)
+    sol = net.simulate(8.0, initial={"J.omega": 5.0}, engine=engine, rtol=1e-10)
+    root = math.sqrt(2.0)
+    stops = math.atanh(5.0 / (4.0 * root)) / root
+    twist = 4.0 - 4.0 * math.cosh(root * stops) + 5.0 / root * math.sinh(root * stops)
+    assert words(sol) == [("brake", "slipping forward", "locked"), ("brake", "locked", "slipping forward")]
+    assert times(sol) == pytest.approx([stops, 2.0 + 8.0 - 2.0 * twist], abs=1e-8)

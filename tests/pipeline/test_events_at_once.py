@@ -71,3 +71,26 @@ def test_where_a_torque_turns_round_only_the_flanks_next_to_it_part(engine: str,
     (event,) = (event for event in sol.events if event[0] > 0.1)
     assert event[1:] == ("gap1" if driven == "r0" else "gap2", "in contact", "open")
     assert event[0] == pytest.approx(math.pi / 8, abs=1e-9)
+
+
+@pytest.mark.parametrize("order", ["FG", "GF"])
+def test_a_gear_that_would_jam_where_a_friction_lets_go_drives_on(order: str) -> None:
+    """It is locked, and its load had turned it; from where the friction slips, a drives, as no other mode has rates."""
+    net = sw.Network("lets go")
+    net.add(sw.TorqueSource("motor", tau=20.0 * sw.t), "a")
+    net.add(sw.Inertia("A", J=0.1017), "a")
+    parts = {
+        "F": (sw.DryFriction("friction", tau_c=4.93), "a"),
+        "G": (sw.LossyGear("gear", ratio=2.86, efficiency=0.884, efficiency_back=-0.438), "a", "b"),
+    }
+    for letter in order:
+        net.add(*parts[letter])
+    net.add(sw.Inertia("B", J=2.52), "b")
+    net.add(sw.TorqueSource("load", tau=46.28), "b")
+    sol = net.simulate(2.0)
+    # tau_a drives: J_A a + tau_a = 20 t - 4.93, and 0.884 tau_a + 46.28 / 2.86 = J_B a / 2.86^2
+    inertia, rests = 0.1017 + 2.52 / 2.86**2 / 0.884, 4.93 - 46.28 / 2.86 / 0.884
+    begins = 0.6008818181818
+    wanted = (10.0 * (4.0 - begins**2) - rests * (2.0 - begins)) / inertia
+    assert sol.phases[-1].modes["gear"] == "driving forward"
+    assert sol["A.omega"][-1] == pytest.approx(wanted, rel=1e-9)

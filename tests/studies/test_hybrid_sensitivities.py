@@ -28,6 +28,7 @@ def assert_differences(
     *,
     step: float = STEP,
     order: int = 2,
+    close: float = CLOSE,
     **options: object,
 ) -> MotionSensitivities:
     """Compare with central differences of independent runs, extrapolated for errors of the given order."""
@@ -43,7 +44,7 @@ def assert_differences(
         near, far = ((of(name, value * (1 + h)) - of(name, value * (1 - h))) / (2 * h) for h in (step / 2, step))
         expected = near + (near - far) / (2**order - 1)
         found = value * np.array([made[text][name] for text in measures])
-        np.testing.assert_allclose(found / sizes, expected / sizes, rtol=CLOSE, atol=CLOSE, err_msg=name)
+        np.testing.assert_allclose(found / sizes, expected / sizes, rtol=close, atol=close, err_msg=name)
     return made
 
 
@@ -115,6 +116,44 @@ def test_a_rebound_is_the_closed_form() -> None:
         assert made.measures[measure] == pytest.approx(float(closed.subs(at)), rel=1e-8)
         for name, symbol in (("stop.upper", h), ("stop.restitution", e), ("J.J", J), ("T.tau", tau)):
             assert made[measure][name] == pytest.approx(float(closed.diff(symbol).subs(at)), rel=1e-7), (measure, name)
+
+
+def flanks(J: float, restitution: float, **rest: float) -> sw.Network:
+    """An inertia that a torque drives against another one until both are at rest to each other."""
+    net = sw.Network("flanks")
+    net.add(sw.TorqueSource("T", tau=3.0), "a")
+    net.add(sw.Inertia("J1", J=J), "a")
+    net.add(sw.Backlash("g", gap=0.1, restitution=restitution, **rest), "a", "b")
+    net.add(sw.Inertia("J2", J=1.4), "b")
+    return net
+
+
+def assert_momentum_is_kept(omega_rest: float, t: float) -> None:
+    """Impacts keep it, whenever they are: omega = T t / (J1 + J2), to the roundings of two dozen of them."""
+    T, J1, J2 = 3.0, 0.6, 1.4
+    made = motion_sensitivities(flanks(J1, 0.5, omega_rest=omega_rest), ["end J2.omega"], t_end=t)["end J2.omega"]
+    assert made["J1.J"] == pytest.approx(-T * t / (J1 + J2) ** 2, rel=1e-9)
+    assert made["J2.J"] == pytest.approx(-T * t / (J1 + J2) ** 2, rel=1e-9)
+    assert made["T.tau"] == pytest.approx(t / (J1 + J2), rel=1e-9)
+    assert made["g.restitution"] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("omega_rest", [1e-4, 1e-6, 1e-7])
+def test_flanks_that_come_to_rest_pass_on_the_derivative_of_their_momentum(omega_rest: float) -> None:
+    assert_momentum_is_kept(omega_rest, 1.5)
+
+
+def test_impacts_of_flanks_that_hardly_move_pass_on_the_derivative_of_their_momentum() -> None:
+    """The last ones are found so late that a run so short does not go back to the limit for them."""
+    with pytest.warns(sw.AccuracyWarning, match="hardly moving any more"):
+        assert_momentum_is_kept(1e-7, 0.45)
+
+
+def test_a_spring_behind_flanks_that_come_to_rest_equals_central_differences() -> None:
+    net = flanks(0.1, 0.65)
+    net.add(sw.Spring("S", c=90.0, d=1.2), "b", "c")
+    net.add(sw.Inertia("J3", J=4.0), "c")
+    assert_differences(net, ["max S.tau", "rms S.tau"], 1.5, ("J1.J", "J2.J", "g.gap"), close=1e-7)
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5])

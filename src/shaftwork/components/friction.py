@@ -11,7 +11,7 @@ from sympy import And, Expr, Min, Ne, Not, exp, false, tanh
 from shaftwork.components.base import Component, Port, Role, component
 from shaftwork.components.bounds import no_less
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, Branch, End, ThroughLaw, rigid
-from shaftwork.components.laws import t
+from shaftwork.components.laws import as_expression, t
 from shaftwork.components.modes import ANEW, Leave, Mode, Modes
 from shaftwork.components.switching import number_of, refuse_no_time_on, while_on
 from shaftwork.core.errors import ParameterError
@@ -163,8 +163,12 @@ class Brake(Component):
         if p.form is None:
             yield from self._without_modes(p)
             return
-        yield from rubs(self._capacity(p), p)
-        if isinstance(p.on, Expr) and p.on.has(INTEGRAL):
+        capacity = as_expression(self._capacity(p))
+        if p.form != STUCK and capacity.has(INTEGRAL):
+            yield ThroughLaw(p.mode * capacity, label="phi")
+            return
+        yield from rubs(capacity, p)
+        if capacity.has(INTEGRAL) or as_expression(p.on or 0).has(INTEGRAL):
             yield ThroughLaw(p.mode * (1 - p.mode**2) * INTEGRAL, label="phi")  # no torque: it carries the angle
 
     def _without_modes(self, p: Any) -> Iterator[Branch]:

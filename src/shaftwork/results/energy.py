@@ -30,8 +30,9 @@ class EnergyBalance:
         supplied: (s,) work of all sources and weights since the start, J; a weight's is negative while it is lifted.
         lost: (s,) heat since the start, J.
         work: work that went through the sources and weights, both ways counted as positive, J.
-        lost_in: heat of the whole run by part, J; an impact's is that of the part whose change of mode it came with.
-            The balance begins after what happens at the very start.
+        lost_in: heat of the whole run by part, J. That of an impact is the part's that is hit, less what gears lose in
+            it; a sprung contact that is closed holds what its spring has taken up. The balance begins after what
+            happens at the very start.
         supplied_by: work of the whole run by source and weight, J.
     """
 

@@ -32,6 +32,7 @@ class Impacts:
     def __init__(self, regimes: Regimes, elements: Sequence[Element], tick: float) -> None:
         self._regimes, self._elements, self._tick = regimes, elements, tick
         self._impulses = Impulses(regimes, elements)
+        self.gears = self._impulses.gears
 
     def meets(self, moment: Moment, t: float, to: Mode, number: int) -> float:
         """The speed across an element that is joined from now on; zero where it is no more than an error of the run."""

@@ -369,6 +369,8 @@ class Settling:
         ways = [{number: leave.to} for leave in element.modes[to].leaves if leave.to not in ("", before)]
         for k, limited in self._impacts.limited(modes).items():
             ways += [{number: to, k: name} for _, name in limited if k != number]
+        for k in self._impacts.gears:
+            ways += [{number: to, k: leave.to} for leave in self.elements[k].modes[modes[k]].leaves if k != number]
         for way in ways:
             if self._regimes.possible(new := with_modes(modes, way)):
                 changes = [Change(t, self.elements[k], modes[k], name) for k, name in way.items()]

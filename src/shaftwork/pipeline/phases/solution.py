@@ -84,7 +84,7 @@ def _stretch(run: Run, span: Span, phase: Phase) -> Stretch:
         key=(id(assembly), phase.p.tobytes()),
         stores=assembly.stores,
         bind=bind,
-        observer=ModelObserver(assembly.model.form, bind, instants),
+        observer=ModelObserver(assembly.model.form, bind, instants, assembly.quantities),
         instants=instants,
         dense=lambda times: dense(times)[:, :size],
         states=states,
@@ -96,7 +96,7 @@ def _impacts(run: Run) -> tuple[Impact, ...]:
     found: dict[float, tuple[str, dict[str, float], dict[str, float]]] = {}
     for change in run.changes:
         modes = change.element.modes
-        if change.rebound or modes[change.before].form != modes[change.after].form:
+        if change.rebound or change.given or change.lost or modes[change.before].form != modes[change.after].form:
             _, *totals = found.setdefault(change.time, (change.element.part.name, {}, {}))
             for total, energies in zip(totals, (change.given, change.lost), strict=True):
                 for part, energy in energies.items():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -39,6 +40,22 @@ class _Step(NamedTuple):
     parted: ModeNames = ()
 
 
+class End(NamedTuple):
+    """Where one leg goes over into the next.
+
+    Args:
+        before: (n,) states.
+        after: (n',) states that follow.
+        slopes: (n, m) total derivatives of those before.
+        shift: (m,) derivatives of the time.
+    """
+
+    before: Array
+    after: Array
+    slopes: Array
+    shift: Array
+
+
 class _Held(NamedTuple):
     """All that is stored by name, and its total derivatives (m,)."""
 
@@ -60,8 +77,8 @@ class Carrying:
     ) -> None:
         self._phases, self._equations, self._sizes = phases, equations, sizes
 
-    def over(self, before: Leg, after: Leg, slopes: Array, changes: Sequence[Change], shift: Array) -> Array:
-        """Total derivatives (n', m) of the new states.
+    def over(self, before: Leg, after: Leg, ends: Sequence[End], changes: Sequence[Change]) -> tuple[int, Array]:
+        """Which of the ends it was, and the total derivatives (n', m) of the new states.
 
         The modes that a run goes through within an instant are tried as they may follow each other; what leads to the
         states of the run is the way that it went.
@@ -69,23 +86,22 @@ class Carrying:
         Args:
             before: the leg that ends.
             after: the next one.
-            slopes: (n, m) total derivatives of the states at its end.
+            ends: where one leg goes over into the other, as far as that is known; the likeliest first.
             changes: of mode, at that time.
-            shift: (m,) derivatives of the time.
 
         Raises:
             SimulationError: none of them leads there.
         """
-        x, sizes, ways = after.at(after.low)[1], self._sizes(after.model), list[tuple[float, Array]]()
-        for steps in self._ways(before, after, changes):
+        sizes, ways = self._sizes(after.model), list[tuple[float, int, Array]]()
+        for (k, end), steps in product(enumerate(ends), self._ways(before, after, changes)):
             try:
-                found, made = self._along(steps, before, after.low, slopes, shift)
+                found, made = self._along(steps, before, after.low, end)
             except NetworkError:
                 continue
-            ways.append((float((np.abs(found - x) / sizes).max(initial=0.0)), made))
-        nearest = min((away for away, _ in ways), default=np.inf)
+            ways.append((float((np.abs(found - end.after) / sizes).max(initial=0.0)), k, made))
+        nearest = min((away for away, *_ in ways), default=np.inf)
         if nearest <= CLOSE:
-            return next(made for away, made in ways if away <= nearest + ALIKE)
+            return next((k, made) for away, k, made in ways if away <= nearest + ALIKE)
         names = ", ".join(dict.fromkeys(f"'{change.element.name}'" for change in changes)) or "parts"
         raise SimulationError(
             f"At t = {after.start:.9g} s {names} change together, and how the derivatives pass that is not known here. "
@@ -136,9 +152,9 @@ class Carrying:
             steps.append(_Step(last))
         return tuple(steps)
 
-    def _along(self, steps: Sequence[_Step], before: Leg, t: float, slopes: Array, shift: Array) -> tuple[Array, Array]:
+    def _along(self, steps: Sequence[_Step], before: Leg, t: float, end: End) -> tuple[Array, Array]:
         """States (n',) and their total derivatives (n', m) at the end of a way."""
-        model, p, x, made = before.model, before.p, before.at(before.high)[1], slopes
+        model, p, (x, _, made, shift) = before.model, before.p, end
         for step in steps:
             assembly, old = self._phases.assembly(step.modes), p
             p = assembly.vector({}, self._phases.numbers(step.modes))

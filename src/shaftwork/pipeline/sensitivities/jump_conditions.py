@@ -13,7 +13,7 @@ Source: Aizerman and Gantmacher, On the stability of periodic motions, 1958.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +24,7 @@ from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import SimulationError
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.moments import Change
-from shaftwork.pipeline.sensitivities.carrying import Carrying
+from shaftwork.pipeline.sensitivities.carrying import Carrying, End
 from shaftwork.pipeline.sensitivities.legs import Leg
 
 TOGETHER = 1e-9
@@ -47,10 +47,13 @@ class _Cause:
     Args:
         argument: in states, parameters and time; it is zero at the instant.
         change: of mode, or None.
+        late: how long ago, in s, what may be thrown back was at its limit: the run finds it beyond, as far as rounding
+            hides it, and as a rule goes back there for the impact.
     """
 
     argument: Expr
     change: Change | None = None
+    late: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +85,33 @@ class _Group(NamedTuple):
     shift: Array
     pace: float
     causes: list[_Cause]
+
+
+class _Crossing(NamedTuple):
+    """One leg goes over into the next.
+
+    Args:
+        old: the side before.
+        new: the side after.
+        groups: of the causes.
+        total: (N, m) total derivatives before.
+        shift: (m,) derivatives of the time, where there is one group.
+        pace: of that group.
+        late: how long before the end of the leg it is, s.
+    """
+
+    old: _Side
+    new: _Side
+    groups: Sequence[_Group]
+    total: Array
+    shift: Array
+    pace: float
+    late: float
+
+    @property
+    def end(self) -> End:
+        """That of the states alone."""
+        return End(self.old.x, self.new.x, self.total[: len(self.old.x)], self.shift)
 
 
 class Jump(NamedTuple):
@@ -136,17 +166,27 @@ class JumpConditions:
         """
         old, new = self._side(before, before.high), self._side(after, after.low)
         adds = before.model is after.model and not any(change.impact for change in changes)
-        groups = self._grouped(old, slopes, self._causes(old, new, changes))
-        if len(groups) > 1:
-            return Jump(self._one_by_one(old, new, slopes, groups, adds=adds), None, adds, 0.0)
-        shift, pace, _ = groups[0] if groups else _Group(np.zeros(slopes.shape[1]), 1.0, [])
-        total = slopes + np.outer(old.rates, shift)
+        causes = list(self._causes(old, new, changes))
+        late = max((cause.late for cause in causes), default=0.0)
+        ends = [self._crossing(old, new, slopes, causes, back) for back in dict.fromkeys((late, 0.0))]
+        single = [end for end in ends if len(end.groups) <= 1]
+        if not single:
+            return Jump(self._one_by_one(old, new, slopes, ends[-1].groups, adds=adds), None, adds, 0.0)
+        end, total = single[-1], single[-1].total
         if self._carrying is not None and not adds:
-            size = len(old.x)
-            total = np.concatenate([self._carrying.over(before, after, total[:size], changes, shift), total[size:]])
-        made = total - np.outer(new.rates, shift)
+            k, carried = self._carrying.over(before, after, [one.end for one in single], changes)
+            end, total = single[k], np.concatenate([carried, single[k].total[len(old.x) :]])
+        made = self._later(end.new, total - np.outer(end.new.rates, end.shift), end.late)
         share = self._share(before.model, slopes, made) if adds else 1.0
-        return Jump(made, shift, adds, EXACT / pace * share)
+        return Jump(made, end.shift, adds, EXACT / end.pace * share)
+
+    def _crossing(self, old: _Side, new: _Side, slopes: Array, causes: Sequence[_Cause], late: float) -> _Crossing:
+        """The instant as it is when both sides are gone back by so much, in s."""
+        slopes = self._later(old, slopes, -late)
+        old, new = self._moved(old, -late), self._moved(new, -late)
+        groups = self._grouped(old, slopes, causes)
+        shift, pace, _ = groups[0] if groups else _Group(np.zeros(slopes.shape[1]), 1.0, [])
+        return _Crossing(old, new, groups, slopes + np.outer(old.rates, shift), shift, pace, late)
 
     def _share(self, model: Model, before: Array, after: Array) -> float:
         """The part of derivatives (N, m) that is new."""
@@ -159,6 +199,22 @@ class JumpConditions:
         times, states = leg.read(np.array([t]))
         rates = self._equations(leg.model).rates(times, states, leg.p)
         return _Side(leg, float(times[0]), states[0], rates[0])
+
+    def _moved(self, side: _Side, step: float) -> _Side:
+        """A side a little later or earlier, in s, along a straight line, as the run goes to the limit and back."""
+        if not step:
+            return side
+        x = side.x + step * side.rates[: len(side.x)]
+        rates = self._equations(side.leg.model).rates(np.array([side.t]), x[None, :], side.leg.p)
+        return replace(side, x=x, rates=rates[0])
+
+    def _later(self, side: _Side, slopes: Array, step: float) -> Array:
+        """Derivatives (N, m) at a side a little later or earlier, in s."""
+        if not step:
+            return slopes
+        equations = self._equations(side.leg.model)
+        by_states, by_parameters = equations.coefficients(np.array([side.t]), side.x[None, :], side.leg.p)
+        return np.asarray(slopes + step * (by_states[0] @ slopes[: len(side.x)] + by_parameters[0]))
 
     def _causes(self, old: _Side, new: _Side, changes: Sequence[Change]) -> Iterator[_Cause]:
         """All that happens at an instant by itself, and not in consequence of something else there."""
@@ -192,7 +248,8 @@ class JumpConditions:
                 guard = leg.assembly.guards_shown[watched.guard]
                 value, rate = self._course(old, guard)
                 if watched.side * rate > 0:
-                    yield abs(value / rate), _Cause(guard, found)
+                    back = 0.0 if watched.leave.rebound is None else max(value / rate, 0.0)
+                    yield abs(value / rate), _Cause(guard, found, back)
 
     def _course(self, side: _Side, argument: Expr) -> tuple[float, float]:
         """Value and rate of an argument."""
@@ -215,7 +272,7 @@ class JumpConditions:
             raise _touched(old.leg, _worded(cause))
         return -moved / rate, abs(rate) / most
 
-    def _grouped(self, old: _Side, slopes: Array, causes: Iterator[_Cause]) -> list[_Group]:
+    def _grouped(self, old: _Side, slopes: Array, causes: Sequence[_Cause]) -> list[_Group]:
         """Causes by their times."""
         groups: list[_Group] = []
         for cause in causes:

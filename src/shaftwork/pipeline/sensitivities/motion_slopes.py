@@ -17,7 +17,7 @@ from shaftwork.core.errors import AccuracyWarning, ParameterError, SimulationErr
 from shaftwork.integrate.variation import Coefficients, Variation, variation
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.moments import Change
-from shaftwork.pipeline.sensitivities.carrying import Carrying
+from shaftwork.pipeline.sensitivities.carrying import Carrying, End
 from shaftwork.pipeline.sensitivities.differentiable import rows_of
 from shaftwork.pipeline.sensitivities.jump_conditions import ADVICE, TOGETHER, Jump, JumpConditions, by_chance
 from shaftwork.pipeline.sensitivities.legs import Leg, parted
@@ -106,7 +106,9 @@ class MotionSlopes:
         slopes = np.zeros((self._swiftest[self.legs[0].model].size, count))
         if carrying is not None and motion.start is not None:
             size, first = len(self.legs[0].model.states), np.zeros((len(motion.start.model.states), count))
-            slopes[:size] = carrying.over(motion.start, self.legs[0], first, self._changes(self.legs[0]), fixed)
+            loose, leg = motion.start, self.legs[0]
+            end = End(loose.at(loose.high)[1], leg.at(leg.low)[1], first, fixed)
+            slopes[:size] = carrying.over(loose, leg, [end], self._changes(leg))[1]
         self._shifts.append(fixed)
         doubts: list[tuple[float, float]] = []
         last: Jump | None = None
