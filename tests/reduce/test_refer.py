@@ -191,6 +191,37 @@ def test_gaps_frictions_brakes_and_motors_act_as_in_the_train(train: Train, pick
         assert torque == pytest.approx(others[name], abs=1e-9 * scale)
 
 
+@pytest.mark.parametrize(
+    ("limits", "there"),
+    [
+        ({"tau_max": 15.0}, (-90.0, 90.0)),
+        ({"tau_max": 8.0, "tau_min": -3.0}, (-48.0, 18.0)),
+        ({"tau_max": 9.0, "tau_min": 2.0}, (-54.0, -12.0)),
+        ({"tau_max": 8.0, "tau_min": 0.0}, (-48.0, 0.0)),
+    ],
+)
+def test_limits_of_torque_exchange_places_behind_a_gear_that_reverses(
+    limits: dict[str, float], there: tuple[float, float]
+) -> None:
+    """The start saturates at one limit, the stop at the other; both trains move alike to the tolerance of the run."""
+    net = sw.Network("drive")
+    speed = sw.Table([0.0, 0.2, 1.5, 1.7], [0.0, 60.0, 60.0, 0.0])
+    net.add(sw.SpeedController("drive", omega_ref=speed, k_p=2.0, t_i=0.1, **limits), "motor")
+    net.add(sw.Inertia("J1", J=0.05), "motor")
+    net.add(sw.Gear("gear", ratio=-6.0), "motor", "wheel")
+    net.add(sw.Inertia("J2", J=2.0), "wheel")
+    small = sw.reduce.refer(net, "wheel")
+    (made,) = (part for part in small.network.parts if part.name == "drive")
+    assert (-made.tau_max if made.tau_min is None else made.tau_min, made.tau_max) == pytest.approx(there, rel=1e-14)
+    assert small.table["drive.tau_max"].referred in there
+    times = np.linspace(0.0, 3.0, 61)
+    old, new = (train.simulate(3.0, rtol=1e-10, t_eval=times) for train in (net, small.network))
+    most, least = limits["tau_max"], limits.get("tau_min", -limits["tau_max"])
+    assert (old["drive.tau"].min(), old["drive.tau"].max()) == pytest.approx((least, most), rel=1e-12)
+    assert -6.0 * old["drive.tau"] == pytest.approx(new["drive.tau"], abs=1e-7 * 6 * most)
+    assert old["J2.omega"] == pytest.approx(new["J2.omega"], abs=1e-8 * 10)
+
+
 def crane_train(gear: sw.Component, shaft: sw.Component) -> sw.Network:
     """A motor behind a reducer, with a coupling before it, and a crane on wheels; its J2 is that of the source."""
     net = sw.Network("crane")

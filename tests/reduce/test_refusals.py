@@ -26,7 +26,7 @@ VALUES: dict[str, dict[str, Any]] = {
     "Shaft": {"length": 1.0, "diameter": 0.1, "inner_diameter": 0.02, "damping": 3.0},
     "SpeedController": {"omega_ref": 100 * sw.t, "k_p": 3.0, "t_i": 0.1, "tau_max": 40.0},
 }
-ONE_WAY = {"AveragedBLDC", "BLDCMotor", "Hoist", "InductionMachine", "SpeedController"}
+ONE_WAY = {"AveragedBLDC", "BLDCMotor", "Hoist", "InductionMachine"}
 """They have a direction, one node and no sign that could turn it."""
 BUILT_IN = {name: kind for name, kind in REGISTRY.items() if kind.__module__.startswith("shaftwork.")}
 
@@ -91,6 +91,21 @@ def test_a_spring_that_is_twisted_by_the_gear_beside_it_is_refused() -> None:
     net.add(sw.Spring("brace", c=1.0), "a", "b")
     message = refused(net)
     assert "'brace' closes a loop: by the way round it, node 'a' turns 3 times as fast as node 'b'" in message
+
+
+@pytest.mark.parametrize(("apart", "shown"), [(2.5e-8, "1.00000003"), (-3e-12, "0.999999999997")])
+def test_ratios_that_differ_by_little_are_shown_in_as_many_digits_as_tell_them_apart(apart: float, shown: str) -> None:
+    net = base(gear=sw.Gear("gear", ratio=4.0 * (1 + apart)))
+    net.add(sw.Gear("back", ratio=0.25), "b", "c")
+    net.add(sw.Spring("brace", c=1.0), "a", "c")
+    assert f"node 'a' turns {shown} times as fast as node 'c'" in refused(net)
+
+
+def test_a_loop_in_which_power_is_lost_but_no_speed_is_refused_by_the_power() -> None:
+    net = base(gear=sw.LossyGear("gear", ratio=4.0, efficiency=0.8))
+    net.add(sw.Gear("back", ratio=0.25), "b", "c")
+    net.add(sw.Spring("brace", c=1.0), "a", "c")
+    assert "power at node 'a' counts 0.8 times what it does at node 'c'" in refused(net, drives={"gear": "a"})
 
 
 def test_a_differential_is_refused_and_one_with_a_fixed_ring_is_not() -> None:

@@ -85,6 +85,18 @@ def test_as_many_masses_as_there_are_lose_nothing() -> None:
     assert lost.rms_error < 1e-9
 
 
+def test_the_number_of_masses_is_an_integer_of_any_kind_and_nothing_else() -> None:
+    net = chain(INERTIAS, STIFFNESSES)
+    plain = sw.reduce.simplify(net, 3, "c2")
+    for masses in (np.int64(3), np.uint8(3), np.array(3)):
+        small = sw.reduce.simplify(net, masses, "c2")  # type: ignore[arg-type]
+        assert small.network.name == plain.network.name
+        assert str(small.table) == str(plain.table)
+    for wrong in (3.0, "3", True, np.True_, np.float64(3.0), np.array([3]), 0, 6):
+        with pytest.raises(sw.ParameterError, match="must be a whole number from 1 to the 5 inertias"):
+            sw.reduce.simplify(net, wrong, "c2")  # type: ignore[arg-type]
+
+
 def test_springs_in_series_are_one_that_loses_as_much_in_a_slow_twist() -> None:
     """Abdelkader 2016, (15). With a node without inertia between them there is nothing to approximate."""
     net = chain([2.0, 0.0, 3.0], [1000.0, 4000.0], damping=1e-3)

@@ -126,6 +126,48 @@ def test_a_motor_that_is_switched_off_is_not_asked_to_accelerate_its_rotor() -> 
     assert braked.tau_peak == pytest.approx(sw.sizing.choose(started, [heavy]).candidates[0].tau_peak, rel=1e-3)
 
 
+@pytest.mark.parametrize("start", [0.0, 0.5])
+def test_the_impulse_of_a_speed_that_jumps_is_in_no_figure_and_the_choice_says_so(start: float) -> None:
+    """Of the impulse of all torque, J omega + d omega t, the first part is not in the mean torque."""
+    net = sw.Network("hard")
+    net.add(sw.SpeedSource("drive", omega=sw.Step(10.0, start) if start else 10.0), "shaft")
+    net.add(sw.Inertia("J", J=3.0), "shaft")
+    net.add(sw.Gear("gear", ratio=-2.0), "shaft", "wheel")
+    net.add(sw.ViscousLoad("load", d=4.0), "wheel")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", sw.NetworkWarning)  # that the torque is an impulse, which is the point
+        sol = net.simulate(2.0)
+    for named in ({"motor": "drive"}, {"torque": "gear.tau_b", "speed": "wheel.omega"}):
+        made = sw.sizing.duty(sol, **named)  # type: ignore[arg-type]
+        (note,) = made.notes
+        assert f"the speed jumps at {start:g} s; what an inertia rigidly there takes at once is in no figure" in note
+        assert note.startswith("from rest") is (start == 0)
+    made = sw.sizing.duty(sol, "drive", ratio=3.0)
+    assert made.tau_mean * made.duration == pytest.approx(1.0 * 10.0 * (2.0 - start) / 3, rel=1e-10)
+    choice = sw.sizing.choose(made)
+    for text in made.notes:
+        assert f"duty: {text}\n" in str(choice)
+    assert "not checked: the impulse on the motor's own rotor where the speed jumps" in str(choice)
+
+
+def test_a_motor_that_runs_or_that_a_store_starts_gives_no_impulse() -> None:
+    crane = sw.scenes.crane_start()
+    running = crane.simulate(1.0, initial=crane.compile().steady_state())
+    assert running["rotor.omega"][0] > 1.0
+    soft = sw.Network("soft")
+    soft.add(sw.SpeedSource("drive", omega=10.0), "motor")
+    soft.add(sw.Spring("shaft", c=100.0, d=1.0), "motor", "wheel")
+    soft.add(sw.Inertia("J", J=1.0), "wheel")
+    for made in (
+        sw.sizing.duty(running, "motor"),
+        sw.sizing.duty(soft.simulate(1.0), torque="shaft.tau", speed="J.omega"),
+        sw.sizing.duty(sw.scenes.crane().simulate(1.0), "motor"),
+    ):
+        assert made.jumps.size == 0
+        assert "jump" not in str(made)
+        assert "impulse" not in str(sw.sizing.choose(made))
+
+
 def test_the_packages_motors_are_marked_as_chosen_and_make_parts_of_a_network() -> None:
     assert OWN.read_text(encoding="utf-8").startswith("#")
     assert "CHOSEN" in OWN.read_text(encoding="utf-8")

@@ -258,9 +258,21 @@ def _along(graph: CircuitGraph, part: GraphPart, shafts: Clusters) -> Iterator[P
             here, there = graph.node_name(nodes[0]), graph.node_name(node)
             yield Problem(
                 "two ratios",
-                f"'{part.name}' closes a loop: by the way round it, node '{here}' turns {own.ratio / other.ratio:g} "
-                f"times as fast as node '{there}'.",
+                f"'{part.name}' closes a loop: by the way round it, {_difference(own, other, here, there)}.",
                 "No one ratio refers a shaft that its own gears twist; take the part out, or leave the train as it is.",
                 (part.name,),
                 (here, there),
             )
+
+
+def _difference(own: Scale, other: Scale, here: str, there: str) -> str:
+    """In what two scales differ, in as many digits as it takes to see that."""
+    if not math.isclose(own.ratio, other.ratio, rel_tol=AGREE):
+        return f"node '{here}' turns {_unlike_one(own.ratio / other.ratio)} times as fast as node '{there}'"
+    share = _unlike_one(own.power / other.power)
+    return f"power at node '{here}' counts {share} times what it does at node '{there}'"
+
+
+def _unlike_one(value: float) -> str:
+    shown = (f"{value:.{digits}g}" for digits in range(6, 18))
+    return next(text for text in shown if float(text) != 1.0)

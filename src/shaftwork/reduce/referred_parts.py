@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from sympy import Abs, Expr, Float, Rational, S, Symbol, signsimp
@@ -63,6 +63,9 @@ OF_CLASS: Mapping[str, Mapping[str, Exponents]] = {
     },
 }
 """Parts whose parameters stand for a gear of their own, a lever or a machine, and not for the shaft itself."""
+
+LIMITS: Mapping[str, tuple[str, str]] = {"SpeedController": ("tau_max", "tau_min")}
+"""The largest and the smallest value of a torque; where the smallest is not given, it is minus the largest."""
 
 COUNTERPARTS: Mapping[type[Component], tuple[type[Component], Mapping[str, str]]] = {
     Mass: (Inertia, {"m": "J"}),
@@ -154,8 +157,11 @@ def _scaled(part: Component, scale: Scale, here: Domain, domain: Domain) -> tupl
         kind, names = COUNTERPARTS[kind][0], dict(COUNTERPARTS[kind][1])
     values: dict[str, Any] = {"symbol": part.symbol}
     entries: list[Entry] = []
+    targets = {name: kind.declared[names.get(name, name)] for name in part.declared}
+    if scale.ratio < 0:
+        targets |= _turned_limits(part)
     for name, declared in part.declared.items():
-        target = kind.declared[names.get(name, name)]
+        target = targets[name]
         value = declared.magnitude(getattr(part, name))[0]
         made = _referred(value, target, _powers(part, declared), scale, (MOTIONS[here], MOTIONS[domain]))
         values[target.name] = made[0]
@@ -169,6 +175,16 @@ def _scaled(part: Component, scale: Scale, here: Domain, domain: Domain) -> tupl
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NetworkWarning)  # what is odd about the part was said when it was made
         return kind(part.name, **values), tuple(entries)
+
+
+def _turned_limits(part: Component) -> dict[str, Parameter]:
+    """What the limits of a part become where it turns backwards: each other, or one of the same size both ways."""
+    if type(part).__name__ not in LIMITS:
+        return {}
+    most, least = LIMITS[type(part).__name__]
+    if getattr(part, least) is None:
+        return {most: replace(part.declared[most], above=0.0)}
+    return {most: part.declared[least], least: part.declared[most]}
 
 
 def _powers(part: Component, declared: Parameter) -> Exponents:

@@ -39,6 +39,8 @@ UNCHECKED = (
     "inertia ratio and stiffness for the speed control, loads on bearings and shaft end, noise",
 )
 """What a choice says nothing about."""
+ROTOR_IMPULSE = "the impulse on the motor's own rotor where the speed jumps: prescribe a ramp there"
+"""What it says nothing about besides where a speed jumps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,9 +165,9 @@ class Choice:
         if len(shown) < len(self.candidates):
             lines.append(f"and {len(self.candidates) - len(shown)} more")
         sources = dict.fromkeys(one.motor.source for one in self.candidates if one.motor.source)
-        return "\n".join(
-            [*lines, *(f"values: {text}" for text in sources), *(f"not checked: {u}" for u in self.unchecked)]
-        )
+        lines += [f"values: {text}" for text in sources]
+        lines += [f"duty: {note}" for note in self.duty.notes]
+        return "\n".join([*lines, *(f"not checked: {u}" for u in self.unchecked)])
 
 
 def choose(
@@ -206,7 +208,8 @@ def choose(
     demand = _demand(duty, np.array(list(dict.fromkeys(motor.n_n for motor in known))))
     found = [_candidate(demand, motor, contained, required) for motor in known]
     ranked = sorted(found, key=lambda one: (not one.fits, *_rank(one)))
-    return Choice(duty, tuple(ranked), required)
+    unchecked = (*UNCHECKED, ROTOR_IMPULSE) if duty.jumps.size else UNCHECKED
+    return Choice(duty, tuple(ranked), required, unchecked)
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -236,6 +237,11 @@ class Duty:
             raise MissingExtraError("pandas", "data", "Duty.to_pandas()") from None
         return pd.DataFrame.from_dict(self.figures, orient="index", columns=["value", "unit"])
 
+    @cached_property
+    def jumps(self) -> Array:
+        """Times in s at which the speed jumps, the start of the motion among them where it jumps from rest."""
+        return _jumps(self.shaft)
+
     @property
     def notes(self) -> tuple[str, ...]:
         """What a reader of the figures must know."""
@@ -245,10 +251,11 @@ class Duty:
             made.append(f"at the motor's shaft, before {whose}: ratio {shaft.ratio:g}, efficiency {shaft.efficiency:g}")
         if self.held > BRIEF * self.duration:
             made.append(f"torque is held at standstill for {self.held:.6g} s; at_rest='released' if a brake does that")
-        if (jumps := _jumps(shaft)).size:
-            made.append(
-                f"the speed jumps at {jumps[0]:.6g} s; what an inertia rigidly there takes at once is in no figure"
-            )
+        start, last = shaft.steps[0], "what an inertia rigidly there takes at once is in no figure"
+        if start in self.jumps:
+            made.append(f"from rest the speed jumps at {start:.6g} s; {last}")
+        if (later := self.jumps[self.jumps > start]).size:
+            made.append(f"the speed jumps at {later[0]:.6g} s; {last}")
         if self.cooling < 1:
             made.append(f"cooling {self.cooling:g} at standstill, full from {self.n_cooling:.6g} 1/min on")
         if self.duration > LONG_CYCLE:
@@ -268,6 +275,7 @@ def cooling_at(n: Array, cooling: float, n_cooling: Any) -> Array:
 
 def _jumps(shaft: MotorShaft) -> Array:
     """Times in s at which the speed of the motor jumps."""
-    ends = shaft.steps[1:]
+    start, ends = shaft.steps[:1], shaft.steps[1:]
     (_, before), (_, after) = shaft.read(np.nextafter(ends, -np.inf)), shaft.read(ends)
-    return ends[np.abs(after - before) > BRIEF * shaft.omega_top]
+    least, prescribed = BRIEF * shaft.omega_top, abs(shaft.omega_prescribed)
+    return np.concatenate([start[[prescribed > least]], ends[np.abs(after - before) > least]])

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.components.base import Component
+from shaftwork.components.sources import SpeedSource
 from shaftwork.core.errors import ParameterError, SignalError
 from shaftwork.core.parameters import in_si
 from shaftwork.results.observer import Array
@@ -67,6 +68,16 @@ class MotorShaft:
         """Highest speed of the motor in size, rad/s."""
         speeds = turning_points(self._speeds, self.steps, smallest=SMALLEST).values
         return float(np.abs(speeds).max()) * abs(self.ratio)
+
+    @property
+    def omega_prescribed(self) -> float:
+        """Speed of the motor at the start if every state were at rest, rad/s; zero where no source prescribes one."""
+        made, start = self.solution, self.steps[:1]
+        owners = dict.fromkeys(name.rpartition(".")[0] for name in made.names if name.endswith(".tau"))
+        if not any(isinstance(made.observer.part(owner), SpeedSource) for owner in owners):
+            return 0.0
+        still = np.zeros_like(made.dense(start))
+        return self.ratio * float(made.observer.signal(self.speed, start, still, made.dense)[0])
 
     @property
     def steps(self) -> Array:

@@ -71,7 +71,7 @@ def sweep(
 
     Raises:
         ParameterError: an argument is out of its range, there is no such parameter or measure, or the store is that of
-            another sweep.
+            another sweep or is damaged in a line that is not the last.
         NetworkError: the network cannot be assembled.
         SignalError: a measure is of a quantity that does not exist.
     """

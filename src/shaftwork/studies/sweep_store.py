@@ -9,12 +9,15 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from sys import float_info
+from typing import Any
 
 import numpy as np
 
 from shaftwork.core.errors import ParameterError
+from shaftwork.network.wording import listed
 from shaftwork.results.measures import Measure
 from shaftwork.studies.sweep_task import Chunk, Reader, Task
 
@@ -29,47 +32,54 @@ class Store:
         task: the sweep.
 
     Raises:
-        ParameterError: the file is that of another sweep, or cannot be written.
+        ParameterError: the file is that of another sweep, is damaged in a line that is not the last, or cannot be
+            written.
     """
 
     def __init__(self, path: str | Path, task: Task) -> None:
         self._path, self._title = Path(path), _title(task)
+        title = (json.dumps(self._title) + "\n").encode()
         try:
-            text = self._path.read_text(encoding="utf-8") if self._path.exists() else ""
-            lines = text.splitlines(keepends=True)
-            whole = [line for line in lines if line.endswith("\n")]
+            raw = self._path.read_bytes() if self._path.exists() else b""
+            *whole, torn = raw.split(b"\n")
+            if whole or not title.startswith(torn):
+                self._refuse_other(raw.split(b"\n", 1)[0])
             if not whole:
-                self._path.write_text(json.dumps(self._title) + "\n", encoding="utf-8")
-            elif len(whole) < len(lines):
-                self._path.write_text("".join(whole), encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
+                self._path.write_bytes(title)
+            elif torn:
+                self._path.write_bytes(raw[: -len(torn)])
+        except OSError as error:
             raise ParameterError(
                 f"store = '{path}' cannot be used: {error}. Give a file in a folder that exists."
             ) from None
-        if whole:
-            self._refuse_other(whole[0])
-        self.chunks = [self._read(line, len(task.measures)) for line in whole[1:]]
+        self.chunks = [self._read(line, number, task) for number, line in enumerate(whole[1:], 2)]
         """What is there."""
 
-    def _refuse_other(self, line: str) -> None:
-        try:
-            found = json.loads(line)
-            known = dict(found)
-        except ValueError:
-            raise ParameterError(f"store = '{self._path}' is no file of a sweep. Give another name.") from None
+    def _refuse_other(self, line: bytes) -> None:
+        found = _parsed(line)
+        if not isinstance(found, dict) or "format" not in found:
+            raise ParameterError(
+                f"store = '{self._path}' is no file of a sweep: line 1 does not say of which. Give another name; if it "
+                "was one and is damaged, delete the file."
+            )
         for what, own in self._title.items():
-            if known.get(what) != own:
+            if found.get(what) != own:
                 raise ParameterError(
                     f"store = '{self._path}' holds another sweep, which differs in its {what}, so its results are "
                     "not those of this one. Give another name, or repeat the call that made it."
                 )
 
-    def _read(self, line: str, measures: int) -> Chunk:
-        made = json.loads(line)
+    def _read(self, line: bytes, number: int, task: Task) -> Chunk:
+        made = _parsed(line)
+        if wrong := _objection(made, task):
+            raise ParameterError(
+                f"store = '{self._path}' is damaged in line {number}: {wrong}. Delete this line, and its variants are "
+                "computed anew, or delete the file."
+            )
         values = [[math.nan if value is None else value for value in row] for row in made["values"]]
         return Chunk(
             np.array(made["variants"], dtype=np.intp),
-            np.array(values, dtype=float).reshape(-1, measures),
+            np.array(values, dtype=float).reshape(-1, len(task.measures)),
             tuple(made["reasons"]),
             made.get("left", 0),
         )
@@ -85,6 +95,46 @@ class Store:
         }
         with self._path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(made) + "\n")
+
+
+def _parsed(line: bytes) -> Any:
+    """What a line says; None where it is no JSON."""
+    try:
+        return json.loads(line)
+    except (ValueError, RecursionError):
+        return None
+
+
+def _objection(made: Any, task: Task) -> str:
+    """Why a line is not what a chunk of a sweep is written as; empty where it is."""
+    if not isinstance(made, dict):
+        return "it is not whole, or no chunk of a sweep"
+    if missing := [key for key in ("variants", "values", "reasons") if key not in made]:
+        return f"it lacks {listed(missing)}"
+    variants, values, reasons = made["variants"], made["values"], made["reasons"]
+    if not _are(variants, lambda one: _counts(one, len(task) - 1)) or len(set(variants)) < len(variants):
+        return f"its variants are not different whole numbers from 0 to {len(task) - 1}"
+    if not _are(values, lambda row: _are(row, _measured, len(task.measures)), len(variants)):
+        return f"its values are not {len(task.measures)} numbers for each of its {len(variants)} variants"
+    if not _are(reasons, lambda one: isinstance(one, str), len(variants)):
+        return f"its reasons are not a text for each of its {len(variants)} variants"
+    if not _counts(made.get("left", 0), len(variants)):
+        return f"'left' is not a whole number from 0 to {len(variants)}"
+    return ""
+
+
+def _are(made: Any, holds: Callable[[Any], bool], count: int | None = None) -> bool:
+    """Whether it is a list, of so many entries, of which each is as it should be."""
+    return isinstance(made, list) and count in (None, len(made)) and all(map(holds, made))
+
+
+def _counts(made: Any, most: int) -> bool:
+    return type(made) is int and 0 <= made <= most
+
+
+def _measured(made: Any) -> bool:
+    """A number, or nothing where a variant failed."""
+    return made is None or (type(made) in (int, float) and abs(made) <= float_info.max)
 
 
 def _title(task: Task) -> dict[str, str | int]:
