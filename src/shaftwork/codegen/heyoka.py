@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -45,7 +46,7 @@ class HeyokaProgram:
         guards: heyoka expressions at whose change of sign a run ends; behind the signs of the switches there is a
             parameter for each: 1 where its rise through zero ends the run, -1 where its fall does, 0 where neither; and
             behind these another for each, how far beyond zero it has to go.
-        listeners: the last one is asked at a guard, with its number and the integrator, whether the run goes on.
+        listeners: the last one is asked at a guard, with its number, whether the run goes on.
         held: functions that are constant between switches; they are the last of the parameters.
         stepping: which of the switches depend on them.
     """
@@ -60,9 +61,14 @@ class HeyokaProgram:
     guards: tuple[Any, ...] = ()
     held: HeldParameters | None = None
     stepping: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
-    listeners: list[Callable[[int, Any], bool]] = field(default_factory=list, repr=False, compare=False)
+    listeners: list[Callable[[int], bool]] = field(default_factory=list, repr=False, compare=False)
     _compiled: dict[float, Any] = field(default_factory=dict, repr=False, compare=False)
     _functions: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
+
+    @cached_property
+    def all_timed(self) -> bool:
+        """Whether every switch depends on the time alone."""
+        return bool(self.timed.all())
 
     def guard_met(self, outcome: Any) -> int | None:
         """The guard that an outcome of heyoka means, or None where it means something else."""
@@ -172,8 +178,8 @@ class HeyokaProgram:
         side, offset = heyoka.par[first], heyoka.par[first + len(self.guards)]
         met = heyoka.select(side, side * guard - offset, heyoka.expression(-1.0))
 
-        def ask(integrator: Any, _direction: int) -> bool:
-            return bool(self.listeners) and self.listeners[-1](number, integrator)
+        def ask(_integrator: Any, _direction: int) -> bool:
+            return bool(self.listeners) and self.listeners[-1](number)
 
         # heyoka's own cooldown grows with the tolerance, and hides what follows soon
         return heyoka.t_event(met, direction=heyoka.event_direction.positive, callback=ask, cooldown=COOLDOWN)

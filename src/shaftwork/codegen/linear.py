@@ -329,7 +329,7 @@ class _Reader(ModelObserver):
     def signal(self, name: str, t: Array, x: Array, dense: Dense | None = None) -> Array:
         """(k,) a quantity by its name in `units`; the energy of a part is that in its stores, lines apart."""
         owner, _, quantity = name.rpartition(".")
-        if quantity == "energy" and name not in self._signals:
+        if quantity == "energy" and name not in self.quantities.signals:
             return self.motion.stored(next(part for part in self._graph.parts if part.name == owner))
         return super().signal(name, t, x, dense)
 

@@ -40,6 +40,43 @@ class Impact(NamedTuple):
     lost: Mapping[str, float]
 
 
+class Quantities:
+    """The names of all quantities of a model; made once for all motions in the same equations.
+
+    Args:
+        form: the state form.
+    """
+
+    def __init__(self, form: StateForm) -> None:
+        self._form, self._graph = form, form.graph
+
+    @cached_property
+    def signals(self) -> dict[str, tuple[GraphPart, Signal]]:
+        """Signals of parts."""
+        parts = self._graph.parts
+        return {f"{p.name}.{name}": (p, made) for p in parts for name, made in signals_of(self._graph, p).items()}
+
+    @cached_property
+    def integrals(self) -> dict[str, int]:
+        """States that are integrals, by number."""
+        return {state.name: k for k, state in enumerate(self._form.states) if state.kind == "integral"}
+
+    @cached_property
+    def nodes(self) -> dict[str, int]:
+        """Speeds of nodes and the like, by number of the node."""
+        pairs = zip(self._graph.nodes, self._graph.domains, strict=True)
+        return {f"{name}.{domain.across.name}": k for k, (name, domain) in enumerate(pairs)}
+
+    @cached_property
+    def units(self) -> Mapping[str, str]:
+        """Every quantity that can be read and its unit; where a part and a node share a name, the part's is meant."""
+        units = {f"{name}": domain.across.unit for name, domain in zip(self.nodes, self._graph.domains, strict=True)}
+        units |= {name: _unit(signal) for name, (_, signal) in self.signals.items()}
+        units |= {s.name: s.unit for s in self._form.states if s.kind == "integral"}
+        units |= {f"{part.name}.power": "W" for part in self._graph.parts}
+        return units | {f"{part.name}.energy": "J" for part in self._graph.parts}
+
+
 class ModelObserver:
     """Recovers every quantity of a network from its states.
 
@@ -48,35 +85,25 @@ class ModelObserver:
         bind: makes the array program with the parameter vector of the run; called when a quantity is first read.
         instants: times at which inputs jump: there they are read after the jump, as the states are, and where a time is
             listed twice in a row, first before it.
+        quantities: those of the form, where they are known.
     """
 
-    def __init__(self, form: StateForm, bind: Callable[[], BoundArrays], instants: Timeline = NOTHING) -> None:
+    def __init__(
+        self,
+        form: StateForm,
+        bind: Callable[[], BoundArrays],
+        instants: Timeline = NOTHING,
+        quantities: Quantities | None = None,
+    ) -> None:
         self._form, self._bind, self._instants = form, bind, instants
+        self.quantities = Quantities(form) if quantities is None else quantities
         self._graph: CircuitGraph = form.graph
         self._last: tuple[Array, Array, History] | None = None
 
-    @cached_property
-    def _signals(self) -> dict[str, tuple[GraphPart, Signal]]:
-        parts = self._graph.parts
-        return {f"{p.name}.{name}": (p, made) for p in parts for name, made in signals_of(self._graph, p).items()}
-
-    @cached_property
-    def _integrals(self) -> dict[str, int]:
-        return {state.name: k for k, state in enumerate(self._form.states) if state.kind == "integral"}
-
-    @cached_property
-    def _nodes(self) -> dict[str, int]:
-        pairs = zip(self._graph.nodes, self._graph.domains, strict=True)
-        return {f"{name}.{domain.across.name}": k for k, (name, domain) in enumerate(pairs)}
-
-    @cached_property
+    @property
     def units(self) -> Mapping[str, str]:
         """Every quantity that can be read and its unit; where a part and a node share a name, the part's is meant."""
-        units = {f"{name}": domain.across.unit for name, domain in zip(self._nodes, self._graph.domains, strict=True)}
-        units |= {name: _unit(signal) for name, (_, signal) in self._signals.items()}
-        units |= {s.name: s.unit for s in self._form.states if s.kind == "integral"}
-        units |= {f"{part.name}.power": "W" for part in self._graph.parts}
-        return units | {f"{part.name}.energy": "J" for part in self._graph.parts}
+        return self.quantities.units
 
     def history(self, t: Array, x: Array) -> History:
         """All branch quantities along a trajectory; the last one asked for is kept."""
@@ -99,12 +126,12 @@ class ModelObserver:
         Raises:
             SignalError: such an energy, and no motion.
         """
-        if name in self._signals:
-            return self._read(t, x, lambda history: history.signal(*self._signals[name]))
-        if name in self._integrals:
-            return np.asarray(x[:, self._integrals[name]])
-        if name in self._nodes:
-            return self._read(t, x, lambda history: np.asarray(history.potentials[self._nodes[name]]))
+        if name in self.quantities.signals:
+            return self._read(t, x, lambda history: history.signal(*self.quantities.signals[name]))
+        if name in self.quantities.integrals:
+            return np.asarray(x[:, self.quantities.integrals[name]])
+        if name in self.quantities.nodes:
+            return self._read(t, x, lambda history: np.asarray(history.potentials[self.quantities.nodes[name]]))
         owner, quantity = name.rsplit(".", 1)
         part = next(part for part in self._graph.parts if part.name == owner)
         if quantity == "power":

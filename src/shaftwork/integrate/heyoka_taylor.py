@@ -91,11 +91,13 @@ class _Run:
         integrator.reset_cooldowns() if integrator.with_events else None
         if self.problem.guards is not None:
             self._sizes = np.fmax(self.problem.guards.sizes, 1.0)
-            self._guard(integrator.pars, self.problem.guards.sides, self.problem.guards.offsets)
+            first = self.program.parameter_count + len(self.program.switches)
+            self._sides, self._offsets = np.split(integrator.pars[first:], 2)
+            self._guard(self.problem.guards.sides, self.problem.guards.offsets)
         watch = self._watch(piece)
         self.program.listeners.clear()
         longest = self._first_step(piece)
-        self.program.listeners[:] = [self._listen] if watch is None else []
+        self.program.listeners[:] = [self._reacts] if watch is None else []
         while True:
             left = self.problem.max_steps - self.steps
             raw, outcome, steps = advance(integrator, watch, left if longest == math.inf else 1, longest)
@@ -123,17 +125,16 @@ class _Run:
         if self.problem.react is not None:
             self.problem.react.refuse_missed(self.met, integrator.time, self.state)
 
-    def _guard(self, pars: Array, sides: Array, offsets: Array | Sequence[float]) -> None:
+    def _guard(self, sides: Array, offsets: Array | Sequence[float]) -> None:
         """Watch the guards from here on, by their sides and offsets.
 
         heyoka's tolerance is relative to the largest of states and events: a torque of 1e6 N m in one would cost six
         digits. So guards count in parts of their size, which their first values tell, and how far rounding moves them.
         """
-        first = self.program.parameter_count + len(self.program.switches)
         offsets = np.asarray(offsets)
         sizes = np.fmax(self._sizes, offsets / ROUNDING)
-        pars[first : first + len(sides)] = sides / sizes
-        pars[first + len(sides) :] = offsets / sizes
+        np.divide(sides, sizes, out=self._sides)
+        np.divide(offsets, sizes, out=self._offsets)
 
     def _guard_met(self, raw: Any, outcome: str, watch: Watch | None) -> int | None:
         """The guard at which the run has stopped, by its own event or at that of a switch at the very same instant."""
@@ -143,9 +144,7 @@ class _Run:
         if watch is None or self.problem.guards is None or watch.reason is not None:
             return None
         values = self.program.guard_values(self.integrator.time, self.integrator.state, self.integrator.pars)
-        first = self.program.parameter_count + len(self.program.switches)
-        sides, offsets = np.split(self.integrator.pars[first:], 2)
-        beyond = np.where(sides == 0.0, -np.inf, sides * values - offsets)
+        beyond = np.where(self._sides == 0.0, -np.inf, self._sides * values - self._offsets)
         return int(np.argmax(beyond)) if beyond.size and beyond.max() > 0.0 else None
 
     def _reacts(self, met: int) -> bool:
@@ -157,13 +156,9 @@ class _Run:
         if reaction is None:
             return False
         self.reactions += 1
-        pars = integrator.pars
-        pars[: reaction.p.size] = reaction.p
-        self._guard(pars, reaction.sides, reaction.offsets)
+        integrator.pars[: reaction.p.size] = reaction.p
+        self._guard(reaction.sides, reaction.offsets)
         return True
-
-    def _listen(self, met: int, _integrator: Any) -> bool:
-        return self._reacts(met)
 
     def _first_step(self, piece: Piece) -> float:
         """Longest first step in s, infinite where heyoka's own choice is good.
@@ -207,7 +202,7 @@ class _Run:
         settle(program, self.integrator, piece.end - piece.start)
         if np.isnan(self.integrator.pars[first : first + len(program.switches)]).any():
             raise self._failure(piece, "err_nf_state", None)
-        if program.timed.all():
+        if program.all_timed:
             return None
         integrator = self.integrator
         size = np.abs(program.switch_values(integrator.time, integrator.state, integrator.pars))

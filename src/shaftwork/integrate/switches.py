@@ -37,7 +37,7 @@ def settle(program: Any, integrator: Any, horizon: float) -> None:
     parameters, signs = integrator.pars[:first], integrator.pars[first : first + len(program.switches)]
     timed = signs * program.timed
     middle = program.switch_signs(integrator.time + horizon / 2, integrator.state, parameters, timed)
-    if program.timed.all():
+    if program.all_timed:
         signs[:] = middle
         return
     signs[:] = program.switch_signs(integrator.time, integrator.state, parameters, middle * program.timed)
@@ -107,7 +107,7 @@ def keeps_sides(program: Any, integrator: Any, parameters: Array, start: float) 
         parameters: all parameters before the step, the signs included.
         start: of the step, s.
     """
-    if program.timed.all():
+    if program.all_timed:
         return True
     signs = parameters[program.parameter_count :][: len(program.switches)]
     times = start + INSIDE * (integrator.time - start)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
+from itertools import accumulate
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from sympy import Expr, Integer, Piecewise, Symbol
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.code import bindable, scalar, vectorised_list
 from shaftwork.codegen.elements import Array
+from shaftwork.codegen.observer import Quantities
 from shaftwork.codegen.recovery import History
 from shaftwork.codegen.stores import Stores
 from shaftwork.codegen.timeline import Timeline
@@ -93,7 +95,10 @@ class Assembly:
 
     def __init__(self, model: Model, elements: Sequence[Element], forms: tuple[str, ...]) -> None:
         self.model, self.elements = model, elements
-        self.stores = Stores(model.form)
+        self.stores, self.quantities = Stores(model.form), Quantities(model.form)
+        self._symbols = tuple(conditional(element.modes) for element in elements)
+        # of each element the place where what it shows begins
+        self._firsts = tuple(accumulate((2 + len(symbols) for symbols in self._symbols), initial=0))
         self._places = {name: k for k, name in enumerate(model.parameters)}
         self._expressions: list[Expr] = []
         self._known: dict[tuple[int, Expr], int] = {}
@@ -217,13 +222,9 @@ class Assembly:
 
     def _start(self, number: int, besides: str, t: float, shown: Sequence[Any]) -> str:
         modes = self.elements[number].modes
-        first = sum(2 + len(self._symbols(k)) for k in range(number))
-        symbols = self._symbols(number)
+        first, symbols = self._firsts[number], self._symbols[number]
         holds = starts_of(modes, symbols)(t, *shown[first : first + 2 + len(symbols)])
         return next((m.name for m, found in zip(modes.options, holds, strict=True) if found and m.name != besides), "")
-
-    def _symbols(self, number: int) -> tuple[Symbol, ...]:
-        return conditional(self.elements[number].modes)
 
     @cached_property
     def _shown(self) -> Callable[..., Any]:
@@ -232,15 +233,14 @@ class Assembly:
         for number, element in enumerate(self.elements):
             part = self.parts[element.part.name]
             reads = any(mode.starts.has(INTEGRAL) for mode in element.modes.options)
-            for symbol in (ACROSS, INTEGRAL, *self._symbols(number)):
+            for symbol in (ACROSS, INTEGRAL, *self._symbols[number]):
                 known = symbol != INTEGRAL or reads
                 shown.append(self._readings.guard(part, element.modes, symbol) if known else Integer(0))
         return vectorised_list((TIME, *self._readings.symbols, *self._parameters), shown)
 
     def across(self, number: int, t: float, x: Array, p: Array) -> float:
         """The speed across an element."""
-        first = sum(2 + len(self._symbols(k)) for k in range(number))
-        return float(self._shown_at(t, x, p)[first])
+        return float(self._shown_at(t, x, p)[self._firsts[number]])
 
     def twist(self, number: int) -> int | None:
         """The state that is the twist of an element, or None where none is."""
@@ -268,7 +268,7 @@ class Assembly:
         p, modes, x = moment.regime.p, moment.regime.modes, moment.x
         guards, bound, (rates, known) = self.guards(p), partial(self.bound, p), self._rates(p)
         clocks, size = list(self.clocks), x.size
-        owners = {made.guard: k for (k, _), found in self._watched.items() for made in found}
+        owners = {made.guard: k for (k, _), found in self._watched.items() for made in found} if clocks else {}
         found = guards if not clocks else lambda t, y: guards(t, y[:, :size])
         now = np.abs(moment.regime.limits(span[0], x.tolist()))
         watch = Guards(found, self.sides(modes), np.array(moment.bands), now)

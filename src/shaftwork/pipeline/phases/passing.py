@@ -12,7 +12,7 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import no_value
 from shaftwork.integrate.problem import Reaction, SeriesError
-from shaftwork.pipeline.phases.assemblies import ModeNames
+from shaftwork.pipeline.phases.assemblies import Element, ModeNames
 from shaftwork.pipeline.phases.moments import Change, Moment, Regime, clear_of_limit
 from shaftwork.pipeline.phases.settling import Settling
 
@@ -34,6 +34,10 @@ class Phase(NamedTuple):
     p: Array
 
 
+def _always(_t: float, _moment: Moment) -> bool:
+    return True
+
+
 @dataclass(frozen=True, eq=False)
 class _Way:
     """From one combination of modes to another in the same equations, by one guard.
@@ -42,13 +46,13 @@ class _Way:
         to: the modes that follow.
         side: on which the guard was met.
         watched: guards and sides of those modes.
-        change: of its element, with the time left open.
+        change: its element, and the modes before and after.
     """
 
     to: Regime
     side: float
     watched: tuple[tuple[int, float], ...]
-    change: Callable[[float], Change]
+    change: tuple[Element, str, str]
 
 
 class Passing:
@@ -70,9 +74,10 @@ class Passing:
         moment: Moment,
         start: float,
         note: Callable[[float, list[Change]], None],
-        suits: Callable[[float, Moment], bool] = lambda _t, _moment: True,
+        suits: Callable[[float, Moment], bool] = _always,
     ) -> None:
-        self._settling, self.moment, self._note, self._suits = settling, moment, note, suits
+        self._settling, self.moment, self._suits = settling, moment, suits
+        self._note: Callable[[float, list[Change]], None] | None = note
         self._size = moment.x.size
         self.phases = [Phase(start, moment.regime.modes, moment.regime.p)]
         self._reactions: list[Reaction] = []
@@ -83,7 +88,7 @@ class Passing:
     def __call__(self, number: int, met: int, t: float, x: Array) -> Reaction | None:
         if number < len(self._reactions):  # the run is made once more, for its dense output
             return self._reactions[number]
-        if self.beyond is not None:
+        if self.beyond is not None or self._note is None:
             return None
         found = self._direct(met, t, x) or self._settled(met, t, x)
         if found is None:
@@ -99,9 +104,16 @@ class Passing:
         self.moment = moment
         self._note(t, changes)
         self.phases.append(Phase(t, regime.modes, regime.p))
-        reaction = Reaction(regime.p, regime.sides, self.moment.bands)
+        reaction = Reaction(regime.p, regime.sides, moment.bands)
         self._reactions.append(reaction)
         return reaction
+
+    def close(self) -> None:
+        """Let go of who is told: the run is over, and only made once more for its dense output.
+
+        Else a motion and its run would refer to each other, and such circles wait for the garbage collector.
+        """
+        self._note, self._suits = None, _always
 
     def _settled(self, met: int, t: float, x: Array) -> tuple[Moment, list[Change]] | None:
         before = Moment(self.moment.regime, x[: self._size].copy(), self.moment.bands)
@@ -141,10 +153,11 @@ class Passing:
 
         The same as in `Settling`, for the guards of one combination of modes only, as it is asked at every change.
         """
-        way = self._way(met)
+        ways = self.moment.regime.ways
+        way: _Way | None = ways[met] if met in ways else ways.setdefault(met, self._find(self.moment.regime, met))
         if way is None:
             return None
-        to, states = way.to, x[: self._size].tolist()
+        to, states = way.to, x.tolist()[: self._size]
         rates, now = to.motion(t, states)
         tick, before = self._settling.tick, self.moment.bands
         near = to.limits(t + tick, to.rounded(states, rates, tick))
@@ -160,16 +173,10 @@ class Passing:
         ahead = to.limits(t + step, [v + step * rate for v, rate in zip(states, rates, strict=True)])
         if not way.side * (ahead[met] - now[met]) > 0:  # it is not left behind for good
             return None
-        return Moment(to, x, bands), [way.change(t)]
-
-    def _way(self, met: int) -> _Way | None:
-        """Where a guard leads in the same equations."""
-        regime = self.moment.regime
-        if met not in regime.ways:
-            regime.ways[met] = self._find(regime, met)
-        return regime.ways[met]  # type: ignore[no-any-return]
+        return Moment(to, x, bands), [Change(t, *way.change)]
 
     def _find(self, regime: Regime, met: int) -> _Way | None:
+        """Where a guard leads in the same equations."""
         pairs = [pair for pair in regime.watched if pair[1].guard == met]
         (number, ended), elements = pairs[0], self._settling.elements
         element, leave = elements[number], ended.leave
@@ -180,4 +187,4 @@ class Passing:
             return None
         to = self._settling.regime((*regime.modes[:number], leave.to, *regime.modes[number + 1 :]))
         watched = tuple((made.guard, made.side) for _, made in to.watched)
-        return _Way(to, ended.side, watched, lambda t: Change(t, element, before, leave.to))
+        return _Way(to, ended.side, watched, (element, before, leave.to))

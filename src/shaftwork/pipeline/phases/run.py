@@ -28,6 +28,7 @@ from shaftwork.pipeline.phases.settling import Settling
 # So many changes of mode, each within this part of the run of the one before, are chatter. Rebounds come ever faster,
 # too, before they end: a thousand of them where nearly all speed is given back.
 CHATTER = ((200, 1e-9), (3000, 1e-6))
+SELDOM = max(part for _, part in CHATTER)
 TIGHTEST_RTOL = 1e-14
 STILL = "Nothing moves, and what holds is known at every time."
 
@@ -152,6 +153,9 @@ class Run:
             return
         passed = (t - self.changes[-1].time) / (self.demand.span[1] - self.demand.span[0]) if self.changes else 1.0
         self.changes += changes
+        if passed >= SELDOM:
+            self._soon = [0 for _ in CHATTER]
+            return
         for number, (most, part) in enumerate(CHATTER):
             self._soon[number] = self._soon[number] + 1 if passed < part else 0
             if self._soon[number] > most:
@@ -185,6 +189,7 @@ class Run:
         """One run of the engine, up to a change of equations or the next instant at which an input jumps."""
         regime = moment.regime
         trajectory, passing = self._passed(t, moment)
+        passing.close()
         self.steps += trajectory.statistics.get("steps", 0)
         assert trajectory.end is not None  # noqa: S101 (engines that follow guards say it)
         t, x = trajectory.end

@@ -62,8 +62,9 @@ class _Whole:
     @cached_property
     def stretches(self) -> Stretches:
         """The phases as they are read."""
-        pairs = [(span, phase) for span in self._run.spans for phase in span.phases]
-        return Stretches([phase.start for _, phase in pairs], lambda number: _stretch(self._run, *pairs[number]))
+        run = self._run
+        pairs = [(span, phase) for span in run.spans for phase in span.phases]
+        return Stretches([phase.start for _, phase in pairs], lambda number: _stretch(run, *pairs[number]))
 
     @property
     def steps(self) -> Array:
