@@ -114,8 +114,8 @@ class Impulses:
     def _in_modes(self, t: float, start: Start, modes: ModeNames) -> Start:
         """The same start in other modes of gears; one that jams has stopped in it."""
         made = Start(self._regimes.taking(modes, t, start.held), t, start.held, start.speeds)
-        stops = (k for k in self._stopped(made.moment) if start.speeds[k] and k not in self._stopped(start.moment))
-        return self.begins(made.moment, t) if any(True for _ in stops) else made
+        halted = {*self._stopped(made.moment)} - {*self._stopped(start.moment)}
+        return self.begins(made.moment, t) if any(start.speeds[k] for k in halted) else made
 
     def _consistent(self, t: float, start: Start, blow: Callable[[Start], Blow]) -> tuple[Start, Blow]:
         """The modes of gears in which an impulse passes as they say; a gear that turns, and has none, jams at once."""
