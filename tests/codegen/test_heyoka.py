@@ -26,7 +26,8 @@ CURVE = Table(XS, YS)
 def evaluate(expression, state, time, parameters):
     """The translated expression at one point, its switches set as an engine sets them."""
     program = build((x, v), t, (a, b), (sympy.sympify(expression), sympy.Integer(0)))
-    values = np.concatenate([parameters, program.switch_signs(time, np.array(state), np.array(parameters))])
+    bound = program.bind(np.array(parameters)).parameters
+    values = np.concatenate([bound, program.switch_signs(time, np.array(state), bound)])
     compiled = heyoka.cfunc(list(program.rows), vars=list(program.variables))
     return float(compiled(np.array(state), pars=values[: compiled.nparams], time=time)[0])
 

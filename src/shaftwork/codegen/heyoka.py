@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -12,6 +12,7 @@ import numpy as np
 import sympy
 from numpy.typing import NDArray
 
+from shaftwork.codegen.fixed import Fixed
 from shaftwork.codegen.heyoka_held import HeldParameters
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.components.pieces import parts
@@ -40,7 +41,9 @@ class HeyokaProgram:
         switches: heyoka expressions whose sign the rows depend on.
         conditions: the same as text, for messages.
         timed: which of them depend on the time alone; their signs are known before a run, piece by piece.
-        parameter_count: number of parameters of the model and of held functions, without the signs.
+        parameter_count: number of parameters of the model, of what is fixed by them and of held functions, without the
+            signs.
+        fixed: what is made of the model's parameters alone.
         fading: heyoka expressions u of functions that are constant to the last bit where e^-|u| is nothing beside 1; a
             step ends where u comes near, because a series from afar does not show that they change there.
         guards: heyoka expressions at whose change of sign a run ends; behind the signs of the switches there is a
@@ -57,6 +60,7 @@ class HeyokaProgram:
     conditions: tuple[str, ...]
     timed: NDArray[np.bool_]
     parameter_count: int
+    fixed: Fixed
     fading: tuple[Any, ...] = ()
     guards: tuple[Any, ...] = ()
     held: HeldParameters | None = None
@@ -81,8 +85,11 @@ class HeyokaProgram:
             self._compiled[tolerance] = self._compile(tolerance)
         return self._compiled[tolerance]
 
-    def switch_values(self, t: float, x: Array, parameters: Array) -> Array:
-        """Values of the switches (k,) at time t in s, state x (n,) and all parameters, the signs included."""
+    def switch_values(self, t: float | Array, x: Array, parameters: Array) -> Array:
+        """Values of the switches (k,) at time t in s, state x (n,) and all parameters, the signs included.
+
+        Or (k, times) at many times, with states (n, times) and parameters (p, times).
+        """
         return self._values("switches", self.switches, t, x, parameters)
 
     def guard_values(self, t: float, x: Array, parameters: Array) -> Array:
@@ -93,7 +100,7 @@ class HeyokaProgram:
         """Derivatives of the states (n,); arguments as for `switch_values`."""
         return self._values("rows", self.rows, t, x, parameters)
 
-    def _values(self, name: str, expressions: tuple[Any, ...], t: float, x: Array, parameters: Array) -> Array:
+    def _values(self, name: str, expressions: tuple[Any, ...], t: float | Array, x: Array, parameters: Array) -> Array:
         if name not in self._functions:
             import heyoka
 
@@ -122,7 +129,8 @@ class HeyokaProgram:
 
     def bind(self, parameters: Array) -> BoundProgram:
         """The program with its parameter vector (p,): what `integrate.problem.Problem.symbolic` takes."""
-        return BoundProgram(self, np.append(parameters, np.zeros(self.parameter_count - len(parameters))))
+        known = np.concatenate([parameters, self.fixed.values(parameters)])
+        return BoundProgram(self, np.append(known, np.zeros(self.parameter_count - len(known))))
 
     def step(self, number: int, integrator: Any) -> None:
         """Go on to the next whole number, or back to the last, where the motion has come to the end of one.
@@ -213,6 +221,7 @@ def build(
     parameters: tuple[sympy.Symbol, ...],
     rows: tuple[sympy.Expr, ...],
     guards: tuple[sympy.Expr, ...] = (),
+    changing: Collection[sympy.Symbol] = (),
 ) -> HeyokaProgram:
     """Translate right-hand sides to heyoka.
 
@@ -222,6 +231,7 @@ def build(
         parameters: parameter symbols, in order.
         rows: the derivative of each state.
         guards: what may end a run where its sign changes.
+        changing: parameters that change in the course of a run.
 
     Raises:
         MissingExtraError: heyoka is not installed.
@@ -233,7 +243,8 @@ def build(
 
     rows, guards = _in_pieces(rows), _in_pieces(guards)
     held = sum(isinstance(part, sympy.floor | HeldNoise) for part in parts((*rows, *guards)))
-    translator = Translator(states, time, parameters, held)
+    fixed = Fixed(parameters, (*states, time, *changing), (*rows, *guards))
+    translator = Translator(states, time, parameters, held, fixed)
     translated = tuple(translator.expression(row) for row in rows)
     watched = tuple(translator.expression(guard) for guard in guards)
     return HeyokaProgram(
@@ -242,10 +253,11 @@ def build(
         tuple(translator.switches),
         tuple(translator.conditions),
         np.array(translator.timed, dtype=bool),
-        len(parameters) + held,
+        len(parameters) + len(fixed.found) + held,
+        fixed,
         tuple(translator.fading.values()),
         watched,
-        HeldParameters(translator.held, translator.variables, len(parameters)) if held else None,
+        HeldParameters(translator.held, translator.variables, len(parameters) + len(fixed.found)) if held else None,
         np.array(translator.stepping, dtype=bool),
     )
 

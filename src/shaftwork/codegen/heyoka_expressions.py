@@ -13,6 +13,7 @@ import sympy
 from sympy.functions.elementary.piecewise import ExprCondPair
 from sympy.logic.boolalg import ITE, And, BooleanFalse, BooleanTrue, Not, Or, Xor
 
+from shaftwork.codegen.fixed import Fixed
 from shaftwork.codegen.heyoka_held import Held
 from shaftwork.components import noise
 from shaftwork.components.laws import Interpolation, InterpolationSlope, between_steps
@@ -58,11 +59,17 @@ class Translator:
         states: state symbols; they become the heyoka variables `variables`.
         time: symbol of time.
         parameters: parameter symbols; they become heyoka.par[0], heyoka.par[1], ...
-        held: number of different floors and held noises in all that is to be translated; they follow the parameters.
+        held: number of different floors and held noises in all that is to be translated; they follow what is fixed.
+        fixed: what is made of parameters alone and follows them.
     """
 
     def __init__(
-        self, states: Sequence[sympy.Symbol], time: sympy.Symbol, parameters: Sequence[sympy.Symbol], held: int = 0
+        self,
+        states: Sequence[sympy.Symbol],
+        time: sympy.Symbol,
+        parameters: Sequence[sympy.Symbol],
+        held: int = 0,
+        fixed: Fixed | None = None,
     ) -> None:
         self.variables = tuple(heyoka.expression(f"x{index}") for index in range(len(states)))
         self.switches: list[Any] = []
@@ -72,10 +79,13 @@ class Translator:
         self.held: list[Held] = []
         self._states = frozenset(states)
         self.fading: dict[sympy.Expr, Any] = {}
-        self._first_held, self._first_sign = len(parameters), len(parameters) + held
+        self._fixed = Fixed(parameters, (), ()) if fixed is None else fixed
+        self._first_held = len(parameters) + len(self._fixed.found)
+        self._first_sign = self._first_held + held
         self._moving = frozenset((*states, time))
         self._done: dict[sympy.Basic, Any] = dict(zip(states, self.variables, strict=True))
         self._done.update((symbol, heyoka.par[index]) for index, symbol in enumerate(parameters))
+        self._done.update((part, heyoka.par[len(parameters) + place]) for part, place in self._fixed.found.items())
         self._done[time] = heyoka.time
         self._signs: dict[sympy.Basic, Any] = {}
 
@@ -115,14 +125,15 @@ class Translator:
 
     def arguments(self, node: sympy.Basic) -> list[Any]:
         """The arguments of a node, translated."""
-        return [self.expression(argument) for argument in node.args]
+        return [self.expression(argument) for argument in self._fixed.arguments(node)]
 
     def product(self, node: sympy.Mul) -> Any:
         """A product, with quotients as such and not as negative powers."""
         above: list[Any] = []
         below: list[Any] = []
-        for factor in node.args:
-            inverse = isinstance(factor, sympy.Pow) and factor.exp.is_number and factor.exp.is_negative
+        for factor in self._fixed.arguments(node):
+            fixed = factor in self._fixed.found
+            inverse = not fixed and isinstance(factor, sympy.Pow) and factor.exp.is_number and factor.exp.is_negative
             (below if inverse else above).append(self.expression(1 / factor if inverse else factor))
         upper = heyoka.prod(above) if above else heyoka.expression(1.0)
         return upper / heyoka.prod(below) if below else upper
@@ -186,13 +197,13 @@ class Translator:
         """The largest or smallest of the arguments, two at a time."""
         zero = heyoka.expression(0.0)
         better = heyoka.gt if isinstance(node, sympy.Max) else heyoka.lt
-        best, *others = sorted(node.args, key=sympy.default_sort_key)
-        result = self.expression(best)
-        for other in others:
+        given = sorted(node.args, key=sympy.default_sort_key)
+        result = self.expression(given[0])
+        for number, other in enumerate(given[1:], 1):
             # The best so far is itself an extreme: the switch compares with it as a whole.
+            best = given[0] if number == 1 else node.func(*given[:number])
             wins = better(self.sign(other - best), zero)
             result = heyoka.select(wins, self.expression(other), result)
-            best = node.func(best, other)
         return result
 
     def piecewise(self, node: sympy.Piecewise) -> Any:

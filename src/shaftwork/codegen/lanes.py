@@ -6,8 +6,7 @@ runs and 0 afterwards. So the others go on, and its states at the guard are its 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from collections.abc import Set as AbstractSet
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -15,9 +14,9 @@ from typing import Any
 import heyoka
 import numpy as np
 from numpy.typing import NDArray
-from sympy import Add, Dummy, Expr, Mul, Symbol
+from sympy import Expr, Symbol
 
-from shaftwork.codegen.code import vectorised_list
+from shaftwork.codegen.fixed import Fixed
 from shaftwork.codegen.heyoka import COOLDOWN, HeyokaProgram
 from shaftwork.codegen.heyoka_expressions import Translator
 from shaftwork.components.laws import t as TIME
@@ -86,10 +85,9 @@ class LaneProgram:
         rates: heyoka expressions of the derivatives.
         guards: heyoka expressions that end a lane where they rise through zero on their side.
         integrands: heyoka expressions whose integrals are further states, behind the others.
-        parameter_count: number of the model's parameters; those derived from them follow, then whether a lane runs, and
+        parameter_count: number of the model's parameters; what is fixed by them follows, then whether a lane runs, and
             the sides and offsets of the guards.
-        derive: what is derived from the model's parameters.
-        derived_count: the number of it.
+        fixed: what is made of the model's parameters alone.
     """
 
     variables: tuple[Any, ...]
@@ -97,8 +95,7 @@ class LaneProgram:
     guards: tuple[Any, ...]
     integrands: tuple[Any, ...]
     parameter_count: int
-    derive: Callable[..., Any]
-    derived_count: int
+    fixed: Fixed
     _compiled: dict[float, Any] = field(default_factory=dict, repr=False, compare=False)
     _met: dict[int, tuple[int, float]] = field(default_factory=dict, repr=False, compare=False)
 
@@ -110,12 +107,11 @@ class LaneProgram:
     @property
     def _first(self) -> int:
         """Place of the parameter that says whether a lane runs."""
-        return self.parameter_count + self.derived_count
+        return self.parameter_count + len(self.fixed.found)
 
     def parameters(self, p: Array) -> Array:
-        """(parameters, k) those of the model and what is derived from them, from those of the model alone."""
-        derived = [np.broadcast_to(value, p.shape[1:]) for value in self.derive(*p)]
-        return np.concatenate([p, np.array(derived).reshape(self.derived_count, p.shape[1])])
+        """(parameters, k) those of the model and what is fixed by them, from those of the model alone."""
+        return np.concatenate([p, self.fixed.values(p)])
 
     @cached_property
     def motion(self) -> LaneFunction:
@@ -175,8 +171,6 @@ class LaneProgram:
 def lane_program(program: HeyokaProgram, rows: Rows, integrands: Sequence[Expr]) -> LaneProgram:
     """The program for many variants of what there is a program for one.
 
-    What holds neither states nor time is a parameter of its own, so that a series does not compute it again and again.
-
     Args:
         program: for one variant, with its guards.
         rows: the same as expressions.
@@ -185,43 +179,14 @@ def lane_program(program: HeyokaProgram, rows: Rows, integrands: Sequence[Expr])
     Raises:
         CompileError: a law switches by a condition, which ends a step in each lane at a time of its own.
     """
-    fixed = _Fixed({*rows.states, TIME})
-    reduced = [fixed.taken_out(expression) for expression in (*rows.rates, *integrands)]
-    translator = Translator(rows.states, TIME, (*rows.parameters, *fixed.symbols.values()))
-    made = tuple(translator.expression(expression) for expression in reduced)
+    expressions = (*rows.rates, *integrands)
+    fixed = Fixed(rows.parameters, (*rows.states, TIME), expressions, before=program.fixed.found)
+    translator = Translator(rows.states, TIME, rows.parameters, fixed=fixed)
+    made = tuple(translator.expression(expression) for expression in expressions)
     if program.switches or program.fading or program.held is not None or translator.switches or translator.fading:
         raise CompileError("A law of the network switches by a condition, which variants side by side do not follow.")
     rates, integrals = made[: len(rows.rates)], made[len(rows.rates) :]
-    derived = vectorised_list(rows.parameters, tuple(fixed.symbols))
-    return LaneProgram(
-        program.variables, rates, program.guards, integrals, len(rows.parameters), derived, len(fixed.symbols)
-    )
-
-
-class _Fixed:
-    """Takes what does not move out of expressions.
-
-    Args:
-        moving: symbols of states and time.
-    """
-
-    def __init__(self, moving: AbstractSet[Symbol]) -> None:
-        self._moving = moving
-        self.symbols: dict[Expr, Symbol] = {}
-
-    def taken_out(self, node: Expr) -> Expr:
-        """The expression with a symbol for each part of it that holds neither states nor time."""
-        if not node.args or node.is_number:
-            return node
-        if self._moving.isdisjoint(node.free_symbols):
-            return self.symbols.setdefault(node, Dummy(real=True))
-        if isinstance(node, Add | Mul):
-            fixed, rest = node.as_independent(*self._moving, as_Add=isinstance(node, Add))
-            parts = [self.taken_out(part) for part in type(node).make_args(rest)]
-            # a single negative sign is no number worth a parameter
-            own = fixed if fixed.is_number else self.taken_out(fixed)
-            return node.func(own, *parts)
-        return node.func(*(self.taken_out(part) for part in node.args))
+    return LaneProgram(program.variables, rates, program.guards, integrals, len(rows.parameters), fixed)
 
 
 def lane_function(rows: Rows, expressions: Sequence[Expr]) -> LaneFunction:

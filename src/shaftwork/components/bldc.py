@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import Any, ClassVar
 
 from sympy import Abs, Expr, Integer, Max, Min, Rational, asin, cos, pi, sin
@@ -30,6 +31,7 @@ EDGE = Rational(1, 2)
 """Sine of the angle at which a switch closes or opens: 30 degrees."""
 
 
+@lru_cache(maxsize=64)
 def _shape(angle: Expr, flat: Any) -> Expr:
     """A trapezoid of amplitude one over the electrical angle, in phase with its sine."""
     edge = cos(flat / 2)

@@ -17,7 +17,7 @@ from functools import cached_property
 from sympy import Expr, Symbol, false, true
 from sympy.logic.boolalg import Boolean
 
-from shaftwork.components.branches import THROUGH, End, named_in
+from shaftwork.components.branches import ACROSS, THROUGH, End, named_in
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,16 @@ class Leave:
     @cached_property
     def by_torque(self) -> bool:
         """Whether a torque ends the mode, and not speeds, twists and the time alone."""
-        return self.when.has(THROUGH) or any(named_in(symbol)[0] == "through" for symbol in self.when.free_symbols)
+        return self._reads(THROUGH)
+
+    @cached_property
+    def by_twist(self) -> bool:
+        """Whether twists and the time alone end the mode, whatever else changes at that instant."""
+        return self.rebound is None and not self._reads(ACROSS) and not self._reads(THROUGH)
+
+    def _reads(self, own: Symbol) -> bool:
+        """Whether a variable of the element, ACROSS or THROUGH, or the same of another branch stands in the guard."""
+        return own in self.when.free_symbols or any(named_in(s)[0] == own.name for s in self.when.free_symbols)
 
 
 @dataclass(frozen=True)

@@ -81,17 +81,23 @@ def _early_signs(program: Any, integrator: Any, horizon: float) -> Array:
     integrator.step(max_delta_t=horizon, write_tc=True)
     step = integrator.time - start
     signs = np.zeros(len(program.switches))
-    for part in EARLY:
-        first, second = (
-            np.sign(program.switch_values(time, np.array(integrator.update_d_output(time)), parameters))
-            for time in (start + part / 2 * step, start + part * step)
-        )
+    times = start + np.outer(EARLY, (0.5, 1.0)).ravel() * step
+    found = np.sign(_in_step(program, integrator, times, parameters))
+    for first, second in zip(found.T[::2], found.T[1::2], strict=True):
         signs = np.where((signs == 0.0) & (first == second), second, signs)  # rounding would have no steady sign
     integrator.time = start
     integrator.state[:] = state
     integrator.pars[:] = parameters
     integrator.reset_cooldowns()
     return np.asarray(signs)
+
+
+def _in_step(program: Any, integrator: Any, times: Array, parameters: Array) -> Array:
+    """Values of the switches (switches, k) at times (k,) in s within the last step."""
+    states = [integrator.update_d_output(time).copy() for time in times.tolist()]
+    given = np.empty((parameters.size, times.size))
+    given[:] = parameters[:, None]
+    return np.asarray(program.switch_values(times, np.ascontiguousarray(np.transpose(states)), given))
 
 
 def keeps_sides(program: Any, integrator: Any, parameters: Array, start: float) -> bool:
@@ -110,10 +116,8 @@ def keeps_sides(program: Any, integrator: Any, parameters: Array, start: float) 
     if program.all_timed:
         return True
     signs = parameters[program.parameter_count :][: len(program.switches)]
-    times = start + INSIDE * (integrator.time - start)
-    states = [np.array(integrator.update_d_output(time)) for time in times]
-    values = np.array([program.switch_values(*at, parameters) for at in zip(times, states, strict=True)])
-    return bool((signs * values >= -WRONG_SIDE * np.abs(values).max(axis=0)).all())
+    values = _in_step(program, integrator, start + INSIDE * (integrator.time - start), parameters)
+    return bool((signs[:, None] * values >= -WRONG_SIDE * np.abs(values).max(axis=1)[:, None]).all())
 
 
 class Watch:
@@ -146,20 +150,23 @@ class Watch:
         """Whether a switch that is no number has stopped it."""
 
     def __call__(self, integrator: Any) -> bool:
-        values = self._program.switch_values(integrator.time, integrator.state, integrator.pars)
-        if np.isnan(values.sum()):
-            condition = self._program.conditions[int(np.argmax(np.isnan(values)))]
-            self.reason, self.valueless = f"the condition {condition} is neither true nor false", True
-            self.last_good = integrator.time, integrator.state.copy()
-            return False
-        signs = integrator.pars[self._signs]
+        now, state, parameters = integrator.time, integrator.state, integrator.pars
+        values, signs = self._program.switch_values(now, state, parameters), parameters[self._signs]
         np.maximum(self._largest, np.abs(values), out=self._largest)
         inside = signs * values
         # What switches by the time alone has its sign for the piece, and nothing can drive it back.
-        if (self._moving & (inside <= WRONG_SIDE * self._largest)).any():
-            return self._looked_at(integrator, values, signs, inside)
-        self.leaves = False
-        return self._goes_on(integrator, values, np.zeros(0, dtype=bool))
+        if ((inside > WRONG_SIDE * self._largest) | self._program.timed).all():
+            self.leaves = False
+            if now - self._last < self._short:
+                return self._goes_on(integrator, values)
+            self._last, self._short_steps, self.last_good = now, 0, (now, state.copy())
+            return True
+        if np.isnan(values).any():
+            condition = self._program.conditions[int(np.argmax(np.isnan(values)))]
+            self.reason, self.valueless = f"the condition {condition} is neither true nor false", True
+            self.last_good = now, state.copy()
+            return False
+        return self._looked_at(integrator, values, signs, inside)
 
     def _looked_at(self, integrator: Any, values: Array, signs: Array, inside: Array) -> bool:
         """Whether the run goes on where a switch is at zero, or on the wrong side of it."""

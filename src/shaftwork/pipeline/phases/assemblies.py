@@ -146,7 +146,7 @@ class Assembly:
 
     @property
     def guards_shown(self) -> tuple[Expr, ...]:
-        """The guards in states, parameters and time, by number."""
+        """The guards in states, parameters and time."""
         return tuple(self._expressions)
 
     @cached_property
@@ -158,10 +158,9 @@ class Assembly:
     def vector(self, base: Mapping[str, float], numbers: Mapping[str, float]) -> Array:
         """The parameter vector with the given values and numbers of modes."""
         p = self.model.defaults.copy()
-        for values in (base, numbers):
-            for name, value in values.items():
-                if name in self._places:
-                    p[self._places[name]] = value
+        for name, value in (*base.items(), *numbers.items()):
+            if name in self._places:
+                p[self._places[name]] = value
         return p
 
     def prepared(self, p: Array) -> Prepared:
@@ -373,10 +372,11 @@ class Assembly:
             return None
         from shaftwork.codegen.heyoka import build
 
-        clocks = tuple(Symbol(f"clock {k}", real=True) for k in self.clocks)
+        states = (*rows.states, *(Symbol(f"clock {k}", real=True) for k in self.clocks))
         rates = (*rows.rates, *(self._expressions[k] for k in self.clocks))
+        changing = [rows.parameters[place] for place in self._numbers]
         try:
-            return build((*rows.states, *clocks), TIME, rows.parameters, rates, tuple(self._expressions))
+            return build(states, TIME, rows.parameters, rates, self.guards_shown, changing)
         except CompileError:
             return None
 

@@ -135,14 +135,17 @@ class Settling:
         named = next(pair for pair in moment.regime.watched if pair[1].guard == met)
         found: list[tuple[Moment, list[Change]]] = []
         failed: list[SimulationError] = []
-        for first in self._at_once(moment, after, named):
+        ways = self._at_once(moment, after, named)
+        least = max(1, len({number for number, made in ways if made.leave.by_twist}))
+        for first in ways:
             try:
                 found.append(self._consistent(t, after, moment, first))
             except SimulationError as error:
                 failed.append(error)
             else:
-                if len(found[-1][1]) == 1:  # none can be fewer
-                    break
+                changes = found[-1][1]
+                if len(changes) == 1 or (len(changes) == least and not any(one.impact for one in changes)):
+                    break  # none can be fewer
         if not found:
             raise failed[0]
         return min(found, key=lambda made: len(made[1]))
