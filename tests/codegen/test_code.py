@@ -9,7 +9,7 @@ import pytest
 import sympy
 from sympy import Heaviside, Max, Min, Piecewise, Symbol, sin, sqrt, tanh
 
-from shaftwork.codegen.code import bindable, scalar, vectorised, vectorised_list
+from shaftwork.codegen.code import bindable, branchwise, scalar, vectorised, vectorised_list
 from shaftwork.core.errors import CompileError
 
 x, y, c = (Symbol(name, real=True) for name in ("x", "gap.phi", "class"))  # names that are no names in Python
@@ -48,10 +48,19 @@ def test_two_lists_with_bound_parameters_are_those_of_one_function_and_the_secon
     assert reads_none_of_it[1](-1.0, [2.0]) == [4.0]
 
 
-def test_where_one_value_is_none_all_are_nan() -> None:
-    both, one = bindable({"t": x, "x": (y,)}, {"p": (c,)}, [x], [y, sqrt(y)])([1.5])
-    assert np.isnan([*one(0.0, [-1.0]), *both(0.0, [-1.0])[0], *both(0.0, [-1.0])[1]]).all()
-    assert both(0.0, [4.0]) == ([0.0], [4.0, 2.0])
+def test_a_value_that_is_none_is_nan_beside_others_that_are_some() -> None:
+    both, one = bindable({"t": x, "x": (y,)}, {"p": (c,)}, [x], [y, sqrt(y), 1 / x])([1.5])
+    np.testing.assert_array_equal(one(0.0, [-1.0]), [-1.0, np.nan, np.nan])
+    np.testing.assert_array_equal(np.hstack(both(0.0, [-1.0])), [0.0, -1.0, np.nan, np.nan])
+    assert both(0.5, [4.0]) == ([0.5], [4.0, 2.0, 2.0])
+
+
+def test_what_stands_twice_in_a_branch_is_not_asked_for_where_the_branch_does_not_hold() -> None:
+    law = Piecewise((sqrt(y) + sin(sqrt(y)), y > 0), (y, True))
+    both, one = bindable({"t": x, "x": (y,)}, {"p": (c,)}, [law], [law + c])([1.5])
+    assert both(0.0, [-1.0]) == ([-1.0], [0.5])
+    assert one(0.0, [-1.0]) == [0.5]
+    assert branchwise({"y": y}, [law])(-1.0) == [-1.0]
 
 
 def test_a_symbol_without_a_value_is_refused_by_name() -> None:

@@ -95,6 +95,11 @@ def test_soils_are_those_of_the_table_in_newtons_per_metre() -> None:
     }
 
 
+def test_a_wrong_resistance_of_a_soil_is_said_of_the_soil() -> None:
+    with pytest.raises(sw.ParameterError, match=r"Soil: mean = -5 must be above 0"):
+        sw.Soil(-5, 1)
+
+
 @pytest.mark.parametrize(
     ("wrong", "answer"),
     [

@@ -101,6 +101,8 @@ def test_a_reference_may_be_any_law_of_time() -> None:
     ("limits", "words"),
     [
         ({"tau_min": -2.0}, "tau_min is given without tau_max"),
+        ({"t_track": 1.0, "tau_max": 1.0}, "there is no integral part. Give t_i"),
+        ({"t_track": 1.0, "t_i": 1.0}, "there are no limits. Give tau_max"),
         ({"tau_min": 2.0, "tau_max": 1.0}, "no room between tau_min = 2 N m and tau_max = 1 N m"),
         ({"tau_max": -1.0}, "no room between tau_min = 1 N m and tau_max = -1 N m"),
         ({"t_on": 1.0, "t_off": 1.0}, "t_off = 1 s is not later than t_on = 1 s"),

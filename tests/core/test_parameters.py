@@ -10,7 +10,7 @@ import pint
 import pytest
 
 import shaftwork as sw
-from shaftwork.core.parameters import Parameter
+from shaftwork.core.parameters import Parameter, whole
 
 
 def problem_of(part: sw.Component) -> str:
@@ -127,3 +127,20 @@ def test_bounds_read_as_words() -> None:
     assert Parameter("i", "1", "ratio", nonzero=True).bounds == "not zero"
     assert Parameter("x", "m", "place").bounds == ""
     assert Parameter("p", "1", "pairs", above=0, whole=True).bounds == "above 0 and whole"
+
+
+@pytest.mark.parametrize("three", [3, np.int64(3), np.uint8(3)])
+def test_a_count_may_be_an_integer_of_any_kind(three: int) -> None:
+    """numpy's are what a loop over an array gives."""
+    assert type(whole(three)) is int
+    assert repr(sw.Lumped(three)) == repr(sw.Lumped(3))
+    net = sw.Network("one")
+    net.add(sw.TorqueSource("motor", tau=1.0), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    made = sw.studies.sweep(net, {"J.J": [1.0, 2.0]}, t_end=0.1, measures=["end J.omega"], processes=three // three)
+    assert len(made.best("end J.omega", three)) == 2
+
+
+@pytest.mark.parametrize("none", [True, np.bool_(1), 2.0, np.float64(3.0), "4", None, 0, 9])
+def test_what_is_no_count_or_out_of_its_range_is_none(none: object) -> None:
+    assert whole(none, 1, 8) is None

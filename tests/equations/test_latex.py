@@ -26,6 +26,7 @@ from shaftwork.core.parameters import parameter
 from shaftwork.equations.printing import printed_number
 from shaftwork.equations.widths import printed_width
 from shaftwork.network.builder import NetworkBuilder
+from shaftwork.scenes import SCENES
 from tests.equations.networks import MECHANICAL, crane, dc_drive, equations_of, hoist, mixed_train, shaft, train
 
 ROOT = Path(__file__).parents[2]
@@ -58,6 +59,18 @@ def overfull(log: str) -> list[float]:
 def test_a_document_compiles_and_keeps_inside_its_margins(name: str, values: bool, tmp_path: Path) -> None:  # noqa: FBT001
     log = compile_latex(equations_of(NETWORKS[name]()).document(values=values), tmp_path)
     assert max(overfull(log), default=0.0) < 10.0  # points: what sticks out is less than a letter and a half
+
+
+@compiles
+@pytest.mark.parametrize("scene", ["excavator", "bldc-shaft"])
+@pytest.mark.parametrize("values", [False, True])
+def test_the_document_of_a_scene_with_long_laws_keeps_inside_its_margins(
+    scene: str,
+    values: bool,  # noqa: FBT001
+    tmp_path: Path,
+) -> None:
+    log = compile_latex(SCENES[scene]().equations().document(values=values), tmp_path)
+    assert max(overfull(log), default=0.0) < 10.0
 
 
 @compiles

@@ -188,6 +188,11 @@ def test_a_law_that_cannot_be_evaluated_is_said(law: Any, words: str) -> None:
     assert "TorqueSource 'motor': tau" in problem.message
 
 
+def test_a_condition_in_place_of_a_law_is_answered_with_the_law_that_says_it() -> None:
+    problem = typed(sources.TorqueSource("motor", tau=laws.omega > 3), "rotor")
+    assert "omega - 3 in place of omega > 3" in problem.hint
+
+
 @pytest.mark.parametrize("law", [laws.omega, laws.phi * laws.t])
 def test_a_prescribed_speed_may_depend_on_time_alone(law: sympy.Expr) -> None:
     problem = typed(sources.SpeedSource("drive", omega=law), "rotor")

@@ -107,6 +107,7 @@ def test_dense_output_agrees_with_output_times() -> None:
         ({"t_end": 1.0, "parameters": {"motor.tau": sw.Step(1.0)}}, "must be a number here"),
         ({"t_end": 1.0, "algebraic_loops": "x"}, "'refuse' or 'solve'"),
         ({"t_end": 1.0, "rtol": 0.0}, "rtol"),
+        ({"t_end": 1.0, "rtol": 1e-16}, "rounding of double precision"),
         ({"t_end": 1.0, "t_eval": 1}, "at least 2"),
         ({"t_end": 1.0, "t_eval": [0.5, 0.4]}, "strictly increasing"),
         ({"t_end": 1.0, "t_eval": [0.5, 2.0]}, "between 0 and 1"),
@@ -122,6 +123,19 @@ def test_dense_output_agrees_with_output_times() -> None:
 def test_a_wrong_argument_is_named_with_what_would_be_right(arguments: dict[str, object], words: str) -> None:
     with pytest.raises(sw.ParameterError, match=words):
         two_masses().simulate(**arguments)
+
+
+@pytest.mark.parametrize("rtol", [1e-16, 1.0, math.nan])
+def test_wherever_a_relative_tolerance_is_asked_for_it_is_one_that_doubles_can_keep(rtol: float) -> None:
+    net, measures, finest = two_masses(), {"speed": "end J1.omega"}, float(np.finfo(float).eps)
+    model = net.compile()
+    with pytest.raises(sw.ParameterError, match="rtol"):
+        model.choose_engine(1.0, rtol=rtol)
+    with pytest.raises(sw.ParameterError, match="rtol"):
+        sw.studies.sweep(net, samples={"J1.J": [1.0]}, t_end=1.0, measures=measures, rtol=rtol)
+    with pytest.raises(sw.ParameterError, match="rtol"):
+        sw.studies.motion_sensitivities(net, measures, t_end=1.0, rtol=rtol)
+    assert model.simulate(1.0, rtol=finest).t[-1] == 1.0
 
 
 def test_changed_parameters_give_the_same_motion_as_a_new_network() -> None:

@@ -85,7 +85,9 @@ def test_the_study_ranks_the_models_as_their_orders_say() -> None:
 
 def test_a_model_that_fails_is_a_row_with_its_reason(tmp_path: Path) -> None:
     models = (sw.Wave(), sw.Spectral(4))
-    study = work_precision(sw.scenes.shaft_step(), "line", t_end=0.01, models=models, engines=("scipy",), points=11)
+    study = work_precision(
+        sw.scenes.shaft_step(), "line", t_end=0.01, models=models, engines=("scipy",), points=np.int64(11)
+    )
     failed, good = study.trials
     assert "knows no travelling waves" in failed.why
     assert np.isinf(failed.error)

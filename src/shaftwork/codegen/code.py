@@ -120,7 +120,7 @@ def bindable(
 ) -> Callable[..., tuple[Callable[..., Any], Callable[..., Any]]]:
     """Two lists of expressions as functions of floats, for values of the parameters that are given once.
 
-    The one gives both lists, the other the second alone; where a value is none, all of them are nan.
+    The one gives both lists, the other the second alone; a value that is none is nan.
 
     Args:
         arguments: by names for the code, a symbol or those of the floats in a list.
@@ -134,28 +134,53 @@ def bindable(
     printer.known |= own.known
     shared = _shared(printer, both)
     lists = [[printer.doprint(made) for made in made_of] for made_of in (first, second)]
+    given = {**arguments, **parameters}
     inner = [
-        *_guarded("both", arguments, read, shared, lists),
-        *_guarded("one", arguments, read, shared, lists[1:]),
+        *_guarded("both", arguments, read, shared, lists, f"first({', '.join(given)}), second({', '.join(given)})"),
+        *_guarded("one", arguments, read, shared, lists[1:], f"second({', '.join(given)})"),
         "return both, one",
     ]
-    return _compiled("bind", tuple(parameters), [*bound, *inner], SCALAR)
+    names = {**SCALAR, "first": branchwise(given, first), "second": branchwise(given, second)}
+    return _compiled("bind", tuple(parameters), [*bound, *inner], names)
+
+
+def branchwise(
+    arguments: Mapping[str, Symbol | Sequence[Symbol]], expressions: Sequence[Expr]
+) -> Callable[..., list[float]]:
+    """Expressions as a slow function of floats, for where those of `scalar` raise; a value that is none is nan.
+
+    What stands in an expression more than once is evaluated there though no branch may need it whose condition holds.
+
+    Args:
+        arguments: as of `scalar`.
+        expressions: to evaluate.
+    """
+    symbols = [s for given in arguments.values() for s in ((given,) if isinstance(given, Symbol) else given)]
+    made = list[Callable[..., Any]]()
+
+    def function(*values: Any) -> list[float]:
+        if not made:
+            made.append(vectorised_list(symbols, expressions))
+        with np.errstate(all="ignore"):
+            found = [float(value) for value in made[0](*np.hstack(values))]
+        return [value if math.isfinite(value) else math.nan for value in found]
+
+    return function
 
 
 def _guarded(
-    name: str, arguments: Iterable[str], read: list[str], shared: Mapping[str, str], lists: list[list[str]]
+    name: str, arguments: Iterable[str], read: list[str], shared: Mapping[str, str], lists: list[list[str]], slow: str
 ) -> list[str]:
-    """The lines of a function that returns lists, of nan where a value is none."""
+    """The lines of a function that returns lists, found more slowly where Python's functions raise."""
     needed = _needed(shared, [text for texts in lists for text in texts])
     found = ", ".join(f"[{', '.join(texts)}]" for texts in lists)
-    none = ", ".join(f"[nan] * {len(texts)}" for texts in lists)
     lines = [*read, *(f"{part} = {shared[part]}" for part in shared if part in needed), f"return {found}"]
     return [
         f"def {name}({', '.join(arguments)}):",
         "    try:",
         *(f"        {line}" for line in lines),
         "    except (ArithmeticError, ValueError):",
-        f"        return {none}",
+        f"        return {slow}",
     ]
 
 
@@ -196,6 +221,16 @@ def _vectorised(symbols: tuple[Symbol, ...], expression: Expr) -> Callable[..., 
     if len(symbols) == 1 and expression == symbols[0]:
         return lambda value: value
     return _array_function(symbols, expression)
+
+
+def is_rough(function: Callable[..., Any], arguments: Iterable[Any]) -> bool:
+    """Whether a function computes on its way what is no number, as in a branch that does not hold."""
+    try:
+        with np.errstate(all="ignore", divide="raise", invalid="raise"):
+            function(*arguments)
+    except FloatingPointError:
+        return True
+    return False
 
 
 def vectorised_list(symbols: Sequence[Symbol], expressions: Sequence[Expr]) -> Callable[..., Any]:

@@ -163,10 +163,7 @@ class HeyokaProgram:
             options["opt_level"] = 0
         if self.switches or self.fading or self.guards:
             options["t_events"] = [
-                *(
-                    _crossing(heyoka.par[self.parameter_count + number], switch, self._passed(number))
-                    for number, switch in enumerate(self.switches)
-                ),
+                *(self._leaves_its_side(number, switch) for number, switch in enumerate(self.switches)),
                 *(heyoka.t_event(value**2 - NEAR**2, callback=_go_on) for value in self.fading),
                 *(self._end(number, guard) for number, guard in enumerate(self.guards)),
             ]
@@ -191,6 +188,18 @@ class HeyokaProgram:
 
         # heyoka's own cooldown grows with the tolerance, and hides what follows soon
         return heyoka.t_event(met, direction=heyoka.event_direction.positive, callback=ask, cooldown=COOLDOWN)
+
+    def _leaves_its_side(self, number: int, switch: Any) -> Any:
+        """The event that a switch leaves the side that its sign says."""
+        import heyoka
+
+        if self.timed[number]:  # a piece ends there, and rounding would tell whether it has turned by then: never
+            return heyoka.t_event(heyoka.time * heyoka.time + 1.0, callback=_go_on)
+        # Only a fall through zero triggers, so a switch that starts at zero or touches it does not stop the run; one
+        # that rests at zero has sign 0 and no event, which would trigger for ever.
+        sign = heyoka.par[self.parameter_count + number]
+        side = heyoka.select(sign, sign * switch, heyoka.expression(1.0))
+        return heyoka.t_event(side, direction=heyoka.event_direction.negative, callback=self._passed(number))
 
     def _passed(self, number: int) -> Callable[[Any, int], bool]:
         """What happens where a switch leaves its side: it has the other, or a whole number gives way to the next."""
@@ -271,13 +280,3 @@ def _in_pieces(rows: tuple[sympy.Expr, ...]) -> tuple[sympy.Expr, ...]:
 def _go_on(_integrator: Any, _direction: int) -> bool:
     """The callback of an event that only ends a step."""
     return True
-
-
-def _crossing(sign: Any, switch: Any, passed: Callable[[Any, int], bool]) -> Any:
-    """The event that a switch leaves the side that its sign says."""
-    import heyoka
-
-    # Only a fall through zero triggers, so a switch that starts at zero or touches it does not stop the run; one that
-    # rests at zero has sign 0 and no event, which would trigger for ever.
-    side = heyoka.select(sign, sign * switch, heyoka.expression(1.0))
-    return heyoka.t_event(side, direction=heyoka.event_direction.negative, callback=passed)

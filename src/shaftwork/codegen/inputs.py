@@ -11,7 +11,7 @@ import numpy as np
 from scipy import sparse
 from sympy import Expr, I, Integer, Symbol, nan
 
-from shaftwork.codegen.code import vectorised
+from shaftwork.codegen.code import is_rough, vectorised
 from shaftwork.codegen.elements import Array, Index, TemplateGroup, groups_of
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.laws import switches
@@ -189,6 +189,23 @@ class Inputs:
                     value = function(t, *read) + free
                     rows.append((value - levels[:, None, None]).reshape(-1, t.size))
         return np.concatenate(rows)
+
+    def first_rough(self, t: float, y: Array, x: Array, p: Array) -> int | None:
+        """The first input whose law or slope computes on its way what is no number, though it may not need it.
+
+        Args:
+            t: time, s.
+            y: (outputs,) outputs.
+            x: (n,) states.
+            p: parameter vector.
+        """
+        for group in self._groups:
+            read = _read(group, y, x, p)
+            for k, place in enumerate(group.inputs.tolist()):
+                own = [np.float64(t), *(np.float64(value if np.ndim(value) == 0 else value[k]) for value in read)]
+                if any(is_rough(function, own) for function in (group.value, *group.slopes) if function is not None):
+                    return int(place)
+        return None
 
     def _evaluate(self, pick: Callable[[_Group], Function | None], t: Any, y: Array, x: Array, p: Array) -> Array:
         result = np.zeros((self.size, *np.shape(x)[1:]))

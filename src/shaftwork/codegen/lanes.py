@@ -25,6 +25,9 @@ from shaftwork.reduction.rows import Rows
 
 Array = NDArray[np.float64]
 
+WIDTH = 8
+"""Lanes of one run: of more the program takes longer to compile and the lanes wait for each other, of fewer there are
+more calls."""
 BLOCK = 4096
 """Points at which a function is evaluated at once."""
 
@@ -36,10 +39,12 @@ class LaneFunction:
     Args:
         expressions: heyoka's, in its parameters.
         variables: heyoka's state variables.
+        often: whether it is asked so often that optimising it is worth while.
     """
 
     expressions: tuple[Any, ...]
     variables: tuple[Any, ...]
+    often: bool = True
 
     @cached_property
     def _compiled(self) -> tuple[Any, list[int]]:
@@ -48,14 +53,14 @@ class LaneFunction:
         used = sorted(int(str(parameter)[1:]) for parameter in read)
         renamed = {heyoka.par[number]: heyoka.par[k] for k, number in enumerate(used)}
         made = heyoka.subs(list(self.expressions), renamed) if used else list(self.expressions)
-        return heyoka.cfunc(made, vars=list(self.variables)), used
+        return heyoka.cfunc(made, vars=list(self.variables), opt_level=3 if self.often else 0), used
 
     def __call__(self, t: Array, x: Array, p: Array) -> Array:
         """Values (expressions, [m,] k) at times ([m,] k) in s, states (n, [m,] k), parameters (parameters, k)."""
-        function, used = self._compiled
         made = np.empty((len(self.expressions), *t.shape))
         if not self.expressions or not t.size:
             return made
+        function, used = self._compiled
         if t.ndim == 1:
             made[:] = self._at(function, t, x, p[used])
             return made
@@ -71,6 +76,7 @@ class LaneFunction:
     def _at(self, function: Any, t: Array, x: Array, p: Array) -> Array:
         """(expressions, k) at times (k,), states (n, k), parameters (used, k)."""
         given: dict[str, Any] = {"pars": np.ascontiguousarray(p)} if len(p) else {}
+        given["batch_parallel"] = False  # to hand out blocks so small costs more than it brings
         if function.is_time_dependent:
             given["time"] = np.ascontiguousarray(t)
         return np.asarray(function(np.ascontiguousarray(x), **given))
@@ -100,11 +106,6 @@ class LaneProgram:
     _met: dict[int, tuple[int, float]] = field(default_factory=dict, repr=False, compare=False)
 
     @property
-    def width(self) -> int:
-        """Lanes of one run: as many as two instructions take, so that one need not wait for the other."""
-        return 2 * int(heyoka.recommended_simd_size())
-
-    @property
     def _first(self) -> int:
         """Place of the parameter that says whether a lane runs."""
         return self.parameter_count + len(self.fixed.found)
@@ -113,15 +114,14 @@ class LaneProgram:
         """(parameters, k) those of the model and what is fixed by them, from those of the model alone."""
         return np.concatenate([p, self.fixed.values(p)])
 
-    @cached_property
-    def motion(self) -> LaneFunction:
-        """Rates and guards, one behind the other."""
-        return LaneFunction((*self.rates, *self.guards), self.variables)
-
-    @cached_property
-    def guard_values(self) -> LaneFunction:
-        """The guards alone."""
-        return LaneFunction(self.guards, self.variables)
+    def derivatives(self, expression: Any, count: int) -> tuple[Any, ...]:
+        """A heyoka expression and its first derivatives by time along the motion."""
+        made, time = [expression], heyoka.expression("time")  # by its own time heyoka does not differentiate
+        for _ in range(count):
+            (free,) = heyoka.subs([made[-1]], {heyoka.time: time})
+            terms = [heyoka.diff(free, state) * rate for state, rate in zip(self.variables, self.rates, strict=True)]
+            made += heyoka.subs([heyoka.sum([heyoka.diff(free, time), *terms])], {time: heyoka.time})
+        return tuple(made)
 
     @property
     def met(self) -> dict[int, tuple[int, float]]:
@@ -141,8 +141,8 @@ class LaneProgram:
             count = self._first + 1 + 2 * len(self.guards)
             self._compiled[tolerance] = heyoka.taylor_adaptive_batch(
                 system,
-                np.zeros((len(system), self.width)),
-                pars=np.zeros((count, self.width)),
+                np.zeros((len(system), WIDTH)),
+                pars=np.zeros((count, WIDTH)),
                 tol=tolerance,
                 fast_math=True,  # an eighth faster; lanes that are not finite are found by their states
                 **options,
@@ -189,14 +189,14 @@ def lane_program(program: HeyokaProgram, rows: Rows, integrands: Sequence[Expr])
     return LaneProgram(program.variables, rates, program.guards, integrals, len(rows.parameters), fixed)
 
 
-def lane_function(rows: Rows, expressions: Sequence[Expr]) -> LaneFunction:
-    """Expressions of a network as a function of many variants.
+def lane_expressions(rows: Rows, expressions: Sequence[Expr]) -> tuple[Any, ...]:
+    """Expressions of a network in heyoka's terms.
 
     Raises:
         CompileError: one has no counterpart in heyoka.
     """
     translator = Translator(rows.states, TIME, tuple(Symbol(p.name, real=True) for p in rows.parameters))
     made = tuple(translator.expression(expression) for expression in expressions)
-    if translator.switches:
+    if translator.switches or translator.held:
         raise CompileError("A quantity switches by a condition, which variants side by side do not follow.")
-    return LaneFunction(made, translator.variables)
+    return made

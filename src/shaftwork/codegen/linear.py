@@ -30,6 +30,8 @@ from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.recovery import History, signals_of
 from shaftwork.codegen.waves import Dense
 from shaftwork.components.base import Signal
+from shaftwork.components.branches import INTEGRAL
+from shaftwork.components.slopes import slope
 from shaftwork.core.errors import SignalError, SimulationError
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
 from shaftwork.network.templates import BranchTemplate, Kind
@@ -309,6 +311,9 @@ class _Deviations(History):
                     energy += coefficient * self._nominal.across[index] * self.across[index]
                 case Kind.THROUGH_STORE:
                     energy += self._nominal.through[index] * self.through[index] / coefficient
+        for index, template in self._sprung(part):
+            force = self._nominal.by_angle(part, index, slope(template.stored, INTEGRAL))
+            energy += force * self.by_angle(part, index, INTEGRAL)
         return energy
 
     def absorbed(self, part: GraphPart) -> Array:

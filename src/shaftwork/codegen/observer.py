@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from typing import NamedTuple
 
@@ -11,6 +11,7 @@ import numpy as np
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.recovery import History, signals_of
+from shaftwork.codegen.stores import Stores
 from shaftwork.codegen.timeline import NOTHING, Timeline
 from shaftwork.codegen.waves import Carrying, Dense, along_lines
 from shaftwork.components.base import Component, Profile, Signal
@@ -25,11 +26,11 @@ LARGEST_HISTORY = 2_000_000
 
 
 class Impact(NamedTuple):
-    """An instant at which energy is lost at once.
+    """An instant at which energy is given or lost at once.
 
     Args:
         time: s.
-        part: that is hit; it loses what no other does.
+        part: that is hit; it loses what no other does. Empty where sources jump and nothing is hit.
         given: what sources give then, in J by part.
         lost: what others lose, in J by part.
     """
@@ -184,10 +185,25 @@ class ModelObserver:
             return along_lines(self._bind(), part, profile, t, dense)
         return self._read(t, x, lambda history: history.profile(part, profile))
 
-    @property
-    def impacts(self) -> tuple[Impact, ...]:
-        """Times at which energy is lost at once; only changes of mode do that."""
-        return ()
+    def impacts(self, dense: Dense) -> tuple[Impact, ...]:
+        """Instants at which sources jump that are rigidly joined to what stores energy.
+
+        Law: what a source gives is the impulse through it times the mean of its speeds, as of a jump that is a steep
+        ramp; nothing is lost.
+        """
+        return tuple(self._jumps(dense)) if self._form.has_impulses else ()
+
+    def _jumps(self, dense: Dense) -> Iterator[Impact]:
+        bound, stores = self._bind(), Stores(self._form)
+        for time in self._instants.times:
+            sides = np.array(self._instants.sides(time))
+            if sides[0] == sides[1]:
+                continue
+            x = dense(np.array([np.nextafter(time, -np.inf), time]))
+            held = dict(zip(stores.names, np.diff(stores.of(lambda: bound, sides, x), axis=0)[0].tolist(), strict=True))
+            sources = [bound.values(t, states)[1] for t, states in zip(sides.tolist(), x, strict=True)]
+            if given := stores.given(bound, (sources[0] + sources[1]) / 2, held):
+                yield Impact(time, "", given, {})
 
     def stored(self, t: Array, x: Array, dense: Dense) -> dict[str, Array]:
         """Stored energy by part; of sources those that have stores of their own, such as windings."""
@@ -197,8 +213,8 @@ class ModelObserver:
         return stored | {name: stored[name] + held for name, held in self._in_waves(t, dense).items()}
 
     def _stores(self, part: GraphPart) -> bool:
-        kinds = (self._graph.branches[k].template.kind for k in part.branches)
-        return any(kind in (Kind.ACROSS_STORE, Kind.THROUGH_STORE) for kind in kinds)
+        templates = (self._graph.branches[k].template for k in part.branches)
+        return any(made.kind in (Kind.ACROSS_STORE, Kind.THROUGH_STORE) or made.stored != 0 for made in templates)
 
     def _gives_back(self, part: GraphPart) -> bool:
         return any(self._graph.branches[k].template.conservative for k in part.branches)

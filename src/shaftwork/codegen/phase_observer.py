@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -103,9 +102,8 @@ class PhaseObserver:
     ) -> None:
         self._names, self._make, self._find_impacts = names, stretches, impacts
 
-    @cached_property
-    def impacts(self) -> tuple[Impact, ...]:
-        """Instants at which energy may be lost at once."""
+    def impacts(self, _dense: Dense) -> tuple[Impact, ...]:
+        """Instants at which energy may be given or lost at once."""
         return self._find_impacts()
 
     @property

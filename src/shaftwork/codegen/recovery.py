@@ -7,12 +7,15 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from sympy import Expr
 
 from shaftwork.codegen.arrays import BoundArrays
+from shaftwork.codegen.code import vectorised
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.valueless import without_value
 from shaftwork.components.base import Profile, Signal
-from shaftwork.components.branches import End
+from shaftwork.components.branches import INTEGRAL, End
+from shaftwork.components.slopes import slope
 from shaftwork.core.errors import no_value
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart
 from shaftwork.network.templates import BranchTemplate, Kind
@@ -117,7 +120,19 @@ class History:
                     energy += 0.5 * coefficient * self.across[index] ** 2
                 case Kind.THROUGH_STORE:
                     energy += 0.5 * self.through[index] ** 2 / coefficient
-        return energy
+        return sum((self.by_angle(part, k, template.stored) for k, template in self._sprung(part)), start=energy)
+
+    def _sprung(self, part: GraphPart) -> Iterator[tuple[int, BranchTemplate]]:
+        """The branches of a part whose laws store energy."""
+        templates = ((k, self.form.graph.branches[k].template) for k in part.branches)
+        return ((k, template) for k, template in templates if template.stored != 0)
+
+    def by_angle(self, part: GraphPart, index: int, law: Expr) -> Array:
+        """(k,) an expression of the integral of a branch and of its template's symbols."""
+        symbols, integrals = self.form.graph.branches[index].template.symbols, self.form.integrals
+        place = len(self.form.states) - len(integrals) + integrals.index(index)
+        values = self.bound.p[[part.parameters[symbol.name] for symbol in symbols]]
+        return np.asarray(vectorised((INTEGRAL, *symbols), law)(self.x[place], *values))
 
     def absorbed(self, part: GraphPart) -> Array:
         """(k,) power that goes into a part at its ports, W."""
@@ -128,7 +143,10 @@ class History:
         kinds = (Kind.CONDUCTANCE, Kind.LAW, Kind.THROUGH_SOURCE, Kind.ACROSS_SOURCE)
         branches = self.form.graph.branches
         templates = ((k, branches[k].template) for k in part.branches)
-        return self._power(part, (k for k, t in templates if t.through or (t.kind in kinds and not t.line)))
+        power = self._power(part, (k for k, t in templates if t.through or (t.kind in kinds and not t.line)))
+        for k, template in self._sprung(part):
+            power -= self.by_angle(part, k, slope(template.stored, INTEGRAL)) * self.across[k]
+        return power
 
     def lifted(self, part: GraphPart) -> Array:
         """(k,) power that the weights of a part take in, W, and give back when they come down."""

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
-from sympy import count_ops, cse
+from sympy import Symbol, count_ops, cse
 
-from shaftwork.codegen.code import scalar
+from shaftwork.codegen.code import branchwise, scalar
 from shaftwork.codegen.elements import Array
 from shaftwork.components.laws import t as TIME
 from shaftwork.reduction.rows import Rows
@@ -27,7 +27,15 @@ class ScalarProgram:
     @cached_property
     def function(self) -> Callable[..., list[float]]:
         """(t, states, parameters) to the list of rates, in Python floats."""
-        return scalar({"t": TIME, "x": self._rows.states, "p": self._rows.parameters}, self._rates)
+        return scalar(self._arguments, self._rates)
+
+    @cached_property
+    def _slow(self) -> Callable[..., list[float]]:
+        return branchwise(self._arguments, self._rates)
+
+    @property
+    def _arguments(self) -> dict[str, Symbol | Sequence[Symbol]]:
+        return {"t": TIME, "x": self._rows.states, "p": self._rows.parameters}
 
     @property
     def source(self) -> str:
@@ -36,13 +44,13 @@ class ScalarProgram:
 
     def bind(self, p: Array) -> Callable[[float, Array], Array]:
         """The right-hand side for one parameter vector; NaN where a law cannot be evaluated."""
-        function, values, size = self.function, p.tolist(), len(self._rates)
+        function, values = self.function, p.tolist()
 
         def rhs(t: float, x: Array) -> Array:
             try:
                 return np.array(function(t, x.tolist(), values))
             except (ArithmeticError, ValueError):
-                return np.full(size, np.nan)
+                return np.array(self._slow(t, x, p))
 
         return rhs
 

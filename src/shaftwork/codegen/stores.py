@@ -67,7 +67,8 @@ class Stores:
         """
         if -1 not in self._columns:
             return x[:, self._columns]
-        return x @ self._loop_map(bind().part) if self.by_loops else self._recovered(bind(), t, x)
+        states = x[:, : len(self._states)]  # waves may follow them
+        return states @ self._loop_map(bind().part) if self.by_loops else self._recovered(bind(), t, x)
 
     def _loop_map(self, part: LinearPart) -> Array:
         """(n, stores) what the states are multiplied by; the last one is kept."""
@@ -134,24 +135,49 @@ class Stores:
         for name, branch in self._branches.items():
             if branch in self._form.dependent_across:
                 links[branch] = bound.part.coefficients[branch] * gained[name]
-        return np.asarray(links - self._matrices(bound.part)[1] @ links)
+        return np.asarray(links - bound.part.cutsets @ links)
 
-    def given(self, bound: BoundArrays, t: float, gained: Mapping[str, float]) -> dict[str, float]:
-        """What ideal sources of speed give at once, in J by part, where stores gain so much in these equations.
+    def turns(self, bound: BoundArrays, gained: Mapping[str, float]) -> Array:
+        """(branches,) how far every branch turns at once where stores gain so much.
 
-        Law: E = -e i_E, the impulse that passes through a source times its speed.
+        Law: psi_S = (i_S' - i_S) / S, and F' psi_S among the links; beside it no speed counts.
         """
-        form = self._form
-        if not (form.across_inputs and form.dependent_across):
-            return {}
+        tree = np.zeros(len(self._form.graph.branches))
+        for name, branch in self._branches.items():
+            if branch in self._form.dependent_through:
+                tree[branch] = gained[name] / bound.part.coefficients[branch]
+        return np.asarray(tree + bound.part.loops.T @ tree)
+
+    def sources(self, bound: BoundArrays, t: float) -> Array:
+        """(inputs,) what sources of time alone give at a time in s; zero for others, whose laws may have no value."""
         inputs = bound.program.inputs
-        u = inputs.values(t, np.zeros(inputs.outputs), np.zeros(len(self._states)), bound.p)[len(form.laws) :]
-        energy = -u * self.impulses(bound, gained)[list(form.across_inputs)]
-        found: dict[str, float] = {}
-        for branch, value in zip(form.across_inputs, energy.tolist(), strict=True):
+        values = inputs.values(t, np.zeros(inputs.outputs), np.zeros(len(self._states)), bound.p)
+        return np.where(inputs.of_time, values, 0.0)
+
+    def given(self, bound: BoundArrays, u: Array, gained: Mapping[str, float]) -> dict[str, float]:
+        """What ideal sources give at once, in J by part, where stores gain so much in these equations.
+
+        Law: E = -w psi_W - e i_E: a torque times the angle by which its source turns, and a speed times the impulse
+        that passes through its source.
+
+        Args:
+            bound: the equations with their parameters.
+            u: (inputs,) torques w and speeds e of the sources.
+            gained: by every store, by name.
+        """
+        form, found = self._form, dict[str, float]()
+        laws, speeds = np.split(u, [len(form.laws)])
+        pairs: list[tuple[int, float]] = []
+        if form.dependent_through:
+            pairs += zip(form.laws, laws * self.turns(bound, gained)[list(form.laws)], strict=True)
+        if form.dependent_across:
+            pairs += zip(
+                form.across_inputs, speeds * self.impulses(bound, gained)[list(form.across_inputs)], strict=True
+            )
+        for branch, taken in pairs:
             part = form.graph.part_of(branch).name
-            found[part] = found.get(part, 0.0) + value
-        return found
+            found[part] = found.get(part, 0.0) - float(taken)
+        return {part: energy for part, energy in found.items() if energy}
 
     def _state_maps(self, part: LinearPart) -> tuple[Array, Array]:
         """What stores and inputs are multiplied by in the states that new equations start with; the last are kept."""

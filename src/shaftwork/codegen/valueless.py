@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from sympy import Expr
+from sympy import Basic, Expr
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
@@ -28,8 +28,26 @@ def without_value(bound: BoundArrays, times: Array, states: Array) -> tuple[floa
     order = np.argsort(~inputs.of_time, kind="stable")
     if (found := first_missing(times, u[order].T)) is None:
         return None
-    branch = bound.program.form.graph.branches[int(bound.program.assembly.inputs[order[found[1]]])]
-    return found[0], in_words(bound.program.form.graph.parts[branch.part], branch.template.law)
+    return found[0], _law_of(bound, int(order[found[1]]))
+
+
+def rough(bound: BoundArrays, times: Array, states: Array) -> tuple[float, str] | None:
+    """The first of times (k,) at which a law, or a branch of it that does not hold, has no value or slope; and the law.
+
+    Only a Taylor series needs all of them. None where all have one.
+    """
+    inputs = bound.program.inputs
+    for time, state in zip(times.tolist(), states, strict=True):
+        place = inputs.first_rough(time, bound.values(time, state)[0], state, bound.p)
+        if place is not None:
+            return time, _law_of(bound, place)
+    return None
+
+
+def _law_of(bound: BoundArrays, place: int) -> str:
+    """The law of an input in words."""
+    branch = bound.program.form.graph.branches[int(bound.program.assembly.inputs[place])]
+    return in_words(bound.program.form.graph.parts[branch.part], branch.template.law)
 
 
 def first_missing(times: Array, values: Array) -> tuple[float, int] | None:
@@ -41,16 +59,13 @@ def first_missing(times: Array, values: Array) -> tuple[float, int] | None:
     return float(times[row]), int(np.argmax(missing[row]))
 
 
-def in_words(part: GraphPart, law: Expr) -> str:
+def in_words(part: GraphPart, law: Basic) -> str:
     """What stands in a law of a part, as it was given: "tau = sqrt(1 - t) of TorqueSource 'pull'"."""
     component = part.component
     given = {name: value for name, value in component.values.items() if isinstance(value, Expr | Table)}
     names = substitution(component)
-    inside = [
-        name
-        for name, value in given.items()
-        if any(side.has(as_expression(value).xreplace(names)) for side in (law, -law))
-    ]
+    read = {name: as_expression(value).xreplace(names) for name, value in given.items()}
+    inside = [name for name, value in read.items() if law.has(value) or law.has(-value)]
     texts = [f"{name} = {given[name]}" for name in inside or given]
     shown = [text if len(text) <= LONGEST else f"{text[:LONGEST]}..." for text in texts]
     return f"{' or '.join(shown) or 'the law'} of {title(component)}"

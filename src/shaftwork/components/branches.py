@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from sympy import Expr, Function, Integer, Symbol
+from sympy import Expr, Function, Integer, S, Symbol
 
 ACROSS = Symbol("across", real=True)
 """The across variable of the branch in whose law it stands."""
@@ -89,13 +89,15 @@ class ThroughLaw:
     """Through = f(across, integral of across, t): damper, friction, motor curve, load, resistor, source of torque.
 
     It may read other ports and branches of its part besides, and is then a controlled source. A `conservative` one, as
-    a weight, gives back what it takes: in a part that loses energy its work is supplied, and not lost.
+    a weight, gives back what it takes: in a part that loses energy its work is supplied, and not lost. One that springs
+    back, as a contact, has `stored` energy, in J in INTEGRAL and parameters: what it takes beyond that is lost.
     """
 
     through: Expr
     ends: tuple[End, End] | None = None
     label: str = ""
     conservative: bool = False
+    stored: Expr = S.Zero
 
 
 @dataclass(frozen=True)

@@ -36,8 +36,8 @@ class Soil:
     std: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mean", in_si("mean", self.mean, "N/m", above=0))
-        object.__setattr__(self, "std", in_si("std", self.std, "N/m", at_least=0))
+        object.__setattr__(self, "mean", in_si("Soil: mean", self.mean, "N/m", above=0))
+        object.__setattr__(self, "std", in_si("Soil: std", self.std, "N/m", at_least=0))
 
     @classmethod
     def read(cls, text: Any) -> Soil:

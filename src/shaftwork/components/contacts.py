@@ -93,11 +93,18 @@ def _rigid(above: Any, below: Any, p: Any) -> Modes:
 
 def _branches(upper: Any, lower: Any, p: Any, second: str | None = "b") -> Iterator[Branch]:
     if p.c is not None:
-        yield ThroughLaw(_law(upper, lower, p))
+        yield ThroughLaw(_law(upper, lower, p), stored=_stored(upper, lower, p))
         return
     if p.form == CLOSED:
         yield rigid(("a", second))
     yield ThroughLaw(p.mode * (1 - p.mode**2) * INTEGRAL, ("a", second), "phi")  # no torque: it carries the twist
+
+
+def _stored(upper: Any, lower: Any, p: Any) -> Expr:
+    """What the flanks have taken up and can give back; they still have it where they part and it is relaxing."""
+    pieces = [(p.c * (INTEGRAL - upper) ** 2 / 2, upper < INTEGRAL)] if upper is not None else []
+    pieces += [(p.c * (INTEGRAL - lower) ** 2 / 2, lower > INTEGRAL)] if lower is not None else []
+    return Piecewise(*pieces, (Integer(0), True))
 
 
 def _law(upper: Any, lower: Any, p: Any) -> Expr:
@@ -118,9 +125,10 @@ class Backlash(Component):
 
     Law: tau = max(0, c (phi - gap/2) + d omega) where phi > gap/2, min(0, c (phi + gap/2) + d omega) where
     phi < -gap/2, and 0 between, with phi the twist and omega the speed of node a against node b. A contact never
-    pulls: flanks that part faster than they spring back have let go. Without c the flanks are rigid, and the speed
+    pulls: flanks that part faster than they spring back have let go. Beyond gap/2 by x they store c x^2 / 2; what d
+    takes is lost, and what they have not given back when they let go. Without c the flanks are rigid, and the speed
     omega with which they meet comes back as -restitution omega. Modes: open, in contact, in contact backward.
-    Source: Marinkovic 2012, (12)-(16); restitution: Newton.
+    Source: Marinkovic 2012, (12)-(16); restitution: Newton; energy: Willems 1972.
     """
 
     gap: float = parameter("rad", "whole free twist", at_least=0, latex=r"\Delta")

@@ -43,6 +43,12 @@ class SpeedController(Component):
 
     def __post_init__(self) -> None:
         refuse_no_time_on(self)
+        if self.t_track is not None and (self.t_i is None or self.tau_max is None):
+            raise ParameterError(
+                f"SpeedController '{self.name}': t_track unwinds the integral part at the limits of the torque, and "
+                f"there {'is no integral part' if self.t_i is None else 'are no limits'}. Give "
+                f"{'t_i' if self.t_i is None else 'tau_max'}, or leave t_track out."
+            )
         most, least = number_of(self, "tau_max"), number_of(self, "tau_min")
         if most is None:
             if self.tau_max is None and self.tau_min is not None:

@@ -19,6 +19,7 @@ from shaftwork.components.shaft_meshes import (
     spectral,
 )
 from shaftwork.core.errors import ParameterError
+from shaftwork.core.parameters import whole
 
 MOST_ELEMENTS = 100_000
 """Elements of a model; more is a typing error."""
@@ -288,10 +289,11 @@ MODELS: tuple[type[ShaftModel], ...] = (Rigid, OneSpring, Lumped, CentralDiffere
 
 def _whole(model: ShaftModel, name: str, least: int, most: int) -> None:
     value = getattr(model, name)
-    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+    if (count := whole(value, least, most)) is None:
         raise ParameterError(
             f"{type(model).__name__}: {name} = {value!r} must be a whole number from {least} to {most}."
         )
+    object.__setattr__(model, name, count)
 
 
 def _one_of(model: ShaftModel, name: str, choices: tuple[Any, ...]) -> None:

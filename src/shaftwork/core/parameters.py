@@ -6,6 +6,7 @@ import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from operator import index
 from typing import Any
 
 from shaftwork.core.errors import ParameterError
@@ -139,6 +140,15 @@ def in_si(name: str, value: Any, unit: str = "1", **bounds: Any) -> float:
     if objection is not None:
         raise ParameterError(f"{name} = {value!r} {objection}.")
     return float(number)
+
+
+def whole(value: Any, least: int = 1, most: float = math.inf) -> int | None:
+    """A count of any kind of integer, numpy's too, as Python's own; None where it is none or out of its range."""
+    try:
+        count = None if isinstance(value, bool) else index(value)
+    except TypeError:
+        return None
+    return count if count is not None and least <= count <= most else None
 
 
 def parameter(unit: str, meaning: str, *, default: Any = REQUIRED, latex: str = "", **bounds: Any) -> Any:

@@ -178,8 +178,10 @@ class Writer:
             return [text]
         summed = sorted(sums[0].args, key=self._first)
         pieces = [self._signed(part) for part in rising_first(summed)]
-        pieces[0] = rf"{self._signed(term / sums[0])} \, \bigl( {pieces[0].removeprefix('+ ')}"
-        return [*pieces[:-1], rf"{pieces[-1]} \bigr)"]
+        factor, first = self._signed(term / sums[0]), rf"\bigl( {pieces[0].removeprefix('+ ')}"
+        apart = printed_width(factor + first) > WIDEST_PIECE
+        begun = [factor, rf"\cdot {first}"] if apart else [rf"{factor} \, {first}"]
+        return [*begun, *pieces[1:-1], rf"{pieces[-1]} \bigr)"]
 
     def _first(self, term: Expr) -> str:
         """Sorts terms by the first of their symbols."""

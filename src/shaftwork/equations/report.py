@@ -27,6 +27,7 @@ PREAMBLE = r"""\documentclass[11pt,a4paper]{article}
 \allowdisplaybreaks"""
 BEGIN = r"""\date{}
 \begin{document}
+\sloppy
 \maketitle"""
 
 

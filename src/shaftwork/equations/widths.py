@@ -10,7 +10,8 @@ from shaftwork.equations.notation import without_marks
 TOKEN = re.compile(r"\\[A-Za-z]+|\\.|.", re.DOTALL)
 WIDTHS = {
     **dict.fromkeys("+-=<>", 2.5),
-    **dict.fromkeys("()[].,;:!|", 0.65),
+    **dict.fromkeys("()[].:!|", 0.65),
+    **dict.fromkeys(",;", 0.8),
     **dict.fromkeys(" &$", 0.0),
     **dict.fromkeys((r"\left", r"\right", r"\biggl", r"\biggr", r"\displaystyle"), 0.25),
     r"\,": 0.3,
@@ -22,8 +23,8 @@ WIDTHS = {
     r"\cdot": 1.3,
 }
 """Widths in units of an ordinary letter, about 5.7 points at a font size of 11 points."""
-LETTER, GREEK, DIGIT = 1.0, 1.1, 0.95
-SCRIPT_SIZE = 0.75
+LETTER, CAPITAL, GREEK, DIGIT = 1.0, 1.35, 1.1, 0.95
+SCRIPT_SIZE, SCRIPT_SPACE = 0.75, 0.1
 FUNCTION = re.compile(r"\\(tanh|cosh|sinh|cos|sin|tan|exp|log|sqrt|operatorname|max|min|sign)$")
 
 
@@ -51,7 +52,7 @@ def _item(item: str, tokens: Iterator[str]) -> float:
         case "{":
             return _width(tokens, one=False)
         case "_" | "^":
-            return SCRIPT_SIZE * _width(tokens, one=True)
+            return SCRIPT_SPACE + SCRIPT_SIZE * _width(tokens, one=True)
         case r"\frac":
             return 0.4 + max(_width(tokens, one=True), _width(tokens, one=True))
         case r"\begin" | r"\end":
@@ -63,4 +64,6 @@ def _item(item: str, tokens: Iterator[str]) -> float:
         return WIDTHS[item]
     if FUNCTION.match(item):
         return 0.9 * len(item)
-    return DIGIT if item.isdigit() else GREEK if item.startswith("\\") else LETTER
+    if item.isdigit():
+        return DIGIT
+    return GREEK if item.startswith("\\") else CAPITAL if item.isupper() else LETTER

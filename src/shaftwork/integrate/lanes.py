@@ -18,6 +18,8 @@ ARRIVED = (-(2**32) - 3, -(2**32) - 1)
 """heyoka's outcomes time_limit and success."""
 MOST_STEPS = 1_000_000
 """Of one lane, between two changes of mode."""
+Block = tuple[Array, Array, Array, Array]
+"""Of some lanes: start states, parameters, output times, and (1, width) the longest steps in s."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,19 +54,21 @@ def run_lanes(program: Any, x: Array, p: Array, sides: Array, offsets: Array, t:
         rtol: relative tolerance.
     """
     integrator = program.integrator(min(max(rtol, TIGHTEST_TOLERANCE), LOOSEST_TOLERANCE))
-    width, count = program.width, t.shape[1]
+    width, count = integrator.batch_size, t.shape[1]
     padded = np.minimum(np.arange(-(-count // width) * width), count - 1)  # the last one stands in for what is missing
     start = np.zeros((integrator.dim, count))
     start[: len(x)] = x
     full = np.concatenate([p, np.ones((1, count)), np.repeat(sides[:, None], count, axis=1), offsets])
-    starts, parameters, grids = (_blocks(values, padded, width) for values in (start, full, t))
+    longest = LONGEST_STEP * (t[-1:] - t[:1]) / (len(t) - 1)
+    given = (start, full[: len(integrator.pars)], t, longest)  # heyoka keeps no parameters behind the last one it reads
+    blocks = zip(*(_blocks(values, padded, width) for values in given), strict=True)
     ends, met = np.full(padded.size, np.inf), np.full(padded.size, -1, dtype=np.intp)
     states, steps = np.empty((len(t), integrator.dim, padded.size)), []
-    for number, (own, given, grid) in enumerate(zip(starts, parameters, grids, strict=True)):
-        states[:, :, number * width : (number + 1) * width] = _run(program, integrator, own, given, grid)
+    for first, block in zip(range(0, padded.size, width), blocks, strict=True):
+        states[:, :, first : first + width] = _run(program, integrator, block)
         steps += [taken for _, _, _, taken in integrator.propagate_res]
         for lane, (guard, time) in program.met.items():
-            met[number * width + lane], ends[number * width + lane] = guard, time
+            met[first + lane], ends[first + lane] = guard, time
     good = np.isfinite(states[-1]).all(axis=0)
     times = np.minimum(t, ends[:count]) if np.isfinite(ends).any() else t
     return Lanes(times, states[:, :, :count], met[:count], good[:count], np.array(steps[:count]))
@@ -76,26 +80,32 @@ def _blocks(values: Array, lanes: NDArray[np.intp], width: int) -> Array:
     return np.ascontiguousarray(taken.reshape(len(values), -1, width).swapaxes(0, 1))
 
 
-def _run(program: Any, integrator: Any, start: Array, p: Array, times: Array) -> Array:
+def _run(program: Any, integrator: Any, block: Block) -> Array:
     """(m, n, width) states of some lanes, NaN in those that fail; where one does, the others run once more without."""
-    own, p = np.arange(times.shape[1]), p[: len(integrator.pars)]
-    begin, given, grid = start, p, times
-    while True:
-        integrator.set_time(grid[0])
-        integrator.state[:] = begin
-        integrator.pars[:] = given
-        if integrator.with_events:
-            integrator.reset_cooldowns()
-        program.met.clear()
-        longest = LONGEST_STEP * (grid[-1] - grid[0]) / (len(grid) - 1)
-        _, states = integrator.propagate_grid(grid, max_delta_t=longest, max_steps=MOST_STEPS)
-        if (integrator.time >= grid[-1]).all():
-            if (left_out := own != np.arange(own.size)).any():
-                states[:, :, left_out] = np.nan
-            return np.asarray(states)
+    states, ends = _propagated(program, integrator, block), block[2][-1]
+    if (integrator.time >= ends).all():
+        return states
+    lanes = own = np.arange(ends.size)
+    while not (integrator.time >= ends[own]).all():
         # those that a failure of another one has cut off have the outcome of a good step
         failed = np.array([int(result[0]) not in ARRIVED for result in integrator.propagate_res])
         if failed.all() or not failed.any():
             return np.full_like(states, np.nan)
         own = np.where(failed, own[~failed][0], own)
-        begin, given, grid = (np.ascontiguousarray(values[:, own]) for values in (start, p, times))
+        start, p, times, longest = (np.ascontiguousarray(values[:, own]) for values in block)
+        states = _propagated(program, integrator, (start, p, times, longest))
+    states[:, :, own != lanes] = np.nan
+    return states
+
+
+def _propagated(program: Any, integrator: Any, block: Block) -> Array:
+    """(m, n, width) states of some lanes, as far as all of them come."""
+    start, p, times, longest = block
+    integrator.set_time(times[0])
+    integrator.state[:] = start
+    integrator.pars[:] = p
+    if integrator.with_events:
+        integrator.reset_cooldowns()
+    program.met.clear()
+    _, states = integrator.propagate_grid(times, max_delta_t=longest[0], max_steps=MOST_STEPS)
+    return np.asarray(states)

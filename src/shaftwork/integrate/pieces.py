@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from shaftwork.core.errors import SimulationError, no_value
-from shaftwork.integrate.problem import Array, Problem, Timed
+from shaftwork.integrate.problem import Array, Explain, Problem, Timed
 
 # A run has stalled when so many steps together advance by less than so many times this part of the whole time.
 STALL_STEPS, STALL_SPAN = 2000, 1e-10
@@ -162,6 +162,12 @@ def failure(
     """
     if (law := _law_without_value(problem, t, x, guard)) is not None:
         return no_value(*law)
+    if engine == "heyoka" and isinstance(problem, Problem) and (law := _near(problem, problem.rough, t, x)) is not None:
+        return SimulationError(
+            f"The heyoka engine failed at t = {law[0]:.9g} s: {law[1]} has a value there, but not all its branches and "
+            "slopes have one, and a Taylor series computes even those whose condition does not hold. Take "
+            "engine='scipy', or give each a value: a root, a logarithm or a quotient of Max(1e-9, ...)."
+        )
     reason = reason if guard is None else guard.reason(reason)
     if problem.names:
         bad = np.flatnonzero(~np.isfinite(x))
@@ -179,15 +185,20 @@ def failure(
 
 def _law_without_value(problem: Timed, t: float, x: Array, guard: GuardedFunctions | None) -> tuple[float, str] | None:
     """A law that has no value where a run has failed, or just after: the time in s, and the law in words."""
-    if problem.explain is None:
-        return None
-    rates = problem.rhs(t, x) if isinstance(problem, Problem) else np.zeros_like(x)
-    steps = np.append(0.0, AHEAD * (problem.t_end - problem.t0))[:, None]
-    found = problem.explain(t + steps[:, 0], x + steps * np.where(np.isfinite(rates), rates, 0.0))
-    if found is not None or guard is None or guard.not_finite is None:
+    found = _near(problem, problem.explain, t, x)
+    if problem.explain is None or found is not None or guard is None or guard.not_finite is None:
         return found
     at, state, _ = guard.not_finite
     return problem.explain(np.array([at]), state[None, :]) if np.isfinite(at) and np.isfinite(state).all() else None
+
+
+def _near(problem: Timed, explain: Explain | None, t: float, x: Array) -> tuple[float, str] | None:
+    """What explains the failure of a run where it has come to, or just after."""
+    if explain is None:
+        return None
+    rates = problem.rhs(t, x) if isinstance(problem, Problem) else np.zeros_like(x)
+    steps = np.append(0.0, AHEAD * (problem.t_end - problem.t0))[:, None]
+    return explain(t + steps[:, 0], x + steps * np.where(np.isfinite(rates), rates, 0.0))
 
 
 class Pace:

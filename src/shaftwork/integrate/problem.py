@@ -125,6 +125,7 @@ class Problem:
             that makes this where an engine asks for it, or None where there is none.
         explain: from times (k,) and states (k, n) to the first of these times at which a law has no value, and that law
             in words; None where all have one. It is asked for messages.
+        rough: the same of a law of which any part has no value or no slope, be it in a branch that does not hold.
         max_steps: an engine gives up, with a reason, after this many steps.
         found: what an engine has found out about the equations, for its next run with them.
     """
@@ -148,6 +149,7 @@ class Problem:
     driven: LinearInputs | None = None
     symbolic: Any = None
     explain: Explain | None = None
+    rough: Explain | None = None
     max_steps: int = 10_000_000
     found: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 

@@ -26,7 +26,8 @@ from shaftwork.network.controlled import check_readings
 from shaftwork.network.grammar import FUNCTION_NAMES, FUNCTIONS
 from shaftwork.network.graph import GROUND, CircuitGraph, resolve
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
-from shaftwork.network.templates import BranchTemplate, Kind, check_stores, make_template, substitution
+from shaftwork.network.stores import check_stores
+from shaftwork.network.templates import BranchTemplate, Kind, make_template, substitution
 from shaftwork.network.textfile import MAXIMUM_NAME, is_name
 from shaftwork.network.wording import Spelling, at_nodes, listed, title
 
@@ -220,7 +221,7 @@ class _Examination:
     def _faults_of(self, part: Component, values: Mapping[str, Any]) -> tuple[_Fault, ...]:
         """Faults of the laws, found once for parts that have the same."""
         odd = tuple(
-            _Fault(name, f"is a {type(value).__name__}, not a number or a law", "Give a number, a Table or a formula.")
+            _Fault(name, f"is a {type(value).__name__}, not a number or a law", _instead_of(value))
             for name, value in values.items()
             if not isinstance(value, float) and (not isinstance(value, sympy.Expr) or value.is_Matrix)
             if part.declared[name].record is None and (value is not None or part.declared[name].default is not None)
@@ -233,6 +234,13 @@ class _Examination:
         return self._faults[key]
 
 
+def _instead_of(value: Any) -> str:
+    """What to give in place of what is no law."""
+    if isinstance(value, sympy.logic.boolalg.Boolean):
+        return "Give a formula: omega - 3 in place of omega > 3, or Piecewise((1, omega > 3), (0, True))."
+    return "Give a number, a Table or a formula."
+
+
 def _law_faults(part: Component, values: Mapping[str, Any]) -> Iterator[_Fault]:
     """What the laws of a part read that they may not, first as given, then in the branches that they end in."""
     laws = {name: value for name, value in values.items() if isinstance(value, sympy.Expr)}
@@ -243,8 +251,8 @@ def _law_faults(part: Component, values: Mapping[str, Any]) -> Iterator[_Fault]:
     _check_ends(part, templates)
     check_readings(part, templates)
     check_stores(part, templates)
-    for template in {(made.kind, made.law, made.terms, made.through): made for made in templates}.values():
-        if unreadable := _unreadable("", template.law):
+    for template in {(made.kind, made.law, made.terms, made.through, made.stored): made for made in templates}.values():
+        if unreadable := _unreadable("", template.law) or _unreadable("", template.stored):
             yield unreadable._replace(what=f"a branch law {unreadable.what}")
         elif not (strange := _strange_symbols(template)):
             continue

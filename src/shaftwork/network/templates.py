@@ -14,7 +14,7 @@ from enum import IntEnum
 from functools import cached_property
 from typing import Any, TypeVar, get_args
 
-from sympy import Expr, Float, I, Integer, Symbol, nan, oo, zoo
+from sympy import Expr, Float, I, Integer, S, Symbol, nan, oo, zoo
 
 from shaftwork.components.base import Component, Derived, symbols_of
 from shaftwork.components.branches import (
@@ -39,7 +39,7 @@ from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import ALL_IN_ONE, Choice, Modes, has_mode, mode_symbol
 from shaftwork.components.slopes import jumps, slope
-from shaftwork.core.domains import DOMAINS, ROTATION
+from shaftwork.core.domains import DOMAINS
 from shaftwork.core.errors import ParameterError, ShaftworkError
 
 T = TypeVar("T")
@@ -73,6 +73,7 @@ class BranchTemplate:
             `HISTORY`; the next two branches of a line are its other end.
         through: of a coupling that loses power, the factors of its through variable, one for each term; else empty.
         conservative: what a through law takes in it gives back.
+        stored: what a through law stores, J, in INTEGRAL and parameters.
     """
 
     kind: Kind
@@ -85,6 +86,7 @@ class BranchTemplate:
     line: tuple[Expr, Expr] | None = None
     through: tuple[Expr, ...] = ()
     conservative: bool = False
+    stored: Expr = S.Zero
 
     @property
     def balances(self) -> tuple[tuple[Expr, End, End], ...]:
@@ -164,24 +166,6 @@ def make_template(part: Component, values: Mapping[str, Any], choices: tuple[Cho
     yielded = _without_absent(tuple(part.branches(p)))
     branches = tuple(made for number, branch in enumerate(yielded, 1) for made in resolver.templates(branch, number))
     return Template(branches, tuple(known.values()), _occurring(derived, resolver.printed), modes)
-
-
-def check_stores(part: Component, templates: tuple[BranchTemplate, ...]) -> None:
-    """That no two stores of a part have one name: it is that of a state.
-
-    Raises:
-        ValueError: two have.
-    """
-    domains = {port.name: port.domain for port in (*part.ports, *part.inner_ports())}
-    found: set[str] = set()  # only asked for membership
-    for made in templates:
-        if made.kind not in (Kind.ACROSS_STORE, Kind.THROUGH_STORE):
-            continue
-        domain = next((domains[end] for end in made.ends if end is not None), None) or ROTATION
-        name = made.label or (domain.across if made.kind is Kind.ACROSS_STORE else domain.through).name
-        if name in found:
-            raise ValueError(f"two of its stores have the name {name!r}; give each branch a label of its own")
-        found.add(name)
 
 
 def _choose(p: Any, modes: tuple[Modes, ...], choices: tuple[Choice, ...]) -> dict[Symbol, str]:
@@ -278,8 +262,7 @@ class _Resolver:
                     joint = rigid(ends or self._default).terms if kind is Kind.COUPLING else ()
                     where = (None, None) if joint else ends or self._default
                     made = self._template(kind, found, where, joint, label)
-                    gives_back = isinstance(branch, ThroughLaw) and branch.conservative
-                    yield dataclasses.replace(made, conservative=gives_back) if gives_back else made
+                    yield self._with_energy(made, branch, number) if isinstance(branch, ThroughLaw) else made
             case DelayLine(impedance, delay, ends, label):
                 impedance, delay = _law(impedance, branch, number), _law(delay, branch, number)
                 line, symbols = self._in_parameters(impedance, delay)
@@ -319,6 +302,25 @@ class _Resolver:
         (known, *factors), symbols = self._in_parameters(law, *(coefficient for coefficient, _, _ in terms), *through)
         placed, others = with_factors(terms, tuple(factors[: len(terms)])), tuple(factors[len(terms) :])
         return BranchTemplate(kind, known, ends, placed, label, symbols, law, through=others)
+
+    def _with_energy(self, made: BranchTemplate, branch: ThroughLaw, number: int) -> BranchTemplate:
+        """A through law with what it says of its energy, which the part of it has that is not linear in the speed.
+
+        Raises:
+            ShaftworkError: what it stores is not that of its angle.
+        """
+        stored = _law(branch.stored, branch, number).xreplace(self._derived)
+        strange = stored.free_symbols - {INTEGRAL, *self._symbols}
+        if strange or has_mode(stored) or not (stored == 0 or _law(branch.through, branch, number).has(INTEGRAL)):
+            raise ShaftworkError(
+                f"branch {number} (ThroughLaw) has stored = {reprlib.repr(stored)}. Write it in p.name and "
+                "in INTEGRAL, which its law must read, for all modes alike."
+            )
+        if stored == 0 or made.kind is Kind.CONDUCTANCE:
+            return dataclasses.replace(made, conservative=True) if branch.conservative else made
+        read = made.law.free_symbols | stored.free_symbols
+        symbols = tuple(symbol for symbol in self._symbols if symbol in read)
+        return dataclasses.replace(made, conservative=branch.conservative, stored=stored, symbols=symbols)
 
     def _in_parameters(self, *laws: Expr) -> tuple[tuple[Expr, ...], tuple[Symbol, ...]]:
         """Laws without derived quantities, and the symbols in them."""

@@ -18,6 +18,8 @@ from shaftwork.network.netlist import Netlist
 
 OUTPUTS, MOST_OUTPUTS = 1001, 10_000_000
 """Output times when the user gives none, and the most that can be asked for."""
+FINEST_RTOL = float(np.finfo(float).eps)
+"""What doubles can keep; a smaller tolerance would promise what no engine holds."""
 DELAYING = ("length", "density", "shear_modulus")
 """What the delay of a shaft depends on, and with it the choice of its model."""
 OutputTimes = int | Sequence[float] | Array | Literal["steps"] | None
@@ -75,8 +77,11 @@ def relative_tolerance(rtol: Any) -> float:
         ParameterError: it cannot be; says what would be right.
     """
     value = in_si("rtol", rtol)
-    if not 0 < value < 1:
-        raise ParameterError(f"rtol = {rtol} must lie between 0 and 1; 1e-8 is a good choice.")
+    if not FINEST_RTOL <= value < 1:
+        raise ParameterError(
+            f"rtol = {rtol} must lie between {FINEST_RTOL:.2g}, the rounding of double precision, and 1; "
+            "1e-8 is a good choice, and no engine gains much below 1e-13."
+        )
     return value
 
 

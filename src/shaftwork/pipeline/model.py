@@ -14,7 +14,7 @@ from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.operating import initial_state, steady_state
 from shaftwork.codegen.switching import Switching
-from shaftwork.codegen.valueless import without_value
+from shaftwork.codegen.valueless import rough, without_value
 from shaftwork.core.errors import CompileError, ParameterError, SimulationError
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import LinearInputs, Problem, Trajectory
@@ -212,7 +212,7 @@ class Model(CompiledModel):
 
     def choose_engine(self, t_end: float, *, t_start: float = 0.0, rtol: float = 1e-8) -> tuple[str, str]:
         """The engine that "auto" takes for a motion, and why."""
-        return self._choice(Demand(time_span(t_start, t_end), rtol, None, None, "auto", 1, None))
+        return self._choice(Demand(time_span(t_start, t_end), relative_tolerance(rtol), None, None, "auto", 1, None))
 
     def _choice(self, demand: Demand) -> tuple[str, str]:
         prepared = self.prepare(self.defaults)
@@ -283,6 +283,7 @@ class Model(CompiledModel):
             driven=prepared.linear if self.degree is None else None,
             symbolic=prepared.symbolic,
             explain=lambda t, x: without_value(prepared.bound, t, x),
+            rough=lambda t, x: rough(prepared.bound, t, x),
             max_steps=demand.max_steps,
         )
 

@@ -11,6 +11,7 @@ from math import comb
 import numpy as np
 
 from shaftwork.core.errors import ParameterError
+from shaftwork.core.parameters import whole
 from shaftwork.reduce.chain import Chain, Station, matrices_of, modes_of, series
 
 MOST = 20_000
@@ -53,7 +54,7 @@ def groupings(chain: Chain, masses: int, keep: str, driven: int) -> tuple[Groupi
             groupings.
     """
     count = len(chain.stations)
-    if isinstance(masses, bool) or not isinstance(masses, int) or not 1 <= masses <= count:
+    if whole(masses, 1, count) is None:
         held = "" if all(station.inertia for station in chain.stations) else " and prescribed speeds"
         raise ParameterError(
             f"masses = {masses!r} must be a whole number from 1 to the {count} inertias{held} of the chain."

@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import zip_longest
-from operator import index
 from typing import Any
 
 import numpy as np
@@ -183,7 +182,6 @@ def simplify(
     if keep and not any(link.has(keep) for link in chain.links):
         known = ", ".join(item.part.name for link in chain.links for item in link.placed)
         raise ParameterError(f"keep = {keep!r} is no shaft between two inertias of '{net.name}'. There are: {known}.")
-    masses = _whole(masses)
     tried = groupings(chain, masses, keep, _driven(chain))
     title = f"{net.name}, {masses} {'mass' if masses == 1 else 'masses'}"
     made = Network(title)
@@ -194,14 +192,6 @@ def simplify(
     by_modes = modal.network(f"{title}, by modes") if modal else None
     losses = _losses(chain, tried[0].chain, modal)
     return Simplified(made, by_modes, GroupTable(rows, rigid), losses, keep, tried, net, referred, chain)
-
-
-def _whole(masses: Any) -> Any:
-    """An integer of any kind as one of Python's own; what is none as it is, to be refused."""
-    try:
-        return masses if isinstance(masses, bool) else index(masses)
-    except TypeError:
-        return masses
 
 
 def _reference(net: Network, keep: str) -> str:

@@ -6,7 +6,7 @@ residual measures the error of the integration, independent of any reference.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -31,8 +31,7 @@ class EnergyBalance:
         lost: (s,) heat since the start, J.
         work: work that went through the sources and weights, both ways counted as positive, J.
         lost_in: heat of the whole run by part, J. That of an impact is the part's that is hit, less what gears lose in
-            it; a sprung contact that is closed holds what its spring has taken up. The balance begins after what
-            happens at the very start.
+            it. The balance begins after what happens at the very start.
         supplied_by: work of the whole run by source and weight, J.
     """
 
@@ -61,7 +60,7 @@ def energy_balance(observer: Observer, dense: Dense, steps: Array) -> EnergyBala
         steps: (s,) times between which `dense` is smooth.
     """
     before, after = _stored_on_both_sides(observer, dense, steps)
-    impulses, hits, given = _impulses(observer, steps, after - before)
+    impulses, hits, given = _impulses(observer.impacts(dense), steps, after - before)
     panels = 1
     found = _integrate(observer, dense, steps, panels)
     for _ in range(HALVINGS):
@@ -88,18 +87,19 @@ def energy_balance(observer: Observer, dense: Dense, steps: Array) -> EnergyBala
 
 
 def _impulses(
-    observer: Observer, steps: Array, jumps: Array
+    impacts: Iterable[tuple[float, str, Mapping[str, float], Mapping[str, float]]], steps: Array, jumps: Array
 ) -> tuple[Array, list[tuple[str, Array]], dict[str, float]]:
     """(s,) energy that sources give at once; of impacts by part the (s,) that is lost, and what sources give."""
     impulses = jumps.copy()
     lost: dict[str, Array] = {}
     given: dict[str, float] = {}
-    for time, part, sources, others in observer.impacts:
+    for time, part, sources, others in impacts:
         if time <= steps[0]:  # the balance begins after it
             continue
         places = np.flatnonzero(steps == time)[-1:]
-        own = sum(sources.values()) - impulses[places] - sum(others.values())
-        lost.setdefault(part, np.zeros(len(steps)))[places] += own
+        if part:
+            own = sum(sources.values()) - impulses[places] - sum(others.values())
+            lost.setdefault(part, np.zeros(len(steps)))[places] += own
         for other, energy in others.items():
             lost.setdefault(other, np.zeros(len(steps)))[places] += energy
         impulses[places] = sum(sources.values())

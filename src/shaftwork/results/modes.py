@@ -11,7 +11,7 @@ import numpy as np
 from scipy import sparse
 
 from shaftwork.core.errors import MissingExtraError, ParameterError, SignalError
-from shaftwork.core.parameters import in_si
+from shaftwork.core.parameters import in_si, whole
 from shaftwork.results.eigenvalues import eigenmodes
 from shaftwork.results.observer import Array
 from shaftwork.results.slopes import Complex, Motions, Slopes
@@ -172,9 +172,9 @@ def checked_count(count: int | None) -> int | None:
     Raises:
         ParameterError: it is none.
     """
-    if count is not None and (isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1):
+    if count is not None and (number := whole(count)) is None:
         raise ParameterError(f"count = {count!r} must be a number of modes, 1 or more; leave it out for all.")
-    return None if count is None else int(count)
+    return None if count is None else number
 
 
 def modes_of(title: str, slopes: Motions, rates: Complex, vectors: Complex) -> Modes:

@@ -32,11 +32,10 @@ class Observer(Protocol):
         """(k, places) a quantity along a part at times t (k,) with states x (k, n), with the motion behind them."""
         ...
 
-    @property
-    def impacts(self) -> Sequence[tuple[float, str, Mapping[str, float], Mapping[str, float]]]:
-        """Times in s at which energy may be lost at once.
+    def impacts(self, dense: Dense) -> Sequence[tuple[float, str, Mapping[str, float], Mapping[str, float]]]:
+        """Times in s at which energy may be given or lost at once.
 
-        Of each the part that is hit, what sources give then and what others lose of it, in J by part.
+        Of each the part that is hit, if any, what sources give then and what others lose of it, in J by part.
         """
         ...
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shaftwork.core.errors import MissingExtraError, ParameterError
-from shaftwork.core.parameters import in_si
+from shaftwork.core.parameters import in_si, whole
 from shaftwork.results.observer import Array
 from shaftwork.results.turning import Read, TurningPoints, turning_points
 
@@ -69,8 +69,9 @@ class Rainflow:
         Raises:
             ParameterError: no whole numbers above 0.
         """
-        numbers = bins if isinstance(bins, tuple) else (bins, bins)
-        if len(numbers) != 2 or not all(isinstance(n, int) and n > 0 for n in numbers):
+        given = bins if isinstance(bins, tuple) else (bins, bins)
+        numbers = [count for count in map(whole, given) if count is not None]
+        if len(given) != 2 or len(numbers) != 2:
             raise ParameterError(f"bins = {bins!r} must be a whole number above 0, or two: of ranges and of means.")
         low, high = (float(self.mean.min()), float(self.mean.max())) if len(self) else (0.0, 0.0)
         if high <= low:

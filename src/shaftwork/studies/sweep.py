@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from shaftwork.core.errors import ParameterError
+from shaftwork.core.parameters import whole
 from shaftwork.core.progress import Progress
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import OutputTimes, checked_parameter, relative_tolerance, time_span
@@ -80,14 +81,15 @@ def sweep(
     limits = _limits(require, readers)
     _, end = time_span(0.0, t_end)
     (name,) = engine_names([engine])
-    if processes is not None and (isinstance(processes, bool) or not isinstance(processes, int) or processes < 1):
+    count = None if processes is None else whole(processes)
+    if processes is not None and count is None:
         raise ParameterError(f"processes = {processes!r} must be a number, 1 or more; leave it out for all cores.")
     options = {"rtol": relative_tolerance(rtol), "engine": name, "initial": initial, "t_eval": t_eval}
     if t_eval is None and all(isinstance(reader, Measure) for reader in readers.values()):
         options["t_eval"] = 2  # they read the motion between these
     task = Task(net, columns, readers, _lines(sn, readers), end, options)
     worker = Worker(task)
-    values, reasons, left = _run(task, worker, processes, None if store is None else Store(store, task))
+    values, reasons, left = _run(task, worker, count, None if store is None else Store(store, task))
     why = worker.why or (f"{left} of {len(task)} variants ran one by one: {LEFT}" if left else "")
     measured = dict(zip(readers, values.T, strict=True))
     return Sweep(net.name, columns, measured, limits, reasons, why)
@@ -96,7 +98,7 @@ def sweep(
 def _run(task: Task, worker: Worker, processes: int | None, store: Store | None) -> tuple[Array, tuple[str, ...], int]:
     """(variants, measures), why variants failed, and how many could not be followed side by side."""
     values, reasons = np.full((len(task), len(task.measures)), np.nan), [""] * len(task)
-    open_, progress, alone = np.ones(len(task), dtype=bool), Progress(), 0
+    open_, progress, alone, failed = np.ones(len(task), dtype=bool), Progress(), 0, 0
 
     def take(variants: Any, found: Array, why: Iterable[str]) -> None:
         values[variants], open_[variants] = found, False
@@ -105,14 +107,13 @@ def _run(task: Task, worker: Worker, processes: int | None, store: Store | None)
 
     for chunk in [] if store is None else store.chunks:
         take(chunk.variants, chunk.values, chunk.reasons)
-        alone += chunk.left
+        alone, failed = alone + chunk.left, failed + sum(map(bool, chunk.reasons))
     try:
         for chunk in chunks(worker, task, np.flatnonzero(open_), processes):
             if store is not None:
                 store.append(chunk)
             take(chunk.variants, chunk.values, chunk.reasons)
-            alone += chunk.left
-            failed = sum(map(bool, reasons))
+            alone, failed = alone + chunk.left, failed + sum(map(bool, chunk.reasons))
             done, remark = len(task) - int(open_.sum()), f", {failed} failed" if failed else ""
             progress.show(done / len(task), f"{done} of {len(task)} variants{remark}")
     finally:

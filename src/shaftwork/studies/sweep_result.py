@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
-from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.core.errors import MissingExtraError, ParameterError
+from shaftwork.core.parameters import whole
 from shaftwork.results.observer import Array
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ class Sweep:
         """
         if measure not in self.measures:
             raise ParameterError(f"There is no measure '{measure}'. There are: {', '.join(self.measures)}.")
-        if count is not None and (isinstance(count, bool) or not isinstance(count, Integral) or count < 1):
+        if count is not None and whole(count) is None:
             raise ParameterError(f"count = {count!r} must be a number, 1 or more; leave it out for all that pass.")
         rows = np.flatnonzero(self.passed)
         values = self.measures[measure][rows]

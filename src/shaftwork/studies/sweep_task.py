@@ -143,7 +143,7 @@ class Worker:
     def run(self, variants: NDArray[np.intp]) -> Chunk:
         """Measures of some variants."""
         values = np.full((variants.size, len(self._task.measures)), np.nan)
-        reasons = [self._objection(variant) for variant in variants.tolist()]
+        reasons = [self._objection(variant) if self._choosy else "" for variant in variants.tolist()]
         open_ = np.array([not reason for reason in reasons])
         if self._ensemble is not None and open_.any():
             here = np.flatnonzero(open_)

@@ -17,7 +17,7 @@ import numpy as np
 from shaftwork.components.shaft_models import CentralDifference, Lumped, OneSpring, ShaftModel, Spectral, Wave
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError
-from shaftwork.core.parameters import in_si
+from shaftwork.core.parameters import in_si, whole
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.network import Network
 from shaftwork.results.observer import Array
@@ -212,12 +212,12 @@ def work_precision(
     if shaft not in shafts:
         raise ParameterError(f"'{net.name}' has no shaft {shaft!r}. It has: {', '.join(shafts) or 'none'}.")
     end, allowed = in_si("t_end", t_end, "s", above=0), in_si("budget", budget, "s", above=0)
-    if isinstance(points, bool) or not isinstance(points, int) or points < 1:
+    if (count := whole(points)) is None:
         raise ParameterError(f"points = {points!r} must be a number of output times, 1 or more.")
     pairs = list(itertools.product(shaft_models(models), engine_names(engines)))
     began = time.monotonic()
     # the fronts of waves that start at zero pass at multiples of the delay; these times are none
-    t = end * (np.arange(1, points + 1) - 0.5) / points
+    t = end * (np.arange(1, count + 1) - 0.5) / count
     known = truth(net, shaft, end, t)
     trials: list[Trial] = []
     for model, engine in pairs:

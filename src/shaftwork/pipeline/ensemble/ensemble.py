@@ -26,10 +26,11 @@ from shaftwork.pipeline.ensemble.extremes import largest
 from shaftwork.pipeline.ensemble.groups import Group, Index, Mask, Pace, joined
 from shaftwork.pipeline.ensemble.programs import EXTREMES, EnsembleCode
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.phases.assemblies import Assembly, ModeNames, conditional
+from shaftwork.pipeline.phases.assemblies import Assembly, ModeNames
 from shaftwork.pipeline.phases.model import PhasedModel
 from shaftwork.pipeline.phases.regimes import with_modes
 from shaftwork.pipeline.phases.run import Run
+from shaftwork.pipeline.phases.starts import conditional
 from shaftwork.results.measures import Measure
 
 SAMPLES = (50, 4000)
@@ -39,6 +40,8 @@ FEWEST, FEWEST_SEEN = 16, 6
 STEPS, MOST_STEPS = 2.0, 2.6
 """Steps for a sample in the first variant. A lane that takes more than the second runs again with twice the samples."""
 MOST_HALVINGS = 10
+REFERENCE = 1e-8
+"""Relative tolerance of the first variant, which counts steps: a tighter one has longer series and fewer of them."""
 LONGER = 2.0
 """A phase is looked for up to so many times its length in the first variant, and then once more."""
 MOST_ROUNDS = 200
@@ -82,7 +85,6 @@ class Ensemble:
         self._modes, lasting, steps = self._reference()
         self._horizons = lasting
         self._spacing = (span[1] - span[0]) / min(max(steps / STEPS, SAMPLES[0]), SAMPLES[1])
-        self.looks = any(measure.kind in EXTREMES for measure in measures)
         if self._of(self._modes) is None:
             raise CompileError("The equations at the start have no program for variants side by side.")
 
@@ -125,10 +127,10 @@ class Ensemble:
         phased = self.phased
         if phased is None:
             solution = self.model.simulate(
-                self.span[1], t_start=self.span[0], rtol=self.rtol, t_eval=2, parameters=self._first
+                self.span[1], t_start=self.span[0], rtol=REFERENCE, t_eval=2, parameters=self._first
             )
             return (), {(): self.span[1] - self.span[0]}, solution.statistics.get("steps", 0)
-        demand = Demand(self.span, self.rtol, None, np.array(self.span), "auto", MOST_ROUNDS * 10_000, None)
+        demand = Demand(self.span, REFERENCE, None, np.array(self.span), "auto", MOST_ROUNDS * 10_000, None)
         run = Run(phased.phases, self._first, demand)
         run.march(None)
         phases = [phase for span in run.spans for phase in span.phases]
@@ -273,9 +275,8 @@ class _Way:
         times = self.ensemble.samples(group)
         lanes = run_lanes(equations.code.program, group.x, p, equations.sides, entry.offsets, times, self.ensemble.rtol)
         self.ensemble.pace.learn(self.columns[:, group.lanes], lanes.steps)
-        good = lanes.good & equations.stays(lanes, p, entry.offsets)
-        states = lanes.x[:, : len(group.x)].swapaxes(0, 1)
-        jets = equations.code.jets(lanes.t, states, p) if self.ensemble.looks else {}
+        jets, guards = equations.code.seen(lanes.t, lanes.x[:, : len(group.x)].swapaxes(0, 1), p)
+        good = lanes.good & equations.stays(guards, entry.offsets)
         coarse = good & _coarse(lanes, jets) if group.halvings < MOST_HALVINGS else np.zeros_like(good)
         good &= ~coarse
         self._measure(_Followed(equations, lanes, p, self.ensemble.rtol), group, jets, good)
@@ -372,7 +373,7 @@ class _Followed:
         unguarded, offsets = np.zeros_like(equations.sides), np.zeros((equations.sides.size, own.size))
         made = run_lanes(program, start, p, unguarded, offsets, grid, self.rtol)
         x = made.x[-1:, : len(start)].swapaxes(0, 1)
-        return np.asarray(sign * equations.code.jets(grid[-1:], x, p)[row][:, 0])
+        return np.asarray(sign * equations.code.seen(grid[-1:], x, p)[0][row][:, 0])
 
 
 def _coarse(lanes: Lanes, jets: Mapping[int, Array]) -> Mask:

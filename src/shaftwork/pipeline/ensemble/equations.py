@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.codegen.elements import Array
-from shaftwork.integrate.lanes import Lanes
 from shaftwork.pipeline.ensemble.programs import EnsembleCode
 from shaftwork.pipeline.phases.assemblies import Assembly, ModeNames
 from shaftwork.pipeline.phases.courses import FEW
@@ -80,10 +79,6 @@ class Equations:
             p[place] = columns[column]
         return self.code.program.parameters(p)
 
-    def _motion(self, t: Array, x: Array, p: Array) -> tuple[Array, Array]:
-        made = self.code.program.motion(t, x, p)
-        return made[: len(x)], made[len(x) :]
-
     def entered(self, t: Array, x: Array, p: Array) -> Entry:
         """Whether every guard is on its own side, or on its limit and about to be, as `Settling` would find.
 
@@ -94,9 +89,9 @@ class Equations:
         """
         if not len(self.sides):
             return Entry(np.ones(t.size, dtype=bool), np.zeros((0, t.size)))
-        rates, now = self._motion(t, x, p)
+        rates, now = self.code.motion(t, x, p)
         moved = self._rounded(x, rates)
-        near_rates, near = self._motion(t + self._tick, moved, p)
+        near_rates, near = self.code.motion(t + self._tick, moved, p)
         side, bands, step = self.sides[:, None], np.abs(near - now), self._step(rates)
         value = side * now
         falls, known = np.zeros_like(value, dtype=bool), np.zeros_like(value, dtype=bool)
@@ -128,18 +123,17 @@ class Equations:
         """A step further along a straight line."""
         t, x, rates, _ = course
         later = x + step * rates
-        return t + step, later, *self._motion(t + step, later, p)
+        return t + step, later, *self.code.motion(t + step, later, p)
 
     def leaves_behind(self, before: Equations, guard: int) -> bool:
         """Whether the guard by which these modes were entered is met no more; `entered` looks at all the others."""
         return before.code is not self.code or not self.sides[guard] == before.sides[guard] != 0.0
 
-    def stays(self, lanes: Lanes, p: Array, offsets: Array) -> Mask:
-        """(k,) whether every guard was on its own side at all times at which a lane was looked at."""
+    def stays(self, guards: Array, offsets: Array) -> Mask:
+        """(k,) whether every guard (guards, m, k) was on its own side at all times at which a lane was looked at."""
         if not len(self._watched):
-            return np.ones(lanes.good.size, dtype=bool)
-        x = lanes.x[:, : len(self.code.model.states)].swapaxes(0, 1)
-        guards = self.code.program.guard_values(lanes.t, x, p)[self._watched] * self.sides[self._watched][:, None, None]
-        most, least = guards.max(axis=1), guards.min(axis=1)
+            return np.ones(offsets.shape[1], dtype=bool)
+        watched = guards[self._watched] * self.sides[self._watched][:, None, None]
+        most, least = watched.max(axis=1), watched.min(axis=1)
         allowed = WITHIN * np.maximum(np.abs(most), np.abs(least)) + 2.0 * offsets[self._watched]
         return np.asarray((most <= allowed).all(axis=0))

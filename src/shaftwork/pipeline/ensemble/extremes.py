@@ -2,8 +2,8 @@
 
 Where its slope falls through zero between two samples, or does so and rises again, the polynomial through its values
 and its first two derivatives at both says about when. From the first of these samples the motion is followed to that
-time, and Newton's step on the slope gives the height: right to the tolerance of the motion, whatever the distance of
-the samples.
+time, and the polynomial from there gives the height, or Newton's step on the slope where it is hardly away: right to
+the tolerance of the motion, whatever the distance of the samples.
 """
 
 from __future__ import annotations
@@ -17,18 +17,22 @@ from shaftwork.codegen.elements import Array
 
 DATA = 3
 """What is known of a quantity: its value and its first two derivatives by time."""
-NEARLY, SURELY = 0.01, 2e-3
-"""Peaks that seem lower than the highest by less than these parts of the range may yet be higher: seen by a tangent,
-and by the polynomial."""
+BEYOND = 0.2
+"""Of the difference between the cubic and the quintic in the middle of an interval: so far the motion may be from the
+quintic. Of a sine, whose samples are less than half a period apart, it is at most half of that."""
+NEARLY = 0.1
+"""Of the range: so near to the top a peak and a dip between the same two samples are looked for."""
 SHORT = 1e-9
 """Of the time: between samples that are closer the larger one is the peak."""
-PLACES, NEWTON = 7, 3
-"""Places at which a polynomial is looked at, and steps from the highest of them to its peak."""
+PLACES, NEWTON = 7, 5
+"""Places at which a polynomial is looked at, and steps to a peak between two of them."""
 INSIDE = 1e-4
-"""Of an interval: a peak is looked for so far from its ends."""
+"""Of an interval: the motion is followed to so far from its ends."""
 NEAR = 1e-9
-"""Of the range: a peak is known where Newton's step rises by less."""
-MOST_ROUNDS = 10
+"""Of the range: a peak is known where Newton's step rises by less, or a polynomial misses it by less."""
+CLOSE = 0.01
+"""Of an interval: a polynomial is trusted so far from where it has been put right."""
+MOST_ROUNDS = 20
 
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
@@ -47,67 +51,62 @@ def largest(t: Array, jets: Array, best: Array, there: There) -> Array:
     """
     top, bottom = jets[0].max(axis=0), jets[0].min(axis=0)
     found, size = np.maximum(best, top), top - bottom
-    at, own = _likely(t, jets, found - NEARLY * size)
+    at, own = _likely(t, jets, found, top - NEARLY * size)
     left, right = (np.array([t[k, own], *jets[:, k, own]]) for k in (at, at + 1))
     times, height = _peak(left, right)
-    highest = found.copy()
-    np.maximum.at(highest, own, height)
-    kept = (height >= (highest - SURELY * size)[own]) & _holds_a_peak(left, right, height)
-    at, own, left, right, times = at[kept], own[kept], left[:, kept], right[:, kept], times[kept]
+    beyond, surely = _beyond(left, right), found.copy()
+    np.maximum.at(surely, own, height - beyond)
+    on = np.isfinite(height) & (height + beyond >= surely[own])
     for _ in range(MOST_ROUNDS):
+        at, own, left, right, times, height = at[on], own[on], left[:, on], right[:, on], times[on], height[on]
         if not own.size:
-            break
-        jet = there(at, own, times)
-        rise = _rise(jet)
-        near = rise < NEAR * size[own]
-        np.maximum.at(found, own, jet[0] + np.where(near, rise, 0.0))
-        left, right = _narrowed(left, np.array([times, *jet]), right)
+            return np.asarray(found)
+        middle = np.array([times, *there(at, own, times)])
+        np.maximum.at(found, own, middle[1])
+        missed, room = np.abs(height - middle[1]), np.minimum(times - left[0], right[0] - times)
+        # on either side of what is known now
+        at, own, missed, room, before = (np.tile(values, 2) for values in (at, own, missed, room, times))
+        left, right = np.concatenate([left, middle], axis=1), np.concatenate([middle, right], axis=1)
         times, height = _peak(left, right)
-        on = ~near & _holds_a_peak(left, right, height)
-        at, own, left, right, times = at[on], own[on], left[:, on], right[:, on], times[on]
-    found[own] = np.nan
+        near = NEAR * size[own]
+        # what a polynomial misses grows with the cube of the distance from a point that it goes through
+        part = np.abs(times - before) / room
+        sure = (part < CLOSE) & (missed * part**3 < near)
+        np.maximum.at(found, own[sure], height[sure])
+        on = ~sure & (height + _beyond(left, right) > found[own] + near)
+    found[own[on]] = np.nan
     return np.asarray(found)
 
 
-def _likely(t: Array, jets: Array, least: Array) -> tuple[Index, Index]:
-    """Samples (c,) of lanes (c,) after which there may be a peak of at least so much (k,)."""
-    values, slopes, bends = jets
-    at, own = np.nonzero((slopes[:-1] > 0) & (slopes[1:] < 0))
-    length = t[at + 1, own] - t[at, own]
-    # a curve that bends down is no higher than where its two tangents meet
-    (y0, d0), (y1, d1) = ((values[k, own], slopes[k, own]) for k in (at, at + 1))
-    bound = y0 + d0 * (y1 - y0 - d1 * length) / (d0 - d1)
-    kept = (length > SHORT * np.abs(t[at, own])) & (bound >= least[own])
-    # a peak and a dip between the same two samples leave the sign of the slope as it was
-    high, whose = np.nonzero(np.maximum(values[:-1], values[1:]) >= least)
-    (d0, b0), (d1, b1) = ((slopes[k, whose], bends[k, whose]) for k in (high, high + 1))
-    length = t[high + 1, whose] - t[high, whose]
-    turns = np.minimum(np.abs(d0), np.abs(d1)) < length * np.maximum(np.abs(b0), np.abs(b1))
-    both = (d0 * d1 > 0) & turns & (length > SHORT * np.abs(t[high, whose]))
-    return np.concatenate([at[kept], high[both]]), np.concatenate([own[kept], whose[both]])
+def _likely(t: Array, jets: Array, least: Array, near: Array) -> tuple[Index, Index]:
+    """Samples (c,) of lanes (c,) after which there may be a peak of at least so much (k,).
+
+    The slope falls through zero, or, where one of the samples is near (k,) the top, does so and rises again. A
+    polynomial is no higher than the highest of its Bernstein coefficients.
+    """
+    up, high = jets[1] > 0, jets[0] >= near
+    at = np.flatnonzero((up[:-1] & ~up[1:]) | high[:-1] | high[1:])
+    lanes = t.shape[1]
+    flat = [np.ravel(values) for values in (t, *jets)]  # to take by one number is the quickest
+    left, right = (np.array([values.take(at + k) for values in flat]) for k in (0, lanes))
+    length = right[0] - left[0]
+    (y0, v0, a0), (y1, v1, a1) = ((y, v * length / 5, a * length**2 / 20) for _, y, v, a in (left, right))
+    inner = np.maximum(np.maximum(y0 + v0, y0 + 2 * v0 + a0), np.maximum(y1 - v1, y1 - 2 * v1 + a1))
+    own = at % lanes
+    kept = (length > SHORT * np.abs(left[0])) & (inner > np.maximum(y0, y1))
+    kept &= inner + _beyond(left, right) >= least[own]
+    return at[kept] // lanes, own[kept]
 
 
-def _holds_a_peak(left: Array, right: Array, height: Array) -> Mask:
-    """(c,) whether there is a peak between two times, of which a height is known about."""
-    return np.asarray(((left[2] > 0) & (right[2] < 0)) | (height > np.maximum(left[1], right[1])))
-
-
-def _narrowed(left: Array, middle: Array, right: Array) -> tuple[Array, Array]:
-    """The part of an interval that holds its peak, by the slope and the bend in the middle."""
-    rising, dips = middle[2] > 0, middle[3] > 0
-    later = np.where(rising, ~(dips & (right[2] > 0)), dips & (left[2] < 0))
-    return np.where(later, middle, left), np.where(later, right, middle)
-
-
-def _rise(jet: Array) -> Array:
-    """(c,) how much higher a peak is than a value (3, c) near it; infinite where the curve does not bend down."""
-    _, slope, bend = jet
-    down = bend < 0
-    return np.where(down, slope**2 / np.where(down, -2.0 * bend, 1.0), np.inf)
+def _beyond(left: Array, right: Array) -> Array:
+    """(c,) how far the motion may be from the quintic through what is known at two times; see `_peak`."""
+    length = right[0] - left[0]
+    apart = (left[2] - right[2]) * length / 32 + (left[3] + right[3]) * length**2 / 64
+    return np.asarray(BEYOND * np.abs(apart))
 
 
 def _peak(left: Array, right: Array) -> tuple[Array, Array]:
-    """Times and heights (c,) of the largest values of the quintics through what is known at two times.
+    """Times and heights (c,) of the highest peaks of the quintics through what is known at two times; -inf where none.
 
     Args:
         left: (4, c) time in s, value, and first and second derivative.
@@ -126,15 +125,26 @@ def _peak(left: Array, right: Array) -> tuple[Array, Array]:
         v0,
         y0,
     )
-    places = np.linspace(INSIDE, 1.0 - INSIDE, PLACES)
-    u = places[_horner(quintic, places[:, None]).argmax(axis=0)]
     slope = [power * c for power, c in zip(range(5, 0, -1), quintic, strict=False)]
     bend = [power * c for power, c in zip(range(4, 0, -1), slope, strict=False)]
+    places = np.linspace(0.0, 1.0, PLACES)[:, None]
+    heights, slopes = _horner(quintic, places), _horner(slope, places)
+    turns = (slopes[:-1] > 0) & (slopes[1:] < 0)
+    first = np.where(turns, np.maximum(heights[:-1], heights[1:]), -np.inf).argmax(axis=0)
+    u = _falling(slope, bend, places[first, 0], places[first + 1, 0])
+    height = np.where(turns.any(axis=0), _horner(quintic, u), -np.inf)
+    return left[0] + np.clip(u, INSIDE, 1.0 - INSIDE) * length, height
+
+
+def _falling(slope: list[Array], bend: list[Array], low: Array, high: Array) -> Array:
+    """Where a polynomial falls through zero between two places (c,): Newton's steps, halves where they leave."""
+    u = low + (high - low) / 2
     for _ in range(NEWTON):
-        bends = _horner(bend, u)
-        step = _horner(slope, u) / np.where(bends < 0, bends, -np.inf)
-        u = np.clip(u - step, INSIDE, 1.0 - INSIDE)
-    return left[0] + u * length, _horner(quintic, u)
+        value, bends = _horner(slope, u), _horner(bend, u)
+        low, high = np.where(value > 0, u, low), np.where(value > 0, high, u)
+        new = u - value / np.where(bends < 0, bends, -np.inf)
+        u = np.where((bends < 0) & (new >= low) & (new <= high), new, low + (high - low) / 2)
+    return u
 
 
 def _horner(coefficients: tuple[Array, ...] | list[Array], u: Array) -> Array:

@@ -6,18 +6,16 @@ from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
-from sympy import Add, Expr
+import numpy as np
+from sympy import Expr
 
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.expressed import Expressed
-from shaftwork.codegen.lanes import LaneFunction, LaneProgram, lane_function, lane_program
+from shaftwork.codegen.lanes import LaneFunction, LaneProgram, lane_expressions, lane_program
 from shaftwork.codegen.stores import Stores
-from shaftwork.components.laws import t as TIME
-from shaftwork.components.slopes import slope
 from shaftwork.core.errors import CompileError
 from shaftwork.pipeline.ensemble.extremes import DATA
 from shaftwork.pipeline.model import Model
-from shaftwork.reduction.rows import Rows
 from shaftwork.results.measures import Measure
 
 EXTREMES = {"max": (1.0,), "min": (-1.0,), "peak": (1.0, -1.0)}
@@ -54,32 +52,49 @@ class EnsembleCode:
         """By measure, which of the integrals behind the states is its."""
         integrands = [self._quantities[row] ** POWERS[measures[row].kind] for row in integrated]
         self.program: LaneProgram = lane_program(program, model.rows, integrands)
+        self._compose([self._expressed.store(name) for name in stores.names] if self.program.guards else [])
 
-    def jets(self, t: Array, x: Array, p: Array) -> dict[int, Array]:
-        """By measure that is an extreme, what it reads and the first and second derivative by time, (3, m, k).
+    def _compose(self, stored: Sequence[Expr]) -> None:
+        """Two functions: what is read of every sample, and what is asked for at the ends of phases."""
+        program = self.program
+        shown, held = lane_expressions(self._rows, self._quantities), lane_expressions(self._rows, stored)
+        jets = [made for row in self._extremes for made in program.derivatives(shown[row], DATA - 1)]
+        self._seen = LaneFunction((*jets, *program.guards), program.variables)
+        self._parts = {"rates": program.rates, "guards": program.guards, "stored": held, "shown": shown}
+        expressions = tuple(one for part in self._parts.values() for one in part)
+        self._points = LaneFunction(expressions, program.variables, often=False)
+
+    def seen(self, t: Array, x: Array, p: Array) -> tuple[dict[int, Array], Array]:
+        """By measure that is an extreme, what it reads and its first two derivatives by time, (3, m, k); and guards.
 
         Args:
             t: (m, k) times, s.
             x: (n, m, k) states.
             p: (parameters, k).
+
+        Returns:
+            These, and the values (guards, m, k) of all guards.
         """
-        made = self._jets(t, x, p)
-        return {row: made[DATA * k : DATA * (k + 1)] for k, row in enumerate(self._extremes)}
+        made = self._seen(t, x, p)
+        jets = {row: made[DATA * k : DATA * (k + 1)] for k, row in enumerate(self._extremes)}
+        return jets, made[DATA * len(self._extremes) :]
 
-    @cached_property
-    def _jets(self) -> LaneFunction:
-        jets = [made for row in self._extremes for made in _jet(self._quantities[row], self._rows)]
-        return lane_function(self._rows, jets)
+    def motion(self, t: Array, x: Array, p: Array) -> tuple[Array, Array]:
+        """Rates (n, k) and guards (guards, k) at times (k,), states (n, k), parameters (parameters, k)."""
+        made = self._part(t, x, p)
+        return made["rates"], made["guards"]
 
-    @cached_property
-    def shown(self) -> LaneFunction:
-        """What the measures read."""
-        return lane_function(self._rows, self._quantities)
+    def stored(self, t: Array, x: Array, p: Array) -> Array:
+        """All that is stored, in the order of the names of `codegen.stores.Stores`; arguments as for `motion`."""
+        return self._part(t, x, p)["stored"]
 
-    @cached_property
-    def stored(self) -> LaneFunction:
-        """All that is stored, in the order of the names of `codegen.stores.Stores`."""
-        return lane_function(self._rows, [self._expressed.store(name) for name in self._stores.names])
+    def shown(self, t: Array, x: Array, p: Array) -> Array:
+        """What the measures read; arguments as for `motion`."""
+        return self._part(t, x, p)["shown"]
+
+    def _part(self, t: Array, x: Array, p: Array) -> dict[str, Array]:
+        ends = np.cumsum([len(part) for part in self._parts.values()])[:-1]
+        return dict(zip(self._parts, np.split(self._points(t, x, p), ends), strict=True))
 
     @cached_property
     def state_rows(self) -> list[int]:
@@ -91,12 +106,3 @@ class EnsembleCode:
         """Places of torques and currents among all that is stored, and of the rest."""
         through = [k for k, name in enumerate(self._stores.names) if name in self._stores.through]
         return through, [k for k in range(len(self._stores.names)) if k not in through]
-
-
-def _jet(quantity: Expr, rows: Rows) -> tuple[Expr, ...]:
-    """A quantity and its derivatives by time along the motion."""
-    made = [quantity]
-    for _ in range(1, DATA):
-        parts = (slope(made[-1], state) * rate for state, rate in zip(rows.states, rows.rates, strict=True))
-        made.append(slope(made[-1], TIME) + Add(*parts))
-    return tuple(made)

@@ -4,32 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, partial
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import sparse
-from sympy import Expr, Integer, Piecewise, Symbol
+from sympy import Expr, Integer, Symbol, Tuple
 
 from shaftwork.codegen.arrays import BoundArrays
-from shaftwork.codegen.code import bindable, scalar, vectorised_list
+from shaftwork.codegen.code import bindable, is_rough, vectorised, vectorised_list
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.observer import Quantities
 from shaftwork.codegen.recovery import History
 from shaftwork.codegen.stores import Stores
 from shaftwork.codegen.timeline import Timeline
-from shaftwork.codegen.valueless import first_missing, in_words, without_value
+from shaftwork.codegen.valueless import first_missing, in_words, rough, without_value
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Leave, Mode, Modes
 from shaftwork.components.pieces import pieces_degree
-from shaftwork.core.errors import CompileError
+from shaftwork.core.errors import CompileError, no_value
 from shaftwork.integrate.choice import available
 from shaftwork.integrate.problem import Guards, Problem
 from shaftwork.network.graph import GraphPart
 from shaftwork.pipeline.phases.rates import rates_of
+from shaftwork.pipeline.phases.starts import conditional, starts_of
 from shaftwork.pipeline.prepared import Prepared
 from shaftwork.reduction.readings import NamedReadings, Readings
 
@@ -151,9 +152,12 @@ class Assembly:
 
     @cached_property
     def clocks(self) -> tuple[int, ...]:
-        """Guards that change with time by themselves: a step must be short enough to see it, though no state moves."""
+        """Guards that change with time by themselves, other than along straight pieces, or where no state moves.
+
+        A step must be short enough to see it.
+        """
         every = not self.model.states
-        return tuple(k for k, made in enumerate(self._expressions) if every or _winds(made))
+        return tuple(k for k, made in enumerate(self._expressions) if every or pieces_degree(made) is None)
 
     def vector(self, base: Mapping[str, float], numbers: Mapping[str, float]) -> Array:
         """The parameter vector with the given values and numbers of modes."""
@@ -223,6 +227,8 @@ class Assembly:
         modes = self.elements[number].modes
         first, symbols = self._firsts[number], self._symbols[number]
         holds = starts_of(modes, symbols)(t, *shown[first : first + 2 + len(symbols)])
+        if holds is None:
+            raise no_value(t, in_words(self.elements[number].part, Tuple(*(mode.starts for mode in modes.options))))
         return next((m.name for m, found in zip(modes.options, holds, strict=True) if found and m.name != besides), "")
 
     @cached_property
@@ -256,8 +262,8 @@ class Assembly:
 
     def of_element(self, number: int, expression: Expr | None) -> Expr:
         """What is made of an element's parameters, in those of the network; zero where there is nothing."""
-        element, made = self.elements[number], as_expression(0 if expression is None else expression)
-        return self._readings.guard(self.parts[element.part.name], element.modes, made)
+        element = self.elements[number]
+        return self._readings.guard(self.parts[element.part.name], element.modes, as_expression(expression or 0))
 
     def problem(self, moment: Moment, span: tuple[float, float], times: Timeline) -> Problem:
         """The motion of a phase, before it is known where it ends; tolerances are for rtol = 1.
@@ -300,6 +306,7 @@ class Assembly:
             guards=watch,
             symbolic=lambda: None if self.program is None else self.program.bind(p),
             explain=lambda t, y: self.without_value(p, modes, t, y[:, :size]),
+            rough=lambda t, y: self._rough(p, modes, t, y[:, :size]),
             found=known,
         )
 
@@ -311,6 +318,17 @@ class Assembly:
             return law
         number, made = pairs[found[1]]
         return found[0], in_words(self.elements[number].part, made.leave.when)
+
+    def _rough(self, p: Array, modes: ModeNames, times: Array, states: Array) -> tuple[float, str] | None:
+        """The first time at which a law or a guard has no value in some branch, and which one."""
+        law, symbols = rough(self.bound(p), times, states), (TIME, *self._readings.symbols, *self._parameters)
+        for number, made in () if law is not None else self.watched(modes):
+            function = vectorised(symbols, self._expressions[made.guard])
+            known = np.array([*self._read(p)(times, states)]).reshape(-1, times.size)
+            for time, values in zip(times, known.T, strict=True):
+                if is_rough(function, (time, *values, *p)):
+                    return float(time), in_words(self.elements[number].part, made.leave.when)
+        return law
 
     def _rates(self, p: Array) -> tuple[Callable[[float, Array], Array], dict[str, Any]]:
         """The right-hand side and what engines find out about it, for all phases with these parameters."""
@@ -379,22 +397,3 @@ class Assembly:
             return build(states, TIME, rows.parameters, rates, self.guards_shown, changing)
         except CompileError:
             return None
-
-
-def _winds(guard: Expr) -> bool:
-    """Whether a guard changes with time other than along straight pieces."""
-    return pieces_degree(guard) is None
-
-
-@lru_cache(maxsize=256)
-def conditional(modes: Modes) -> tuple[Symbol, ...]:
-    """The parameters in the conditions under which a motion starts in the modes of an element."""
-    found = set[Symbol]().union(*(mode.starts.free_symbols for mode in modes.options))
-    return tuple(sorted(found - {TIME, ACROSS, INTEGRAL}, key=str))
-
-
-@lru_cache(maxsize=256)
-def starts_of(modes: Modes, symbols: tuple[Symbol, ...]) -> Callable[..., list[bool]]:
-    """From the time, the speed across, the twist and parameters to whether a motion may start in each mode."""
-    conditions = [Piecewise((Integer(1), mode.starts), (Integer(0), True)) for mode in modes.options]
-    return scalar((TIME, ACROSS, INTEGRAL, *symbols), conditions)

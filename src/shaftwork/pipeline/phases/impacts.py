@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from sympy import Integer
 
+from shaftwork.codegen.observer import Impact
 from shaftwork.components.branches import INTEGRAL
 from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError, SimulationError
@@ -180,8 +181,8 @@ class Impacts:
                 "stiffness c and a damping d."
             )
 
-    def jumped(self, t: float, moment: Moment, before: float, after: float) -> tuple[Moment, list[Change]]:
-        """After a source has jumped that is rigidly joined to inertias.
+    def jumped(self, t: float, moment: Moment, before: float, after: float) -> tuple[Moment, list[Change], Impact]:
+        """After a source has jumped that is rigidly joined to inertias; what it gives then, and what gears lose.
 
         What holds by a limited torque takes no speed along at once, and contacts are pressed, not pulled.
 
@@ -191,25 +192,20 @@ class Impacts:
             before: a time just before it, s, at which inputs are read.
             after: the same just after it.
         """
-        regime = moment.regime
-        if not (self._impulses.gears or self.limited(regime.modes)):
-            bound = regime.assembly.bound(regime.p)
-            return moment._replace(x=bound.impulse(moment.x, before, after)), []
+        regime, begins = moment.regime, self._impulses.begins(moment, before)
 
         def pulled(start: Start, _: Sequence[Stage]) -> Blow:
             new = self._joined(start.moment.regime.modes, start.held, after, {}, NO_IMPACT)
             return Blow(new, new.regime)
 
-        stages = self._impulses.stages(after, self._impulses.begins(moment, before), pulled, {})
-        new = stages[-1].blow.after
-        changes = self._differences(t, regime.modes, new.regime.modes)
-        if not changes and self._impulses.gears:
-            number = self._impulses.gears[0]
-            changes = [Change(t, self._elements[number], *2 * (regime.modes[number],))]
-        if changes:
-            given = self._impulses.given(after, stages, before)
-            changes[0] = changes[0]._replace(given=given, lost=self._impulses.lost(after, stages))
-        return new, changes
+        if self._impulses.gears or self.limited(regime.modes):
+            stages = self._impulses.stages(after, begins, pulled, {})
+        else:
+            moved = moment._replace(x=regime.assembly.bound(regime.p).impulse(moment.x, before, after))
+            stages = (Stage(begins, Blow(moved, regime), 1.0),)
+        new, given = stages[-1].blow.after, self._impulses.given(after, stages, before)
+        at_once = Impact(t, "", given, self._impulses.lost(after, stages))
+        return new, self._differences(t, regime.modes, new.regime.modes), at_once
 
     def limited(self, modes: ModeNames) -> dict[int, tuple[tuple[float, str], ...]]:
         """Elements that join by a torque that is limited, with the sides on which it is and the modes there."""

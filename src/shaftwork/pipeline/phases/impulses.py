@@ -217,7 +217,7 @@ class Impulses:
         return {name: then[name] - value for name, value in start.held.items()}
 
     def given(self, t: float, stages: Sequence[Stage], before: float | None = None) -> dict[str, float]:
-        """What ideal sources of speed give in an impulse, in J by part, their impulse times the mean of their speeds.
+        """What ideal sources give in an impulse, in J by part, their impulse times the mean of their speeds.
 
         Args:
             t: time after it in s at which they are read.
@@ -228,11 +228,13 @@ class Impulses:
         jumped = 0.0
         for stage in stages:
             assembly, p = stage.blow.passing.assembly, stage.blow.passing.p
-            bound, gained = assembly.bound(p), self._gained(t, stage.start, stage.blow)
+            bound, stores, gained = assembly.bound(p), assembly.stores, self._gained(t, stage.start, stage.blow)
             then = jumped + stage.share * (1.0 - jumped)
             late = 1.0 if before is None else (jumped + then) / 2
             for time, weight in ((t, late), (before, 1.0 - late)):
-                for part, energy in assembly.stores.given(bound, time, gained).items() if time is not None else ():
+                if time is None:
+                    continue
+                for part, energy in stores.given(bound, stores.sources(bound, time), gained).items():
                     found[part] = found.get(part, 0.0) + stage.share * weight * energy
             jumped = then
         return found

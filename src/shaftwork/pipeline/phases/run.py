@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from shaftwork.codegen.elements import Array
+from shaftwork.codegen.observer import Impact
 from shaftwork.codegen.timeline import Timeline
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate import choice
@@ -87,6 +88,7 @@ class Run:
         self.settling = self._known.settling
         self.spans: list[Span] = []
         self.changes: list[Change] = []
+        self.jumps: list[Impact] = []
         self.engine, self.why, self.steps = "", "", 0
         self._soon = [0 for _ in CHATTER]
 
@@ -204,8 +206,9 @@ class Run:
             return t, moment
         moment = passing.moment._replace(x=x[: moment.x.size])
         if sides != (t, t) and regime.assembly.model.form.has_impulses:
-            moment, changes = self.settling.jumped(t, moment, *sides)
+            moment, changes, at_once = self.settling.jumped(t, moment, *sides)
             self.note(t, changes)
+            self.jumps.append(at_once)
             met = None if changes else met
         over = met is None and t >= self.demand.span[1]
         return t, moment if over else self._settle(t, moment, met)

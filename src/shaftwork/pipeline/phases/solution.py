@@ -93,16 +93,23 @@ def _stretch(run: Run, span: Span, phase: Phase) -> Stretch:
 
 
 def _impacts(run: Run) -> tuple[Impact, ...]:
-    """Changes at which speeds may jump, those of one time in one, with the part of the first."""
-    found: dict[float, tuple[str, dict[str, float], dict[str, float]]] = {}
+    """Changes and sources with which speeds may jump, those of one time in one, with the part of the first change."""
+    found = [jump for jump in run.jumps if jump.given or jump.lost]
     for change in run.changes:
         modes = change.element.modes
         if change.rebound or change.given or change.lost or modes[change.before].form != modes[change.after].form:
-            _, *totals = found.setdefault(change.time, (change.element.part.name, {}, {}))
-            for total, energies in zip(totals, (change.given, change.lost), strict=True):
-                for part, energy in energies.items():
-                    total[part] = total.get(part, 0.0) + energy
-    return tuple(Impact(time, *at_once) for time, at_once in found.items())
+            found.append(Impact(change.time, change.element.part.name, change.given, change.lost))
+    by_time: dict[float, Impact] = {}
+    for made in found:
+        known = by_time.get(made.time, Impact(made.time, "", {}, {}))
+        energies = (_sums(known.given, made.given), _sums(known.lost, made.lost))
+        by_time[made.time] = Impact(made.time, known.part or made.part, *energies)
+    return tuple(by_time.values())
+
+
+def _sums(first: Mapping[str, float], second: Mapping[str, float]) -> dict[str, float]:
+    """Energies by part of two together."""
+    return {part: first.get(part, 0.0) + second.get(part, 0.0) for part in (*first, *second)}
 
 
 def _events(changes: Iterable[Change]) -> Iterator[tuple[float, str, str, str]]:
