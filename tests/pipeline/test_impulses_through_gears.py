@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from random import Random
 from typing import Any
 
 import pytest
@@ -192,6 +193,26 @@ def test_a_jump_of_a_prescribed_speed_is_supplied_and_what_a_gear_loses_in_it_is
     assert sol.energy.supplied[-1] == pytest.approx(supplied, rel=1e-12)
     assert sol.energy.supplied_by["drive"] == pytest.approx(supplied, rel=1e-12)
     assert sol.energy.lost_in["part"] == pytest.approx(lost, rel=1e-12)
+
+
+@pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials"])
+@pytest.mark.parametrize("seed", [5, 7, 11, 23])
+def test_a_jump_that_a_spring_takes_up_is_no_impact_for_a_gear(engine: str, seed: int) -> None:
+    """No impulse passes: a gear that turns goes on turning, though rounding might say that it is stopped."""
+    random = Random(seed)  # noqa: S311 (no secret)
+    net = sw.Network("jump")
+    net.add(sw.SpeedSource("drive", omega=sw.Step(random.uniform(1, 3), 0.3)), "d")
+    net.add(sw.Spring("first", c=random.uniform(50, 6000)), "d", "a")
+    net.add(sw.Inertia("J0", J=random.uniform(0.05, 2)), "a")
+    net.add(sw.Spring("second", c=random.uniform(10, 300)), "a", "b")
+    net.add(sw.Inertia("J1", J=random.uniform(0.05, 2)), "b")
+    net.add(sw.LossyGear("gear", ratio=random.uniform(0.5, 2), efficiency=0.67, efficiency_back=0.4), "b", "c")
+    net.add(sw.Inertia("J2", J=random.uniform(0.05, 2)), "c")
+    start = {"J0.omega": random.uniform(-3, 3), "J1.omega": random.uniform(-3, 3)}
+    sol = net.simulate(0.4, engine=engine, rtol=1e-9, initial=start)
+    before, after = (sol.at([t]) for t in (0.3 - 1e-9, 0.3 + 1e-9))
+    for name in ("J0.omega", "J1.omega", "J2.omega"):
+        assert after[name][0] == pytest.approx(before[name][0], abs=1e-4)  # 2e-9 s at 1e4 rad/s2
 
 
 def test_impacts_of_one_instant_lose_in_their_own_parts() -> None:
