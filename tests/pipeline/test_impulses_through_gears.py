@@ -195,6 +195,23 @@ def test_a_jump_of_a_prescribed_speed_is_supplied_and_what_a_gear_loses_in_it_is
     assert sol.energy.lost_in["part"] == pytest.approx(lost, rel=1e-12)
 
 
+@pytest.mark.parametrize("gears", [1, 3])
+def test_small_impacts_leave_gears_alone_that_they_do_not_reach(gears: int) -> None:
+    """Ever slower impacts on the one side of a spring, heavy gears on the other: they have rounding, and no impulse."""
+    net = sw.Network("elsewhere")
+    net.add(sw.Inertia("ball", J=0.1), "a")
+    net.add(sw.HardStop("stop", lower=0.0, restitution=0.6), "a")
+    net.add(sw.TorqueSource("weight", tau=-1.0), "a")
+    net.add(sw.Spring("spring", c=0.01), "a", "n0")
+    for k in range(gears):
+        net.add(sw.Inertia(f"J{k}", J=3.7 + k), f"n{k}")
+        net.add(sw.LossyGear(f"gear{k}", ratio=1.3, efficiency=0.8, efficiency_back=0.6), f"n{k}", f"n{k + 1}")
+    net.add(sw.Inertia("last", J=2.9), f"n{gears}")
+    sol = net.simulate(2.0, initial={"stop.phi": 0.1, "J0.omega": 3.3})
+    assert sum(event[1] == "stop" for event in sol.events) > 15
+    assert {event[1] for event in sol.events if event[0] > 0} == {"stop"}
+
+
 @pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials"])
 @pytest.mark.parametrize("seed", [5, 7, 11, 23])
 def test_a_jump_that_a_spring_takes_up_is_no_impact_for_a_gear(engine: str, seed: int) -> None:

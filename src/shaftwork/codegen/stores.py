@@ -126,6 +126,11 @@ class Stores:
             energy += 0.5 * held[name] ** 2 * (1 / coefficient if name in self.through else coefficient)
         return energy
 
+    def momentum(self, bound: BoundArrays, held: Mapping[str, float]) -> float:
+        """The largest momentum of an inertia or mass: by what part of it an impulse is uncertain."""
+        inertias = (pair for pair in self._branches.items() if pair[0] not in self.through)
+        return max((abs(float(bound.part.coefficients[k]) * held[name]) for name, k in inertias), default=0.0)
+
     def impulses(self, bound: BoundArrays, gained: Mapping[str, float]) -> Array:
         """(branches,) what passes through every branch at once where stores gain so much; of a coupling its lambda.
 

@@ -199,7 +199,7 @@ class Impacts:
             return Blow(new, new.regime)
 
         x = regime.assembly.bound(regime.p).impulse(moment.x, before, after)
-        stages = (Stage(begins, Blow(moment._replace(x=x), regime), 1.0),)
+        stages: tuple[Stage, ...] = (Stage(begins, Blow(moment._replace(x=x), regime), 1.0),)
         # where springs alone take the jump up no impulse passes, and rounding would tell the way of it through gears
         held = self._regimes.held(stages[0].blow.after, after)
         passes = any(abs(v - begins.held[name]) > NO_IMPACT * max(abs(v), 1.0) for name, v in held.items())

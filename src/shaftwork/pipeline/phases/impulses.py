@@ -175,7 +175,9 @@ class Impulses:
             return None
         assembly, p = found.passing.assembly, found.passing.p
         impulses = self._impulses(t, start, found)
-        least = NOTHING_OF * np.abs(impulses).max(initial=0.0)
+        # a gear elsewhere has the rounding of what moves there, however small the impact is
+        momentum = assembly.stores.momentum(assembly.bound(p), start.held)
+        least = NOTHING_OF * max(np.abs(impulses).max(initial=0.0), momentum)
         ways = [
             (_guard(assembly, k, leave, impulses, p), k, leave.to)
             for k in self.gears
