@@ -372,3 +372,22 @@ def test_a_brake_whose_torque_falls_with_the_angle_stops_where_it_should_and_let
     twist = 4.0 - 4.0 * math.cosh(root * stops) + 5.0 / root * math.sinh(root * stops)
     assert words(sol) == [("brake", "slipping forward", "locked"), ("brake", "locked", "slipping forward")]
     assert times(sol) == pytest.approx([stops, 2.0 + 8.0 - 2.0 * twist], abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    "friction", [sw.Clutch("k", tau=0.1), sw.DryFriction("k", tau_c=0.1)], ids=lambda part: type(part).__name__
+)
+def test_a_friction_in_series_with_a_spring_needs_an_inertia_between(friction: sw.Component) -> None:
+    """Without one the spring would be wound up the moment that the friction slips, even from rest. Hooke and Coulomb in
+    series: 0.1 N m wind it up by 0.01 rad, then it slips.
+    """
+    net = sw.Network("in series")
+    net.add(sw.SpeedSource("drive", omega=0.5), "a")
+    net.add(friction, "a", "m")
+    net.add(sw.Spring("s", c=10.0), "m", "ground")
+    with pytest.raises(sw.NetworkError, match=r"massless node: node 'm' has no inertia: the torque of Spring 's'"):
+        net.compile()
+    net.add(sw.Inertia("M", J=1e-9), "m")
+    sol = net.simulate(0.04, t_eval=[0.0, 0.01, 0.04])
+    # the small inertia swings on by 0.5 rad/s sqrt(1e-9 / 10) s
+    assert sol["s.tau"] == pytest.approx([0.0, 0.05, 0.1], abs=6e-5)

@@ -222,3 +222,14 @@ def test_what_is_no_train_and_no_side_is_refused() -> None:
         sw.reduce.refer("x", to="a")  # type: ignore[arg-type]
     with pytest.raises(sw.ParameterError, match="'x' is no network"):
         sw.reduce.simplify("x", 3)  # type: ignore[arg-type]
+
+
+def test_a_chain_at_a_node_that_moves_along_a_line_is_refused_with_the_reason() -> None:
+    net = sw.Network("lift")
+    net.add(sw.Inertia("D", J=0.5), "d")
+    net.add(sw.Drum("drum", radius=0.3), "d", "r")
+    net.add(sw.TranslationalSpring("rope", c=1e4), "r", "cab")
+    net.add(sw.Mass("cabin", m=300.0), "cab")
+    with pytest.raises(sw.NetworkError, match="no part turns"):
+        sw.reduce.simplify(net, 2, "rope", to="cab")
+    assert sw.reduce.simplify(net, 2, "rope", to="d")

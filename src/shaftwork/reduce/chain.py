@@ -237,7 +237,10 @@ def _not_a_row(stations: dict[str, Station], links: dict[tuple[str, str], list[P
             yield Problem(
                 "branching", f"At node '{node}' {len(beside)} shafts meet.", "Simplify one branch.", (), (node,)
             )
-    if len(links) != len(stations) - 1:
+    if not stations:
+        what = "no part turns: the reference of the train is a node that moves along a line"
+        yield Problem("no row", f"{what}.", "Give a node that turns, to='...'.")
+    elif len(links) != len(stations) - 1:
         what = f"{len(stations)} nodes are joined by {len(links)} shafts"
         yield Problem("no row", f"{what}; a chain has one shaft less than nodes.", "Open the loop, or join the parts.")
 

@@ -80,7 +80,11 @@ def structural_problems(form: StateForm) -> tuple[Problem, ...]:
     return (
         *view.prescribed_twice(),
         *controlled_problems(view),
-        *(view.unbalanced() if form.tree.unbalanced else (*view.massless(), *view.implicit(), *view.undetermined())),
+        *(
+            view.unbalanced()
+            if form.tree.unbalanced
+            else (*view.massless(), *view.implicit(), *view.wound(), *view.undetermined())
+        ),
         *view.locked(),
         *view.jumping(),
         *view.redundant(),
@@ -140,6 +144,27 @@ class _Structure(View):
             )
             hint = f"Give the node some {words.store}, however small{self.spelling.suggestion(nodes)}."
             yield Problem("algebraic loop", message, hint, self.parts([law, *losses]), nodes)
+
+    def wound(self) -> Iterator[Problem]:
+        """Springs that a friction without inertia behind it would wind up at once when it begins to slip."""
+        for spring in self.tree.tree[Kind.THROUGH_STORE]:
+            laws = [branch for branch in self.cutsets.get(spring, ()) if self._holds(branch)]
+            if not laws:
+                continue
+            branch, words = self.graph.branches[spring], self.words(spring)
+            moved = self.moved[spring]
+            nodes = self.nodes(node for node in moved if node in (branch.plus, branch.minus)) or self.nodes(moved)
+            message = (
+                f"{at_nodes(nodes)} has no {words.store}: the {words.through} of {self.titles([spring])} would be that "
+                f"of {self.titles(laws)} at every instant, and jump where its mode changes."
+            )
+            hint = f"Give the node some {words.store}, however small{self.spelling.suggestion(nodes)}."
+            yield Problem("massless node", message, hint, self.parts([spring, *laws]), nodes)
+
+    def _holds(self, law: int) -> bool:
+        """Whether the part of a law holds in another mode, up to a torque: a friction, a brake."""
+        modes = (mode for modes in self.graph.part_of(law).modes for mode in modes.options)
+        return self.kind(law) in (Kind.LAW, Kind.THROUGH_SOURCE) and any(mode.gives_way for mode in modes)
 
     def undetermined(self) -> Iterator[Problem]:
         """Nodes whose speed or voltage nothing fixes, group by group."""

@@ -45,7 +45,8 @@ class View:
     def __init__(self, form: StateForm) -> None:
         self.form, self.graph, self.tree = form, form.graph, form.tree
         self.spelling = Spelling(form.graph.nodes)
-        wanted = {*form.tree.tree[Kind.THROUGH_SOURCE], *form.tree.tree[Kind.LAW], *form.tree_conductances}
+        springs = form.tree.tree[Kind.THROUGH_STORE] if any(part.modes for part in form.graph.parts) else ()
+        wanted = {*form.tree.tree[Kind.THROUGH_SOURCE], *form.tree.tree[Kind.LAW], *form.tree_conductances, *springs}
         self.moved: dict[int, list[int]] = {branch: [] for branch in wanted}
         for node, row in enumerate(form.tree.potentials if wanted else ()):
             for branch in wanted.intersection(row or ()):
