@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib.util
 import os
 
+import pytest
+
 # The matrices of the tests are small: threads that wait for each other would cost several times the work. This must be
 # said before numpy is loaded.
 for library in ("OMP", "OPENBLAS", "MKL"):
@@ -16,3 +18,10 @@ if importlib.util.find_spec("heyoka") is not None:
     # Thousands of random networks are compiled once each: they are not worth keeping, on disk or in memory.
     heyoka.llvm_state.set_diskcache_enabled(False)
     heyoka.llvm_state.set_memcache_limit(2**28)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Random networks run without the coverage tool: it would double their time, and other tests reach every line."""
+    for item in items:
+        if getattr(getattr(item, "function", None), "is_hypothesis_test", False):
+            item.add_marker("no_cover")
