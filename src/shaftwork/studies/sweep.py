@@ -81,9 +81,7 @@ def sweep(
     limits = _limits(require, readers)
     _, end = time_span(0.0, t_end)
     (name,) = engine_names([engine])
-    count = None if processes is None else whole(processes)
-    if processes is not None and count is None:
-        raise ParameterError(f"processes = {processes!r} must be a number, 1 or more; leave it out for all cores.")
+    count = _count(processes)
     options = {"rtol": relative_tolerance(rtol), "engine": name, "initial": initial, "t_eval": t_eval}
     if t_eval is None and all(isinstance(reader, Measure) for reader in readers.values()):
         options["t_eval"] = 2  # they read the motion between these
@@ -93,6 +91,13 @@ def sweep(
     why = worker.why or (f"{left} of {len(task)} variants ran one by one: {LEFT}" if left else "")
     measured = dict(zip(readers, values.T, strict=True))
     return Sweep(net.name, columns, measured, limits, reasons, why)
+
+
+def _count(processes: int | None) -> int | None:
+    """How many processes; None for as many as there are cores."""
+    if processes is not None and (count := whole(processes)) is None:
+        raise ParameterError(f"processes = {processes!r} must be a number, 1 or more; leave it out for all cores.")
+    return None if processes is None else count
 
 
 def _run(task: Task, worker: Worker, processes: int | None, store: Store | None) -> tuple[Array, tuple[str, ...], int]:
