@@ -367,7 +367,8 @@ def test_a_guard_that_is_met_just_after_a_sample_leaves_extremes_right() -> None
     slow = sweep(net, samples=samples, t_end=2.5, measures=names, engine="scipy", rtol=1e-10)
     assert fast.why == ""
     for name in names:
-        np.testing.assert_allclose(fast.measures[name], slow.measures[name], rtol=1e-8, err_msg=name)
+        size = np.abs(slow.measures["max J1.omega"] if name.endswith("omega") else 100.0).max()  # of the motion
+        np.testing.assert_allclose(fast.measures[name], slow.measures[name], atol=1e-9 * size, rtol=0, err_msg=name)
 
 
 def test_what_none_passes_is_a_table_of_no_rows() -> None:

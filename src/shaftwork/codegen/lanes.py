@@ -1,23 +1,25 @@
-"""Many variants side by side: one heyoka program whose lanes are variants, each with its own time, states, parameters.
+"""Many variants side by side: one compiled step whose lanes are variants, each with its own time, state, parameters.
 
-A lane in which a guard is met stands still from there on: its rates are multiplied by a parameter that is 1 while it
-runs and 0 afterwards. So the others go on, and its states at the guard are its states at the end.
+The step is one function of heyoka's, straight through all stages of the method, with the control of the step size in
+it: a lane that is not accurate enough stays where it is and gets a smaller step. So no lane waits for another, and what
+comes out for one does not depend on those beside it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import heyoka
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import DOP853
 from sympy import Expr, Symbol
 
 from shaftwork.codegen.fixed import Fixed
-from shaftwork.codegen.heyoka import COOLDOWN, HeyokaProgram
+from shaftwork.codegen.heyoka import HeyokaProgram
 from shaftwork.codegen.heyoka_expressions import Translator
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError
@@ -25,26 +27,25 @@ from shaftwork.reduction.rows import Rows
 
 Array = NDArray[np.float64]
 
-WIDTH = 8
-"""Lanes of one run: of more the program takes longer to compile and the lanes wait for each other, of fewer there are
-more calls."""
-BLOCK = 4096
-"""Points at which a function is evaluated at once."""
+SAFETY, LEAST_FACTOR, MOST_FACTOR = 0.85, 0.2, 5.0
+"""Of the next step by the error of this one."""
+TINY = 1e-30
+"""Beside an error."""
+JET = 3
+"""What is known of a quantity at a time: its value and its first two derivatives by time."""
 
 
 @dataclass(frozen=True)
 class LaneFunction:
-    """Expressions as a function of many times, states and parameters at once.
+    """Expressions as a function of many states, parameters and times at once.
 
     Args:
         expressions: heyoka's, in its parameters.
-        variables: heyoka's state variables.
-        often: whether it is asked so often that optimising it is worth while.
+        variables: heyoka's variables.
     """
 
     expressions: tuple[Any, ...]
     variables: tuple[Any, ...]
-    often: bool = True
 
     @cached_property
     def _compiled(self) -> tuple[Any, list[int]]:
@@ -53,33 +54,28 @@ class LaneFunction:
         used = sorted(int(str(parameter)[1:]) for parameter in read)
         renamed = {heyoka.par[number]: heyoka.par[k] for k, number in enumerate(used)}
         made = heyoka.subs(list(self.expressions), renamed) if used else list(self.expressions)
-        return heyoka.cfunc(made, vars=list(self.variables), opt_level=3 if self.often else 0), used
+        # fast_math: a quarter faster; what is not finite is found by whoever asks
+        return heyoka.cfunc(made, vars=list(self.variables), opt_level=1, fast_math=True), used
 
     def __call__(self, t: Array, x: Array, p: Array) -> Array:
-        """Values (expressions, [m,] k) at times ([m,] k) in s, states (n, [m,] k), parameters (parameters, k)."""
-        made = np.empty((len(self.expressions), *t.shape))
-        if not self.expressions or not t.size:
-            return made
-        function, used = self._compiled
-        if t.ndim == 1:
-            made[:] = self._at(function, t, x, p[used])
-            return made
-        rows = max(1, BLOCK // t.shape[-1])  # fresh memory costs more than the arithmetic
-        given = np.tile(p[used], rows)
-        for first in range(0, len(t), rows):
-            block = slice(first, first + rows)
-            shape, size = t[block].shape, t[block].size
-            found = self._at(function, t[block].ravel(), x[:, block].reshape(len(x), size), given[:, :size])
-            made[:, block] = found.reshape(len(made), *shape)
+        """Values (expressions, k) at times (k,) in s, states (n, k), parameters (parameters, k)."""
+        made = np.empty((len(self.expressions), t.size))
+        if self.expressions and t.size:
+            function, _ = self._compiled
+            given: dict[str, Any] = {"time": np.ascontiguousarray(t)} if function.is_time_dependent else {}
+            self.into(made, np.ascontiguousarray(x), self.taken(p), **given)
         return made
 
-    def _at(self, function: Any, t: Array, x: Array, p: Array) -> Array:
-        """(expressions, k) at times (k,), states (n, k), parameters (used, k)."""
-        given: dict[str, Any] = {"pars": np.ascontiguousarray(p)} if len(p) else {}
-        given["batch_parallel"] = False  # to hand out blocks so small costs more than it brings
-        if function.is_time_dependent:
-            given["time"] = np.ascontiguousarray(t)
-        return np.asarray(function(np.ascontiguousarray(x), **given))
+    def taken(self, p: Array) -> Array:
+        """Of the parameters (parameters, k) those that are read."""
+        return np.ascontiguousarray(p[self._compiled[1]])
+
+    def into(self, made: Array, x: Array, taken: Array, **given: Any) -> None:
+        """Write values (expressions, k) for variables (n, k) and what is `taken` of the parameters, all contiguous."""
+        function, used = self._compiled
+        if used:
+            given["pars"] = taken
+        function(x, outputs=made, batch_parallel=False, **given)  # to hand out so few costs more than it brings
 
 
 @dataclass(frozen=True)
@@ -91,8 +87,7 @@ class LaneProgram:
         rates: heyoka expressions of the derivatives.
         guards: heyoka expressions that end a lane where they rise through zero on their side.
         integrands: heyoka expressions whose integrals are further states, behind the others.
-        parameter_count: number of the model's parameters; what is fixed by them follows, then whether a lane runs, and
-            the sides and offsets of the guards.
+        parameter_count: number of the model's parameters; what is fixed by them follows.
         fixed: what is made of the model's parameters alone.
     """
 
@@ -102,70 +97,125 @@ class LaneProgram:
     integrands: tuple[Any, ...]
     parameter_count: int
     fixed: Fixed
-    _compiled: dict[float, Any] = field(default_factory=dict, repr=False, compare=False)
-    _met: dict[int, tuple[int, float]] = field(default_factory=dict, repr=False, compare=False)
-
-    @property
-    def _first(self) -> int:
-        """Place of the parameter that says whether a lane runs."""
-        return self.parameter_count + len(self.fixed.found)
 
     def parameters(self, p: Array) -> Array:
         """(parameters, k) those of the model and what is fixed by them, from those of the model alone."""
         return np.concatenate([p, self.fixed.values(p)])
 
-    def derivatives(self, expression: Any, count: int) -> tuple[Any, ...]:
-        """A heyoka expression and its first derivatives by time along the motion."""
+    def jet(self, expression: Any) -> tuple[Any, ...]:
+        """A heyoka expression and its first two derivatives by time along the motion."""
         made, time = [expression], heyoka.expression("time")  # by its own time heyoka does not differentiate
-        for _ in range(count):
+        for _ in range(JET - 1):
             (free,) = heyoka.subs([made[-1]], {heyoka.time: time})
             terms = [heyoka.diff(free, state) * rate for state, rate in zip(self.variables, self.rates, strict=True)]
             made += heyoka.subs([heyoka.sum([heyoka.diff(free, time), *terms])], {time: heyoka.time})
         return tuple(made)
 
+
+class LaneStep:
+    """One step of a lane, with its error and the size of the next one; Dormand and Prince's method of order 8(5,3).
+
+    Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.10. The tolerance is a part
+    of the size of a state: of its value, of its change in the step and of its nominal size together.
+
+    A lane is a column of *rows*: states, integrals, time, and the size of the next step. Behind its parameters come its
+    *limits*: the tolerance, the end and the longest step, and nominal sizes of the states.
+
+    Args:
+        program: the system.
+        shown: heyoka expressions of which jets are wanted; the guards follow them.
+    """
+
+    def __init__(self, program: LaneProgram, shown: Sequence[Any]) -> None:
+        self.states, self.rows = len(program.variables), len(program.variables) + len(program.integrands) + 2
+        self.first_limit = program.parameter_count + len(program.fixed.found)
+        jets = [made for expression in (*shown, *program.guards) for made in program.jet(expression)]
+        self._jets, self._room = len(jets), np.empty(0)
+        self._function = self._written(program, jets)
+
     @property
-    def met(self) -> dict[int, tuple[int, float]]:
-        """By lane of the last run, the guard that it has met and when, s."""
-        return self._met
+    def height(self) -> int:
+        """Number of values that a step writes for a lane: the rows after it, and the jets before it."""
+        return self.rows + self._jets
 
-    def integrator(self, tolerance: float) -> Any:
-        """The `heyoka.taylor_adaptive_batch` for a relative tolerance; one compilation for each tolerance."""
-        if tolerance not in self._compiled:
-            heyoka.set_logger_level_error()  # a lane that fails says so itself
-            running = heyoka.par[self._first]
-            integrals = [heyoka.expression(f"integral{k}") for k in range(len(self.integrands))]
-            pairs = zip((*self.variables, *integrals), (*self.rates, *self.integrands), strict=True)
-            system = [(variable, running * rate) for variable, rate in pairs]
-            events = [self._event(number, guard) for number, guard in enumerate(self.guards)]
-            options = {"t_events": events} if events else {}
-            count = self._first + 1 + 2 * len(self.guards)
-            self._compiled[tolerance] = heyoka.taylor_adaptive_batch(
-                system,
-                np.zeros((len(system), WIDTH)),
-                pars=np.zeros((count, WIDTH)),
-                tol=tolerance,
-                fast_math=True,  # an eighth faster; lanes that are not finite are found by their states
-                **options,
-            )
-        return self._compiled[tolerance]
+    def room(self, size: int) -> Array:
+        """(size,) for steps, the same each time: fresh memory costs as much as the arithmetic."""
+        if self._room.size < size:
+            self._room = np.empty(size)
+        return self._room[:size]
 
-    def _event(self, number: int, guard: Any) -> Any:
-        first = self._first + 1
-        side, offset = heyoka.par[first + number], heyoka.par[first + len(self.guards) + number]
-        met, running = self._met, slice(self._first, first + len(self.guards))
+    def taken(self, p: Array, sizes: Array) -> Array:
+        """What is read of parameters (parameters, k) and limits, with nominal sizes (n,) and no limits yet."""
+        limits = np.ones((3, p.shape[1]))
+        return self._function.taken(np.concatenate([p, limits, np.repeat(sizes[:, None], p.shape[1], axis=1)]))
 
-        def stop(integrator: Any, _direction: int, lane: int) -> bool:
-            if lane not in met:
-                met[lane] = number, float(integrator.time[lane])
-                integrator.pars[running, lane] = 0.0
-            return True
+    def limit(self, taken: Array, tolerance: float, end: Array | float, longest: float) -> None:
+        """Set the limits in what is `taken`: the tolerance, the end and the longest step, s."""
+        first = -(3 + self.states)
+        taken[first], taken[first + 1], taken[first + 2] = tolerance, end, longest
 
-        return heyoka.t_event_batch(
-            heyoka.select(side, side * guard - offset, heyoka.expression(-1.0)),
-            direction=heyoka.event_direction.positive,
-            callback=stop,
-            cooldown=COOLDOWN,
-        )
+    def __call__(self, rows: Array, taken: Array, made: Array) -> None:
+        """Write a step (height, k) of lanes (rows, k), all contiguous."""
+        self._function.into(made, rows, taken)
+
+    def _written(self, program: LaneProgram, jets: Sequence[Any]) -> LaneFunction:
+        time, step = heyoka.make_vars("time", "step")
+        integrals = [heyoka.expression(f"integral{k}") for k in range(len(program.integrands))]
+        limit = [heyoka.par[self.first_limit + k] for k in range(3 + self.states)]
+        (tolerance, end, longest), sizes = limit[:3], limit[3:]
+        left = end - time
+        wanted = heyoka.select(heyoka.lt(step, longest), step, longest)
+        size = heyoka.select(heyoka.lt(wanted, left), wanted, left)
+        old = [*program.variables, *integrals]
+        stages = _stages(program, time, size)
+        new = [_moved(x, size, DOP853.B, slopes) for x, slopes in zip(old, stages, strict=True)]
+        error = _error(size, tolerance, sizes, old, stages[: self.states])
+        factor = SAFETY / heyoka.sqrt(heyoka.sqrt(heyoka.sqrt(error + TINY)))  # the error is of order 8
+        factor = heyoka.select(heyoka.lt(factor, MOST_FACTOR), factor, heyoka.expression(MOST_FACTOR))
+        factor = heyoka.select(heyoka.gt(factor, LEAST_FACTOR), factor, heyoka.expression(LEAST_FACTOR))
+        good = heyoka.lte(error, 1.0)
+        arrived = heyoka.select(heyoka.lt(wanted, left), time + size, end)
+        after = [heyoka.select(good, moved, x) for x, moved in zip([*old, time], [*new, arrived], strict=True)]
+        here = heyoka.subs(list(jets), {heyoka.time: time}) if jets else []
+        return LaneFunction((*after, size * factor, *here), (*old, time, step))
+
+
+def _stages(program: LaneProgram, time: Any, size: Any) -> list[list[Any]]:
+    """Slopes at the stages of a step, by state and integral."""
+    slopes: list[list[Any]] = [[] for _ in (*program.rates, *program.integrands)]
+    expressions = [*program.rates, *program.integrands]
+    for weights, part in zip(DOP853.A, DOP853.C, strict=True):
+        there = {x: _moved(x, size, weights, before) for x, before in zip(program.variables, slopes, strict=False)}
+        for before, slope in zip(
+            slopes, heyoka.subs(expressions, {**there, heyoka.time: time + part * size}), strict=True
+        ):
+            before.append(slope)
+    return slopes
+
+
+def _moved(x: Any, size: Any, weights: Array, slopes: Sequence[Any]) -> Any:
+    """A state moved along slopes."""
+    return x + size * _weighted(weights, slopes)
+
+
+def _weighted(weights: Array, slopes: Sequence[Any]) -> Any:
+    """The sum of slopes with weights."""
+    terms = [weight * slope for weight, slope in zip(weights.tolist(), slopes, strict=False) if weight]
+    return heyoka.sum(terms) if terms else heyoka.expression(0.0)
+
+
+def _error(size: Any, tolerance: Any, nominal: Sequence[Any], old: Sequence[Any], stages: Sequence[list[Any]]) -> Any:
+    """The error of a step as a part of what is allowed: of order 5 and of order 3 as in the method's own program."""
+    squares = []
+    for weights in (DOP853.E5, DOP853.E3):
+        parts = []
+        for x, slopes, least in zip(old, stages, nominal, strict=False):
+            allowed = least * least + x * x + (size * slopes[0]) * (size * slopes[0])
+            missed = _weighted(weights, slopes)
+            parts.append(missed * missed / allowed)
+        squares.append(heyoka.sum(parts))
+    fifth, third = squares
+    return size * fifth / (tolerance * heyoka.sqrt(fifth + 0.01 * third + TINY * TINY))
 
 
 def lane_program(program: HeyokaProgram, rows: Rows, integrands: Sequence[Expr]) -> LaneProgram:

@@ -1,111 +1,154 @@
-"""Variants side by side through one heyoka program, each up to its own guard or end."""
+"""Variants side by side, each with steps of its own, a number of steps at a time."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shaftwork.integrate.heyoka_taylor import LOOSEST_TOLERANCE, TIGHTEST_TOLERANCE
 from shaftwork.integrate.problem import Array
 
-# A step is at most so many output intervals long: where a motion starts as a polynomial, the last terms of a series are
-# zero and would let the first step have no end.
-LONGEST_STEP = 2.0
-ARRIVED = (-(2**32) - 3, -(2**32) - 1)
-"""heyoka's outcomes time_limit and success."""
+LOOK = 8
+"""After so many steps it is looked whether all lanes have come to the end."""
+OF_A_STEP, LOOSEST_TOLERANCE, TIGHTEST_TOLERANCE = 0.1, 1e-7, 1e-13
+"""The tolerance of a step as a part of that of the motion, and its bounds."""
+FIRST_STEPS, MOST_AT_ONCE = 32, 64
+"""Steps of every lane before it is looked at what they have met: at first, and twice as many each time up to these."""
 MOST_STEPS = 1_000_000
-"""Of one lane, between two changes of mode."""
-Block = tuple[Array, Array, Array, Array]
-"""Of some lanes: start states, parameters, output times, and (1, width) the longest steps in s."""
+"""Of a lane, between two changes of mode."""
+FIRST_CHANGE = 0.01
+"""The first step may change a state by so much of its size."""
+WITHOUT_LIMIT = 1e300
+STILL = 8 * float(np.finfo(float).eps)
+"""A step that is shorter than this part of the time leads nowhere."""
+WIDTH = 8
+"""Lanes are a multiple of this many: a compiled function takes so many at once, and rounds what is left differently."""
+
+Index = NDArray[np.intp]
+Mask = NDArray[np.bool_]
 
 
-@dataclass(frozen=True, eq=False)
-class Lanes:
-    """Variants over one stretch of their motion.
+class Steps:
+    """Some steps of lanes.
 
     Args:
-        t: (m, k) output times in s; after its guard a lane stays there.
-        x: (m, n, k) states and, behind them, integrals.
-        met: (k,) guard at which a lane has ended, or -1.
-        good: (k,) whether it came there.
-        steps: (k,) that it took.
+        step: a `codegen.lanes.LaneStep`.
+        taken: (used, k) what it takes of the parameters.
+        made: (m + 1, height, k): rows at the start, and what each of m steps has written.
     """
 
-    t: Array
-    x: Array
-    met: NDArray[np.intp]
-    good: NDArray[np.bool_]
-    steps: NDArray[np.intp]
+    def __init__(self, step: Any, taken: Array, made: Array) -> None:
+        self._step, self._taken, self._made = step, taken, made
+        self.t: Array = made[:-1, step.rows - 2]
+        """(m, k) times in s at the start of each step; a lane that is at its end stays there."""
+        self.jets: Array = made[1:, step.rows :].swapaxes(0, 1)
+        """(jets, m, k) what the step shows there."""
+
+    @cached_property
+    def longest(self) -> Array:
+        """(k,) of each lane, s."""
+        return np.asarray(np.diff(self.t, axis=0).max(axis=0))
+
+    @property
+    def last(self) -> Array:
+        """(rows, k) at the start of the last step."""
+        return np.asarray(self._made[-2, : self._step.rows])
+
+    def at(self, start: Index, own: Index, t: Array) -> tuple[Array, Array]:
+        """Rows (rows, c) and jets (jets, c) at times (c,) in s, from the starts (c,) of steps of lanes (c,)."""
+        step, count = self._step, own.size
+        every = _padded(count)
+        start, own, t = start[every], own[every], t[every]
+        rows = np.ascontiguousarray(self._made[start, : step.rows, own].T)
+        rows[-1] = WITHOUT_LIMIT
+        taken = np.ascontiguousarray(self._taken[:, own])
+        step.limit(taken, WITHOUT_LIMIT, t, WITHOUT_LIMIT)
+        there, here = np.empty((2, step.height, own.size))
+        step(rows, taken, there)
+        step(there[: step.rows], taken, here)
+        return there[: step.rows, :count], here[step.rows :, :count]
+
+    def cut(self, start: Index, t: Array, jets: Array) -> None:
+        """Let lanes stay at times (k,) in s with jets (jets, k), from behind the starts (k,) of steps on."""
+        later = np.arange(len(self.t))[:, None] > start
+        np.copyto(self.t, t, where=later)
+        for own, jet in zip(self.jets, jets, strict=True):
+            np.copyto(own, jet, where=later)
 
 
-def run_lanes(program: Any, x: Array, p: Array, sides: Array, offsets: Array, t: Array, rtol: float) -> Lanes:
-    """Integrate variants of one system.
+class LaneRun:
+    """Lanes on their way.
 
     Args:
-        program: a `codegen.lanes.LaneProgram`.
-        x: (n, k) start states.
+        step: a `codegen.lanes.LaneStep`.
+        x: (n, k) states.
+        rates: (n, k) theirs.
+        t: (k,) s.
         p: (parameters, k).
-        sides: (guards,) on which each is met.
-        offsets: (guards, k) how far beyond zero it has to go.
-        t: (m, k) output times in s, strictly increasing, the first one the start.
+        sizes: (n,) nominal, of the states.
+        limits: end of the motion and the longest step, s.
         rtol: relative tolerance.
     """
-    integrator = program.integrator(min(max(rtol, TIGHTEST_TOLERANCE), LOOSEST_TOLERANCE))
-    width, count = integrator.batch_size, t.shape[1]
-    padded = np.minimum(np.arange(-(-count // width) * width), count - 1)  # the last one stands in for what is missing
-    start = np.zeros((integrator.dim, count))
-    start[: len(x)] = x
-    full = np.concatenate([p, np.ones((1, count)), np.repeat(sides[:, None], count, axis=1), offsets])
-    longest = LONGEST_STEP * (t[-1:] - t[:1]) / (len(t) - 1)
-    given = (start, full[: len(integrator.pars)], t, longest)  # heyoka keeps no parameters behind the last one it reads
-    blocks = zip(*(_blocks(values, padded, width) for values in given), strict=True)
-    ends, met = np.full(padded.size, np.inf), np.full(padded.size, -1, dtype=np.intp)
-    states, steps = np.empty((len(t), integrator.dim, padded.size)), []
-    for first, block in zip(range(0, padded.size, width), blocks, strict=True):
-        states[:, :, first : first + width] = _run(program, integrator, block)
-        steps += [taken for _, _, _, taken in integrator.propagate_res]
-        for lane, (guard, time) in program.met.items():
-            met[first + lane], ends[first + lane] = guard, time
-    good = np.isfinite(states[-1]).all(axis=0)
-    times = np.minimum(t, ends[:count]) if np.isfinite(ends).any() else t
-    return Lanes(times, states[:, :, :count], met[:count], good[:count], np.array(steps[:count]))
+
+    def __init__(
+        self,
+        step: Any,
+        x: Array,
+        rates: Array,
+        t: Array,
+        p: Array,
+        sizes: Array,
+        limits: tuple[float, float],
+        rtol: float,
+    ) -> None:
+        self._step, self._end = step, limits[0]
+        with np.errstate(divide="ignore"):
+            first = FIRST_CHANGE * ((sizes[:, None] + np.abs(x)) / np.abs(rates)).min(axis=0)
+        rows, taken = np.zeros((step.rows, t.size)), step.taken(p, sizes)
+        rows[: len(x)], rows[-2], rows[-1] = x, t, np.minimum(first, limits[1])
+        step.limit(taken, min(max(OF_A_STEP * rtol, TIGHTEST_TOLERANCE), LOOSEST_TOLERANCE), *limits)
+        self._count, self._block = 0, FIRST_STEPS
+        self._take(np.arange(t.size), rows, taken)
+
+    def _take(self, lanes: Index, rows: Array, taken: Array) -> None:
+        """Go on with some lanes (k,) from rows (rows, k), with what is `taken` (used, k) of their parameters."""
+        self.lanes = lanes
+        """(k,) numbers of the lanes that are on their way."""
+        every = _padded(lanes.size)
+        self._rows, self._taken = (np.ascontiguousarray(values[:, every]) for values in (rows, taken))
+
+    def go(self) -> tuple[Steps, Mask]:
+        """Some steps of the lanes that are on their way, and (k,) whether each of them goes well.
+
+        The steps are gone with the next ones.
+        """
+        step, count = self._step, self.lanes.size
+        shape = self._block + 1, step.height, self._rows.shape[1]
+        made = step.room(math.prod(shape)).reshape(shape)
+        made[0, : step.rows] = self._rows
+        for k in range(self._block):
+            step(made[k, : step.rows], self._taken, made[k + 1])
+            if k % LOOK == 0 and (made[k, step.rows - 2] >= self._end).all():
+                made = made[: k + 2]
+                break
+        self._count += len(made) - 1
+        self._block = min(2 * self._block, MOST_AT_ONCE)
+        steps = Steps(step, self._taken[:, :count], made[:, :, :count])
+        t, size = steps.last[-2:]
+        good = np.isfinite(steps.last).all(axis=0) & ((t >= self._end) | (size > STILL * np.abs(t)))
+        return steps, good & (self._count < MOST_STEPS)
+
+    def keep(self, on: Mask, steps: Steps) -> None:
+        """Go on with some of the lanes (k,), from where steps have led them."""
+        if on.any():
+            self._take(self.lanes[on], steps.last[:, on], self._taken[:, : on.size][:, on])
+        else:
+            self.lanes = self.lanes[on]
 
 
-def _blocks(values: Array, lanes: NDArray[np.intp], width: int) -> Array:
-    """(blocks, rows, width) of some lanes of (rows, lanes)."""
-    taken = values if values.shape[1] == lanes.size else values[:, lanes]
-    return np.ascontiguousarray(taken.reshape(len(values), -1, width).swapaxes(0, 1))
-
-
-def _run(program: Any, integrator: Any, block: Block) -> Array:
-    """(m, n, width) states of some lanes, NaN in those that fail; where one does, the others run once more without."""
-    states, ends = _propagated(program, integrator, block), block[2][-1]
-    if (integrator.time >= ends).all():
-        return states
-    lanes = own = np.arange(ends.size)
-    while not (integrator.time >= ends[own]).all():
-        # those that a failure of another one has cut off have the outcome of a good step
-        failed = np.array([int(result[0]) not in ARRIVED for result in integrator.propagate_res])
-        if failed.all() or not failed.any():
-            return np.full_like(states, np.nan)
-        own = np.where(failed, own[~failed][0], own)
-        start, p, times, longest = (np.ascontiguousarray(values[:, own]) for values in block)
-        states = _propagated(program, integrator, (start, p, times, longest))
-    states[:, :, own != lanes] = np.nan
-    return states
-
-
-def _propagated(program: Any, integrator: Any, block: Block) -> Array:
-    """(m, n, width) states of some lanes, as far as all of them come."""
-    start, p, times, longest = block
-    integrator.set_time(times[0])
-    integrator.state[:] = start
-    integrator.pars[:] = p
-    if integrator.with_events:
-        integrator.reset_cooldowns()
-    program.met.clear()
-    _, states = integrator.propagate_grid(times, max_delta_t=longest[0], max_steps=MOST_STEPS)
-    return np.asarray(states)
+def _padded(count: int) -> Index:
+    """Numbers of lanes, and the last one again up to a multiple of the width."""
+    return np.minimum(np.arange(-(-count // WIDTH) * WIDTH), count - 1)

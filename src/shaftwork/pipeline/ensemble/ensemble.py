@@ -7,47 +7,39 @@ own side or about to be. A variant of which anything else is true is left to `Mo
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.stores import Stores
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import CompileError, NetworkError
-from shaftwork.integrate.lanes import Lanes, run_lanes
+from shaftwork.integrate.lanes import LaneRun, Steps
 from shaftwork.network.graph import GraphPart
-from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.ensemble.equations import Entry, Equations
-from shaftwork.pipeline.ensemble.extremes import largest
-from shaftwork.pipeline.ensemble.groups import Group, Index, Mask, Pace, joined
+from shaftwork.pipeline.ensemble.extremes import largest, reach
+from shaftwork.pipeline.ensemble.groups import Group, Index, Mask, joined
 from shaftwork.pipeline.ensemble.programs import EXTREMES, EnsembleCode
+from shaftwork.pipeline.ensemble.rises import first_rises
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.assemblies import Assembly, ModeNames
 from shaftwork.pipeline.phases.model import PhasedModel
 from shaftwork.pipeline.phases.regimes import with_modes
-from shaftwork.pipeline.phases.run import Run
 from shaftwork.pipeline.phases.starts import conditional
 from shaftwork.results.measures import Measure
 
-SAMPLES = (50, 4000)
-"""Of the whole motion, at least and at most."""
-FEWEST, FEWEST_SEEN = 16, 6
-"""Samples of a phase, and those before the guard of a lane that has an extreme."""
-STEPS, MOST_STEPS = 2.0, 2.6
-"""Steps for a sample in the first variant. A lane that takes more than the second runs again with twice the samples."""
-MOST_HALVINGS = 10
-REFERENCE = 1e-8
-"""Relative tolerance of the first variant, which counts steps: a tighter one has longer series and fewer of them."""
-LONGER = 2.0
-"""A phase is looked for up to so many times its length in the first variant, and then once more."""
+LONGEST = 1 / 50
+"""Of the whole motion: a step."""
 MOST_ROUNDS = 200
 """Stretches of a motion, each up to a change of mode."""
 SAME = 1e-9
 """What is stored has gone over unchanged where it differs by less than this, of the largest of its kind and of 1."""
+ON, OVER, LOST = -1, -2, -3
+"""What a lane has met where that is no guard: nothing, the end of the motion, and what it cannot pass."""
 MEASURED = ("max", "min", "peak", "mean", "rms", "end")
 
 
@@ -80,12 +72,10 @@ class Ensemble:
         self._first = dict(first)
         self._equations: dict[ModeNames, Equations | None] = {}
         self._codes: dict[Model, EnsembleCode] = {}
-        self.pace = Pace()
         self._refuse()
-        self._modes, lasting, steps = self._reference()
-        self._horizons = lasting
-        self._spacing = (span[1] - span[0]) / min(max(steps / STEPS, SAMPLES[0]), SAMPLES[1])
-        if self._of(self._modes) is None:
+        self.start = self._first_modes(first)
+        """The modes in which the first variant starts."""
+        if self.equations(self.start) is None:
             raise CompileError("The equations at the start have no program for variants side by side.")
 
     def _refuse(self) -> None:
@@ -122,24 +112,20 @@ class Ensemble:
         """The model, where parts change their mode."""
         return self.model if isinstance(self.model, PhasedModel) else None
 
-    def _reference(self) -> tuple[ModeNames, dict[ModeNames, float], int]:
-        """Modes at the start, the longest phase in each combination of modes, and steps, of the first variant."""
-        phased = self.phased
-        if phased is None:
-            solution = self.model.simulate(
-                self.span[1], t_start=self.span[0], rtol=REFERENCE, t_eval=2, parameters=self._first
-            )
-            return (), {(): self.span[1] - self.span[0]}, solution.statistics.get("steps", 0)
-        demand = Demand(self.span, REFERENCE, None, np.array(self.span), "auto", MOST_ROUNDS * 10_000, None)
-        run = Run(phased.phases, self._first, demand)
-        run.march(None)
-        phases = [phase for span in run.spans for phase in span.phases]
-        lasting: dict[ModeNames, float] = {}
-        for phase, end in zip(phases, [*(phase.start for phase in phases[1:]), self.span[1]], strict=True):
-            lasting[phase.modes] = max(lasting.get(phase.modes, 0.0), end - phase.start)
-        return phases[0].modes, lasting, run.steps
+    def _first_modes(self, values: Mapping[str, float]) -> ModeNames:
+        """The modes in which a variant starts."""
+        if self.phased is None:
+            return ()
+        phases = self.phased.phases
+        assembly = phases.assembly(phases.first)
+        p = assembly.vector(dict(values), phases.numbers(phases.first))
+        return assembly.first_modes(self.span[0], np.zeros(len(assembly.model.states)), p)
 
-    def _of(self, modes: ModeNames) -> Equations | None:
+    def starts_alike(self, column: Array) -> bool:
+        """Whether the values (names,) of the parameters that vary leave the modes at the start as they are."""
+        return self._first_modes(dict(zip(self.names, column.tolist(), strict=True))) == self.start
+
+    def equations(self, modes: ModeNames) -> Equations | None:
         """The equations of a combination of modes, or None where variants cannot run side by side in them."""
         if modes not in self._equations:
             try:
@@ -182,20 +168,6 @@ class Ensemble:
         symbols = {f"{made.part.name}.{symbol.name}" for made in elements for symbol in conditional(made.modes)}
         return not symbols.isdisjoint(self.names)
 
-    def first_assembly(self) -> Assembly | None:
-        """The equations in which the modes at the start are found."""
-        return None if self.phased is None else self.phased.phases.assembly(self.phased.phases.first)
-
-    def samples(self, group: Group) -> Array:
-        """(m, k) times at which lanes are looked at, up to their end or for as long as the phase may last."""
-        horizon = LONGER * self._horizons.get(group.modes, math.inf)
-        end = np.minimum(self.span[1], group.t + horizon)
-        end = np.where(self.span[1] - end < self._spacing, self.span[1], end)
-        count = max(FEWEST, math.ceil(float((end - group.t).max()) / self._spacing)) * 2**group.halvings + 1
-        times = group.t + np.linspace(0.0, 1.0, count)[:, None] * (end - group.t)
-        times[-1] = end
-        return times
-
     def after(self, group: Group, guard: int, p: Array) -> list[tuple[ModeNames, Mask]]:
         """The modes to which a guard leads by itself, and the lanes (k,) that go there."""
         phased = self.phased
@@ -212,15 +184,6 @@ class Ensemble:
             names = [assembly.start_of(number, before, *start) for start in starts]
         found = dict.fromkeys(names)
         return [(with_modes(group.modes, {number: to}), np.array([name == to for name in names])) for to in found]
-
-    def equations(self, modes: ModeNames) -> Equations | None:
-        """The equations of a combination of modes."""
-        return self._of(modes)
-
-    @property
-    def start(self) -> ModeNames:
-        """The modes in which the first variant starts."""
-        return self._modes
 
 
 class _Way:
@@ -249,46 +212,48 @@ class _Way:
         assert equations is not None  # noqa: S101 (checked when it was made)
         lanes = np.flatnonzero(ensemble.alike(self.columns))
         if ensemble.decisive:
-            lanes = lanes[[self._starts_alike(k) for k in lanes.tolist()]]
+            lanes = lanes[[ensemble.starts_alike(column) for column in self.columns[:, lanes].T]]
         size = len(equations.code.model.states)
         return [Group(ensemble.start, lanes, np.full(lanes.size, ensemble.span[0]), np.zeros((size, lanes.size)))]
-
-    def _starts_alike(self, lane: int) -> bool:
-        ensemble, assembly = self.ensemble, self.ensemble.first_assembly()
-        assert assembly is not None and ensemble.phased is not None  # noqa: S101, PT018 (only modes are decided upon)
-        phases, x = ensemble.phased.phases, np.zeros(len(assembly.model.states))
-        values = dict(zip(ensemble.names, self.columns[:, lane].tolist(), strict=True))
-        p = assembly.vector(values, phases.numbers(phases.first))
-        return assembly.first_modes(ensemble.span[0], x, p) == ensemble.start
 
     def _stretch(self, group: Group) -> list[Group]:
         """Up to the next change of mode in each lane; the groups that go on from there."""
         equations = self.ensemble.equations(group.modes)
         if equations is None or not group.lanes.size:
             return []
-        group = group.some(self.ensemble.pace.order(self.columns[:, group.lanes]))
         p = equations.parameters(self.columns[:, group.lanes])
-        entry = equations.entered(group.t, group.x, p)
-        group, p, entry = _kept(group, p, entry)
+        group, p, entry = _kept(group, p, equations.entered(group.t, group.x, p))
         if not group.lanes.size:
             return []
-        times = self.ensemble.samples(group)
-        lanes = run_lanes(equations.code.program, group.x, p, equations.sides, entry.offsets, times, self.ensemble.rtol)
-        self.ensemble.pace.learn(self.columns[:, group.lanes], lanes.steps)
-        jets, guards = equations.code.seen(lanes.t, lanes.x[:, : len(group.x)].swapaxes(0, 1), p)
-        good = lanes.good & equations.stays(guards, entry.offsets)
-        coarse = good & _coarse(lanes, jets) if group.halvings < MOST_HALVINGS else np.zeros_like(good)
-        good &= ~coarse
-        self._measure(_Followed(equations, lanes, p, self.ensemble.rtol), group, jets, good)
-        t, x = lanes.t[-1], lanes.x[-1, : len(group.x)]
-        over = good & (lanes.met < 0) & (t >= self.ensemble.span[1])
-        self._end(equations, group, x, p, over)
-        on = good & (lanes.met < 0) & ~over
-        made = [replace(group, t=t, x=x, halvings=0).some(on), replace(group, halvings=group.halvings + 1).some(coarse)]
-        for guard in np.unique(lanes.met[good & (lanes.met >= 0)]).tolist():
-            here = good & (lanes.met == guard)
-            made += self._changed(equations, replace(group, t=t, x=x, halvings=0).some(here), guard)
+        ends = self._followed(equations, group, p, entry)
+        over = ends.met == OVER
+        self._end(equations, ends.group, p, over)
+        made = []
+        for guard in np.unique(ends.met[ends.met >= 0]).tolist():
+            made += self._changed(equations, ends.group.some(ends.met == guard), guard)
         return made
+
+    def _followed(self, equations: Equations, group: Group, p: Array, entry: Entry) -> _Ends:
+        """Lanes up to their guards or the end of the motion."""
+        span, code, size = self.ensemble.span, equations.code, len(group.x)
+        rates = code.motion(group.t, group.x, p)[0]
+        limits = span[1], LONGEST * (span[1] - span[0])
+        run = LaneRun(code.step, group.x, rates, group.t, p, equations.sizes, limits, self.ensemble.rtol)
+        ends = _Ends(replace(group, t=group.t.copy(), x=group.x.copy()), np.full(group.lanes.size, LOST))
+        while run.lanes.size:
+            own = run.lanes
+            steps, good = run.go()
+            met, rows = _met(equations, entry.offsets[:, own], steps)
+            rows = np.where(met >= 0, rows, steps.last)
+            good |= met >= 0
+            met[good & (met < 0) & (rows[-2] >= span[1])] = OVER
+            self._measure(equations, steps, group.lanes[own], good)
+            done = good & (met != ON)
+            there = own[done]
+            ends.met[there], ends.group.t[there], ends.group.x[:, there] = met[done], rows[-2, done], rows[:size, done]
+            self._integrate(equations, group.lanes[there], rows[size:-2, done])
+            run.keep(good & ~done, steps)
+        return ends
 
     def _changed(self, before: Equations, group: Group, guard: int) -> list[Group]:
         """Past a guard: what is stored goes over to the equations that follow, where it goes over unchanged."""
@@ -307,33 +272,36 @@ class _Way:
             made.append(Group(modes, group.lanes[there], t, x).some(same))
         return made
 
-    def _measure(self, followed: _Followed, group: Group, jets: Mapping[int, Array], good: Mask) -> None:
-        """What the stretch adds to the measures."""
-        equations, lanes, size, own = followed.equations, followed.lanes, len(group.x), group.lanes
+    def _measure(self, equations: Equations, steps: Steps, lanes: Index, good: Mask) -> None:
+        """What some steps add to the extremes."""
         for row, measure in enumerate(self.ensemble.measures):
-            if measure.kind in ("mean", "rms"):
-                added = lanes.x[-1, size + equations.code.integral_of[row]]
-                self.values[row, own[good]] += added[good]
             for sign in EXTREMES.get(measure.kind, ()):
-                jet = jets[row] if sign > 0 else -jets[row]
-                found = largest(lanes.t, jet, self.values[row, own], partial(followed.jets, row, sign))
-                self.values[row, own[good]] = found[good]
+                place = equations.code.extreme(row)
+                near = np.flatnonzero(reach(steps.jets[place], sign, steps.longest) > self.values[row, lanes])
+                quantity = _Quantity(steps, place, sign, 0.0, near)
+                found = largest(quantity.t, quantity.jets, self.values[row, lanes[near]], quantity.at)
+                self.values[row, lanes[near]] = np.where(good[near], found, self.values[row, lanes[near]])
 
-    def _end(self, equations: Equations, group: Group, x: Array, p: Array, over: Mask) -> None:
+    def _integrate(self, equations: Equations, lanes: Index, integrals: Array) -> None:
+        """What a stretch adds to the measures that are integrals."""
+        for row, place in equations.code.integral_of.items():
+            self.values[row, lanes] += integrals[place]
+
+    def _end(self, equations: Equations, group: Group, p: Array, over: Mask) -> None:
         """The variants that have come to the end of their motion."""
         self.done[group.lanes[over]] = True
         if any(measure.kind == "end" for measure in self.ensemble.measures) and over.any():
-            shown = equations.code.shown(np.full(int(over.sum()), self.ensemble.span[1]), x[:, over], p[:, over])
+            shown = equations.code.shown(group.t[over], group.x[:, over], p[:, over])
             for row, measure in enumerate(self.ensemble.measures):
                 if measure.kind == "end":
                     self.values[row, group.lanes[over]] = shown[row]
 
     def _results(self) -> Array:
         duration = self.ensemble.span[1] - self.ensemble.span[0]
-        made = self.values.copy()
+        made = self.values + 0.0  # without zeros of the other sign
         for row, measure in enumerate(self.ensemble.measures):
             if measure.kind == "min":
-                made[row] *= -1.0
+                made[row] = 0.0 - made[row]
             elif measure.kind in ("mean", "rms"):
                 made[row] /= duration
                 made[row] = np.sqrt(np.maximum(made[row], 0.0)) if measure.kind == "rms" else made[row]
@@ -342,49 +310,67 @@ class _Way:
 
 
 @dataclass(frozen=True, eq=False)
-class _Followed:
-    """A stretch of the motion of some variants, to go to any time in it.
+class _Ends:
+    """Where lanes have come to.
 
     Args:
-        equations: of its modes.
-        lanes: the stretch.
-        p: (parameters, k).
-        rtol: relative tolerance.
+        group: the lanes with their times and states there.
+        met: (k,) the guard that each has met, OVER at the end of the motion, or LOST.
     """
 
-    equations: Equations
-    lanes: Lanes
-    p: Array
-    rtol: float
-
-    def jets(self, row: int, sign: float, at: Index, own: Index, times: Array) -> Array:
-        """(3, c) what a measure reads, times a sign, and its derivatives at times (c,), from samples (c,) before.
-
-        Args:
-            row: of the measure.
-            sign: of what is read.
-            at: (c,) samples.
-            own: (c,) lanes.
-            times: (c,) s.
-        """
-        equations, p = self.equations, self.p[:, own]
-        program = equations.code.program
-        start, grid = self.lanes.x[at, : len(program.variables), own].T, np.array([self.lanes.t[at, own], times])
-        unguarded, offsets = np.zeros_like(equations.sides), np.zeros((equations.sides.size, own.size))
-        made = run_lanes(program, start, p, unguarded, offsets, grid, self.rtol)
-        x = made.x[-1:, : len(start)].swapaxes(0, 1)
-        return np.asarray(sign * equations.code.seen(grid[-1:], x, p)[0][row][:, 0])
+    group: Group
+    met: NDArray[np.intp]
 
 
-def _coarse(lanes: Lanes, jets: Mapping[int, Array]) -> Mask:
-    """(k,) lanes of which there are too few samples to know their extremes, where there are any."""
-    seen = 1 + np.count_nonzero(lanes.t[1:] > lanes.t[:-1], axis=0)
-    coarse = (lanes.steps > MOST_STEPS * (len(lanes.t) - 1)) & bool(jets)
-    if (few := np.flatnonzero(seen < FEWEST_SEEN)).size:
-        for jet in jets.values():
-            slopes = jet[1][:, few]
-            coarse[few] |= (slopes[:-1] * slopes[1:] < 0).any(axis=0)
-    return np.asarray(coarse)
+def _met(equations: Equations, offsets: Array, steps: Steps) -> tuple[NDArray[np.intp], Array]:
+    """(k,) the guard that each lane meets first, or ON, and the rows (rows, k) there; from there on it stays there."""
+    met, first = np.full(steps.t.shape[1], ON), np.full(steps.t.shape[1], np.inf)
+    at, rows = np.zeros(met.size, dtype=np.intp), np.zeros_like(steps.last)
+    for guard in equations.watched.tolist():
+        place, side = equations.code.guard(guard), equations.sides[guard]
+        near = np.flatnonzero(reach(steps.jets[place], side, steps.longest) > offsets[guard])
+        if not near.size:
+            continue
+        quantity = _Quantity(steps, place, side, offsets[guard, near], near)
+        rises = first_rises(quantity.t, quantity.jets, quantity.at)
+        earlier = rises.t < first[near]
+        own = near[earlier]
+        met[own], first[own], at[own] = guard, rises.t[earlier], rises.at[earlier]
+    own = np.flatnonzero(met >= 0)
+    if own.size:
+        shown, start = np.empty((len(steps.jets), met.size)), np.full(met.size, len(steps.t))
+        rows[:, own], shown[:, own] = steps.at(at[own], own, first[own])
+        start[own] = at[own]
+        steps.cut(start, first, shown)
+    return met, rows
+
+
+class _Quantity:
+    """What steps show at a place, times a sign and less offsets, in some lanes.
+
+    Args:
+        steps: of all lanes.
+        place: of the jet.
+        sign: 1 or -1.
+        offsets: (k,), or one for all.
+        lanes: (k,).
+    """
+
+    def __init__(self, steps: Steps, place: slice, sign: float, offsets: Array | float, lanes: Index) -> None:
+        self._steps, self._place, self._sign, self._lanes = steps, place, sign, lanes
+        self._offsets = np.broadcast_to(offsets, lanes.size)
+        own = lanes if lanes.size < steps.t.shape[1] else slice(None)
+        self.t: Array = steps.t[:, own]
+        """(m, k) times of the samples, s."""
+        self.jets: Array = sign * steps.jets[place][:, :, own]
+        """(3, m, k) values and their first two derivatives by time."""
+        self.jets[0] -= self._offsets
+
+    def at(self, start: Index, own: Index, t: Array) -> Array:
+        """(3, c) jets at times (c,) in s, from samples (c,) of the lanes (c,)."""
+        jet = np.array(self._sign * self._steps.at(start, self._lanes[own], t)[1][self._place])
+        jet[0] -= self._offsets[own]
+        return jet
 
 
 def _kept(group: Group, p: Array, entry: Entry) -> tuple[Group, Array, Entry]:

@@ -16,9 +16,6 @@ from shaftwork.pipeline.phases.moments import CLEAR, EPS, GOLDEN, NOTHING, ROUND
 from shaftwork.pipeline.phases.settling import AHEAD, AHEAD_OF_RUN
 from shaftwork.pipeline.prepared import NOMINAL
 
-WITHIN = 1e-9
-"""A guard that is beyond its limit by more than this part of its largest value has been missed."""
-
 Mask = NDArray[np.bool_]
 Course = tuple[Array, Array, Array, Array]
 """Times (k,), states (n, k), their rates, and guards (guards, k)."""
@@ -68,7 +65,7 @@ class Equations:
             self.sides, sizes = assembly.sides(modes), assembly.sizes(self._base)
         places = {name: k for k, name in enumerate(model.parameters)}
         self._places = [(places[name], column) for column, name in enumerate(names) if name in places]
-        self._watched, self._sizes = np.flatnonzero(self.sides), np.array(sizes)
+        self.watched, self.sizes = np.flatnonzero(self.sides), np.array(sizes)
         self._tick = ROUNDINGS * float(np.spacing(max(map(abs, span))))
         self._ahead = AHEAD_OF_RUN * (span[1] - span[0])
 
@@ -104,19 +101,19 @@ class Equations:
             known |= sure
         good = (value < -bands) | ((value <= bands) & falls)
         clear = np.where(2 * value > -CLEAR * bands, np.maximum(value, 0.0) + CLEAR * bands, bands)
-        return Entry(np.all(good[self._watched], axis=0), np.maximum(clear, NOTHING))
+        return Entry(np.all(good[self.watched], axis=0), np.maximum(clear, NOTHING))
 
     def _rounded(self, x: Array, rates: Array) -> Array:
         """The states so far away as rounding may move them, and the time by a tick; see `moments.Regime.rounded`."""
         way = np.array([(-1.0) ** k for k in range(len(x))])[:, None]
         part = way * np.array([(0.5 + k * GOLDEN % 1) * ROUNDINGS * EPS for k in range(len(x))])[:, None]
-        least = part * self._sizes[:, None] / NOMINAL
+        least = part * self.sizes[:, None] / NOMINAL
         return np.asarray(x + part * np.abs(x) + least + way * self._tick * np.abs(rates))
 
     def _step(self, rates: Array) -> Array:
         """(k,) how far in s the further course is looked at."""
         with np.errstate(divide="ignore"):
-            steps = (AHEAD * self._sizes[:, None] / np.abs(rates)).min(axis=0)
+            steps = (AHEAD * self.sizes[:, None] / np.abs(rates)).min(axis=0)
         return np.asarray(np.minimum(self._ahead, steps))
 
     def _later(self, step: Array, course: Course, p: Array) -> Course:
@@ -128,12 +125,3 @@ class Equations:
     def leaves_behind(self, before: Equations, guard: int) -> bool:
         """Whether the guard by which these modes were entered is met no more; `entered` looks at all the others."""
         return before.code is not self.code or not self.sides[guard] == before.sides[guard] != 0.0
-
-    def stays(self, guards: Array, offsets: Array) -> Mask:
-        """(k,) whether every guard (guards, m, k) was on its own side at all times at which a lane was looked at."""
-        if not len(self._watched):
-            return np.ones(offsets.shape[1], dtype=bool)
-        watched = guards[self._watched] * self.sides[self._watched][:, None, None]
-        most, least = watched.max(axis=1), watched.min(axis=1)
-        allowed = WITHIN * np.maximum(np.abs(most), np.abs(least)) + 2.0 * offsets[self._watched]
-        return np.asarray((most <= allowed).all(axis=0))

@@ -51,12 +51,12 @@ def largest(t: Array, jets: Array, best: Array, there: There) -> Array:
     """
     top, bottom = jets[0].max(axis=0), jets[0].min(axis=0)
     found, size = np.maximum(best, top), top - bottom
-    at, own = _likely(t, jets, found, top - NEARLY * size)
+    at, own = likely(t, jets, found, found - NEARLY * size)
     left, right = (np.array([t[k, own], *jets[:, k, own]]) for k in (at, at + 1))
-    times, height = _peak(left, right)
-    beyond, surely = _beyond(left, right), found.copy()
-    np.maximum.at(surely, own, height - beyond)
-    on = np.isfinite(height) & (height + beyond >= surely[own])
+    times, height = peak(left, right)
+    missed, surely = beyond(left, right), found.copy()
+    np.maximum.at(surely, own, height - missed)
+    on = np.isfinite(height) & (height + missed >= surely[own])
     for _ in range(MOST_ROUNDS):
         at, own, left, right, times, height = at[on], own[on], left[:, on], right[:, on], times[on], height[on]
         if not own.size:
@@ -67,45 +67,54 @@ def largest(t: Array, jets: Array, best: Array, there: There) -> Array:
         # on either side of what is known now
         at, own, missed, room, before = (np.tile(values, 2) for values in (at, own, missed, room, times))
         left, right = np.concatenate([left, middle], axis=1), np.concatenate([middle, right], axis=1)
-        times, height = _peak(left, right)
+        times, height = peak(left, right)
         near = NEAR * size[own]
         # what a polynomial misses grows with the cube of the distance from a point that it goes through
         part = np.abs(times - before) / room
         sure = (part < CLOSE) & (missed * part**3 < near)
         np.maximum.at(found, own[sure], height[sure])
-        on = ~sure & (height + _beyond(left, right) > found[own] + near)
+        on = ~sure & (height + beyond(left, right) > found[own] + near)
     found[own[on]] = np.nan
     return np.asarray(found)
 
 
-def _likely(t: Array, jets: Array, least: Array, near: Array) -> tuple[Index, Index]:
+def reach(jets: Array, sign: float, longest: Array) -> Array:
+    """(k,) what a quantity times a sign can have come to: from a sample, with twice the steepest of all its slopes.
+
+    Args:
+        jets: (3, m, k) values and their first two derivatives by time.
+        sign: of what is asked for.
+        longest: (k,) time between two samples, s.
+    """
+    top = jets[0].max(axis=0) if sign > 0 else -jets[0].min(axis=0)
+    return np.asarray(top + np.maximum(jets[1].max(axis=0), -jets[1].min(axis=0)) * longest)
+
+
+def likely(t: Array, jets: Array, least: Array, near: Array) -> tuple[Index, Index]:
     """Samples (c,) of lanes (c,) after which there may be a peak of at least so much (k,).
 
     The slope falls through zero, or, where one of the samples is near (k,) the top, does so and rises again. A
     polynomial is no higher than the highest of its Bernstein coefficients.
     """
     up, high = jets[1] > 0, jets[0] >= near
-    at = np.flatnonzero((up[:-1] & ~up[1:]) | high[:-1] | high[1:])
-    lanes = t.shape[1]
-    flat = [np.ravel(values) for values in (t, *jets)]  # to take by one number is the quickest
-    left, right = (np.array([values.take(at + k) for values in flat]) for k in (0, lanes))
+    at, own = np.divmod(np.flatnonzero((up[:-1] & ~up[1:]) | high[:-1] | high[1:]), t.shape[1])
+    left, right = (np.array([t[k, own], *jets[:, k, own]]) for k in (at, at + 1))
     length = right[0] - left[0]
     (y0, v0, a0), (y1, v1, a1) = ((y, v * length / 5, a * length**2 / 20) for _, y, v, a in (left, right))
     inner = np.maximum(np.maximum(y0 + v0, y0 + 2 * v0 + a0), np.maximum(y1 - v1, y1 - 2 * v1 + a1))
-    own = at % lanes
     kept = (length > SHORT * np.abs(left[0])) & (inner > np.maximum(y0, y1))
-    kept &= inner + _beyond(left, right) >= least[own]
-    return at[kept] // lanes, own[kept]
+    kept &= inner + beyond(left, right) >= least[own]
+    return at[kept], own[kept]
 
 
-def _beyond(left: Array, right: Array) -> Array:
-    """(c,) how far the motion may be from the quintic through what is known at two times; see `_peak`."""
+def beyond(left: Array, right: Array) -> Array:
+    """(c,) how far the motion may be from the quintic through what is known at two times; see `peak`."""
     length = right[0] - left[0]
     apart = (left[2] - right[2]) * length / 32 + (left[3] + right[3]) * length**2 / 64
     return np.asarray(BEYOND * np.abs(apart))
 
 
-def _peak(left: Array, right: Array) -> tuple[Array, Array]:
+def peak(left: Array, right: Array) -> tuple[Array, Array]:
     """Times and heights (c,) of the highest peaks of the quintics through what is known at two times; -inf where none.
 
     Args:

@@ -11,10 +11,9 @@ from sympy import Expr
 
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.expressed import Expressed
-from shaftwork.codegen.lanes import LaneFunction, LaneProgram, lane_expressions, lane_program
+from shaftwork.codegen.lanes import JET, LaneFunction, LaneProgram, LaneStep, lane_expressions, lane_program
 from shaftwork.codegen.stores import Stores
 from shaftwork.core.errors import CompileError
-from shaftwork.pipeline.ensemble.extremes import DATA
 from shaftwork.pipeline.model import Model
 from shaftwork.results.measures import Measure
 
@@ -55,29 +54,22 @@ class EnsembleCode:
         self._compose([self._expressed.store(name) for name in stores.names] if self.program.guards else [])
 
     def _compose(self, stored: Sequence[Expr]) -> None:
-        """Two functions: what is read of every sample, and what is asked for at the ends of phases."""
+        """Two functions: a step, with what is read of its start, and what is asked for at the ends of phases."""
         program = self.program
         shown, held = lane_expressions(self._rows, self._quantities), lane_expressions(self._rows, stored)
-        jets = [made for row in self._extremes for made in program.derivatives(shown[row], DATA - 1)]
-        self._seen = LaneFunction((*jets, *program.guards), program.variables)
+        self.step = LaneStep(program, [shown[row] for row in self._extremes])
         self._parts = {"rates": program.rates, "guards": program.guards, "stored": held, "shown": shown}
-        expressions = tuple(one for part in self._parts.values() for one in part)
-        self._points = LaneFunction(expressions, program.variables, often=False)
+        self._points = LaneFunction(tuple(one for part in self._parts.values() for one in part), program.variables)
 
-    def seen(self, t: Array, x: Array, p: Array) -> tuple[dict[int, Array], Array]:
-        """By measure that is an extreme, what it reads and its first two derivatives by time, (3, m, k); and guards.
+    def extreme(self, row: int) -> slice:
+        """Where, among what a step shows, is the jet of a measure that is an extreme."""
+        first = JET * self._extremes.index(row)
+        return slice(first, first + JET)
 
-        Args:
-            t: (m, k) times, s.
-            x: (n, m, k) states.
-            p: (parameters, k).
-
-        Returns:
-            These, and the values (guards, m, k) of all guards.
-        """
-        made = self._seen(t, x, p)
-        jets = {row: made[DATA * k : DATA * (k + 1)] for k, row in enumerate(self._extremes)}
-        return jets, made[DATA * len(self._extremes) :]
+    def guard(self, number: int) -> slice:
+        """Where, among what a step shows, is the jet of a guard."""
+        first = JET * (len(self._extremes) + number)
+        return slice(first, first + JET)
 
     def motion(self, t: Array, x: Array, p: Array) -> tuple[Array, Array]:
         """Rates (n, k) and guards (guards, k) at times (k,), states (n, k), parameters (parameters, k)."""
