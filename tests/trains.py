@@ -58,7 +58,9 @@ class Train:
         return net.compile()
 
 
-class _Builder:
+class Builder:
+    """A train on its way: its parts so far, and the start speeds of its nodes."""
+
     def __init__(self, choose: Choose, *, rigid: bool) -> None:
         self.choose, self.rigid = choose, rigid
         self.parts: list[Part] = []
@@ -153,7 +155,7 @@ def trains(draw: st.DrawFn, most: int = 8, *, rigid: bool = True) -> Train:
     def choose(*options: Any) -> Any:
         return options[draw(st.integers(0, len(options) - 1))]
 
-    made = _Builder(choose, rigid=rigid)
+    made = Builder(choose, rigid=rigid)
     nodes = [f"r{k}" for k in range(draw(st.integers(2, most)))]
     for node in nodes:
         made.add("Inertia", node, J=choose(1.0, 0.5, 0.1, 2.0))

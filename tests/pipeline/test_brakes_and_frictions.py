@@ -391,3 +391,22 @@ def test_a_friction_in_series_with_a_spring_needs_an_inertia_between(friction: s
     sol = net.simulate(0.04, t_eval=[0.0, 0.01, 0.04])
     # the small inertia swings on by 0.5 rad/s sqrt(1e-9 / 10) s
     assert sol["s.tau"] == pytest.approx([0.0, 0.05, 0.1], abs=6e-5)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_clutch_to_a_swinging_speed_gives_way_though_that_speed_bends_the_other_way(engine: str) -> None:
+    """The spring behind it asks for more and more torque, while the prescribed speed falls behind its own tangent."""
+    a, omega, J1, J2, c, most = 3.0, 8.238327648331623, 0.08771229348112548, 0.37, 1000.0, 2.3018689460797077
+    net = sw.Network("clutch to a swinging speed")
+    net.add(sw.SpeedSource("line", omega=a * sympy.sin(omega * sw.t)), "driven")
+    net.add(sw.Clutch("clutch", tau=most), "driven", "b")
+    net.add(sw.Inertia("J1", J=J1), "b")
+    net.add(sw.Spring("shaft", c=c), "a", "b")
+    net.add(sw.Inertia("J2", J=J2), "a")
+    sol = net.simulate(0.01, engine=engine, rtol=1e-9)
+    (gives_way,) = (event for event in sol.events if event[2:] == ("engaged", "slipping forward"))
+    # while it holds, the spring is driven by the prescribed speed: c times its twist and J1 at that speed's rate
+    k, t = math.sqrt(c / J2), gives_way[0]
+    twist = a * omega / (k**2 - omega**2) * (math.cos(omega * t) - math.cos(k * t))
+    assert c * twist + J1 * a * omega * math.cos(omega * t) == pytest.approx(most, rel=1e-8)
+    assert sol["clutch.tau"][-1] == pytest.approx(most, rel=1e-12)

@@ -94,3 +94,36 @@ def test_a_gear_that_would_jam_where_a_friction_lets_go_drives_on(order: str) ->
     wanted = (10.0 * (4.0 - begins**2) - rests * (2.0 - begins)) / inertia
     assert sol.phases[-1].modes["gear"] == "driving forward"
     assert sol["A.omega"][-1] == pytest.approx(wanted, rel=1e-9)
+
+
+@pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials"])
+@pytest.mark.parametrize("when", [{"t_on": 0.5}, {"on": sw.t - 0.5}])
+def test_a_switch_that_will_open_again_closes_on_a_conducting_diode(engine: str, when: dict[str, object]) -> None:
+    """Before the supply comes on, the switch and the freewheel diode short it: the diode blocks, the switch closes.
+
+    From 1 s on L di/dt = 48 - i, so that i(2) = 48 (1 - exp(-20)).
+    """
+    net = sw.Network("switched")
+    net.add(sw.VoltageSource("supply", u=sw.Step(48.0, start=1.0)), "p", "e")
+    net.add(sw.Ground("earth"), "e")
+    net.add(sw.Switch("switch", t_off=2.5, **when), "p", "q")  # type: ignore[arg-type]
+    net.add(sw.Diode("diode"), "e", "q")
+    net.add(sw.Resistor("R", R=1.0), "q", "r")
+    net.add(sw.Inductor("L", L=0.05), "r", "e")
+    sol = net.simulate(3.0, engine=engine, rtol=1e-10)
+    now = sol.at([0.7, 1.5, 2.0, 2.7])
+    np.testing.assert_array_equal(now["switch.u"][:3], 0.0)
+    np.testing.assert_allclose(now["L.i"][2], 48.0 * (1 - math.exp(-20.0)), rtol=1e-8)
+    assert now["switch.i"][3] == 0.0
+    assert sol.phases[-1].modes == {"switch": "open", "diode": "conducting"}
+
+
+def test_a_switch_that_will_open_again_does_not_stay_open_in_place_of_a_short_circuit() -> None:
+    net = sw.Network("short")
+    net.add(sw.VoltageSource("supply", u=10.0), "p", "e")
+    net.add(sw.Ground("earth"), "e")
+    net.add(sw.Resistor("R", R=1.0), "p", "e")
+    net.add(sw.Inductor("L", L=0.1), "p", "e")
+    net.add(sw.Switch("switch", t_on=0.5, t_off=1.5), "p", "e")
+    with pytest.raises(sw.SimulationError, match=r"'switch' can neither stay open nor become closed at t = 0\.5 s"):
+        net.simulate(2.0)

@@ -251,3 +251,17 @@ def test_what_an_impact_at_the_very_start_loses_in_a_gear_is_in_no_balance() -> 
     sol = net.simulate(0.1, initial={"A.omega": 4.0})
     assert sol["A.omega"][-1] == 0.0
     assert set(sol.energy.lost_in.values()) == {0.0}
+
+
+@pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials"])
+def test_a_flank_that_cannot_open_where_a_gear_jams_does_not_become_the_other_one(engine: str) -> None:
+    """The lower flank would have to pull at what jams. It went on as the upper one, on which pulling is pressing."""
+    net = sw.Network("flank before a gear that jams")
+    net.add(sw.TorqueSource("pull", tau=-100.0), "a")
+    net.add(sw.Inertia("J1", J=2.3), "a")
+    net.add(sw.Backlash("gap", gap=0.02, omega_rest=1e-3), "a", "b")
+    net.add(sw.Inertia("J2", J=2.3), "b")
+    net.add(sw.LossyGear("gear", ratio=-0.61, efficiency=0.97, efficiency_back=-0.2), "b", "c")
+    net.add(sw.Inertia("J3", J=7.0), "c")
+    with pytest.raises(sw.SimulationError, match="jammed coupling: LossyGear 'gear'"):
+        net.simulate(0.3, engine=engine, initial={"J1.omega": 0.7, "J2.omega": 1.9})

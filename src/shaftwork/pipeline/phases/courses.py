@@ -1,4 +1,4 @@
-"""The course of a motion near an instant, along straight lines: what is about to go beyond its limit."""
+"""The course of a motion near an instant, along short parabolas: what is about to go beyond its limit."""
 
 from __future__ import annotations
 
@@ -50,9 +50,11 @@ def moved(moment: Moment, t: float, step: float) -> Moment:
 
 
 def later(regime: Regime, step: float, course: Course) -> Course:
-    """A step further along a straight line."""
+    """A step further along a parabola (Heun): a prescribed speed bends, so what it is compared with must bend too."""
     t, x, rates, _ = course
-    states = [v + step * rate for v, rate in zip(x, rates, strict=True)]
+    straight = [v + step * rate for v, rate in zip(x, rates, strict=True)]
+    ends, _ = regime.motion(t + step, straight)
+    states = [v + step * (rate + end) / 2 for v, rate, end in zip(x, rates, ends, strict=True)]
     return t + step, states, *regime.motion(t + step, states)
 
 

@@ -329,10 +329,7 @@ class Settling:
         return beyond * step / gain if 0 < beyond < gain else 0.0
 
     def _commutated(self, moment: Moment, t: float, modes: ModeNames, plain: Moment) -> tuple[Moment, dict[int, str]]:
-        """What takes over a torque or current that a change would cut off from its store: a diode, a freewheel.
-
-        Without one it is cut off, with the energy of the store.
-        """
+        """What takes over a torque or current that a change would cut off, with its energy: a diode, a freewheel."""
         names = plain.regime.assembly.stores.through
         if plain.x is moment.x or not names:
             return plain, {}
@@ -369,7 +366,9 @@ class Settling:
         """
         modes, (number, to) = moment.regime.modes, wanted
         element, before = self.elements[number], modes[number]
-        ways = [{number: leave.to} for leave in element.modes[to].leaves if leave.to not in ("", before)]
+        leads = (leave for leave in element.modes[to].leaves if leave.to not in ("", before))
+        # neither the other flank nor a time to come is there
+        ways = [{number: leave.to} for leave in leads if leave.rebound is None and not leave.by_twist]
         for k, limited in self._impacts.limited(modes).items():
             ways += [{number: to, k: name} for _, name in limited if k != number]
         for k in self._impacts.gears:
