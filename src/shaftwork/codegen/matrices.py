@@ -27,6 +27,8 @@ from shaftwork.reduction.form import StateForm
 Array = NDArray[np.float64]
 SINGULAR = 1e-13
 """Reciprocal condition below which a block of algebraic equations has no solution to speak of."""
+SMALL = 96
+"""Branches up to which the blocks are arrays: products of small sparse matrices cost a hundred times as much."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +91,7 @@ class MatrixAssembly:
         Q = F if self.cutsets is self.loops else self.cutsets(p)
         blocks = _Blocks(form, F, Q, len(self.inputs))
         solve_conductances = self._inverse_of_conductances(blocks, k)
-        link_g = sparse.diags_array(k[blocks.R])
+        link_g = blocks.diagonal(k[blocks.R])
         # across variables of the tree conductances from states and inputs
         drive_x = blocks.Q("G", "R") @ link_g @ blocks.across_x("R") + blocks.Q("G", "L") @ blocks.pick("L")
         drive_u = blocks.Q("G", "R") @ link_g @ blocks.across_u("R") + blocks.Q("G", "W") @ blocks.input("W")
@@ -97,16 +99,16 @@ class MatrixAssembly:
         r_x = link_g @ (blocks.across_x("R") + blocks.F("G", "R").T @ g_x)
         r_u = link_g @ (blocks.across_u("R") + blocks.F("G", "R").T @ g_u)
         # torque balance of the tree capacities
-        K = sparse.diags_array(k[blocks.K])
-        mass = sparse.diags_array(k[blocks.C]) + blocks.Q("C", "K") @ K @ blocks.F("C", "K").T
-        to_speed = self._inverse(mass, blocks.C, "inertia")
+        K = blocks.diagonal(k[blocks.K])
+        mass = blocks.diagonal(k[blocks.C]) + blocks.Q("C", "K") @ K @ blocks.F("C", "K").T
+        to_speed = self._inverse(blocks, mass, blocks.C, "inertia")
         c_x = -to_speed @ (blocks.Q("C", "R") @ r_x + blocks.Q("C", "L") @ blocks.pick("L"))
         c_u = -to_speed @ (blocks.Q("C", "R") @ r_u + blocks.Q("C", "W") @ blocks.input("W"))
         c_du = -to_speed @ blocks.Q("C", "K") @ K @ blocks.F("E", "K").T @ blocks.input("E")
         # speed balance of the loops with compliances
-        S = sparse.diags_array(1 / k[blocks.S])
-        compliance = sparse.diags_array(1 / k[blocks.L]) + blocks.F("S", "L").T @ S @ blocks.Q("S", "L")
-        to_torque = self._inverse(compliance, blocks.L, "compliance")
+        S = blocks.diagonal(1 / k[blocks.S])
+        compliance = blocks.diagonal(1 / k[blocks.L]) + blocks.F("S", "L").T @ S @ blocks.Q("S", "L")
+        to_torque = self._inverse(blocks, compliance, blocks.L, "compliance")
         l_x = to_torque @ (blocks.across_x("L") + blocks.F("G", "L").T @ g_x)
         l_u = to_torque @ (blocks.across_u("L") + blocks.F("G", "L").T @ g_u)
         l_du = -to_torque @ blocks.F("S", "L").T @ S @ blocks.Q("S", "W") @ blocks.input("W")
@@ -118,11 +120,11 @@ class MatrixAssembly:
         if self.potentials is not None:
             C, D = blocks.with_readings(C, D, self.potentials(p), g_x, g_u)
         return LinearPart(
-            A=sparse.vstack([c_x, l_x, z_x], format="csr"),
-            B=sparse.vstack([c_u, l_u, z_u], format="csr"),
-            B1=sparse.vstack([c_du, l_du, sparse.csr_array(z_u.shape)], format="csr"),
-            C=C,
-            D=D,
+            A=sparse.csr_array(blocks.stack([c_x, l_x, z_x])),
+            B=sparse.csr_array(blocks.stack([c_u, l_u, z_u])),
+            B1=sparse.csr_array(blocks.stack([c_du, l_du, blocks.nothing(*z_u.shape)])),
+            C=sparse.csr_array(C),
+            D=sparse.csr_array(D),
             conductance_x=sparse.csr_array(g_x),
             conductance_u=sparse.csr_array(g_u),
             tree_law_x=sparse.csr_array(t_x),
@@ -133,11 +135,11 @@ class MatrixAssembly:
         )
 
     def _inverse_of_conductances(self, blocks: _Blocks, k: Array) -> Any:
-        links = sparse.diags_array(k[blocks.R])
-        matrix = sparse.diags_array(k[blocks.G]) + blocks.Q("G", "R") @ links @ blocks.F("G", "R").T
-        return self._inverse(matrix, blocks.G, "conductance")
+        links = blocks.diagonal(k[blocks.R])
+        matrix = blocks.diagonal(k[blocks.G]) + blocks.Q("G", "R") @ links @ blocks.F("G", "R").T
+        return self._inverse(blocks, matrix, blocks.G, "conductance")
 
-    def _inverse(self, matrix: Any, branches: NDArray[np.intp], what: str) -> Any:
+    def _inverse(self, blocks: _Blocks, matrix: Any, branches: NDArray[np.intp], what: str) -> Any:
         """The inverse, block by block of connected unknowns; diagonal where nothing is coupled."""
         matrix = sparse.csr_array(matrix)
         size = matrix.shape[0]
@@ -146,7 +148,7 @@ class MatrixAssembly:
         if count == size:
             if (bad := np.flatnonzero(diagonal == 0)).size:
                 raise self._singular(branches[bad[:1]], what)
-            return sparse.diags_array(1 / diagonal, format="csr")
+            return blocks.diagonal(1 / diagonal)
         order = np.argsort(label, kind="stable")
         starts = np.searchsorted(label[order], np.arange(count + 1))
         rows, columns, data = [], [], []
@@ -162,7 +164,7 @@ class MatrixAssembly:
             columns.append(np.tile(members, len(members)))
             data.append(inverse.ravel())
         entries = (np.concatenate(data), (np.concatenate(rows), np.concatenate(columns)))
-        return sparse.csr_array(entries, shape=matrix.shape)
+        return blocks.own(sparse.csr_array(entries, shape=matrix.shape))
 
     def _singular(self, branches: NDArray[np.intp], what: str) -> CompileError:
         names = ", ".join(f"'{name}'" for name in dict.fromkeys(self.form.graph.part_of(int(b)).name for b in branches))
@@ -188,13 +190,31 @@ class _Blocks:
             "W": form.laws,
         }
         self._groups = {name: np.array(members, dtype=np.intp) for name, members in groups.items()}
-        self._loops, self._cutsets = loops, cutsets
+        self._small = loops.shape[0] <= SMALL
+        self._loops = self.own(loops)
+        self._cutsets = self._loops if cutsets is loops else self.own(cutsets)
         self._cache: dict[tuple[bool, str, str], Any] = {}
         self._integrals, self._readings = form.integrals, form.readings
         self._states, self._inputs = len(form.states), inputs
 
     def __getattr__(self, name: str) -> NDArray[np.intp]:
         return self._groups[name]
+
+    def own(self, matrix: Any) -> Any:
+        """A sparse matrix as an array, where the network is small."""
+        return matrix.toarray() if self._small else matrix
+
+    def diagonal(self, values: Array) -> Any:
+        """A diagonal matrix."""
+        return np.diag(values) if self._small else sparse.diags_array(values, format="csr")
+
+    def nothing(self, *shape: int) -> Any:
+        """A matrix of zeros."""
+        return np.zeros(shape) if self._small else sparse.csr_array(shape)
+
+    def stack(self, matrices: Sequence[Any]) -> Any:
+        """Matrices one below the other."""
+        return np.vstack(matrices) if self._small else sparse.vstack(matrices, format="csr")
 
     def F(self, tree: str, link: str) -> Any:
         """The block of the loop matrix between two groups."""
@@ -214,13 +234,13 @@ class _Blocks:
         """(group, n) rows that pick the states of C or L."""
         size = len(self._groups[group])
         offset = 0 if group == "C" else len(self.C)
-        return _selection(np.arange(size) + offset, self._states)
+        return self._selection(np.arange(size) + offset, self._states)
 
     def input(self, group: str) -> Any:
         """(group, m) rows that pick the inputs w or e."""
         size = len(self._groups[group])
         offset = 0 if group == "W" else len(self.W)
-        return _selection(np.arange(size) + offset, self._inputs)
+        return self._selection(np.arange(size) + offset, self._inputs)
 
     def across_x(self, link: str) -> Any:
         """(link, n) across variables of the links, from the states alone."""
@@ -233,15 +253,14 @@ class _Blocks:
     def output_rows(self, outputs: NDArray[np.intp], g_x: Any, g_u: Any) -> tuple[Any, Any]:
         """C and D: the across variables of the output branches, each a link or a tree branch."""
         links = self._loops[:, outputs].T
-        own = _selection(outputs, self._loops.shape[0])
+        own = self._selection(outputs, self._loops.shape[0])
         return self._of_tree(links + own, g_x, g_u)  # a tree branch has no loop: its own column stands for it
 
     def _of_tree(self, rows: Any, g_x: Any, g_u: Any) -> tuple[Any, Any]:
         """Sums of across variables of tree branches, from states and inputs."""
-        rows = sparse.csr_array(rows)
         x = rows[:, self.C] @ self.pick("C") + rows[:, self.G] @ g_x
         u = rows[:, self.E] @ self.input("E") + rows[:, self.G] @ g_u
-        return sparse.csr_array(x), sparse.csr_array(u)
+        return x, u
 
     def with_readings(self, C: Any, D: Any, potentials: Any, g_x: Any, g_u: Any) -> tuple[Any, Any]:
         """C and D with the rows of what controlled sources read below them."""
@@ -249,16 +268,13 @@ class _Blocks:
             np.array([reading.of for reading in self._readings if reading.kind == kind], dtype=np.intp)
             for kind in ("across", "through", "integral")
         )
-        across_x, across_u = self._of_tree(potentials[nodes], g_x, g_u)
-        carried = sparse.csr_array(_selection(stores, self._loops.shape[0]) - self._cutsets[stores])  # -Q in a tree
+        across_x, across_u = self._of_tree(self.own(potentials[nodes]), g_x, g_u)
+        carried = self._selection(stores, self._loops.shape[0]) - self._cutsets[stores]  # -Q in a tree
         through_x, through_u = carried[:, self.L] @ self.pick("L"), carried[:, self.W] @ self.input("W")
         place = {branch: len(self.C) + len(self.L) + k for k, branch in enumerate(self._integrals)}
-        own = _selection(np.array([place[int(branch)] for branch in integrals], dtype=np.intp), self._states)
-        none = sparse.csr_array((len(integrals), self._inputs))
-        return (
-            sparse.vstack([C, across_x, through_x, own], format="csr"),
-            sparse.vstack([D, across_u, through_u, none], format="csr"),
-        )
+        own = self._selection(np.array([place[int(branch)] for branch in integrals], dtype=np.intp), self._states)
+        none = self.nothing(len(integrals), self._inputs)
+        return self.stack([C, across_x, through_x, own]), self.stack([D, across_u, through_u, none])
 
     def integral_rows(self, outputs: NDArray[np.intp], C: Any, D: Any) -> tuple[Any, Any]:
         """The rows z' = y of the integrals."""
@@ -266,7 +282,8 @@ class _Blocks:
         rows = np.array([place[branch] for branch in self._integrals], dtype=np.intp)
         return C[rows], D[rows]
 
-
-def _selection(columns: NDArray[np.intp], width: int) -> Any:
-    size = len(columns)
-    return sparse.csr_array((np.ones(size), (np.arange(size), columns)), shape=(size, width))
+    def _selection(self, columns: NDArray[np.intp], width: int) -> Any:
+        if self._small:
+            return np.eye(width)[columns]
+        size = len(columns)
+        return sparse.csr_array((np.ones(size), (np.arange(size), columns)), shape=(size, width))
