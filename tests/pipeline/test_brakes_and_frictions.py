@@ -313,6 +313,14 @@ def test_a_given_time_is_that_of_its_event_to_the_last_digit(engine: str) -> Non
     assert sol["second.tau"][2] == 3.0
 
 
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("t_on", [3.0, 2.7, 0.1 + 0.2 * 9])
+def test_a_given_time_at_which_the_condition_holds_already_is_met_to_the_last_digit(t_on: float, engine: str) -> None:
+    brake = sw.Brake("brake", tau=30.0, t_on=t_on, on=sw.omega - 10)
+    sol = wheel(sw.TorqueSource("pull", tau=20.0), brake).simulate(4.0, engine=engine)
+    assert times(sol)[0] == t_on
+
+
 @pytest.mark.parametrize("first", ["load", "brake"])
 def test_a_hoist_and_a_brake_that_both_hold_carry_in_the_order_of_the_network(first: str) -> None:
     """The friction of the hoist takes all that it can before the brake takes the rest, or nothing behind the brake.

@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 LARGEST_UNROLLED = 100
 # e^-24 is 4e-11: what a series misses beyond is below the tolerance, and what follows it sees.
 NEAR = 24.0
+# What is fading counts so much at first, and between the square of this and 1 later.
+WEIGHT = 1e-3
 # For so long in s an event that has just been met is not met again.
 COOLDOWN = 1e-9
 
@@ -48,7 +50,7 @@ class HeyokaProgram:
             step ends where u comes near, because a series from afar does not show that they change there.
         guards: heyoka expressions at whose change of sign a run ends; behind the signs of the switches there is a
             parameter for each: 1 where its rise through zero ends the run, -1 where its fall does, 0 where neither; and
-            behind these another for each, how far beyond zero it has to go.
+            behind these another for each, how far beyond zero it has to go; last of all one for each of `fading`.
         listeners: the last one is asked at a guard, with its number, whether the run goes on.
         held: functions that are constant between switches; they are the last of the parameters.
         stepping: which of the switches depend on them.
@@ -78,6 +80,21 @@ class HeyokaProgram:
         """The guard that an outcome of heyoka means, or None where it means something else."""
         number = -int(outcome) - 1 - len(self.switches) - len(self.fading)
         return number if 0 <= number < len(self.guards) else None
+
+    def weigh(self, integrator: Any) -> None:
+        """Set how much each of `fading` counts, so that it stays within bounds for a while from here on.
+
+        heyoka's tolerance is relative to the largest of states and events, and long after a pulse u^2 is 1e18.
+        """
+        if self.fading:
+            values = self._values("fading", self.fading, integrator.time, integrator.state, integrator.pars)
+            with np.errstate(over="ignore"):
+                integrator.pars[self.first_weight :] = WEIGHT / (values * values + NEAR**2)
+
+    @property
+    def first_weight(self) -> int:
+        """The place of the first weight among the parameters."""
+        return self.parameter_count + len(self.switches) + 2 * len(self.guards)
 
     def integrator(self, tolerance: float) -> Any:
         """The `heyoka.taylor_adaptive` for a relative tolerance; one compilation for each tolerance."""
@@ -164,8 +181,9 @@ class HeyokaProgram:
         if self.switches or self.fading or self.guards:
             options["t_events"] = [
                 *(self._leaves_its_side(number, switch) for number, switch in enumerate(self.switches)),
-                *(heyoka.t_event(value**2 - NEAR**2, callback=_go_on) for value in self.fading),
+                *(self._comes_near(number, value) for number, value in enumerate(self.fading)),
                 *(self._end(number, guard) for number, guard in enumerate(self.guards)),
+                *(self._outgrows(number, value) for number, value in enumerate(self.fading)),
             ]
         return heyoka.taylor_adaptive(
             list(zip(self.variables, self.rows, strict=True)),
@@ -173,6 +191,26 @@ class HeyokaProgram:
             tol=tolerance,
             compact_mode=len(self.rows) > LARGEST_UNROLLED,
             **options,
+        )
+
+    def _comes_near(self, number: int, value: Any) -> Any:
+        """The event that what is fading comes near."""
+        import heyoka
+
+        return heyoka.t_event(heyoka.par[self.first_weight + number] * (value**2 - NEAR**2), callback=_go_on)
+
+    def _outgrows(self, number: int, value: Any) -> Any:
+        """The event that what is fading counts too much or too little."""
+        import heyoka
+
+        size = heyoka.par[self.first_weight + number] * (value**2 + NEAR**2)
+
+        def weigh(integrator: Any, _direction: int) -> bool:
+            self.weigh(integrator)
+            return True
+
+        return heyoka.t_event(
+            (size - WEIGHT**2) * (1.0 - size), direction=heyoka.event_direction.negative, callback=weigh
         )
 
     def _end(self, number: int, guard: Any) -> Any:
@@ -193,12 +231,14 @@ class HeyokaProgram:
         """The event that a switch leaves the side that its sign says."""
         import heyoka
 
-        if self.timed[number]:  # a piece ends there, and rounding would tell whether it has turned by then: never
-            return heyoka.t_event(heyoka.time * heyoka.time + 1.0, callback=_go_on)
+        one = heyoka.expression(1.0)
         # Only a fall through zero triggers, so a switch that starts at zero or touches it does not stop the run; one
         # that rests at zero has sign 0 and no event, which would trigger for ever.
         sign = heyoka.par[self.parameter_count + number]
-        side = heyoka.select(sign, sign * switch, heyoka.expression(1.0))
+        if self.timed[number]:  # a piece ends there, and rounding would tell whether it has turned by then: never;
+            # and it must not be large, for heyoka's tolerance is relative to the largest of states and events
+            return heyoka.t_event(heyoka.select(sign, one, one), callback=_go_on)
+        side = heyoka.select(sign, sign * switch, one)
         return heyoka.t_event(side, direction=heyoka.event_direction.negative, callback=self._passed(number))
 
     def _passed(self, number: int) -> Callable[[Any, int], bool]:

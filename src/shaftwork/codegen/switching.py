@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sympy import Expr, Symbol, pi, sin
+from sympy import Expr, Min, Symbol, pi, sin
 
 from shaftwork.codegen.code import scalar, vectorised
 from shaftwork.codegen.elements import Array
@@ -138,8 +138,9 @@ def _switches(form: StateForm) -> Iterator[_Switch]:
     for part, law, parameters, acts in _laws(form):
         if law not in found:
             moving = switches(law) if law.has(TIME) else ()
-            if not acts and line(law) is not None:  # the mode ends at that very time
-                moving = (*moving, (law, (0.0,)))
+            if not acts:  # a mode ends at that very time, or at the last of several
+                times = law.args if isinstance(law, Min) else (law,)
+                moving = (*moving, *((time, (0.0,)) for time in times if line(time) is not None))
             found[law] = tuple((argument, levels) for argument, levels in moving if argument.has(TIME))
         for argument, levels in found[law]:
             symbols = tuple(symbol for symbol in parameters if argument.has(symbol))

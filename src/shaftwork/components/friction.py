@@ -17,7 +17,7 @@ from shaftwork.components.switching import number_of, refuse_no_time_on, while_o
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter
 
-SLIPPING, STUCK = "", "stuck"
+SLIPPING, STUCK, HELD = "", "stuck", "held by others"
 # What holds gives way this much above its limit: then there is a torque that moves it, and no rounding of one.
 GIVES_WAY = 1 + 2e-14
 ROUNDED = 0.01
@@ -25,7 +25,13 @@ ROUNDED = 0.01
 
 
 def rubbing(
-    limit: Any, back: Any = None, *, held: str = "stuck", moves: str = "slipping", apart: tuple[Leave, ...] = ()
+    limit: Any,
+    back: Any = None,
+    *,
+    held: str = "stuck",
+    moves: str = "slipping",
+    apart: tuple[Leave, ...] = (),
+    at_rest: str | None = None,
 ) -> Modes:
     """Slipping forward and backward, and stuck until the torque through it exceeds a limit.
 
@@ -35,13 +41,16 @@ def rubbing(
         held: what the mode of rest is called.
         moves: what the modes of motion are called, before "forward" and "backward".
         apart: what else ends each of these modes, where they lead to one that is called "apart".
+        at_rest: the form in which it gives way while others hold it at rest, where its law is another one then.
     """
     most, least = (size * GIVES_WAY for size in (limit, limit if back is None else back))
     gives_way = (Leave(THROUGH - most, "forward"), Leave(-THROUGH - least, "backward"))
     return Modes(
         (
-            Mode("forward", (Leave(-ACROSS, "stuck"), *apart), 1.0, SLIPPING, ACROSS > 0, f"{moves} forward"),
-            Mode("backward", (Leave(ACROSS, "stuck"), *apart), -1.0, SLIPPING, ACROSS < 0, f"{moves} backward"),
+            Mode("forward", (Leave(-ACROSS, "stuck"), *apart), 1.0, SLIPPING, ACROSS > 0, f"{moves} forward", at_rest),
+            Mode(
+                "backward", (Leave(ACROSS, "stuck"), *apart), -1.0, SLIPPING, ACROSS < 0, f"{moves} backward", at_rest
+            ),
             Mode("stuck", (*gives_way, *apart), 0.0, STUCK, says=held),
         )
     )
@@ -96,11 +105,15 @@ class DryFriction(Component):
             )
 
     def modes(self, p: Any) -> Iterator[Modes]:
-        yield rubbing(p.tau_c if p.tau_s is None else p.tau_s)
+        if p.tau_s is None:
+            yield rubbing(p.tau_c)
+        else:  # a fall at once does not come while nothing moves
+            yield rubbing(p.tau_s, at_rest=HELD if p.omega_s == 0 else None)
 
     def branches(self, p: Any) -> Iterator[Branch]:
         falls = p.tau_s is not None and p.omega_s != 0
-        yield from rubs(p.tau_c + ((p.tau_s - p.tau_c) * exp(-((ACROSS / p.omega_s) ** 2)) if falls else 0), p)
+        slides = p.tau_c + ((p.tau_s - p.tau_c) * exp(-((ACROSS / p.omega_s) ** 2)) if falls else 0)
+        yield from rubs(p.tau_s if p.form == HELD else slides, p)
         if p.form != STUCK:
             yield ThroughLaw(p.d * ACROSS)
 

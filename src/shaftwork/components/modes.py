@@ -67,6 +67,8 @@ class Mode:
         starts: a motion begins in the first mode whose condition holds, in ACROSS, INTEGRAL and the time; in the first
             of all where none does.
         says: how phases of a motion and events call it; modes that say the same are told apart inside only.
+        at_rest: the form in place of `form` where nothing moves across the element, as others hold both of its ends;
+            None where its laws are the same then.
     """
 
     name: str
@@ -75,11 +77,17 @@ class Mode:
     form: str = ""
     starts: Boolean = true
     says: str = ""
+    at_rest: str | None = None
 
     @property
     def words(self) -> str:
         """How phases and events call it."""
         return self.says or self.name
+
+    @property
+    def forms(self) -> tuple[str, ...]:
+        """The form, and that of rest where it is another one."""
+        return (self.form,) if self.at_rest is None else (self.form, self.at_rest)
 
     @cached_property
     def gives_way(self) -> tuple[tuple[float, str], ...]:

@@ -91,9 +91,10 @@ class _Run:
         integrator.reset_cooldowns() if integrator.with_events else None
         if self.problem.guards is not None:
             self._sizes = np.fmax(self.problem.guards.sizes, 1.0)
-            first = self.program.parameter_count + len(self.program.switches)
-            self._sides, self._offsets = np.split(integrator.pars[first:], 2)
+            first, last = self.program.parameter_count + len(self.program.switches), self.program.first_weight
+            self._sides, self._offsets = np.split(integrator.pars[first:last], 2)
             self._guard(self.problem.guards.sides, self.problem.guards.offsets)
+        self.program.weigh(integrator)
         watch = self._watch(piece)
         self.program.listeners.clear()
         longest = self._first_step(piece)
@@ -158,6 +159,7 @@ class _Run:
         self.reactions += 1
         integrator.pars[: reaction.p.size] = reaction.p
         self._guard(reaction.sides, reaction.offsets)
+        self.program.weigh(integrator)
         return True
 
     def _first_step(self, piece: Piece) -> float:

@@ -67,6 +67,11 @@ class GraphPart:
         """Name of the part."""
         return self.component.name
 
+    def ends_of(self, element: Modes) -> tuple[End, End]:
+        """The ports that the across variable of an element is of; its own two by default."""
+        ports = [port.name for port in self.component.ports]
+        return element.ends or (ports[0], ports[1] if len(ports) > 1 else None)
+
 
 @dataclass(frozen=True, eq=False)
 class CircuitGraph:

@@ -39,7 +39,7 @@ def does_the_same(part: Component, referred: Component, scale: Scale) -> bool:
     old, new = _View.of(part), _View.of(referred)
     if len(old.modes) != len(new.modes):
         return False
-    forms = [dict.fromkeys(mode.form for mode in element.options) for element in old.modes]
+    forms = [dict.fromkeys(form for mode in element.options for form in mode.forms) for element in old.modes]
     try:
         guards = all(_Guards(old, new, scale, *pair).agree() for pair in zip(old.modes, new.modes, strict=True))
         return guards and all(

@@ -57,8 +57,7 @@ class Readings:
         Raises:
             NetworkError: it has no finite value: a law of another part has a pole where this part holds still.
         """
-        ports = [port.name for port in part.component.ports]
-        ends = element.ends or (ports[0], ports[1] if len(ports) > 1 else None)
+        ends = part.ends_of(element)
         known: dict[Symbol, Expr] = {}
         for symbol in expression.free_symbols - {TIME}:
             if symbol == ACROSS:

@@ -42,6 +42,8 @@ KEPT = 64
 """Parameter vectors whose matrices are kept."""
 SAMPLES = 64
 """Times at which a guard is looked at to know its size."""
+CLOCK = 1e-20
+"""What a clock counts: heyoka's tolerance is relative to the largest state, which this must never be."""
 
 ModeNames = tuple[str, ...]
 """The mode of every element of a network, in their order."""
@@ -287,7 +289,7 @@ class Assembly:
         if clocks:
 
             def rhs(t: float, y: Array) -> Array:
-                wound = guards(np.array([t]), y[None, :size])[0, clocks]
+                wound = CLOCK * guards(np.array([t]), y[None, :size])[0, clocks]
                 return np.concatenate([rates(t, y[:size]) if size else np.empty(0), wound])
 
             def jacobian(t: float, y: Array) -> Any:
@@ -345,7 +347,7 @@ class Assembly:
             return np.empty(0)
         times = np.linspace(*span, SAMPLES)
         largest = np.abs(guards(times, np.tile(x, (SAMPLES, 1)))).max(axis=0)[list(self.clocks)]
-        return np.where(largest > 0, largest, 1.0) * (span[1] - span[0])
+        return CLOCK * np.where(largest > 0, largest, 1.0) * (span[1] - span[0])
 
     @cached_property
     def _function(self) -> Callable[..., Any]:
@@ -375,8 +377,7 @@ class Assembly:
     def _scalar(self) -> Callable[[list[float]], tuple[Motion, Limits]]:
         rows = self.model.rows
         assert rows is not None  # noqa: S101 (asked only then)
-        arguments = {"t": TIME, "x": rows.states}
-        return bindable(arguments, {"p": rows.parameters}, rows.rates, self._expressions)
+        return bindable({"t": TIME, "x": rows.states}, {"p": rows.parameters}, rows.rates, self._expressions)
 
     def sizes(self, p: Array) -> list[float]:
         """The nominal size of each state."""
@@ -391,7 +392,7 @@ class Assembly:
         from shaftwork.codegen.heyoka import build
 
         states = (*rows.states, *(Symbol(f"clock {k}", real=True) for k in self.clocks))
-        rates = (*rows.rates, *(self._expressions[k] for k in self.clocks))
+        rates = (*rows.rates, *(CLOCK * self._expressions[k] for k in self.clocks))
         changing = [rows.parameters[place] for place in self._numbers]
         try:
             return build(states, TIME, rows.parameters, rates, self.guards_shown, changing)

@@ -1,4 +1,4 @@
-"""The course of a motion near an instant, along short parabolas: what is about to go beyond its limit."""
+"""The course of a motion near an instant: what is about to go beyond its limit."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def leaving(regime: Regime, step: float, here: Course, beside: Course, on_limit:
     """
     ways, found = (here, beside), list[tuple[float, Way]]()
     for _ in range(2):  # where nothing moves yet, its acceleration tells
-        ways = later(regime, step, ways[0]), later(regime, step, ways[1])
+        ways = _bent(regime, step, ways[0]), _bent(regime, step, ways[1])
         moving = []
         for pair in on_limit:
             made, k = pair[1], pair[1].guard
@@ -50,10 +50,16 @@ def moved(moment: Moment, t: float, step: float) -> Moment:
 
 
 def later(regime: Regime, step: float, course: Course) -> Course:
+    """A step further along a straight line."""
+    t, x, rates, _ = course
+    states = [v + step * rate for v, rate in zip(x, rates, strict=True)]
+    return t + step, states, *regime.motion(t + step, states)
+
+
+def _bent(regime: Regime, step: float, course: Course) -> Course:
     """A step further along a parabola (Heun): a prescribed speed bends, so what it is compared with must bend too."""
     t, x, rates, _ = course
-    straight = [v + step * rate for v, rate in zip(x, rates, strict=True)]
-    ends, _ = regime.motion(t + step, straight)
+    _, _, ends, _ = later(regime, step, course)
     states = [v + step * (rate + end) / 2 for v, rate, end in zip(x, rates, ends, strict=True)]
     return t + step, states, *regime.motion(t + step, states)
 

@@ -6,8 +6,10 @@ from collections.abc import Iterator, Sequence
 
 from shaftwork.components.modes import Choice, Mode, Modes
 from shaftwork.core.errors import ParameterError
-from shaftwork.network.graph import CircuitGraph, GraphPart
+from shaftwork.network.graph import CircuitGraph, GraphPart, build_graph
 from shaftwork.network.netlist import Netlist
+from shaftwork.pipeline.phases.resting import at_rest
+from shaftwork.reduction.form import state_form
 
 
 def in_phase(netlist: Netlist, graph: CircuitGraph, phase: str) -> Netlist:
@@ -27,7 +29,8 @@ def in_phase(netlist: Netlist, graph: CircuitGraph, phase: str) -> Netlist:
         for part in graph.parts
         if part.modes
     }
-    return netlist.with_choices(chosen)
+    made = netlist.with_choices(chosen)
+    return at_rest(made, state_form(build_graph(made)))
 
 
 def whole_name(graph: CircuitGraph, phase: str = "") -> str:

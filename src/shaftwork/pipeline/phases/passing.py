@@ -14,6 +14,7 @@ from shaftwork.core.errors import no_value
 from shaftwork.integrate.problem import Reaction, SeriesError
 from shaftwork.pipeline.phases.assemblies import Element, ModeNames
 from shaftwork.pipeline.phases.moments import Change, Moment, Regime, clear_of_limit
+from shaftwork.pipeline.phases.rejoining import settled
 from shaftwork.pipeline.phases.settling import Settling
 
 # Of so many roundings of the time a guard may be late that is met together with another one.
@@ -118,7 +119,7 @@ class Passing:
     def _settled(self, met: int, t: float, x: Array) -> tuple[Moment, list[Change]] | None:
         before = Moment(self.moment.regime, x[: self._size].copy(), self.moment.bands)
         self.refuse_missed(met, t, x)
-        moment, changes = self._settling.settle(t, t, before, met)
+        moment, changes = settled(self._settling, t, t, before, met)
         if moment.x is before.x:
             return moment, changes
         self.beyond = moment, changes  # other states are other equations, or an impact in these

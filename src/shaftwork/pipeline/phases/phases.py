@@ -12,6 +12,7 @@ from shaftwork.integrate import choice
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.phases.assemblies import Assembly, ModeNames, elements_of
+from shaftwork.pipeline.phases.resting import at_rest
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.model import Model
@@ -57,7 +58,10 @@ class Phases:
             try:
                 with warnings.catch_warnings():  # of the network as it is wired compilation has warned
                     warnings.simplefilter("ignore", NetworkWarning)
-                    model = self._rebuild(self._netlist(forms))
+                    netlist = self._netlist(forms)
+                    model = self._rebuild(netlist)
+                    if (resting := at_rest(netlist, model.form)) is not netlist:
+                        model = self._rebuild(resting)
                 self._assemblies[forms] = Assembly(model, self.elements, forms)
             except NetworkError as error:
                 self._assemblies[forms] = error

@@ -24,6 +24,7 @@ from shaftwork.pipeline.phases.assemblies import Assembly
 from shaftwork.pipeline.phases.moments import Change, Moment
 from shaftwork.pipeline.phases.passing import Passing, Phase
 from shaftwork.pipeline.phases.phases import FOLLOWING, Phases
+from shaftwork.pipeline.phases.rejoining import settled
 from shaftwork.pipeline.phases.settling import Settling
 
 # So many changes of mode, each within this part of the run of the one before, are chatter. Rebounds come ever faster,
@@ -141,7 +142,7 @@ class Run:
 
     def _settle(self, t: float, moment: Moment, met: int | None) -> Moment:
         after = self._instants(moment).sides(t)[1]
-        moment, changes = self.settling.settle(t, after, moment, met)
+        moment, changes = settled(self.settling, t, after, moment, met)
         self.note(t, changes)
         return moment
 

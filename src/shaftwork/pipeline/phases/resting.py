@@ -1,0 +1,58 @@
+"""What slips by its mode, and yet does not move at all, as others hold both of its ends: two frictions on one shaft."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import chain
+
+from shaftwork.components.branches import End
+from shaftwork.components.modes import Choice, Modes
+from shaftwork.network.graph import GROUND, GraphPart
+from shaftwork.network.netlist import Netlist
+from shaftwork.network.templates import Kind
+from shaftwork.reduction.form import StateForm
+from shaftwork.reduction.gains import Number, add
+
+
+def at_rest(netlist: Netlist, form: StateForm) -> Netlist:
+    """The network with the laws of rest for what cannot move; the same one where there are none.
+
+    Args:
+        netlist: of the network, with a form chosen for each element.
+        form: of the same network.
+    """
+    parts = {part.name: part for part in form.graph.parts}
+    held: dict[str, tuple[Choice, ...]] = {}
+    for item in netlist.placed:
+        part = parts[item.part.name]
+        pairs = zip(part.modes, item.choices, strict=False)  # nothing is chosen for what has no modes
+        made = tuple(_held(form, part, element, choice) for element, choice in pairs)
+        if made != item.choices:
+            held[part.name] = made
+    return netlist.with_choices(held) if held else netlist
+
+
+def _held(form: StateForm, part: GraphPart, element: Modes, choice: Choice) -> Choice:
+    """What is chosen for an element, in the form of rest where it has one and is at rest."""
+    rests = (mode.at_rest for mode in element.options if mode.form == choice.form and mode.at_rest is not None)
+    other = next(rests, None)
+    return replace(choice, form=other) if other is not None and _rests(form, part, element) else choice
+
+
+def _rests(form: StateForm, part: GraphPart, element: Modes) -> bool:
+    """Whether no branch of the tree but rigid joints is on the way from one end of an element to the other."""
+    first, second = (_potential(form, part, end) for end in part.ends_of(element))
+    if first is None or second is None:
+        return False
+    ways = dict.fromkeys(chain(first, second))
+    return all(
+        form.graph.branches[tree].template.kind is Kind.COUPLING
+        or add(first.get(tree, 0), -second.get(tree, 0), []) == 0
+        for tree in ways
+    )
+
+
+def _potential(form: StateForm, part: GraphPart, end: End) -> Mapping[int, Number] | None:
+    node = GROUND if end is None else part.nodes[end]
+    return {} if node == GROUND else form.tree.potentials[node]

@@ -1,0 +1,74 @@
+"""What ends a step of a Taylor series may be large, and neither the motion nor the times of events suffer from it."""
+
+import math
+
+import numpy as np
+import pytest
+import sympy
+from scipy.optimize import brentq
+
+import shaftwork as sw
+
+pytest.importorskip("heyoka")
+
+# Limits are met where they are beyond zero by more than rounding moves them, here within 2e-10 s.
+EVENT = 1e-9
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-3], ids=["torques of 7 N m", "torques of 7 mN m"])
+@pytest.mark.parametrize("asked", [{"rtol": 1e-9}, {"rtol": 1e-9, "t_eval": 5001}, {"rtol": 1e-13}], ids=str)
+def test_a_slow_ramp_breaks_a_friction_away_on_time_whatever_is_asked_for(size: float, asked: dict[str, float]) -> None:
+    net = sw.Network("breakaway")
+    net.add(sw.Inertia("J", J=0.7 * size), "a")
+    net.add(sw.DryFriction("friction", tau_c=3.0 * size, tau_s=7.3 * size, omega_s=0.2), "a")
+    net.add(sw.TorqueSource("T", tau=size * (sw.Ramp(7.5, duration=1e4) + sympy.sin(0.3 * sw.t) / 1000)), "a")
+    expected = brentq(lambda t: 7.5e-4 * t + 1e-3 * math.sin(0.3 * t) - 7.3, 9700.0, 9750.0, xtol=1e-12)
+    assert net.simulate(9800.0, engine="heyoka", **asked).events[0][0] == pytest.approx(expected, rel=0, abs=EVENT)
+
+
+@pytest.mark.parametrize("asked", [{"rtol": 1e-9}, {"rtol": 1e-9, "t_eval": 5001}], ids=str)
+def test_a_brake_that_fades_slowly_slips_on_time_and_as_often_as_with_another_engine(asked: dict[str, float]) -> None:
+    net = sw.Network("brake")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.Brake("brake", tau=5 * sympy.exp(-sw.t / 2000) + sympy.sin(3 * sw.t) / 1000), "a")
+    net.add(sw.TorqueSource("T", tau=0.4), "a")
+    expected = brentq(lambda t: 0.4 - 5 * math.exp(-t / 2000) - 1e-3 * math.sin(3 * t), 5046.6, 5046.9, xtol=1e-12)
+    sol = net.simulate(5100.0, engine="heyoka", **asked)
+    other = net.simulate(5100.0, engine="scipy")
+    assert sol.events[0][0] == pytest.approx(expected, rel=0, abs=EVENT)
+    assert [event[1:] for event in sol.events] == [event[1:] for event in other.events]
+
+
+def test_the_end_of_a_ramp_costs_no_digits_of_a_long_motion() -> None:
+    net = sw.Network("long ramp")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.Spring("c", c=1.0), "a", "b")
+    net.add(sw.Inertia("K", J=2.0), "b")
+    net.add(sw.TorqueSource("T", tau=sw.Ramp(1.0, duration=9e3)), "a")
+    found, exact = (net.simulate(1e4, engine=engine, t_eval=11)["J.omega"] for engine in ("heyoka", "exact"))
+    # the tolerance of 1e-10 for each of some thousand steps, which an undamped motion keeps
+    assert np.abs(found - exact).max() < 1e-8 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("width", [1.0, 0.01, 1e-4], ids=lambda width: f"{width:g} s wide")
+@pytest.mark.parametrize("middle", [5.0, 5000.0], ids=lambda middle: f"at {middle:g} s")
+def test_a_pulse_of_torque_gives_its_impulse_however_far_away_it_is(width: float, middle: float) -> None:
+    net = sw.Network("pulse")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.TorqueSource("T", tau=sympy.exp(-(((sw.t - middle) / width) ** 2)) / width), "a")
+    sol = net.simulate(1e4, engine="heyoka", rtol=1e-9, t_eval=2)
+    # the time itself is rounded to 1e-12 s, a part of 1e-8 of the narrowest pulse; heyoka's steps add 1e-10 each
+    assert sol["J.omega"][-1] == pytest.approx(math.sqrt(math.pi), rel=3e-8)
+
+
+def test_a_motion_long_after_a_pulse_is_as_exact_as_before_it() -> None:
+    net = sw.Network("after a pulse")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.Spring("c", c=1.0), "a", "b")
+    net.add(sw.Inertia("K", J=2.0), "b")
+    net.add(sw.TorqueSource("T", tau=sympy.exp(-(((sw.t - 5.0) / 0.3) ** 2))), "a")
+    sol = net.simulate(1e4, engine="heyoka", rtol=1e-9, t_eval=11)
+    # sqrt(pi) 0.3 e^(-(0.3 omega)^2 / 4) is the pulse at the frequency omega; the steps before it add nothing
+    omega, impulse = math.sqrt(1.5), math.sqrt(math.pi) * 0.3
+    swing = impulse * math.exp(-((0.3 * omega) ** 2) / 4) * np.cos(omega * (sol.t[1:] - 5.0))
+    assert np.abs(sol["J.omega"][1:] - (impulse + 2 * swing) / 3).max() < 1e-7
