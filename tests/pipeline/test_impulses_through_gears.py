@@ -265,3 +265,35 @@ def test_a_flank_that_cannot_open_where_a_gear_jams_does_not_become_the_other_on
     net.add(sw.Inertia("J3", J=7.0), "c")
     with pytest.raises(sw.SimulationError, match="jammed coupling: LossyGear 'gear'"):
         net.simulate(0.3, engine=engine, initial={"J1.omega": 0.7, "J2.omega": 1.9})
+
+
+def jamming(joint: sw.Component, ratio: float, inertias: tuple[float, float, float], torques: tuple[Any, float]) -> Any:
+    """A self-locking gear that its load begins to drive, and an inertia that a joint leads to one of its ends."""
+    net = sw.Network("jams")
+    net.add(sw.Inertia("hung", J=inertias[0]), "c")
+    net.add(joint, "c", "b" if isinstance(joint, sw.Freewheel) else "a")
+    net.add(sw.Inertia("J1", J=inertias[1]), "a")
+    net.add(sw.LossyGear("gear", ratio=ratio, efficiency=0.97, efficiency_back=-0.2), "a", "b")
+    net.add(sw.Inertia("J2", J=inertias[2]), "b")
+    net.add(sw.TorqueSource("motor", tau=torques[0]), "a")
+    net.add(sw.TorqueSource("load", tau=torques[1]), "c")
+    return net.compile()
+
+
+@pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials"])
+@pytest.mark.parametrize(
+    ("model", "fast", "slow"),
+    [
+        (jamming(sw.DryFriction("joint", tau_c=5.0), 0.37, (2.3, 0.1, 9.0), (3.0 - 20.0 * sw.t, 0.0)), 1.0, 1 / 0.37),
+        (jamming(sw.Freewheel("joint"), 2.0, (3.0, 0.1, 1.0), (-0.5 + 4.0 * sw.t, 8.8)), -2.0, -1.0),
+    ],
+    ids=["friction", "freewheel"],
+)
+def test_what_would_slip_where_a_gear_jams_is_not_stopped_with_it(
+    engine: str, model: sw.Model, fast: float, slow: float
+) -> None:
+    """The gear stops at once; through 5 N m of friction, or a freewheel that would pull, nothing else does."""
+    speeds = {"J1.omega": fast, "J2.omega": slow, "hung.omega": fast if fast > 0 else slow}
+    initial = {name: speeds[name] for name in model.states if name in speeds}
+    with pytest.raises(sw.SimulationError, match=r"stopped at .* by a gear that jams at once, and 'joint' would slip"):
+        model.simulate(0.5, engine=engine, initial=initial)

@@ -97,6 +97,33 @@ class Impacts:
         self._refuse_gain(t, moment, held, self._regimes.held(new, after), hits)
         return new, changes
 
+    def refuse_slip(self, t: float, moment: Moment, new: Moment, number: int) -> None:
+        """Refuse a stop at once, of a gear that jams, in which what holds by a limited torque would slip or part.
+
+        Args:
+            t: s.
+            moment: what was before.
+            new: after it, with all stopped that is joined.
+            number: of the element that wanted another mode.
+
+        Raises:
+            SimulationError: something would; names it.
+        """
+        held, stopped = self._regimes.held(moment, t), self._regimes.held(new, t)
+        least = NO_IMPACT * max(1.0, *map(abs, held.values()))
+        if all(abs(stopped[name] - value) <= least for name, value in held.items()):
+            return
+        before, modes = moment.regime.modes, new.regime.modes
+        joins = {k: name for k, (_, name) in self._pairs(modes) if name != before[k]}
+        after = self._joined(modes, held, t, joins, least).regime.modes
+        slips = [element.name for k, (element, name) in self._pairs(modes) if name != after[k]]
+        if slips:
+            raise SimulationError(
+                f"'{self._elements[number].name}' is stopped at t = {t:.9g} s by a gear that jams at once, and "
+                f"{' and '.join(repr(name) for name in slips)} would slip or part in that stop, which is not followed. "
+                "Put a spring between them, or give the gear an efficiency_back above zero."
+            )
+
     def _kept(self, t: float, before: ModeNames, moment: Moment) -> Moment:
         """Contacts that part in an impact of others, and are pushed back before they could be found again, stay closed.
 

@@ -375,8 +375,9 @@ class Settling:
             ways += [{number: to, k: leave.to} for leave in self.elements[k].modes[modes[k]].leaves if k != number]
         for way in ways:
             if self._regimes.possible(new := with_modes(modes, way)):
-                changes = [Change(t, self.elements[k], modes[k], name) for k, name in way.items()]
-                return self._regimes.changed(moment, after, new), changes
+                made = self._regimes.changed(moment, after, new)
+                self._impacts.refuse_slip(after, moment, made, number)
+                return made, [Change(t, self.elements[k], modes[k], name) for k, name in way.items()]
         raise SimulationError(
             f"'{element.name}' can neither stay {element.modes[before].words} nor become {element.modes[to].words} "
             f"at t = {t:.9g} s. {error.problems[0]}"
