@@ -115,8 +115,8 @@ class LaneProgram:
 class LaneStep:
     """One step of a lane, with its error and the size of the next one; Dormand and Prince's method of order 8(5,3).
 
-    Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.10. The tolerance is a part
-    of the size of a state: of its value, of its change in the step and of its nominal size together.
+    Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.10. The tolerance is a part of the size of a
+    state: of its value, of its change in the step and of its nominal size together.
 
     A lane is a column of *rows*: states, integrals, time, and the size of the next step. Behind its parameters come its
     *limits*: the tolerance, the end and the longest step, and nominal sizes of the states.

@@ -200,10 +200,11 @@ class _Way:
     def go(self) -> tuple[Array, Mask]:
         """Through all of it."""
         waiting = self._begin()
-        for _ in range(MOST_ROUNDS):
-            if not waiting:
-                break
-            waiting = [made for group in joined(waiting) for made in self._stretch(group)]
+        with np.errstate(all="ignore"):  # a lane that runs away is left to `simulate`
+            for _ in range(MOST_ROUNDS):
+                if not waiting:
+                    break
+                waiting = [made for group in joined(waiting) for made in self._stretch(group)]
         return self._results(), self.done
 
     def _begin(self) -> list[Group]:

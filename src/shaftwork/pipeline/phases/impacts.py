@@ -110,7 +110,7 @@ class Impacts:
             SimulationError: something would; names it.
         """
         held, stopped = self._regimes.held(moment, t), self._regimes.held(new, t)
-        least = NO_IMPACT * max(1.0, *map(abs, held.values()))
+        least = NO_IMPACT * max([1.0, *map(abs, held.values())])
         if all(abs(stopped[name] - value) <= least for name, value in held.items()):
             return
         before, modes = moment.regime.modes, new.regime.modes
