@@ -24,9 +24,10 @@ def leaving(regime: Regime, step: float, here: Course, beside: Course, on_limit:
         beside: the same, rounding away from it.
         on_limit: elements and guards.
     """
+    further = _bent if regime.bends else later
     ways, found = (here, beside), list[tuple[float, Way]]()
     for _ in range(2):  # where nothing moves yet, its acceleration tells
-        ways = _bent(regime, step, ways[0]), _bent(regime, step, ways[1])
+        ways = further(regime, step, ways[0]), further(regime, step, ways[1])
         moving = []
         for pair in on_limit:
             made, k = pair[1], pair[1].guard

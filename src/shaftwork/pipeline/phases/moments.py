@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from shaftwork.codegen.elements import Array
+from shaftwork.components.laws import t as TIME
 from shaftwork.pipeline.phases.assemblies import Assembly, Element, Limits, ModeNames, Motion, Watched
 from shaftwork.pipeline.prepared import NOMINAL
 
@@ -77,6 +78,12 @@ class Regime:
     sizes: list[float]
     watched: tuple[tuple[int, Watched], ...]
     ways: dict[int, Any] = field(default_factory=dict)
+
+    @cached_property
+    def bends(self) -> bool:
+        """Whether what is prescribed, a speed for one, depends on the time: near an instant it is no straight line."""
+        form = self.assembly.model.form
+        return any(form.graph.branches[source].template.law.has(TIME) for source in form.across_sources)
 
     @cached_property
     def _rounding(self) -> list[tuple[float, float, float]]:
