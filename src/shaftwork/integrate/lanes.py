@@ -131,7 +131,7 @@ class LaneRun:
         made[0, : step.rows] = self._rows
         for k in range(self._block):
             step(made[k, : step.rows], self._taken, made[k + 1])
-            if k % LOOK == 0 and (made[k, step.rows - 2] >= self._end).all():
+            if k % LOOK == LOOK - 1 and (made[k, step.rows - 2] >= self._end).all():
                 made = made[: k + 2]
                 break
         self._count += len(made) - 1

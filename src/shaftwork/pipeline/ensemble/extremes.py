@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from shaftwork.codegen.elements import Array
 
-DATA = 3
-"""What is known of a quantity: its value and its first two derivatives by time."""
 BEYOND = 0.2
 """Of the difference between the cubic and the quintic in the middle of an interval: so far the motion may be from the
 quintic. Of a sine, whose samples are less than half a period apart, it is at most half of that."""

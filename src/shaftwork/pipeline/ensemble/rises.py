@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from shaftwork.codegen.elements import Array
-from shaftwork.pipeline.ensemble.extremes import NEARLY, Index, beyond, likely, peak
+from shaftwork.pipeline.ensemble.extremes import NEARLY, Index, There, beyond, likely, peak
 
-There = Callable[[Index, Index, Array], Array]
-"""Jets (3, c) at times (c,) in s, from samples (c,) of lanes (c,)."""
 NEAR = 1e-9
 """Of the range: a top that is so near zero need not be found."""
 MOST_ROUNDS, MOST_ITERATIONS = 12, 100
