@@ -19,7 +19,7 @@ import numpy as np
 
 import shaftwork as sw
 from shaftwork.studies import Sweep, sweep
-from shaftwork.studies.sweep_task import Chunk, Worker
+from shaftwork.studies.sweep_task import CHUNK, Chunk, Worker
 
 T_END = 6.5
 MEASURES = {"peak": "max shaft.tau", "speed": "end J2.omega"}
@@ -44,7 +44,7 @@ def resumes(count: int, whole: Sweep) -> bool:
     run, chunks = Worker.run, iter(range(count))
 
     def stop(self: Worker, variants: np.ndarray) -> Chunk:
-        if next(chunks) * 512 >= count // 2:
+        if next(chunks) * CHUNK >= count // 2:
             raise KeyboardInterrupt
         return run(self, variants)
 

@@ -14,12 +14,15 @@ from sympy.functions.elementary.piecewise import ExprCondPair
 from sympy.logic.boolalg import ITE, And, BooleanFalse, BooleanTrue, Not, Or, Xor
 
 from shaftwork.codegen.fixed import Fixed
+from shaftwork.codegen.heyoka_cache import keep_apart
 from shaftwork.codegen.heyoka_held import Held
 from shaftwork.components import noise
 from shaftwork.components.laws import Interpolation, InterpolationSlope, between_steps
 from shaftwork.components.noise import HeldNoise
 from shaftwork.components.slopes import wraps
 from shaftwork.core.errors import CompileError
+
+keep_apart()  # before anything is compiled
 
 SAME_NAME: dict[Any, Callable[..., Any]] = {
     getattr(sympy, name): getattr(heyoka, name)

@@ -7,9 +7,9 @@ comes out for one does not depend on those beside it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any
 
 import heyoka
@@ -21,6 +21,7 @@ from sympy import Expr, Symbol
 from shaftwork.codegen.fixed import Fixed
 from shaftwork.codegen.heyoka import HeyokaProgram
 from shaftwork.codegen.heyoka_expressions import Translator
+from shaftwork.codegen.quintics import BEYOND, JET, apart, inner
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError
 from shaftwork.reduction.rows import Rows
@@ -31,8 +32,10 @@ SAFETY, LEAST_FACTOR, MOST_FACTOR = 0.85, 0.2, 5.0
 """Of the next step by the error of this one."""
 TINY = 1e-30
 """Beside an error."""
-JET = 3
-"""What is known of a quantity at a time: its value and its first two derivatives by time."""
+NOWHERE = -1e300
+"""So far comes what has not been seen yet."""
+BOTH = (1.0, -1.0)
+"""The signs of what may matter on both sides."""
 
 
 @dataclass(frozen=True)
@@ -118,25 +121,40 @@ class LaneStep:
     Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.10. The tolerance is a part of the size of a
     state: of its value, of its change in the step and of its nominal size together.
 
-    A lane is a column of *rows*: states, integrals, time, and the size of the next step. Behind its parameters come its
-    *limits*: the tolerance, the end and the longest step, and nominal sizes of the states.
+    A lane is a column: first its *rows*, which are states, integrals, time, and the size of the next step; then what
+    has been seen, which is the time at the start of the step that led here, jets at that time, and how far each
+    quantity, times a sign, can have come. Behind its parameters come its *limits*: the tolerance, the end and the
+    longest step, and nominal sizes of the states.
 
     Args:
         program: the system.
-        shown: heyoka expressions of which jets are wanted; the guards follow them.
+        shown: heyoka expressions of which jets are wanted, each with the signs that matter; the guards follow them.
     """
 
-    def __init__(self, program: LaneProgram, shown: Sequence[Any]) -> None:
+    def __init__(self, program: LaneProgram, shown: Sequence[tuple[Any, Sequence[float]]]) -> None:
         self.states, self.rows = len(program.variables), len(program.variables) + len(program.integrands) + 2
         self.first_limit = program.parameter_count + len(program.fixed.found)
-        jets = [made for expression in (*shown, *program.guards) for made in program.jet(expression)]
-        self._jets, self._room = len(jets), np.empty(0)
-        self._function = self._written(program, jets)
+        quantities = [*shown, *((guard, BOTH) for guard in program.guards)]
+        self.jets = slice(self.rows + 1, self.rows + 1 + JET * len(quantities))
+        """Rows of what is seen of the quantities."""
+        pairs = [(number, sign) for number, (_, signs) in enumerate(quantities) for sign in signs]
+        self._reaches = {pair: self.jets.stop + k for k, pair in enumerate(pairs)}
+        self.height = self.jets.stop + len(pairs)
+        """Number of values in a column."""
+        self._room = np.empty(0)
+        self._function = self._written(program, [program.jet(quantity) for quantity, _ in quantities])
 
-    @property
-    def height(self) -> int:
-        """Number of values that a step writes for a lane: the rows after it, and the jets before it."""
-        return self.rows + self._jets
+    def jet(self, number: int) -> slice:
+        """Where, among the jets, is that of a quantity."""
+        return slice(JET * number, JET * (number + 1))
+
+    def reach(self, number: int, sign: float) -> int:
+        """The row of how far a quantity can have come, times a sign."""
+        return self._reaches[number, sign]
+
+    def forget(self, columns: Array) -> None:
+        """Let nothing be seen in columns (height, k) yet but the jets at the start."""
+        columns[self.rows], columns[self.jets.stop :] = columns[self.rows - 2], NOWHERE
 
     def room(self, size: int) -> Array:
         """(size,) for steps, the same each time: fresh memory costs as much as the arithmetic."""
@@ -154,30 +172,57 @@ class LaneStep:
         first = -(3 + self.states)
         taken[first], taken[first + 1], taken[first + 2] = tolerance, end, longest
 
-    def __call__(self, rows: Array, taken: Array, made: Array) -> None:
-        """Write a step (height, k) of lanes (rows, k), all contiguous."""
-        self._function.into(made, rows, taken)
+    def __call__(self, columns: Array, taken: Array, made: Array) -> None:
+        """Write what a step makes of columns (height, k), both contiguous."""
+        self._function.into(made, columns, taken)
 
-    def _written(self, program: LaneProgram, jets: Sequence[Any]) -> LaneFunction:
-        time, step = heyoka.make_vars("time", "step")
+    def _written(self, program: LaneProgram, jets: Sequence[tuple[Any, ...]]) -> LaneFunction:
+        time, step, before = heyoka.make_vars("time", "step", "before")
         integrals = [heyoka.expression(f"integral{k}") for k in range(len(program.integrands))]
         limit = [heyoka.par[self.first_limit + k] for k in range(3 + self.states)]
         (tolerance, end, longest), sizes = limit[:3], limit[3:]
         left = end - time
-        wanted = heyoka.select(heyoka.lt(step, longest), step, longest)
-        size = heyoka.select(heyoka.lt(wanted, left), wanted, left)
+        wanted = _lower(step, longest)
+        size = _lower(wanted, left)
         old = [*program.variables, *integrals]
         stages = _stages(program, time, size)
         new = [_moved(x, size, DOP853.B, slopes) for x, slopes in zip(old, stages, strict=True)]
         error = _error(size, tolerance, sizes, old, stages[: self.states])
         factor = SAFETY / heyoka.sqrt(heyoka.sqrt(heyoka.sqrt(error + TINY)))  # the error is of order 8
-        factor = heyoka.select(heyoka.lt(factor, MOST_FACTOR), factor, heyoka.expression(MOST_FACTOR))
-        factor = heyoka.select(heyoka.gt(factor, LEAST_FACTOR), factor, heyoka.expression(LEAST_FACTOR))
+        factor = _higher(_lower(factor, heyoka.expression(MOST_FACTOR)), heyoka.expression(LEAST_FACTOR))
         good = heyoka.lte(error, 1.0)
         arrived = heyoka.select(heyoka.lt(wanted, left), time + size, end)
         after = [heyoka.select(good, moved, x) for x, moved in zip([*old, time], [*new, arrived], strict=True)]
-        here = heyoka.subs(list(jets), {heyoka.time: time}) if jets else []
-        return LaneFunction((*after, size * factor, *here), (*old, time, step))
+        here = heyoka.subs([one for jet in jets for one in jet], {heyoka.time: time}) if jets else []
+        last = [heyoka.expression(f"seen{k}") for k in range(len(here))]
+        come = {pair: heyoka.expression(f"reach{k}") for k, pair in enumerate(self._reaches)}
+        reaches = self._come(time - before, last, here, come)
+        return LaneFunction(
+            (*after, size * factor, time, *here, *reaches), (*old, time, step, before, *last, *come.values())
+        )
+
+    def _come(
+        self, length: Any, last: Sequence[Any], here: Sequence[Any], come: Mapping[tuple[int, float], Any]
+    ) -> list[Any]:
+        """How far quantities can have come by now, from where they have come before the last interval."""
+        made = []
+        for (number, sign), before in come.items():
+            jets = last[self.jet(number)], here[self.jet(number)]
+            missed = apart(length, *jets)
+            between = reduce(_higher, [sign * value for value in inner(length, *jets)])
+            beyond = BEYOND * _higher(missed, -missed)
+            made.append(reduce(_higher, [before, sign * jets[1][0], between + beyond]))
+        return made
+
+
+def _lower(a: Any, b: Any) -> Any:
+    """The lower of two expressions."""
+    return heyoka.select(heyoka.lt(a, b), a, b)
+
+
+def _higher(a: Any, b: Any) -> Any:
+    """The higher of two expressions."""
+    return heyoka.select(heyoka.gt(a, b), a, b)
 
 
 def _stages(program: LaneProgram, time: Any, size: Any) -> list[list[Any]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -15,8 +14,8 @@ LOOK = 8
 """After so many steps it is looked whether all lanes have come to the end."""
 OF_A_STEP, LOOSEST_TOLERANCE, TIGHTEST_TOLERANCE = 0.1, 1e-7, 1e-13
 """The tolerance of a step as a part of that of the motion, and its bounds."""
-FIRST_STEPS, MOST_AT_ONCE = 32, 64
-"""Steps of every lane before it is looked at what they have met: at first, and twice as many each time up to these."""
+MOST_AT_ONCE, ROWS_AT_ONCE = 32, 512
+"""Steps of every lane before it is looked at what they have met, and rows of these steps: more leave the cache."""
 MOST_STEPS = 1_000_000
 """Of a lane, between two changes of mode."""
 FIRST_CHANGE = 0.01
@@ -37,39 +36,43 @@ class Steps:
     Args:
         step: a `codegen.lanes.LaneStep`.
         taken: (used, k) what it takes of the parameters.
-        made: (m + 1, height, k): rows at the start, and what each of m steps has written.
+        made: (m + 1, height, k) columns: at the start, and what each of m steps has written.
     """
 
     def __init__(self, step: Any, taken: Array, made: Array) -> None:
         self._step, self._taken, self._made = step, taken, made
         self.t: Array = made[:-1, step.rows - 2]
         """(m, k) times in s at the start of each step; a lane that is at its end stays there."""
-        self.jets: Array = made[1:, step.rows :].swapaxes(0, 1)
+        self.jets: Array = made[1:, step.jets].swapaxes(0, 1)
         """(jets, m, k) what the step shows there."""
 
-    @cached_property
-    def longest(self) -> Array:
-        """(k,) of each lane, s."""
-        return np.asarray(np.diff(self.t, axis=0).max(axis=0))
+    @property
+    def columns(self) -> Array:
+        """(height, k) at the start of the last step."""
+        return np.asarray(self._made[-2])
 
     @property
     def last(self) -> Array:
-        """(rows, k) at the start of the last step."""
-        return np.asarray(self._made[-2, : self._step.rows])
+        """(rows, k) of them."""
+        return self.columns[: self._step.rows]
+
+    def reach(self, number: int, sign: float) -> Array:
+        """(k,) how far a quantity can have come in these steps, times a sign."""
+        return np.asarray(self._made[-1, self._step.reach(number, sign)])
 
     def at(self, start: Index, own: Index, t: Array) -> tuple[Array, Array]:
         """Rows (rows, c) and jets (jets, c) at times (c,) in s, from the starts (c,) of steps of lanes (c,)."""
         step, count = self._step, own.size
         every = _padded(count)
         start, own, t = start[every], own[every], t[every]
-        rows = np.ascontiguousarray(self._made[start, : step.rows, own].T)
-        rows[-1] = WITHOUT_LIMIT
+        columns = np.ascontiguousarray(self._made[start, :, own].T)
+        columns[step.rows - 1] = WITHOUT_LIMIT
         taken = np.ascontiguousarray(self._taken[:, own])
         step.limit(taken, WITHOUT_LIMIT, t, WITHOUT_LIMIT)
         there, here = np.empty((2, step.height, own.size))
-        step(rows, taken, there)
-        step(there[: step.rows], taken, here)
-        return there[: step.rows, :count], here[step.rows :, :count]
+        step(columns, taken, there)
+        step(there, taken, here)
+        return there[: step.rows, :count], here[step.jets, :count]
 
     def cut(self, start: Index, t: Array, jets: Array) -> None:
         """Let lanes stay at times (k,) in s with jets (jets, k), from behind the starts (k,) of steps on."""
@@ -107,18 +110,21 @@ class LaneRun:
         self._step, self._end = step, limits[0]
         with np.errstate(divide="ignore"):
             first = FIRST_CHANGE * ((sizes[:, None] + np.abs(x)) / np.abs(rates)).min(axis=0)
-        rows, taken = np.zeros((step.rows, t.size)), step.taken(p, sizes)
-        rows[: len(x)], rows[-2], rows[-1] = x, t, np.minimum(first, limits[1])
+        columns, taken = np.zeros((step.height, t.size)), step.taken(p, sizes)
+        columns[: len(x)], columns[step.rows - 2], columns[step.rows - 1] = x, t, np.minimum(first, limits[1])
         step.limit(taken, min(max(OF_A_STEP * rtol, TIGHTEST_TOLERANCE), LOOSEST_TOLERANCE), *limits)
-        self._count, self._block = 0, FIRST_STEPS
-        self._take(np.arange(t.size), rows, taken)
+        self._count = 0
+        self._take(np.arange(t.size), columns, taken)
+        made = np.empty_like(self._columns)
+        step(self._columns, self._taken, made)
+        self._columns[step.jets] = made[step.jets]
 
-    def _take(self, lanes: Index, rows: Array, taken: Array) -> None:
-        """Go on with some lanes (k,) from rows (rows, k), with what is `taken` (used, k) of their parameters."""
+    def _take(self, lanes: Index, columns: Array, taken: Array) -> None:
+        """Go on with some lanes (k,) from columns (height, k), with what is `taken` (used, k) of their parameters."""
         self.lanes = lanes
         """(k,) numbers of the lanes that are on their way."""
         every = _padded(lanes.size)
-        self._rows, self._taken = (np.ascontiguousarray(values[:, every]) for values in (rows, taken))
+        self._columns, self._taken = (np.ascontiguousarray(values[:, every]) for values in (columns, taken))
 
     def go(self) -> tuple[Steps, Mask]:
         """Some steps of the lanes that are on their way, and (k,) whether each of them goes well.
@@ -126,16 +132,17 @@ class LaneRun:
         The steps are gone with the next ones.
         """
         step, count = self._step, self.lanes.size
-        shape = self._block + 1, step.height, self._rows.shape[1]
+        most = min(max(ROWS_AT_ONCE // step.height, LOOK), MOST_AT_ONCE)
+        shape = most + 1, *self._columns.shape
         made = step.room(math.prod(shape)).reshape(shape)
-        made[0, : step.rows] = self._rows
-        for k in range(self._block):
-            step(made[k, : step.rows], self._taken, made[k + 1])
+        made[0] = self._columns
+        step.forget(made[0])
+        for k in range(most):
+            step(made[k], self._taken, made[k + 1])
             if k % LOOK == LOOK - 1 and (made[k, step.rows - 2] >= self._end).all():
                 made = made[: k + 2]
                 break
         self._count += len(made) - 1
-        self._block = min(2 * self._block, MOST_AT_ONCE)
         steps = Steps(step, self._taken[:, :count], made[:, :, :count])
         t, size = steps.last[-2:]
         good = np.isfinite(steps.last).all(axis=0) & ((t >= self._end) | (size > STILL * np.abs(t)))
@@ -144,7 +151,7 @@ class LaneRun:
     def keep(self, on: Mask, steps: Steps) -> None:
         """Go on with some of the lanes (k,), from where steps have led them."""
         if on.any():
-            self._take(self.lanes[on], steps.last[:, on], self._taken[:, : on.size][:, on])
+            self._take(self.lanes[on], steps.columns[:, on], self._taken[:, : on.size][:, on])
         else:
             self.lanes = self.lanes[on]
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 SIDE_BY_SIDE = 16
 """Variants from which on it is worth while to compile a program for many of them."""
-CHUNK, LONE_CHUNK = 1024, 8
+CHUNK, LONE_CHUNK = 2048, 8
 """Variants that are computed and stored at once: side by side, and one by one."""
 
 Reader = Measure | Callable[[Solution], float]

@@ -21,7 +21,7 @@ from shaftwork.core.errors import CompileError, NetworkError
 from shaftwork.integrate.lanes import LaneRun, Steps
 from shaftwork.network.graph import GraphPart
 from shaftwork.pipeline.ensemble.equations import Entry, Equations
-from shaftwork.pipeline.ensemble.extremes import largest, reach
+from shaftwork.pipeline.ensemble.extremes import largest
 from shaftwork.pipeline.ensemble.groups import Group, Index, Mask, joined
 from shaftwork.pipeline.ensemble.programs import EXTREMES, EnsembleCode
 from shaftwork.pipeline.ensemble.rises import first_rises
@@ -248,7 +248,7 @@ class _Way:
             rows = np.where(met >= 0, rows, steps.last)
             good |= met >= 0
             met[good & (met < 0) & (rows[-2] >= span[1])] = OVER
-            self._measure(equations, steps, group.lanes[own], good)
+            self._measure(equations, steps, group.lanes[own], good, met >= 0)
             done = good & (met != ON)
             there = own[done]
             ends.met[there], ends.group.t[there], ends.group.x[:, there] = met[done], rows[-2, done], rows[:size, done]
@@ -273,13 +273,15 @@ class _Way:
             made.append(Group(modes, group.lanes[there], t, x).some(same))
         return made
 
-    def _measure(self, equations: Equations, steps: Steps, lanes: Index, good: Mask) -> None:
-        """What some steps add to the extremes."""
+    def _measure(self, equations: Equations, steps: Steps, lanes: Index, good: Mask, ended: Mask) -> None:
+        """What some steps of lanes (k,) add to the extremes: of those that go well, and those that end at a guard."""
         for row, measure in enumerate(self.ensemble.measures):
             for sign in EXTREMES.get(measure.kind, ()):
-                place = equations.code.extreme(row)
-                near = np.flatnonzero(reach(steps.jets[place], sign, steps.longest) > self.values[row, lanes])
-                quantity = _Quantity(steps, place, sign, 0.0, near)
+                number = equations.code.extreme(row)
+                near = np.flatnonzero((steps.reach(number, sign) > self.values[row, lanes]) | ended)
+                if not near.size:
+                    continue
+                quantity = _Quantity(steps, equations.code.step.jet(number), sign, 0.0, near)
                 found = largest(quantity.t, quantity.jets, self.values[row, lanes[near]], quantity.at)
                 self.values[row, lanes[near]] = np.where(good[near], found, self.values[row, lanes[near]])
 
@@ -328,11 +330,11 @@ def _met(equations: Equations, offsets: Array, steps: Steps) -> tuple[NDArray[np
     met, first = np.full(steps.t.shape[1], ON), np.full(steps.t.shape[1], np.inf)
     at, rows = np.zeros(met.size, dtype=np.intp), np.zeros_like(steps.last)
     for guard in equations.watched.tolist():
-        place, side = equations.code.guard(guard), equations.sides[guard]
-        near = np.flatnonzero(reach(steps.jets[place], side, steps.longest) > offsets[guard])
+        number, side = equations.code.guard(guard), float(equations.sides[guard])
+        near = np.flatnonzero(steps.reach(number, side) > offsets[guard])
         if not near.size:
             continue
-        quantity = _Quantity(steps, place, side, offsets[guard, near], near)
+        quantity = _Quantity(steps, equations.code.step.jet(number), side, offsets[guard, near], near)
         rises = first_rises(quantity.t, quantity.jets, quantity.at)
         earlier = rises.t < first[near]
         own = near[earlier]

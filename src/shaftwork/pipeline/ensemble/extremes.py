@@ -9,15 +9,14 @@ the tolerance of the motion, whatever the distance of the samples.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.codegen.elements import Array
+from shaftwork.codegen.quintics import BEYOND, apart, inner
 
-BEYOND = 0.2
-"""Of the difference between the cubic and the quintic in the middle of an interval: so far the motion may be from the
-quintic. Of a sine, whose samples are less than half a period apart, it is at most half of that."""
 NEARLY = 0.1
 """Of the range: so near to the top a peak and a dip between the same two samples are looked for."""
 SHORT = 1e-9
@@ -76,18 +75,6 @@ def largest(t: Array, jets: Array, best: Array, there: There) -> Array:
     return np.asarray(found)
 
 
-def reach(jets: Array, sign: float, longest: Array) -> Array:
-    """(k,) what a quantity times a sign can have come to: from a sample, with twice the steepest of all its slopes.
-
-    Args:
-        jets: (3, m, k) values and their first two derivatives by time.
-        sign: of what is asked for.
-        longest: (k,) time between two samples, s.
-    """
-    top = jets[0].max(axis=0) if sign > 0 else -jets[0].min(axis=0)
-    return np.asarray(top + np.maximum(jets[1].max(axis=0), -jets[1].min(axis=0)) * longest)
-
-
 def likely(t: Array, jets: Array, least: Array, near: Array) -> tuple[Index, Index]:
     """Samples (c,) of lanes (c,) after which there may be a peak of at least so much (k,).
 
@@ -98,18 +85,15 @@ def likely(t: Array, jets: Array, least: Array, near: Array) -> tuple[Index, Ind
     at, own = np.divmod(np.flatnonzero((up[:-1] & ~up[1:]) | high[:-1] | high[1:]), t.shape[1])
     left, right = (np.array([t[k, own], *jets[:, k, own]]) for k in (at, at + 1))
     length = right[0] - left[0]
-    (y0, v0, a0), (y1, v1, a1) = ((y, v * length / 5, a * length**2 / 20) for _, y, v, a in (left, right))
-    inner = np.maximum(np.maximum(y0 + v0, y0 + 2 * v0 + a0), np.maximum(y1 - v1, y1 - 2 * v1 + a1))
-    kept = (length > SHORT * np.abs(left[0])) & (inner > np.maximum(y0, y1))
-    kept &= inner + beyond(left, right) >= least[own]
+    highest = reduce(np.maximum, inner(length, left[1:], right[1:]))
+    kept = (length > SHORT * np.abs(left[0])) & (highest > np.maximum(left[1], right[1]))
+    kept &= highest + beyond(left, right) >= least[own]
     return at[kept], own[kept]
 
 
 def beyond(left: Array, right: Array) -> Array:
     """(c,) how far the motion may be from the quintic through what is known at two times; see `peak`."""
-    length = right[0] - left[0]
-    apart = (left[2] - right[2]) * length / 32 + (left[3] + right[3]) * length**2 / 64
-    return np.asarray(BEYOND * np.abs(apart))
+    return np.asarray(BEYOND * np.abs(apart(right[0] - left[0], left[1:], right[1:])))
 
 
 def peak(left: Array, right: Array) -> tuple[Array, Array]:

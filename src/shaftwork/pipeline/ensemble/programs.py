@@ -11,7 +11,7 @@ from sympy import Expr
 
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.expressed import Expressed
-from shaftwork.codegen.lanes import JET, LaneFunction, LaneProgram, LaneStep, lane_expressions, lane_program
+from shaftwork.codegen.lanes import LaneFunction, LaneProgram, LaneStep, lane_expressions, lane_program
 from shaftwork.codegen.stores import Stores
 from shaftwork.core.errors import CompileError
 from shaftwork.pipeline.model import Model
@@ -45,7 +45,9 @@ class EnsembleCode:
         self._quantities = [found for found in quantities if found is not None]
         if len(self._quantities) < len(quantities):
             raise CompileError("A measure is of a power, an energy or a place along a shaft.")
-        self._extremes = [row for row, measure in enumerate(measures) if measure.kind in EXTREMES]
+        self._extremes = {
+            row: EXTREMES[kind] for row, measure in enumerate(measures) if (kind := measure.kind) in EXTREMES
+        }
         integrated = [row for row, measure in enumerate(measures) if measure.kind in POWERS]
         self.integral_of = {row: k for k, row in enumerate(integrated)}
         """By measure, which of the integrals behind the states is its."""
@@ -57,19 +59,17 @@ class EnsembleCode:
         """Two functions: a step, with what is read of its start, and what is asked for at the ends of phases."""
         program = self.program
         shown, held = lane_expressions(self._rows, self._quantities), lane_expressions(self._rows, stored)
-        self.step = LaneStep(program, [shown[row] for row in self._extremes])
+        self.step = LaneStep(program, [(shown[row], self._extremes[row]) for row in self._extremes])
         self._parts = {"rates": program.rates, "guards": program.guards, "stored": held, "shown": shown}
         self._points = LaneFunction(tuple(one for part in self._parts.values() for one in part), program.variables)
 
-    def extreme(self, row: int) -> slice:
-        """Where, among what a step shows, is the jet of a measure that is an extreme."""
-        first = JET * self._extremes.index(row)
-        return slice(first, first + JET)
+    def extreme(self, row: int) -> int:
+        """Which of the quantities that a step shows is that of a measure that is an extreme."""
+        return [*self._extremes].index(row)
 
-    def guard(self, number: int) -> slice:
-        """Where, among what a step shows, is the jet of a guard."""
-        first = JET * (len(self._extremes) + number)
-        return slice(first, first + JET)
+    def guard(self, number: int) -> int:
+        """Which of the quantities that a step shows is a guard."""
+        return len(self._extremes) + number
 
     def motion(self, t: Array, x: Array, p: Array) -> tuple[Array, Array]:
         """Rates (n, k) and guards (guards, k) at times (k,), states (n, k), parameters (parameters, k)."""
