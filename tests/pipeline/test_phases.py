@@ -133,6 +133,19 @@ def test_an_output_at_an_event_is_there_once(engine: str) -> None:
     assert sol["J.omega"] == pytest.approx([0.0, 2.0, 0.0, 0.0], abs=1e-8)
 
 
+@pytest.mark.parametrize("engine", ENGINES)
+def test_an_output_where_an_input_jumps_after_an_event_is_there(engine: str) -> None:
+    """From the event on, 0.3 s is not reached to the last bit."""
+    net = sw.Network("gap")
+    net.add(sw.TorqueSource("pull", tau=-50.0 + 90.0 * sw.Step(1.0, 0.3)), "a")
+    net.add(sw.Inertia("J1", J=25.0), "a")
+    net.add(sw.Backlash("gap", gap=0.004), "a", "b")
+    net.add(sw.Inertia("J2", J=28.0), "b")
+    sol = net.simulate(1.0, t_eval=np.linspace(0.0, 1.0, 101), rtol=1e-9, engine=engine)
+    assert sol.t.tolist() == np.linspace(0.0, 1.0, 101).tolist()
+    assert 0.3 in {event[0] for event in sol.events}
+
+
 def test_a_motion_goes_on_from_the_end_of_another_as_if_there_had_been_no_end() -> None:
     """At an event, in contact, and at rest."""
     whole = model().simulate(3.0, rtol=1e-10)

@@ -252,7 +252,8 @@ def _on_grid(problem: Problem, times: Array) -> Trajectory:
             done += recorder.filled
             break
         done = stop
-    end = None if problem.guards is None else (run.integrator.time, run.state)
+    # the integrator's own time may be a rounding away from where it was sent
+    end = None if problem.guards is None else (problem.t_end if run.met is None else run.integrator.time, run.state)
     return Trajectory(times[:done], states[:done], _Replay(problem, stops), {"steps": run.steps}, met=run.met, end=end)
 
 

@@ -16,8 +16,9 @@ OF_A_STEP, LOOSEST_TOLERANCE, TIGHTEST_TOLERANCE = 0.1, 1e-7, 1e-13
 """The tolerance of a step as a part of that of the motion, and its bounds."""
 MOST_AT_ONCE, ROWS_AT_ONCE = 32, 512
 """Steps of every lane before it is looked at what they have met, and rows of these steps: more leave the cache."""
-MOST_STEPS = 1_000_000
-"""Of a lane, between two changes of mode."""
+MOST_STEPS, LOOKS = 100_000, 4
+"""Of a lane, between two changes of mode; after so many looks it is foreseen how many there will be. A lane that needs
+more is stiff, or swings so often that it is better off alone."""
 FIRST_CHANGE = 0.01
 """The first step may change a state by so much of its size."""
 WITHOUT_LIMIT = 1e300
@@ -146,7 +147,9 @@ class LaneRun:
         steps = Steps(step, self._taken[:, :count], made[:, :, :count])
         t, size = steps.last[-2:]
         good = np.isfinite(steps.last).all(axis=0) & ((t >= self._end) | (size > STILL * np.abs(t)))
-        return steps, good & (self._count < MOST_STEPS)
+        if self._count > LOOKS * most:
+            good &= self._count * (t - steps.t[0]) + (self._end - t) * len(steps.t) < MOST_STEPS * (t - steps.t[0])
+        return steps, good
 
     def keep(self, on: Mask, steps: Steps) -> None:
         """Go on with some of the lanes (k,), from where steps have led them."""

@@ -7,11 +7,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from sympy import Expr
 
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.expressed import Expressed
-from shaftwork.codegen.lanes import LaneFunction, LaneProgram, LaneStep, lane_expressions, lane_program
+from shaftwork.codegen.lane_program import LaneFunction, LaneProgram, lane_expressions, lane_program
+from shaftwork.codegen.lanes import LaneStep, Use
 from shaftwork.codegen.stores import Stores
 from shaftwork.core.errors import CompileError
 from shaftwork.pipeline.model import Model
@@ -42,30 +42,26 @@ class EnsembleCode:
         self.model, self._rows, self._stores = model, model.rows, stores
         self._expressed = Expressed(model.form, model.rows)
         quantities = [self._expressed.quantity(measure.quantity) for measure in measures]
-        self._quantities = [found for found in quantities if found is not None]
-        if len(self._quantities) < len(quantities):
+        read = [found for found in quantities if found is not None]
+        if len(read) < len(quantities):
             raise CompileError("A measure is of a power, an energy or a place along a shaft.")
-        self._extremes = {
-            row: EXTREMES[kind] for row, measure in enumerate(measures) if (kind := measure.kind) in EXTREMES
-        }
+        self._extremes = [row for row, measure in enumerate(measures) if measure.kind in EXTREMES]
         integrated = [row for row, measure in enumerate(measures) if measure.kind in POWERS]
         self.integral_of = {row: k for k, row in enumerate(integrated)}
         """By measure, which of the integrals behind the states is its."""
-        integrands = [self._quantities[row] ** POWERS[measures[row].kind] for row in integrated]
-        self.program: LaneProgram = lane_program(program, model.rows, integrands)
-        self._compose([self._expressed.store(name) for name in stores.names] if self.program.guards else [])
-
-    def _compose(self, stored: Sequence[Expr]) -> None:
-        """Two functions: a step, with what is read of its start, and what is asked for at the ends of phases."""
-        program = self.program
-        shown, held = lane_expressions(self._rows, self._quantities), lane_expressions(self._rows, stored)
-        self.step = LaneStep(program, [(shown[row], self._extremes[row]) for row in self._extremes])
-        self._parts = {"rates": program.rates, "guards": program.guards, "stored": held, "shown": shown}
-        self._points = LaneFunction(tuple(one for part in self._parts.values() for one in part), program.variables)
+        self.program: LaneProgram = lane_program(program, model.rows, read)
+        uses = [Use(EXTREMES.get(measure.kind, ()), POWERS.get(measure.kind, 0)) for measure in measures]
+        self.step = LaneStep(self.program, uses)
+        self._parts = {"rates": self.program.rates, "guards": self.program.guards, "shown": self.program.quantities}
+        stored = [self._expressed.store(name) for name in stores.names] if self.program.guards else []
+        self._parts["stored"] = lane_expressions(self._rows, stored)
+        made = tuple(one for part in self._parts.values() for one in part)
+        self._points = LaneFunction(made, self.program.variables)
+        """What is asked for at the ends of phases."""
 
     def extreme(self, row: int) -> int:
         """Which of the quantities that a step shows is that of a measure that is an extreme."""
-        return [*self._extremes].index(row)
+        return self._extremes.index(row)
 
     def guard(self, number: int) -> int:
         """Which of the quantities that a step shows is a guard."""

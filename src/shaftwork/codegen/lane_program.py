@@ -1,0 +1,148 @@
+"""What variants side by side are made of: heyoka's expressions, and functions of them for many lanes at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import heyoka
+import numpy as np
+from numpy.typing import NDArray
+from sympy import Expr, Symbol
+
+from shaftwork.codegen.fixed import Fixed
+from shaftwork.codegen.heyoka import HeyokaProgram
+from shaftwork.codegen.heyoka_expressions import Translator
+from shaftwork.codegen.quintics import JET
+from shaftwork.components.laws import t as TIME
+from shaftwork.core.errors import CompileError
+from shaftwork.reduction.rows import Rows
+
+Array = NDArray[np.float64]
+
+FREE_TIME = heyoka.expression("time")
+"""By its own time heyoka does not differentiate."""
+
+
+@dataclass(frozen=True)
+class LaneFunction:
+    """Expressions as a function of many states, parameters and times at once.
+
+    Args:
+        expressions: heyoka's, in its parameters.
+        variables: heyoka's variables.
+    """
+
+    expressions: tuple[Any, ...]
+    variables: tuple[Any, ...]
+
+    @cached_property
+    def _compiled(self) -> tuple[Any, list[int]]:
+        """The function and the parameters that it reads; it knows no others, so that only these are repeated."""
+        read = heyoka.get_params(list(self.expressions))
+        used = sorted(int(str(parameter)[1:]) for parameter in read)
+        renamed = {heyoka.par[number]: heyoka.par[k] for k, number in enumerate(used)}
+        made = heyoka.subs(list(self.expressions), renamed) if used else list(self.expressions)
+        # fast_math: a quarter faster; what is not finite is found by whoever asks
+        return heyoka.cfunc(made, vars=list(self.variables), opt_level=1, fast_math=True), used
+
+    def __call__(self, t: Array, x: Array, p: Array) -> Array:
+        """Values (expressions, k) at times (k,) in s, states (n, k), parameters (parameters, k)."""
+        made = np.empty((len(self.expressions), t.size))
+        if self.expressions and t.size:
+            function, _ = self._compiled
+            given: dict[str, Any] = {"time": np.ascontiguousarray(t)} if function.is_time_dependent else {}
+            self.into(made, np.ascontiguousarray(x), self.taken(p), **given)
+        return made
+
+    def taken(self, p: Array) -> Array:
+        """Of the parameters (parameters, k) those that are read."""
+        return np.ascontiguousarray(p[self._compiled[1]])
+
+    def into(self, made: Array, x: Array, taken: Array, **given: Any) -> None:
+        """Write values (expressions, k) for variables (n, k) and what is `taken` of the parameters, all contiguous."""
+        function, used = self._compiled
+        if used:
+            given["pars"] = taken
+        function(x, outputs=made, batch_parallel=False, **given)  # to hand out so few costs more than it brings
+
+
+@dataclass(frozen=True)
+class LaneProgram:
+    """A system whose variants run side by side.
+
+    Args:
+        variables: heyoka's state variables.
+        rates: heyoka expressions of the derivatives.
+        guards: heyoka expressions that end a lane where they rise through zero on their side.
+        quantities: heyoka expressions that are measured.
+        parameter_count: number of the model's parameters; what is fixed by them follows.
+        fixed: what is made of the model's parameters alone.
+    """
+
+    variables: tuple[Any, ...]
+    rates: tuple[Any, ...]
+    guards: tuple[Any, ...]
+    quantities: tuple[Any, ...]
+    parameter_count: int
+    fixed: Fixed
+
+    def parameters(self, p: Array) -> Array:
+        """(parameters, k) those of the model and what is fixed by them, from those of the model alone."""
+        return np.concatenate([p, self.fixed.values(p)])
+
+    def jet(self, quantity: Any) -> tuple[Any, ...]:
+        """A heyoka expression and its first two derivatives by time along the motion."""
+        made = [quantity]
+        for _ in range(JET - 1):
+            free = at(made[-1], FREE_TIME)
+            moved = [slope * rate for slope, rate in zip(self.gradient(made[-1]), self.rates, strict=True)]
+            made += heyoka.subs([heyoka.sum([heyoka.diff(free, FREE_TIME), *moved])], {FREE_TIME: heyoka.time})
+        return tuple(made)
+
+    def gradient(self, quantity: Any) -> list[Any]:
+        """The derivatives of a heyoka expression by the states."""
+        free = at(quantity, FREE_TIME)
+        return list(heyoka.subs([heyoka.diff(free, x) for x in self.variables], {FREE_TIME: heyoka.time}))
+
+
+def at(expression: Any, time: Any) -> Any:
+    """A heyoka expression at a time."""
+    (made,) = heyoka.subs([expression], {heyoka.time: time})
+    return made
+
+
+def lane_program(program: HeyokaProgram, rows: Rows, quantities: Sequence[Expr]) -> LaneProgram:
+    """The program for many variants of what there is a program for one.
+
+    Args:
+        program: for one variant, with its guards.
+        rows: the same as expressions.
+        quantities: expressions of what is measured.
+
+    Raises:
+        CompileError: a law or a quantity switches by a condition, which ends a step in each lane at a time of its own.
+    """
+    expressions = (*rows.rates, *quantities)
+    fixed = Fixed(rows.parameters, (*rows.states, TIME), expressions, before=program.fixed.found)
+    translator = Translator(rows.states, TIME, rows.parameters, fixed=fixed)
+    made = tuple(translator.expression(expression) for expression in expressions)
+    if program.switches or program.fading or program.held is not None or translator.switches or translator.fading:
+        raise CompileError("A law or a quantity switches by a condition, which variants side by side do not follow.")
+    rates, measured = made[: len(rows.rates)], made[len(rows.rates) :]
+    return LaneProgram(program.variables, rates, program.guards, measured, len(rows.parameters), fixed)
+
+
+def lane_expressions(rows: Rows, expressions: Sequence[Expr]) -> tuple[Any, ...]:
+    """Expressions of a network in heyoka's terms.
+
+    Raises:
+        CompileError: one has no counterpart in heyoka.
+    """
+    translator = Translator(rows.states, TIME, tuple(Symbol(p.name, real=True) for p in rows.parameters))
+    made = tuple(translator.expression(expression) for expression in expressions)
+    if translator.switches or translator.held:
+        raise CompileError("A store switches by a condition, which variants side by side do not follow.")
+    return made
