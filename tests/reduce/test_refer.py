@@ -270,6 +270,73 @@ def test_motor_gap_and_stick_move_as_in_the_train(gear: sw.Component, to: str) -
     assert [event[1] for event in old.events if event[1] != "reducer"] == [event[1] for event in new.events]
 
 
+FLANKS: dict[str, dict[str, float]] = {
+    "elastic": {"c": 2000.0, "d": 3.0},
+    "rigid": {},
+    "rebound": {"restitution": 0.5, "omega_rest": 1e-3},
+}
+
+
+@pytest.mark.parametrize("flanks", FLANKS)
+@pytest.mark.parametrize("radius", [0.2, -0.2])
+def test_a_gap_closes_and_opens_as_in_the_train_where_the_reference_translates(flanks: str, radius: float) -> None:
+    """And back at its own shaft it is what it was; 1e-8 since an event is located a little elsewhere."""
+    net = sw.Network("lift")
+    net.add(sw.TorqueSource("motor", tau=sw.Step(10.0) + sw.Step(-18.0, 0.31)), "a")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.Backlash("gap", gap=0.02, **FLANKS[flanks]), "a", "b")
+    net.add(sw.Inertia("J2", J=1.0), "b")
+    net.add(sw.Drum("drum", radius=radius), "b", "x")
+    net.add(sw.Mass("load", m=3.0), "x")
+    small = sw.reduce.refer(net, "x")
+    (gap,) = (part for part in small.network.parts if part.name == "gap")
+    assert isinstance(gap, sw.TranslationalBacklash)
+    rest = FLANKS[flanks].get("omega_rest", 1e-6)
+    assert (gap.gap, gap.v_rest) == pytest.approx((0.02 * 0.2, rest * 0.2), rel=1e-14)
+    times = np.linspace(0.0, 1.0, 40)
+    old, new = (each.simulate(1.0, rtol=1e-10, t_eval=times) for each in (net, small.network))
+    force = small.torque_ratio("gap") * old["gap.tau"]
+    assert len(new.events) > 2
+    assert [event[0] for event in old.events] == pytest.approx([event[0] for event in new.events], abs=1e-8)
+    assert force == pytest.approx(new["gap.f"], abs=1e-6 * np.abs(force).max())
+    assert small.ratio("gap") * new["gap.s"] == pytest.approx(old["gap.phi"], abs=1e-8)
+    assert old["load.v"] == pytest.approx(new["load.v"], abs=1e-8)
+
+    track = sw.Network("track")
+    for item in small.network.netlist().placed:
+        track.add(item.part, *item.nodes)
+    track.add(sw.Wheel("wheel", radius=0.2), "shaft", "x")
+    track.add(sw.Inertia("J3", J=1e-9), "shaft")
+    (back,) = (part for part in sw.reduce.refer(track, "shaft").network.parts if part.name == "gap")
+    assert back.gap == pytest.approx(0.02, rel=1e-14)
+    assert isinstance(back, sw.Backlash)
+
+
+def test_a_conveyor_goes_down_behind_a_gear_that_reverses_where_it_went_up() -> None:
+    """Weight, friction and drag are those of the train at any time, to the tolerance of two runs."""
+    net = sw.Network("conveyor")
+    net.add(sw.TorqueSource("motor", tau=sw.Step(-60.0) + sw.Step(55.0, 1.0)), "a")
+    net.add(sw.Inertia("J1", J=0.5), "a")
+    net.add(sw.Gear("gear", ratio=-4.0), "a", "b")
+    net.add(sw.Inertia("J2", J=8.0), "b")
+    net.add(sw.Conveyor("belt", m=200.0, radius=0.2, friction=0.03, incline=0.2, d=10.0), "b")
+    small = sw.reduce.refer(net, "a")
+    assert small.table["belt.incline"].referred == -0.2
+    assert "belt.incline * -1" in str(small.table)
+    assert r"\delta'_{\mathrm{belt}} = -\delta_{\mathrm{belt}}" in small.table.latex()
+    times = np.linspace(0.0, 4.0, 81)
+    old, new = (each.simulate(4.0, rtol=1e-10, t_eval=times) for each in (net, small.network))
+    assert old["J1.omega"].max() > 1.0  # it also runs back
+    assert old["J1.omega"] == pytest.approx(new["J1.omega"], abs=1e-7)
+    assert -old["belt.tau"] / 4.0 == pytest.approx(new["belt.tau"], abs=1e-7)
+    assert [event[2:] for event in old.events] != []
+
+
+def test_what_was_referred_prints_its_table() -> None:
+    small = sw.reduce.refer(crane_train(REDUCER, sw.Spring("shaft", c=24206.0)), "wheel")
+    assert str(small) == str(small.table)
+
+
 def test_laws_read_the_motion_of_their_own_shaft() -> None:
     net = sw.Network("fan")
     net.add(sw.TorqueSource("drive", tau=10 * sw.t), "a")

@@ -8,7 +8,7 @@ import pytest
 
 import shaftwork as sw
 from shaftwork.components import REGISTRY
-from shaftwork.core.domains import ROTATION, TRANSLATION
+from shaftwork.core.domains import ROTATION, TRANSLATION, Domain
 from shaftwork.network.netlist import Placed
 from shaftwork.reduce import referred_parts
 from shaftwork.reduce.scales import Scale
@@ -22,6 +22,7 @@ VALUES: dict[str, dict[str, Any]] = {
     "RandomLoad": {"mean": 3.0, "std": 1.0, "interval": 0.1},
     "Hoist": {"m": 100.0, "radius": 0.2, "efficiency": 0.9},
     "DryFriction": {"tau_c": 3.0, "tau_s": 4.0},
+    "Conveyor": {"m": 100.0, "radius": 0.2, "friction": 0.03, "incline": 0.3, "d": 2.0},
     "Brake": {"tau": 10.0, "on": sw.omega - 10},
     "Shaft": {"length": 1.0, "diameter": 0.1, "inner_diameter": 0.02, "damping": 3.0},
     "SpeedController": {"omega_ref": 100 * sw.t, "k_p": 3.0, "t_i": 0.1, "tau_max": 40.0},
@@ -31,11 +32,11 @@ ONE_WAY = {"AveragedBLDC", "BLDCMotor", "Hoist", "InductionMachine"}
 BUILT_IN = {name: kind for name, kind in REGISTRY.items() if kind.__module__.startswith("shaftwork.")}
 
 
-def seen(kind: type[sw.Component], scale: Scale) -> Any:
+def seen(kind: type[sw.Component], scale: Scale, domain: Domain = ROTATION) -> Any:
     values = VALUES.get(kind.__name__) or {item.name: 1.0 for item in kind.declared.values() if item.required}
     part = kind("part", **values)
     nodes = tuple("abc"[: len(part.ports)])
-    return referred_parts.referred_part(Placed(part, nodes), nodes, scale, ROTATION)
+    return referred_parts.referred_part(Placed(part, nodes), nodes, scale, domain)
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
@@ -179,6 +180,15 @@ def test_gears_round_a_loop_must_agree_in_ratio_and_losses() -> None:
     assert "'other' closes a loop of gears round which ratios or losses differ" in refused(net, drives={"other": "a"})
 
 
+def test_a_lossy_gear_in_a_loop_is_refused_with_the_reason() -> None:
+    net = base(gear=sw.LossyGear("lossy", ratio=3.0, efficiency=0.9))
+    net.add(sw.Gear("other", ratio=3.0), "a", "c")
+    net.add(sw.Spring("shaft", c=10.0), "b", "c")
+    message = refused(net)
+    assert "it lies in a loop: 'motor' drives it from both of its sides" in message
+    assert "drives={'lossy': 'a'}" in message
+
+
 def test_a_self_locking_gear_is_driven_from_one_side() -> None:
     net = base(gear=sw.LossyGear("worm", ratio=3.0, efficiency=0.4, efficiency_back=-0.5))
     assert sw.reduce.refer(net, "b").torque_ratio("J1") == pytest.approx(1.2)
@@ -212,6 +222,27 @@ def test_a_viscous_load_is_a_damper_to_the_frame_where_the_reference_translates(
     assert "CoulombLoad 'seal' cannot be referred: there is no translation part that does what it does" in refused(
         net, "b"
     )
+
+
+def test_the_page_names_all_that_has_a_counterpart_along_a_line() -> None:
+    """Inertia, spring, damper, gap, source of torque and viscous load, and the parts along a line themselves."""
+    turning = {name for name, kind in BUILT_IN.items() if any(port.domain is ROTATION for port in kind.ports)}
+    there = {name for name in turning if not isinstance(seen(BUILT_IN[name], Scale(2.0), TRANSLATION), str)}
+    assert there == {"Inertia", "Spring", "Damper", "Backlash", "TorqueSource", "ViscousLoad"}
+
+
+def test_what_has_no_counterpart_along_a_line_is_refused_by_name() -> None:
+    net = sw.Network("lift")
+    net.add(sw.KlossMotor("motor", tau_k=9.0, s_k=0.2, n_sync=1500), "a")
+    net.add(sw.Inertia("J", J=2.0), "a")
+    net.add(sw.Brake("brake", tau=20.0), "a")
+    net.add(sw.HardStop("stop", upper=10.0), "a")
+    net.add(sw.Drum("drum", radius=0.2), "a", "b")
+    net.add(sw.Mass("load", m=10.0), "b")
+    message = refused(net, "b")
+    for part in ("KlossMotor 'motor'", "Brake 'brake'", "HardStop 'stop'"):
+        assert f"{part} cannot be referred: there is no translation part that does what it does" in message
+    assert message.count("Refer to its own shaft, to='a'") == 3
 
 
 def test_what_is_no_train_and_no_side_is_refused() -> None:

@@ -80,6 +80,36 @@ def test_a_gear_that_reverses_puts_its_sign_before_the_whole() -> None:
     assert inertia == r"$J'_{1} = J_{1} \, i_{\mathrm{planets}}^{2}$"
 
 
+def named_at_length() -> sw.Network:
+    """Names of seventy letters, with and without places to break them, and laws of every kind."""
+    net = sw.Network("long names")
+    net.add(sw.TorqueSource("motor", tau=5 * sw.t**2 + 3 * sw.omega), "a")
+    net.add(sw.TorqueSource("curve", tau=sw.Table(list(range(20)), list(range(20)))), "a")
+    net.add(sw.Inertia("J" * 70, J=2.0), "a")
+    net.add(sw.Gear("gear with a very long name that nobody would ever use in practice, really", ratio=-3.0), "a", "b")
+    net.add(sw.Spring("spring_of_the_second_shaft_between_the_gear_and_the_drum_of_the_hoist", c=1e4), "b", "c")
+    net.add(sw.Inertia("motorshaftcoupling", J=1.0), "c")
+    return net
+
+
+def test_a_law_is_printed_as_it_is_and_as_it_is_at_the_reference_shaft() -> None:
+    latex = sw.reduce.refer(named_at_length(), "c").table.latex()
+    _, laws = latex.split(r"\paragraph{Laws}")
+    assert r"\tau_{\mathrm{motor}} &= 3 \, \omega + 5 \, t^{2}" in laws
+    assert r"\tau'_{\mathrm{motor}} &= 27 \, \omega' - 15 \, t^{2}" in laws
+    assert r"\tau_{\mathrm{curve}} &= (0,\, 0)\, (1,\, 1)\, (2,\, 2)\, " in laws
+    assert r"\tau'_{\mathrm{curve}} &= (0,\, 0)\, (1,\, -3)\, (2,\, -6)\, " in laws
+    assert r"\paragraph{Laws}" not in sw.reduce.refer(sw.scenes.crane_train(), "wheel").table.latex()
+
+
+@compiles
+def test_names_of_seventy_letters_stay_in_their_columns(tmp_path: Path) -> None:
+    """A column of a fixed width that is too narrow for its words is an overfull box; that of the table is another."""
+    table = sw.reduce.refer(named_at_length(), "c").table.latex()
+    log = compile_latex(f"{PREAMBLE}\n\\begin{{document}}\n{table}\n\\end{{document}}", tmp_path)
+    assert max(overfull(log), default=0.0) < 10.0  # points: less than a letter and a half
+
+
 def test_a_table_of_groups_has_units_the_letter_of_the_gap_and_what_is_rigid() -> None:
     small = sw.reduce.simplify(hoist(), 3, "drum_splines", drives={"reducer_stage_2": "a"}, to="drum shaft")
     latex = small.table.latex()

@@ -221,6 +221,7 @@ def test_a_catalogue_of_the_users_own_may_have_remarks_other_orders_and_empty_ce
         (HEADER, "has no motors"),
         (f"{HEADER.replace(',J', '')}\n{ROW}", "lacks J. Columns are name, power"),
         (f"{HEADER},price,{'J'}\n{ROW},3,1", "has the unknown 'price'; it has twice 'J'"),
+        (HEADER + "\n" + ROW.replace("M,", '"M\nfoot",'), "line 2 .*its quotes do not match. A motor is one line"),
         (f"{HEADER}\n{ROW},7", r"line 2 \(\): it has 10 cells, and there are 9 columns"),
         (f"{HEADER}\n{ROW.replace('4000', '4 kW')}", r"line 2 \(M\): power = '4 kW' is no number"),
         (

@@ -90,6 +90,61 @@ def test_modes_that_share_a_frequency_have_no_derivative() -> None:
         frequency_sensitivities(net)
 
 
+def scales(inertia: float, pendulums: int) -> sw.Network:
+    """Two slow modes below 1 Hz beside one of sqrt(1e3 / inertia) rad/s, with alike pendulums on it."""
+    net = sw.Network("scales")
+    net.add(sw.Inertia("fast", J=inertia), "a")
+    net.add(sw.Spring("s", c=1e3), "a", "b")
+    net.add(sw.Inertia("B", J=50.0), "b")
+    net.add(sw.Spring("t", c=5.0, d=0.01), "b", "c")
+    net.add(sw.Inertia("C", J=20.0), "c")
+    net.add(sw.Spring("u", c=2.0), "c", "ground")
+    for k in range(pendulums):
+        net.add(sw.Inertia(f"P{k}", J=1.0), f"p{k}")
+        net.add(sw.Spring(f"w{k}", c=3.0, d=0.1), f"p{k}", "c")
+    return net
+
+
+@pytest.mark.parametrize("inertia", [1e-9, 1e-14])
+def test_slow_modes_beside_a_very_fast_one_have_derivatives(inertia: float) -> None:
+    """They are those of the chain without what is fast, whose mass and twist change them by 1e-9 / 50 and less."""
+    made, slow = frequency_sensitivities(scales(inertia, 0)), frequency_sensitivities(scales(1e-3, 0))
+    assert made.frequencies[2] == pytest.approx(np.sqrt(1e3 / inertia) / (2 * np.pi), rel=1e-6)
+    for name in ("t.c", "u.c", "B.J", "C.J"):
+        # 1e-3 / 50 is the mass on the other side; rounding moves a rate of 0.1 by 1e-16 * 3e8 at most
+        np.testing.assert_allclose(made.relative[name][:2], slow.relative[name][:2], atol=2e-5, err_msg=name)
+
+
+@pytest.mark.parametrize("inertia", [1e-3, 1e-9, 1e-14])
+def test_equal_modes_are_refused_beside_slow_and_fast_ones(inertia: float) -> None:
+    """Of three pendulums two modes leave the chain at rest: equal, and different by rounding."""
+    with pytest.raises(sw.SimulationError, match=r"Mode 3, 0\.27566\d Hz, has the rate of another one"):
+        frequency_sensitivities(scales(inertia, 3))
+
+
+def test_where_nothing_swings_the_table_says_so() -> None:
+    net = sw.Network("over")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.Spring("s", c=100.0, d=50.0), "a", "ground")  # 2 sqrt(c J) = 20 is critical
+    assert str(frequency_sensitivities(net)).startswith("over: no mode swings here")
+
+
+@pytest.mark.parametrize(
+    ("measures", "message"),
+    [
+        ({"f": len}, r"measure 'f' = <built-in function len> must be a name, such as 'max shaft.tau'"),
+        ({"f": 3}, "measure 'f' = 3 must be a name"),
+        (None, "measures = None must be a list of names"),
+        ([], "Name a measure"),
+        ([3], "'3' is no measure"),
+        ({1: "end J1.omega", "1": "end J2.omega"}, "Two measures are called '1'"),
+    ],
+)
+def test_what_is_no_name_of_a_measure_is_refused(measures: object, message: str) -> None:
+    with pytest.raises(sw.ParameterError, match=message):
+        motion_sensitivities(train()[0], measures, t_end=0.1)  # type: ignore[arg-type]
+
+
 def test_measures_of_a_motion_equal_central_differences() -> None:
     net, model = train()
     made = motion_sensitivities(net, MEASURES, t_end=0.8, rtol=1e-10)

@@ -1,4 +1,4 @@
-"""Whether the values of a part go together is asked where they vary, and of those that do not it is known."""
+"""What is asked of values and names before a sweep, and what it says of the way it ran."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
+import sympy
 
 import shaftwork as sw
 from shaftwork.components import REGISTRY
@@ -66,3 +67,67 @@ def test_a_check_that_reads_what_varies_is_made_for_every_variant(limited: Any) 
     )
     assert (found.failed == (most < 1.0)).all()
     assert {reason for reason in found.reasons if reason} == {"Limited 'load': least is above most."}
+
+
+@pytest.mark.parametrize("name", ["load.tau", "passed", "reason"])
+def test_a_measure_does_not_take_the_name_of_another_column(name: str) -> None:
+    net = train(sw.CoulombLoad("load", tau=1.0))
+    with pytest.raises(sw.ParameterError, match=f"No measure can be called '{name}'"):
+        sw.studies.sweep(net, {"load.tau": [1.0, 2.0]}, t_end=0.1, measures={name: "end J.omega"})
+
+
+def test_a_data_frame_with_two_columns_of_one_name_is_refused() -> None:
+    frame = pytest.importorskip("pandas").DataFrame([[1.0, 2.0], [3.0, 4.0]], columns=["J.J", "J.J"])
+    net = train(sw.CoulombLoad("load", tau=1.0))
+    with pytest.raises(sw.ParameterError, match=r"There are two columns 'J\.J'"):
+        sw.studies.sweep(net, samples=frame, t_end=0.1, measures=["end J.omega"])
+
+
+@pytest.mark.parametrize("values", [[1.0, 1.5, 2.0], np.array([3.0, 1.0, 2.5, 1.0])])
+def test_what_must_be_whole_is_refused_wherever_it_is_not(values: Any) -> None:
+    net = train(sw.AveragedBLDC("m", U=48.0, R=0.5, L=1e-3, k=0.1, pole_pairs=2))
+    with pytest.raises(sw.ParameterError, match=r"'m': pole_pairs = [12]\.5 must be .*whole"):
+        sw.studies.sweep(net, {"m.pole_pairs": values}, t_end=0.1, measures=["end J.omega"])
+
+
+@pytest.mark.parametrize(
+    ("torque", "load", "why"),
+    [
+        (
+            100 * sympy.exp(-((10 * sw.t - 3) ** 2)),
+            sw.Damper("load", d=0.1),
+            "a law fades to a constant, as exp and tanh do",
+        ),
+        (
+            4 * sympy.sin(10 * sw.t),
+            sw.CoulombLoad("load", tau=3.0),
+            "a limit at which a mode ends changes with the time by itself",
+        ),
+        (4 * sympy.Heaviside(sw.omega - 1), sw.Damper("load", d=0.1), "a law or a quantity switches by a condition"),
+    ],
+)
+def test_why_is_the_cause_in_the_equations_at_the_start(torque: sympy.Expr, load: sw.Component, why: str) -> None:
+    pytest.importorskip("heyoka")
+    net = sw.Network("start")
+    net.add(sw.TorqueSource("motor", tau=torque), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(load, "a")
+    made = sw.studies.sweep(net, {"J.J": np.linspace(1.0, 2.0, 16)}, t_end=0.1, measures=["end J.omega"])
+    assert made.why.startswith(why)
+
+
+def test_what_hardly_moves_is_known_with_a_smaller_tolerance() -> None:
+    """A linear motion is proportional to its load; the absolute tolerance, that of 0.001 rad/s, is not."""
+    pytest.importorskip("heyoka")
+
+    def peaks(size: float) -> np.ndarray:
+        net = train(sw.Damper("d", d=0.2))
+        net.add(sw.TorqueSource("slow", tau=size * sympy.sin(sw.t)), "a")
+        net.add(sw.Spring("s", c=50.0, d=0.1), "a", "b")
+        net.add(sw.Inertia("J2", J=1.0), "b")
+        samples = {"motor.tau": np.full(16, size), "J2.J": np.linspace(0.5, 2.0, 16)}
+        made = sw.studies.sweep(net, samples=samples, t_end=30.0, measures=["max s.tau"], rtol=1e-12)
+        assert made.why == ""
+        return made.measures["max s.tau"] / size
+
+    np.testing.assert_allclose(peaks(1e-8), peaks(1.0), rtol=1e-5)  # as docs/sweeps.md says

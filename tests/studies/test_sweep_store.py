@@ -107,3 +107,25 @@ def test_a_heading_that_was_cut_off_is_written_anew(tmp_path: Path, lines: list[
     path.write_text(lines[0][:30])
     swept(path)
     assert path.read_text().splitlines() == lines
+
+
+def test_variants_that_two_calls_have_both_stored_count_once(tmp_path: Path) -> None:
+    pytest.importorskip("heyoka")
+    net = sw.Network("swing")
+    net.add(sw.TorqueSource("motor", tau=5.0), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.Spring("shaft", c=700.0, d=1.0), "a", "ground")
+    damping = np.linspace(1.0, 2.0, 16)
+    damping[3] = 0.0  # has other equations
+
+    def resumed() -> sw.studies.Sweep:
+        return sw.studies.sweep(net, samples={"shaft.d": damping}, t_end=0.1, measures=["end J.omega"], store=path)
+
+    path = tmp_path / "store.jsonl"
+    whole = resumed()
+    title, *chunks = path.read_text().splitlines()
+    path.write_text("\n".join([title, *chunks, *chunks, ""]))
+    again = resumed()
+    assert again.why == whole.why
+    assert again.why.startswith("1 of 16 variants ran one by one")
+    np.testing.assert_array_equal(again.measures["end J.omega"], whole.measures["end J.omega"])

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 from typing import Any
 
 import heyoka
@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 
 FREE_TIME = heyoka.expression("time")
 """By its own time heyoka does not differentiate."""
+KEPT = 32
+"""Functions that are kept in a process: what heyoka keeps has to be written out before it is found."""
 
 
 @dataclass(frozen=True)
@@ -78,8 +80,8 @@ class LaneProgram:
         rates: heyoka expressions of the derivatives.
         guards: heyoka expressions that end a lane where they rise through zero on their side.
         quantities: heyoka expressions that are measured.
-        parameter_count: number of the model's parameters; what is fixed by them follows.
-        fixed: what is made of the model's parameters alone.
+        parameter_count: number of the model's parameters and of what is fixed by them, which follows.
+        fixed: what is made of the model's parameters alone; programs with the same expressions are the same.
     """
 
     variables: tuple[Any, ...]
@@ -87,7 +89,7 @@ class LaneProgram:
     guards: tuple[Any, ...]
     quantities: tuple[Any, ...]
     parameter_count: int
-    fixed: Fixed
+    fixed: Fixed = field(compare=False)
 
     def parameters(self, p: Array) -> Array:
         """(parameters, k) those of the model and what is fixed by them, from those of the model alone."""
@@ -106,6 +108,12 @@ class LaneProgram:
         """The derivatives of a heyoka expression by the states."""
         free = at(quantity, FREE_TIME)
         return list(heyoka.subs([heyoka.diff(free, x) for x in self.variables], {FREE_TIME: heyoka.time}))
+
+
+@lru_cache(maxsize=KEPT)
+def lane_function(expressions: tuple[Any, ...], variables: tuple[Any, ...]) -> LaneFunction:
+    """The function of expressions that are small enough to be compared."""
+    return LaneFunction(expressions, variables)
 
 
 def at(expression: Any, time: Any) -> Any:
@@ -132,7 +140,8 @@ def lane_program(program: HeyokaProgram, rows: Rows, quantities: Sequence[Expr])
     if program.switches or program.fading or program.held is not None or translator.switches or translator.fading:
         raise CompileError("A law or a quantity switches by a condition, which variants side by side do not follow.")
     rates, measured = made[: len(rows.rates)], made[len(rows.rates) :]
-    return LaneProgram(program.variables, rates, program.guards, measured, len(rows.parameters), fixed)
+    count = len(rows.parameters) + len(fixed.found)
+    return LaneProgram(program.variables, rates, program.guards, measured, count, fixed)
 
 
 def lane_expressions(rows: Rows, expressions: Sequence[Expr]) -> tuple[Any, ...]:

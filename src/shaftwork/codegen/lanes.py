@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import reduce
+from functools import cached_property, lru_cache, reduce
 from operator import mul
 from typing import Any
 
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.integrate import DOP853
 
 from shaftwork.codegen.lane_errors import TINY, Start, step_error, weighted
-from shaftwork.codegen.lane_program import FREE_TIME, LaneFunction, LaneProgram, at
+from shaftwork.codegen.lane_program import FREE_TIME, KEPT, LaneFunction, LaneProgram, at
 from shaftwork.codegen.quintics import BEYOND, JET, apart, inner
 
 Array = NDArray[np.float64]
@@ -45,6 +45,7 @@ class Use:
     power: int = 0
 
 
+@dataclass(frozen=True)
 class LaneStep:
     """One step of a lane, with its error and the size of the next one; Dormand and Prince's method of order 8(5,3).
 
@@ -62,20 +63,51 @@ class LaneStep:
         uses: what is wanted of each of its quantities. There are jets of those with signs, and of the guards.
     """
 
-    def __init__(self, program: LaneProgram, uses: Sequence[Use]) -> None:
-        measured = list(zip(program.quantities, uses, strict=True))
-        self._integrals = [(quantity, use.power) for quantity, use in measured if use.power]
-        self.states, self.rows = len(program.variables), len(program.variables) + len(self._integrals) + 2
-        self.first_limit = program.parameter_count + len(program.fixed.found)
-        seen = [*((q, use.signs) for q, use in measured if use.signs), *((guard, BOTH) for guard in program.guards)]
-        self.jets = slice(self.rows + 1, self.rows + 1 + JET * len(seen))
+    program: LaneProgram
+    uses: tuple[Use, ...]
+
+    @cached_property
+    def _integrals(self) -> list[tuple[Any, int]]:
+        """Quantities and the powers that are integrated."""
+        pairs = zip(self.program.quantities, self.uses, strict=True)
+        return [(quantity, use.power) for quantity, use in pairs if use.power]
+
+    @cached_property
+    def _seen(self) -> list[tuple[Any, tuple[float, ...]]]:
+        """Quantities of which there are jets, and the signs that matter."""
+        pairs = zip(self.program.quantities, self.uses, strict=True)
+        extremes = [(quantity, use.signs) for quantity, use in pairs if use.signs]
+        return [*extremes, *((guard, BOTH) for guard in self.program.guards)]
+
+    @property
+    def states(self) -> int:
+        """Number of states."""
+        return len(self.program.variables)
+
+    @cached_property
+    def rows(self) -> int:
+        """Number of rows: states, integrals, time, and the size of the next step."""
+        return self.states + len(self._integrals) + 2
+
+    @cached_property
+    def jets(self) -> slice:
         """Rows of what is seen of the quantities."""
-        pairs = [(number, sign) for number, (_, signs) in enumerate(seen) for sign in signs]
-        self._reaches = {pair: self.jets.stop + k for k, pair in enumerate(pairs)}
-        self.height = self.jets.stop + len(pairs)
+        return slice(self.rows + 1, self.rows + 1 + JET * len(self._seen))
+
+    @cached_property
+    def _reaches(self) -> dict[tuple[int, float], int]:
+        """Rows of how far quantities can have come, by quantity and sign."""
+        pairs = [(number, sign) for number, (_, signs) in enumerate(self._seen) for sign in signs]
+        return {pair: self.jets.stop + k for k, pair in enumerate(pairs)}
+
+    @property
+    def height(self) -> int:
         """Number of values in a column."""
-        self._room = np.empty(0)
-        self._function = self._written(program, [quantity for quantity, _ in seen])
+        return self.rows + 1 + JET * len(self._seen) + len(self._reaches)
+
+    @cached_property
+    def _function(self) -> LaneFunction:
+        return _function(self)
 
     def jet(self, number: int) -> slice:
         """Where, among the jets, is that of a quantity."""
@@ -88,12 +120,6 @@ class LaneStep:
     def forget(self, columns: Array) -> None:
         """Let nothing be seen in columns (height, k) yet but the jets at the start."""
         columns[self.rows], columns[self.jets.stop :] = columns[self.rows - 2], NOWHERE
-
-    def room(self, size: int) -> Array:
-        """(size,) for steps, the same each time: fresh memory costs as much as the arithmetic."""
-        if self._room.size < size:
-            self._room = np.empty(size)
-        return self._room[:size]
 
     def taken(self, p: Array, sizes: Array) -> Array:
         """What is read of parameters (parameters, k) and limits, with nominal sizes (n,) and no limits yet."""
@@ -109,36 +135,33 @@ class LaneStep:
         """Write what a step makes of columns (height, k), both contiguous."""
         self._function.into(made, columns, taken)
 
-    def _written(self, program: LaneProgram, seen: Sequence[Any]) -> LaneFunction:
+    def written(self) -> LaneFunction:
+        """The step as a function."""
+        program, quantities = self.program, [quantity for quantity, _ in self._seen]
         time, step, before = heyoka.make_vars("time", "step", "before")
         integrals = [heyoka.expression(f"integral{k}") for k in range(len(self._integrals))]
-        limit = [heyoka.par[self.first_limit + k] for k in range(3 + self.states)]
+        limit = [heyoka.par[program.parameter_count + k] for k in range(3 + self.states)]
         (tolerance, end, longest), sizes = limit[:3], limit[3:]
         left = end - time
         wanted = _lower(step, longest)
         size = _lower(wanted, left)
         old = [*program.variables, *integrals]
-        blind = [quantity for quantity in dict.fromkeys(seen) if at(quantity, FREE_TIME) != quantity]
+        blind = [quantity for quantity in dict.fromkeys(quantities) if at(quantity, FREE_TIME) != quantity]
         integrands = [reduce(mul, [quantity] * power) for quantity, power in self._integrals]
         stages = _stages(program.variables, [*program.rates, *integrands, *blind], time, size)
         new = [_moved(x, size, DOP853.B, slopes) for x, slopes in zip(old, stages, strict=False)]
-        start = Start(program, time, size, sizes)
-        error = (
-            step_error(start, [(x, *of) for x, of in zip(integrals, self._integrals, strict=True)], blind, stages)
-            / tolerance
-        )
+        begun = [(x, *of) for x, of in zip(integrals, self._integrals, strict=True)]
+        error = step_error(Start(program, time, size, sizes), begun, blind, stages) / tolerance
         factor = SAFETY / heyoka.sqrt(heyoka.sqrt(heyoka.sqrt(error + TINY)))  # the error is of order 8
         factor = _higher(_lower(factor, heyoka.expression(MOST_FACTOR)), heyoka.expression(LEAST_FACTOR))
         good = heyoka.lte(error, 1.0)
         arrived = heyoka.select(heyoka.lt(wanted, left), time + size, end)
         after = [heyoka.select(good, moved, x) for x, moved in zip([*old, time], [*new, arrived], strict=True)]
-        here = [at(one, time) for quantity in seen for one in program.jet(quantity)]
+        here = [at(one, time) for quantity in quantities for one in program.jet(quantity)]
         last = [heyoka.expression(f"seen{k}") for k in range(len(here))]
         come = {pair: heyoka.expression(f"reach{k}") for k, pair in enumerate(self._reaches)}
-        reaches = self._come(time - before, last, here, come)
-        return LaneFunction(
-            (*after, size * factor, time, *here, *reaches), (*old, time, step, before, *last, *come.values())
-        )
+        made = (*after, size * factor, time, *here, *self._come(time - before, last, here, come))
+        return LaneFunction(made, (*old, time, step, before, *last, *come.values()))
 
     def _come(
         self, length: Any, last: Sequence[Any], here: Sequence[Any], come: Mapping[tuple[int, float], Any]
@@ -152,6 +175,12 @@ class LaneStep:
             beyond = BEYOND * _higher(missed, -missed)
             made.append(reduce(_higher, [before, sign * jets[1][0], between + beyond]))
         return made
+
+
+@lru_cache(maxsize=KEPT)
+def _function(step: LaneStep) -> LaneFunction:
+    """The function of a step; those of sweeps that differ in their numbers alone share it."""
+    return step.written()
 
 
 def _lower(a: Any, b: Any) -> Any:

@@ -17,7 +17,7 @@ from shaftwork.codegen.waves import Carrying, Dense, along_lines
 from shaftwork.components.base import Component, Profile, Signal
 from shaftwork.core.domains import ROTATION
 from shaftwork.core.errors import SignalError
-from shaftwork.network.graph import CircuitGraph, GraphPart
+from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
 
@@ -77,6 +77,14 @@ class Quantities:
         units |= {f"{part.name}.power": "W" for part in self._graph.parts}
         return units | {f"{part.name}.energy": "J" for part in self._graph.parts}
 
+    def nodes_of(self, name: str) -> tuple[str, ...]:
+        """Names of the nodes that a signal of a part or the speed of a node is of, the reference not among them."""
+        if name not in self.signals:
+            return (self._graph.node_name(self.nodes[name]),) if name in self.nodes else ()
+        part, signal = self.signals[name]
+        numbers = (part.nodes[end] for end in signal.ends if end is not None)
+        return tuple(self._graph.node_name(number) for number in numbers if number != GROUND)
+
 
 class ModelObserver:
     """Recovers every quantity of a network from its states.
@@ -105,6 +113,10 @@ class ModelObserver:
     def units(self) -> Mapping[str, str]:
         """Every quantity that can be read and its unit; where a part and a node share a name, the part's is meant."""
         return self.quantities.units
+
+    def nodes_of(self, name: str) -> tuple[str, ...]:
+        """The moving nodes that a torque or speed is of, by its name in `units`; none for other quantities."""
+        return self.quantities.nodes_of(name)
 
     def history(self, t: Array, x: Array) -> History:
         """All branch quantities along a trajectory; the last one asked for is kept."""

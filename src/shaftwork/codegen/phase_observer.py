@@ -119,6 +119,10 @@ class PhaseObserver:
         """Every quantity that can be read and its unit."""
         return self._first.units
 
+    def nodes_of(self, name: str) -> tuple[str, ...]:
+        """The moving nodes that a torque or speed is of, by its name in `units`; none for other quantities."""
+        return self._first.nodes_of(name)
+
     @property
     def profiles(self) -> Mapping[str, tuple[str, tuple[float, ...]]]:
         """Every quantity that can be read along a part."""

@@ -1,4 +1,4 @@
-"""Parts that touch and let go: gaps and stops, with flanks that spring or rigid ones."""
+"""Parts that touch and let go: gaps and stops, turning or along a line, with flanks that spring or rigid ones."""
 
 from __future__ import annotations
 
@@ -10,18 +10,19 @@ from sympy import Expr, Integer, Max, Min, Piecewise, true
 from shaftwork.components.base import Component, Port, Role, component
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, Branch, ThroughLaw, rigid
 from shaftwork.components.modes import NEVER, Leave, Mode, Modes
+from shaftwork.core.domains import TRANSLATION
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter
 
 CLOSED = "closed"
 
 
-def _stiffness() -> Any:
-    return parameter("N*m/rad", "torsional stiffness in contact, by default rigid", above=0, default=None)
+def _stiffness(unit: str = "N*m/rad", meaning: str = "torsional stiffness") -> Any:
+    return parameter(unit, f"{meaning} in contact, by default rigid", above=0, default=None)
 
 
-def _damping() -> Any:
-    return parameter("N*m*s/rad", "damping in contact", at_least=0, default=0.0)
+def _damping(unit: str = "N*m*s/rad") -> Any:
+    return parameter(unit, "damping in contact", at_least=0, default=0.0)
 
 
 def _restitution() -> Any:
@@ -29,9 +30,9 @@ def _restitution() -> Any:
     return parameter("1", meaning, at_least=0, at_most=1, default=0.0, latex="e")
 
 
-def _rest() -> Any:
+def _rest(unit: str = "rad/s", latex: str = r"\omega_r") -> Any:
     meaning = "of rigid flanks, speed below which they stay together"
-    return parameter("rad/s", meaning, above=0, default=1e-6, latex=r"\omega_r")
+    return parameter(unit, meaning, above=0, default=1e-6, latex=latex)
 
 
 def _refuse_mixed(part: Any) -> None:
@@ -50,11 +51,13 @@ def _torques(upper: Any, lower: Any, p: Any) -> tuple[Any, Any]:
     return forward, backward
 
 
-def _modes(upper: Any, lower: Any, p: Any) -> Modes:
+def _modes(upper: Any, lower: Any, p: Any, rest: Any, twist: str = "phi") -> Modes:
     """Open between two limits of the twist, either of which may be None, and in contact beyond."""
     above = None if upper is None else INTEGRAL - upper
     below = None if lower is None else lower - INTEGRAL
-    return _rigid(above, below, p) if p.c is None else _elastic(above, below, _torques(upper, lower, p))
+    if p.c is None:
+        return _rigid(above, below, (p.restitution, rest), twist)
+    return _elastic(above, below, _torques(upper, lower, p))
 
 
 def _elastic(above: Any, below: Any, torques: tuple[Any, Any]) -> Modes:
@@ -79,25 +82,25 @@ def _elastic(above: Any, below: Any, torques: tuple[Any, Any]) -> Modes:
     return Modes((Mode("open", tuple(begins), starts=inside), *modes))
 
 
-def _rigid(above: Any, below: Any, p: Any) -> Modes:
+def _rigid(above: Any, below: Any, rebound: tuple[Any, Any], twist: str) -> Modes:
     """At a limit a rebound, and below a small speed a rigid contact; it never pulls."""
     begins, modes = [], []
     if above is not None:
-        begins.append(Leave(above, "forward", p.restitution, p.omega_rest))
+        begins.append(Leave(above, "forward", *rebound))
         modes.append(Mode("forward", (Leave(-THROUGH, "open"),), 1.0, CLOSED, NEVER, "in contact"))
     if below is not None:
-        begins.append(Leave(below, "backward", p.restitution, p.omega_rest))
+        begins.append(Leave(below, "backward", *rebound))
         modes.append(Mode("backward", (Leave(THROUGH, "open"),), -1.0, CLOSED, NEVER, "in contact backward"))
-    return Modes((Mode("open", tuple(begins)), *modes), angle="phi")
+    return Modes((Mode("open", tuple(begins)), *modes), angle=twist)
 
 
-def _branches(upper: Any, lower: Any, p: Any, second: str | None = "b") -> Iterator[Branch]:
+def _branches(upper: Any, lower: Any, p: Any, twist: str = "phi") -> Iterator[Branch]:
     if p.c is not None:
         yield ThroughLaw(_law(upper, lower, p), stored=_stored(upper, lower, p))
         return
     if p.form == CLOSED:
-        yield rigid(("a", second))
-    yield ThroughLaw(p.mode * (1 - p.mode**2) * INTEGRAL, ("a", second), "phi")  # no torque: it carries the twist
+        yield rigid(("a", "b"))
+    yield ThroughLaw(p.mode * (1 - p.mode**2) * INTEGRAL, ("a", "b"), twist)  # no torque: it carries the twist
 
 
 def _stored(upper: Any, lower: Any, p: Any) -> Expr:
@@ -143,10 +146,37 @@ class Backlash(Component):
         _refuse_mixed(self)
 
     def modes(self, p: Any) -> Iterator[Modes]:
-        yield _modes(p.gap / 2, -p.gap / 2, p)
+        yield _modes(p.gap / 2, -p.gap / 2, p, p.omega_rest)
 
     def branches(self, p: Any) -> Iterator[Branch]:
         yield from _branches(p.gap / 2, -p.gap / 2, p)
+
+
+@component
+class TranslationalBacklash(Component):
+    """A gap between two nodes that move along a line: couplings of wagons, claws and pins with play.
+
+    Law: that of a `Backlash`, with the force f, the way s and the speed v of node a against node b in place of torque,
+    twist and speed. Modes: open, in contact, in contact backward. Source: as of a `Backlash`.
+    """
+
+    gap: float = parameter("m", "whole free way", at_least=0, latex=r"\Delta")
+    c: float | None = _stiffness("N/m", "stiffness")
+    d: float = _damping("N*s/m")
+    restitution: float = _restitution()
+    v_rest: float = _rest("m/s", "v_r")
+
+    role: ClassVar[Role] = "loss"
+    ports: ClassVar = (Port("a", TRANSLATION), Port("b", TRANSLATION))
+
+    def __post_init__(self) -> None:
+        _refuse_mixed(self)
+
+    def modes(self, p: Any) -> Iterator[Modes]:
+        yield _modes(p.gap / 2, -p.gap / 2, p, p.v_rest, "s")
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        yield from _branches(p.gap / 2, -p.gap / 2, p, "s")
 
 
 @component
@@ -176,7 +206,7 @@ class HardStop(Component):
             raise ParameterError(f"HardStop '{self.name}': lower = {self.lower} must be below upper = {self.upper}.")
 
     def modes(self, p: Any) -> Iterator[Modes]:
-        yield _modes(p.upper, p.lower, p)
+        yield _modes(p.upper, p.lower, p, p.omega_rest)
 
     def branches(self, p: Any) -> Iterator[Branch]:
         yield from _branches(p.upper, p.lower, p)

@@ -31,6 +31,20 @@ Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
 
+class Room:
+    """Memory for steps, the same each time: fresh memory costs as much as the arithmetic."""
+
+    def __init__(self) -> None:
+        self._values = np.empty(0)
+
+    def __call__(self, *shape: int) -> Array:
+        """An array of a shape, of whatever values; that of the last call is gone."""
+        size = math.prod(shape)
+        if self._values.size < size:
+            self._values = np.empty(size)
+        return self._values[:size].reshape(shape)
+
+
 class Steps:
     """Some steps of lanes.
 
@@ -88,6 +102,7 @@ class LaneRun:
 
     Args:
         step: a `codegen.lanes.LaneStep`.
+        room: for its steps.
         x: (n, k) states.
         rates: (n, k) theirs.
         t: (k,) s.
@@ -100,6 +115,7 @@ class LaneRun:
     def __init__(
         self,
         step: Any,
+        room: Room,
         x: Array,
         rates: Array,
         t: Array,
@@ -108,7 +124,7 @@ class LaneRun:
         limits: tuple[float, float],
         rtol: float,
     ) -> None:
-        self._step, self._end = step, limits[0]
+        self._step, self._room, self._end = step, room, limits[0]
         with np.errstate(divide="ignore"):
             first = FIRST_CHANGE * ((sizes[:, None] + np.abs(x)) / np.abs(rates)).min(axis=0)
         columns, taken = np.zeros((step.height, t.size)), step.taken(p, sizes)
@@ -134,8 +150,7 @@ class LaneRun:
         """
         step, count = self._step, self.lanes.size
         most = min(max(ROWS_AT_ONCE // step.height, LOOK), MOST_AT_ONCE)
-        shape = most + 1, *self._columns.shape
-        made = step.room(math.prod(shape)).reshape(shape)
+        made = self._room(most + 1, *self._columns.shape)
         made[0] = self._columns
         step.forget(made[0])
         for k in range(most):

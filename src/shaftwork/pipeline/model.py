@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -114,7 +115,8 @@ class Model(CompiledModel):
         span = time_span(t_start, t_end)
         times = output_times(t_eval, *span)
         demand = Demand(span, relative_tolerance(rtol), atol, times, engine, max_steps, progress)
-        return self._motion(values, initial, demand)
+        made = dict(zip(self.parameters, self.defaults.tolist(), strict=True)) | values
+        return replace(self._motion(values, initial, demand), parameters=made, initial=dict(initial or {}))
 
     def _motion(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
         prepared = self.prepare(self.vector(values) if values else self.defaults)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shaftwork.components.contacts import Backlash
 from shaftwork.components.rotation import Damper, Inertia, Spring
@@ -14,8 +15,7 @@ from shaftwork.components.sources import SpeedSource
 from shaftwork.core.domains import ROTATION
 from shaftwork.core.errors import NetworkError, Problem
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
-
-Array = NDArray[np.float64]
+from shaftwork.reduce.swings import Array, Row
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,11 @@ class Station:
     def heaviest(self) -> str:
         """The name of its largest inertia."""
         return max(self.inertias, key=lambda own: own[1])[0]
+
+    @property
+    def bearings(self) -> tuple[Spring, ...]:
+        """The springs of its support."""
+        return tuple(item.part for item in self.riders if isinstance(item.part, Spring) and item.part.c)
 
     @property
     def prescribed_by(self) -> tuple[str, ...]:
@@ -85,7 +90,35 @@ class Chain:
 
         There is one for each station whose speed is not prescribed.
         """
-        return modes_of(self)[0]
+        free, row = self.row
+        rates = row.rates()
+        return np.append(np.zeros(len(free) - len(rates)), rates) / (2 * np.pi)
+
+    @cached_property
+    def row(self) -> tuple[tuple[int, ...], Row]:
+        """Places of the stations whose speed is not prescribed, and how they swing: the others are a frame to them."""
+        free = tuple(k for k, held in enumerate(self.prescribed) if not held)
+        c = np.array([0.0, *(link.c for link in self.links), 0.0])
+        held = np.array([True, *self.prescribed, True])
+        supports = np.array([station.support for station in self.stations])
+        supports += np.where(held[:-2], c[:-1], 0.0) + np.where(held[2:], c[1:], 0.0)
+        inertias = np.array([station.inertia for station in self.stations])
+        between = [c[a + 1] if b == a + 1 else 0.0 for a, b in pairwise(free)]
+        return free, Row(inertias[list(free)], np.array(between), supports[list(free)])
+
+    def swing(self, rate: float) -> tuple[Array, Array]:
+        """(n,) shape at one of its rates, with a modal inertia of 1 kg m^2, and (n - 1,) torques in the links.
+
+        Where the speed of a station is prescribed, it stands still.
+        """
+        free, row = self.row
+        shape = np.zeros(len(self.stations))
+        shape[list(free)], inner = row.swing(rate)
+        torques = -np.array([link.c for link in self.links]) * np.diff(shape)
+        for (a, b), torque in zip(pairwise(free), inner, strict=True):
+            if b == a + 1:
+                torques[a] = torque
+        return shape, torques
 
     @property
     def prescribed(self) -> tuple[bool, ...]:
@@ -105,43 +138,6 @@ def series(links: Sequence[Link]) -> Link:
     d = sum(link.d * (c / link.c) ** 2 for link in links)
     softest = min(links, key=lambda link: link.c)
     return Link(softest.name, c, d, sum(link.gap for link in links), tuple(n for link in links for n in link.parts))
-
-
-def modes_of(chain: Chain) -> tuple[Array, Array]:
-    """(m,) natural frequencies in Hz and (n, m) shapes in columns, with a modal inertia of 1 kg m^2.
-
-    Where the speed of a station is prescribed, it stands still in every shape.
-    """
-    inertias, stiffness = matrices_of(chain)
-    free = np.flatnonzero(~np.array(chain.prescribed))
-    root = 1 / np.sqrt(inertias[free])
-    squares, inner = np.linalg.eigh(root[:, None] * stiffness[np.ix_(free, free)] * root)
-    shapes = np.zeros((len(inertias), len(free)))
-    shapes[free] = root[:, None] * inner
-    return hertz(squares, chain), shapes
-
-
-def matrices_of(chain: Chain) -> tuple[Array, Array]:
-    """(n,) inertias and (n, n) stiffness of a chain."""
-    inertias = np.array([station.inertia for station in chain.stations])
-    supports = np.diag([station.support for station in chain.stations])
-    return inertias, supports + row_matrix([link.c for link in chain.links])
-
-
-def row_matrix(values: Sequence[float]) -> Array:
-    """(n, n) stiffness or damping of n places in a row, by the (n - 1,) values between neighbours."""
-    matrix = np.zeros((len(values) + 1, len(values) + 1))
-    for k, value in enumerate(values):
-        matrix[k : k + 2, k : k + 2] += value * np.array([[1.0, -1.0], [-1.0, 1.0]])
-    return matrix
-
-
-def hertz(squares: Array, chain: Chain) -> Array:
-    """(n,) frequencies in Hz of ascending squares of rates; the first is exactly 0 where the whole chain turns."""
-    rates = np.sqrt(np.maximum(squares, 0.0))
-    if not any(station.support or station.prescribed_by for station in chain.stations):
-        rates[0] = 0.0
-    return np.asarray(rates / (2 * np.pi))
 
 
 def read_chain(netlist: Netlist, keep: str) -> Chain:
@@ -239,7 +235,12 @@ def _not_a_row(stations: dict[str, Station], links: dict[tuple[str, str], list[P
             )
     if not stations:
         what = "no part turns: the reference of the train is a node that moves along a line"
-        yield Problem("no row", f"{what}.", "Give a node that turns, to='...'.")
+        hint = (
+            "Give a node that turns, to='...'. Where there is none, add Drum('drum', radius=1.0) from a new node to "
+            "one of the train, and TorqueSource('none', tau=0.0) there: seen from it, masses are inertias of the same "
+            "numbers, and forces torques."
+        )
+        yield Problem("no row", f"{what}.", hint)
     elif len(links) != len(stations) - 1:
         what = f"{len(stations)} nodes are joined by {len(links)} shafts"
         yield Problem("no row", f"{what}; a chain has one shaft less than nodes.", "Open the loop, or join the parts.")

@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from shaftwork.reduce.chain import Array
+from shaftwork.core.errors import ParameterError
+from shaftwork.pipeline.network import Network
+from shaftwork.reduce.swings import Array
+from shaftwork.results.solution import Solution
+
+SHOWN = 3
+"""Differences between two networks that are named."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,3 +81,41 @@ def _share(difference: float, size: float) -> float:
     if not size:
         return math.inf if difference else 0.0
     return difference / size
+
+
+def refuse_changes(options: Mapping[str, Any]) -> None:
+    """Raise `ParameterError` for options of a simulation that make another train, for which no small model was made."""
+    if options.get("parameters"):
+        raise ParameterError(
+            "compare: parameters are those of the train, and its small models were made for the values that it has. "
+            "Build the network with the new ones, simplify it, and compare that."
+        )
+    if options.get("initial"):
+        raise ParameterError(
+            "compare: initial values are those of parts of the train, many of which are one in a small model. Leave "
+            "them out: all models start from rest."
+        )
+
+
+def check_motion(before: Any, train: Network, start: float, end: float) -> None:
+    """Raise `ParameterError` where something is no motion of a train from rest, from a time in s to another."""
+    if not isinstance(before, Solution):
+        raise ParameterError(f"compare: before = {before!r} is no motion. Give what `simulate` of the train returns.")
+    for what, time, wanted in (("starts", before.steps[0], start), ("ends", before.t[-1], end)):
+        if not math.isclose(float(time), wanted, abs_tol=1e-12 * end):
+            name = "t_start" if wanted == start else "t_end"
+            raise ParameterError(f"compare: the motion `before` {what} at {time:g} s, and {name} is {wanted:g} s.")
+    given = [name for name, value in before.initial.items() if value]
+    if given:
+        raise ParameterError(
+            f"compare: the motion `before` does not start from rest, but with {', '.join(given)}. The small models do."
+        )
+    known, found = train.graph().parameters, before.parameters
+    pairs = {name: (found.get(name, 0.0), known.get(name, 0.0)) for name in (*known, *found)}
+    other = [f"{name} = {was:g} instead of {now:g}" for name, (was, now) in pairs.items() if was != now]
+    if other:
+        shown = ", ".join([*other[:SHOWN], *(["..."] if len(other) > SHOWN else [])])
+        raise ParameterError(
+            f"compare: the motion `before` is not that of '{train.name}': {shown}. Simulate the train as it is, or "
+            "simplify the one that moved."
+        )

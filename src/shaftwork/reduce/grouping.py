@@ -12,10 +12,12 @@ import numpy as np
 
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import whole
-from shaftwork.reduce.chain import Chain, Station, matrices_of, modes_of, series
+from shaftwork.reduce.chain import Chain, Station, series
 
 MOST = 20_000
 """Groupings that are tried one by one."""
+DIGITS = 13
+"""Errors that agree in so many decimals are equal: what is left is the rounding of two frequencies."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +73,7 @@ def groupings(chain: Chain, masses: int, keep: str, driven: int) -> tuple[Groupi
     true = _swing(chain, driven, kept)
     cuts = (tuple(sorted((*some, *fixed))) for some in combinations(free, chosen))
     found = (_measured(chain, each, kept, driven, true) for each in cuts)
-    return tuple(sorted(found, key=lambda made: (made.frequency_error, made.torque_error)))
+    return tuple(sorted(found, key=lambda made: (round(made.frequency_error, DIGITS), made.torque_error)))
 
 
 def _fixed(chain: Chain, masses: int, kept: int | None) -> tuple[int, ...]:
@@ -104,19 +106,19 @@ def _measured(
 def _swing(chain: Chain, driven: int, kept: int | None) -> tuple[float, float]:
     """The lowest natural frequency, and the torque amplitude of a link in that mode after a unit step at a station.
 
-    Law: |c twist shape| / omega^2 for a step of torque; where the speed is prescribed the step is one of acceleration,
-    and the stiffness there gives what the shape does not, |c twist (K shape)| / omega^4.
+    Law: |torque shape| / omega^2 for a step of torque; where the speed is prescribed the step is one of acceleration,
+    and the stiffness there gives what the shape does not, |torque (K shape)| / omega^4.
     """
-    frequencies, shapes = modes_of(chain)
-    elastic = np.flatnonzero(frequencies > 0)
-    if not elastic.size:
+    rates = chain.row[1].rates(1)
+    if not rates.size:
         return 0.0, 0.0
-    frequency, shape = float(frequencies[elastic[0]]), shapes[:, elastic[0]]
+    rate = float(rates[0])
     if kept is None:
-        return frequency, 0.0
-    twist, square = shape[kept] - shape[kept + 1], (2 * np.pi * frequency) ** 2
-    pushed = matrices_of(chain)[1][driven] @ shape / square if chain.prescribed[driven] else shape[driven]
-    return frequency, float(abs(chain.links[kept].c * twist * pushed)) / square
+        return rate / (2 * np.pi), 0.0
+    shape, torques = chain.swing(rate)
+    held = np.diff(torques, prepend=0.0, append=0.0)[driven] / rate**2
+    pushed = held if chain.prescribed[driven] else shape[driven]
+    return rate / (2 * np.pi), float(abs(torques[kept] * pushed)) / rate**2
 
 
 def grouped(chain: Chain, cuts: tuple[int, ...], kept: int | None) -> tuple[Chain, tuple[tuple[str, ...], ...]]:

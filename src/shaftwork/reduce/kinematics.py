@@ -138,7 +138,9 @@ def _driving_side(graph: CircuitGraph, gear: GraphPart, still: Clusters) -> str 
     if bool(found["a"]) != bool(found["b"]):
         return "a" if found["a"] else "b"
     why = "no source says which way that is"
-    if found["a"]:
+    if round_it := [name for name in found["a"] if name in found["b"]]:
+        why = f"it lies in a loop: {listed(round_it)} drives it from both of its sides"
+    elif found["a"]:
         why = f"sources are on both sides ({listed(found['a'])}; {listed(found['b'])})"
     return Problem(
         "direction of power",

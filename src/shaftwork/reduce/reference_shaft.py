@@ -55,6 +55,9 @@ class Referred:
         """
         return self._scale(part).through
 
+    def __str__(self) -> str:
+        return str(self.table)
+
     def _scale(self, part: str) -> Scale:
         if part not in self.scales:
             raise SignalError(f"No part '{part}' was referred to '{self.to}'. There are: {', '.join(self.scales)}.")
@@ -77,7 +80,7 @@ def refer(net: Network, to: str, *, drives: Mapping[str, str] | None = None) -> 
 
     Args:
         net: the train.
-        to: a node of the reference shaft, rotating or translating.
+        to: a node of the reference shaft, rotating or translating; for the parts that have a counterpart along a line.
         drives: by name of a `LossyGear` the side that drives it, "a" or "b"; by default that of the motors and
             sources, where all of them are on one.
 

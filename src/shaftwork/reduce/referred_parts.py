@@ -10,6 +10,7 @@ from typing import Any
 from sympy import Abs, Expr, Float, Rational, S, Symbol, signsimp
 
 from shaftwork.components.base import Component
+from shaftwork.components.contacts import Backlash, TranslationalBacklash
 from shaftwork.components.laws import Table, as_expression, omega, phi, s, v
 from shaftwork.components.loads import ViscousLoad
 from shaftwork.components.rotation import Damper, Inertia, Spring
@@ -57,12 +58,19 @@ OF_CLASS: Mapping[str, Mapping[str, Exponents]] = {
         "omega_s": _exponents(-1),
     },
     "BucketWheelLoad": {"edge": _exponents(0, 1), "ratio": _exponents(-1)},
+    "TranslationalBacklash": {
+        **dict.fromkeys(("gap", "v_rest"), _exponents(-1)),
+        **dict.fromkeys(("c", "d"), _exponents(2, 1)),
+    },
     "Shaft": {
         **dict.fromkeys(("diameter", "inner_diameter"), _exponents("1/2", "1/4")),
         **dict.fromkeys(("damping", "friction"), _exponents(2, 1)),
     },
 }
 """Parts whose parameters stand for a gear of their own, a lever or a machine, and not for the shaft itself."""
+
+TURNED: Mapping[str, tuple[str, ...]] = {"Conveyor": ("incline",)}
+"""Parameters that change their sign where the part turns backwards: what went up goes down."""
 
 LIMITS: Mapping[str, tuple[str, str]] = {"SpeedController": ("tau_max", "tau_min")}
 """The largest and the smallest value of a torque; where the smallest is not given, it is minus the largest."""
@@ -77,6 +85,8 @@ COUNTERPARTS: Mapping[type[Component], tuple[type[Component], Mapping[str, str]]
     Damper: (TranslationalDamper, {}),
     ViscousLoad: (TranslationalDamper, {}),
     TorqueSource: (ForceSource, {"tau": "f"}),
+    Backlash: (TranslationalBacklash, {"omega_rest": "v_rest"}),
+    TranslationalBacklash: (Backlash, {"v_rest": "omega_rest"}),
 }
 """What a part becomes behind a drum or wheel, and the names of its parameters there."""
 
@@ -163,7 +173,10 @@ def _scaled(part: Component, scale: Scale, here: Domain, domain: Domain) -> tupl
     for name, declared in part.declared.items():
         target = targets[name]
         value = declared.magnitude(getattr(part, name))[0]
-        made = _referred(value, target, _powers(part, declared), scale, (MOTIONS[here], MOTIONS[domain]))
+        if scale.ratio < 0 and name in TURNED.get(type(part).__name__, ()):
+            made = -value, S.NegativeOne
+        else:
+            made = _referred(value, target, _powers(part, declared), scale, (MOTIONS[here], MOTIONS[domain]))
         values[target.name] = made[0]
         if made[1] is not None and value != 0:
             entries.append(

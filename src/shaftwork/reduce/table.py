@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from sympy import Expr, Symbol, latex
+from sympy import Add, Expr, Integer, Symbol, latex
 
+from shaftwork.components.laws import Table, omega, phi, s, v
 from shaftwork.core.errors import SignalError
-from shaftwork.equations.nomenclature import breakable, column, unit
+from shaftwork.equations.assembly import Group
+from shaftwork.equations.nomenclature import column, unit
 from shaftwork.equations.nomenclature import table as longtable
 from shaftwork.equations.notation import without_marks
-from shaftwork.equations.printing import printed_number
-from shaftwork.equations.spelling import escaped
+from shaftwork.equations.printing import Line, Writer, aligned, printed_number
+from shaftwork.equations.spelling import escaped, in_text
 from shaftwork.equations.widths import printed_width
 from shaftwork.reduce.referred_parts import Entry
 
 HEADINGS = ("part", "quantity", "value", "unit", "ratio", "referred", "unit", "formula")
-FORMULA, LETTER = 42, 2
-"""Width of the formulas and about that of a letter in print, mm."""
+PART, FORMULA, LETTER = 20, 42, 2
+"""Width of the names of parts, that of the formulas and about that of a letter in print, mm."""
+MOTION = {omega.name: r"\omega", phi.name: r"\varphi", v.name: "v", s.name: "s"}
+"""What laws read, of their own shaft."""
+POINTS = 12
+"""Points of a table that are printed; of a longer one the first."""
 SCRIPT = 0.75
 """Size of what is in a fraction beside text."""
 TIMES, BREAKS = r" \, ", r" \,\allowbreak "
@@ -67,10 +74,22 @@ class ReductionTable:
         return "\n".join((f"referred to {self.to}", *lines))
 
     def latex(self) -> str:
-        """The table as LaTeX, a `longtable` in the letters of the equations (packages booktabs, array, longtable)."""
+        """The table as LaTeX, a `longtable` in the letters of the equations; what is a law stands below it.
+
+        It needs the packages amsmath, booktabs, array and longtable.
+        """
         titles = ("Part", "Formula", "Value", "Unit", "Ratio", "Referred", "Unit")
-        columns = r"@{\hspace{2mm}}".join((column(20), column(FORMULA), *"rlrrl"))
-        return longtable(columns, titles, [self._printed(entry) for entry in self.entries])
+        columns = r"@{\hspace{2mm}}".join((column(PART), column(FORMULA), *"rlrrl"))
+        text = longtable(columns, titles, [self._printed(entry) for entry in self.entries])
+        laws = [line for entry in self.entries if not isinstance(entry.value, float) for line in self._laws(entry)]
+        if not laws:
+            return text
+        return f"{text}\n\\paragraph{{Laws}}\\mbox{{}}\n\\begin{{align*}}\n{aligned(laws)}\n\\end{{align*}}"
+
+    def _laws(self, entry: Entry) -> tuple[Line, Line]:
+        """A law as it is and as it is at the reference shaft, which reads the motion there."""
+        letter, there = self._names[_own(entry)], {name: f"{text}'" for name, text in MOTION.items()}
+        return Line(letter, _pieces(entry.value, MOTION)), Line(_primed(letter), _pieces(entry.referred, there))
 
     @cached_property
     def _names(self) -> Mapping[Symbol, str]:
@@ -80,7 +99,7 @@ class ReductionTable:
 
     def _printed(self, entry: Entry) -> tuple[str, ...]:
         return (
-            breakable(entry.part),
+            _broken(entry.part, PART),
             self._law(entry),
             _number(entry.value),
             unit(entry.unit),
@@ -90,8 +109,13 @@ class ReductionTable:
         )
 
     def _law(self, entry: Entry) -> str:
-        """The formula, which may be broken between factors; a fraction that is too wide as a quotient on the line."""
+        """The formula, which may be broken between factors; a fraction that is too wide as a quotient on the line.
+
+        Where a letter alone is wider than the column, by the name of its part, the formula is that of the text.
+        """
         own = self._names[_own(entry)]
+        if any(printed_width(letter) > FORMULA / LETTER for letter in (_primed(own), *self._letters_in(entry))):
+            return _broken(_formula(entry), FORMULA)
         above, below = entry.factor.as_numer_denom()
         sign = "-" if above.could_extract_minus_sign() else ""
         upper, lower = (own, *self._factors(-above if sign else above)), self._factors(below)
@@ -104,6 +128,9 @@ class ReductionTable:
             divisor = BREAKS.join(lower)
             law = rf"{BREAKS.join(upper)} \,/\allowbreak\, {f'({divisor})' if len(lower) > 1 else divisor}"
         return f"${_primed(own)} = {sign}{law}$"
+
+    def _letters_in(self, entry: Entry) -> tuple[str, ...]:
+        return tuple(self._names[symbol] for symbol in (_own(entry), *entry.factor.free_symbols))
 
     def _factors(self, product: Expr) -> tuple[str, ...]:
         """A product as LaTeX, factor by factor; nothing where it is one."""
@@ -144,6 +171,20 @@ def _text(value: Any) -> str:
 
 def _number(value: float | Expr) -> str:
     return f"${printed_number(value)}$" if isinstance(value, float) else "law"
+
+
+def _pieces(law: Expr, names: Mapping[str, str]) -> tuple[str, ...]:
+    """The right side of a law, in pieces between which it may be broken."""
+    if isinstance(law, Table):
+        points = [f"({printed_number(x)},\\, {printed_number(y)})\\," for x, y in zip(law.xs, law.ys, strict=True)]
+        return (*points[:POINTS], *([r"\dots"] if len(points) > POINTS else []))
+    return Writer(names, (), (), {}).pieces((Group(Integer(1), Add.make_args(law)),))
+
+
+def _broken(text: str, width: int) -> str:
+    """A text that may be broken after an underscore, and in words that are wider than a column in mm."""
+    words = (re.findall(rf"[^_]{{1,{width // LETTER}}}_*|_+", word) for word in text.split(" "))
+    return " ".join(r"\allowbreak ".join(map(in_text, pieces)) for pieces in words)
 
 
 def _primed(letter: str) -> str:

@@ -2,70 +2,20 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
-from scipy.linalg import eigh
 
 from shaftwork.components.rotation import Inertia, PlanetaryGear, Spring
 from shaftwork.network.netlist import REFERENCE
 from shaftwork.pipeline.network import Network
-from shaftwork.reduce.chain import Array, Chain, Link, hertz, row_matrix, series
+from shaftwork.reduce.chain import Chain, Link, series
 from shaftwork.reduce.groups import add_circuits, add_link, add_riders
-
-NOTHING = 1e-12
-"""A share of a speed or of an inertia that is only rounding."""
-
-
-@dataclass(frozen=True, eq=False)
-class Carried:
-    """An inertia that the boundaries carry, each by its share.
-
-    Args:
-        inertia: its size, kg m^2.
-        base: (b,) share of the speed of each boundary in its own.
-        between: places of the boundaries beside it, one or two.
-    """
-
-    inertia: float
-    base: Array
-    between: tuple[int, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class Mode(Carried):
-    """How a piece of a chain swings while its boundaries are held: an inertia on a spring that they carry.
-
-    Args:
-        c: stiffness of the spring, N m/rad.
-        d: its damping, N m s/rad.
-        shares: (n,) speed of each station against what the boundaries give it, over that of the inertia against its
-            base; zero in other pieces.
-    """
-
-    c: float
-    d: float
-    shares: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """The stations between boundaries, or beyond the outer ones.
-
-    Args:
-        still: (n, b) speed of each station by those of the boundaries while nothing swings; zero in other pieces.
-        inertias: (b, b) what it is for the boundaries then, kg m^2.
-        between: places of the boundaries beside it, one or two.
-        modes: all of its modes.
-    """
-
-    still: Array
-    inertias: Array
-    between: tuple[int, ...]
-    modes: tuple[Mode, ...]
+from shaftwork.reduce.pieces import NOTHING, Carried, Mode, Piece, common, piece_of
+from shaftwork.reduce.swings import Array, singular_values
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +27,8 @@ class ModalChain:
         kept: place of the link.
         boundaries: places of their stations.
         ends: (b,) what turns rigidly with each of them, kg m^2.
+        joints: what is between neighbours of them.
+        support: (b, 2) stiffness and damping of what else holds each of them, for the supports of other stations.
         carried: what two of them carry together.
         modes: lowest first.
         still: (n, b) speed of each station by those of the boundaries while nothing swings.
@@ -86,6 +38,8 @@ class ModalChain:
     kept: int
     boundaries: tuple[int, ...]
     ends: Array
+    joints: tuple[Link, ...]
+    support: Array
     carried: tuple[Carried, ...]
     modes: tuple[Mode, ...]
     still: Array
@@ -99,23 +53,16 @@ class ModalChain:
 
     def frequencies(self) -> Array:
         """(f,) natural frequencies in Hz, ascending, 0 for the turning of the whole: as many as speeds are free."""
-        count = len(self.boundaries)
-        speeds, supports = self.speeds(), np.array([station.support for station in self.chain.stations])
-        stiffness = speeds.T @ (supports[:, None] * speeds)
-        stiffness[:count, :count] += row_matrix([series(links).c for links in self._links()])
-        for place, mode in enumerate(self.modes, count):
-            row = np.append(-mode.base, np.zeros(len(self.modes)))
-            row[place] = 1.0
-            stiffness += mode.c * np.outer(row, row)
+        count, modes = len(self.boundaries), np.array([mode.inertia for mode in self.modes])
+        held = self.support[:, 0] + [self.chain.stations[k].support for k in self.boundaries]
+        springs = np.array([*(link.c for link in self.joints), *held, *(mode.c for mode in self.modes)])
+        twists = np.eye(len(springs), count + len(modes), 1 - count)
+        twists[: count - 1, :count] = np.diff(np.eye(count), axis=0)
+        twists[len(springs) - len(modes) :, :count] = -np.array([mode.base for mode in self.modes]).reshape(-1, count)
         ends = self.ends + sum(item.inertia * item.base**2 for item in self.carried)
-        free = [not self.chain.prescribed[k] for k in self.boundaries] + [True] * len(self.modes)
-        root = 1 / np.sqrt(np.append(ends, [mode.inertia for mode in self.modes])[free])
-        inner = stiffness[np.ix_(free, free)]
-        return hertz(np.asarray(np.linalg.eigvalsh(root[:, None] * inner * root)), self.chain)
-
-    def _links(self) -> Iterator[tuple[Link, ...]]:
-        """The links from each boundary to the next."""
-        return (self.chain.links[a:b] for a, b in pairwise(self.boundaries))
+        free = [not self.chain.prescribed[k] for k in self.boundaries] + [True] * len(modes)
+        roots = np.sqrt(np.append(ends, modes)[free])
+        return singular_values(np.sqrt(springs)[:, None] * twists[:, free] / roots) / (2 * np.pi)
 
     def network(self, name: str) -> Network:
         """The same as a network: inertias on springs at the boundaries, and what sits elsewhere on planetary gears.
@@ -123,30 +70,34 @@ class ModalChain:
         A place between has no inertia of its own; its speed is the sum of those of boundaries and modes, each by its
         share, as sun and ring sum to the carrier. So every part keeps its node.
         """
-        net = Network(name)
+        net, named = Network(name), partial(_free, _names(self.chain))
         add_circuits(net, self.chain)
         stations = [self.chain.stations[k] for k in self.boundaries]
         nodes = [station.node for station in stations]
-        for station, size in zip(stations, self.ends, strict=True):
+        for station, size, (c, d) in zip(stations, self.ends, self.support.tolist(), strict=True):
             if size > NOTHING * self.ends.max():
-                own = station.heaviest if station.inertias else f"share of {station.node}"
+                own = station.heaviest if station.inertias else named(f"share of {station.node}")
                 net.add(Inertia(own, J=float(size)), station.node)
-        for links, pair in zip(self._links(), pairwise(stations), strict=True):
-            link = links[0] if len(links) == 1 else replace(series(links), gap=0.0)
+            if c:
+                net.add(Spring(named(f"support of {station.node}"), c=c, d=d), station.node, REFERENCE)
+        for link, pair in zip(self.joints, pairwise(stations), strict=True):
             add_link(net, link, *pair)
         for item in self.carried:
-            title = f"between {' and '.join(nodes[k] for k in item.between)}"
-            net.add(Inertia(title, J=item.inertia), _add_sum(net, title, nodes, item.base))
+            title = named(f"between {' and '.join(nodes[k] for k in item.between)}")
+            net.add(Inertia(title, J=item.inertia), _add_sum(net, title, nodes, item.base, named))
         boundaries = tuple(nodes)
         for number, mode in enumerate(self.modes, 1):
-            nodes.append(f"mode {number}")
-            base = _add_sum(net, f"base of {nodes[-1]}", boundaries, mode.base)
+            nodes.append(named(f"mode {number}"))
+            base = _add_sum(net, named(f"base of {nodes[-1]}"), boundaries, mode.base, named)
             net.add(Inertia(nodes[-1], J=mode.inertia), nodes[-1])
-            net.add(Spring(f"spring of {nodes[-1]}", c=mode.c, d=mode.d), base, nodes[-1])
+            net.add(Spring(named(f"spring of {nodes[-1]}"), c=mode.c, d=mode.d), base, nodes[-1])
         for station, row in zip(self.chain.stations, self.speeds(), strict=True):
-            if station.riders:
-                here = station.node if station in stations else _add_sum(net, station.node, nodes, row)
-                add_riders(net, station, here)
+            if station in stations:
+                add_riders(net, station, station.node)
+                continue
+            rest = tuple(item for item in station.riders if item.part not in station.bearings)
+            if rest:
+                add_riders(net, replace(station, riders=rest), _add_sum(net, station.node, nodes, row, named))
         return net
 
 
@@ -155,12 +106,12 @@ def truncated(chain: Chain, unknowns: int, kept: int) -> ModalChain:
 
     Law: boundaries are the ends of the kept link and what has a prescribed speed. Between them x = C x_b + Phi q, with
     C the deflection under the boundaries alone and Phi the modes while they are held. With the participation
-    L = Phi^T J C a mode is an inertia s^2 on a spring s^2 omega^2 that the boundaries carry by the shares L / s; what a
-    piece is for its boundaries besides, C^T J C - sum L^T L, they carry rigidly. What is held at one place only follows
-    it, C = 1: then s = L, and the spring of the mode sits at this place. Every frequency is an upper bound. With two
-    unknowns it is the model of two groups. Springs to the frame act at their places and bend no mode; gaps are taken as
-    closed where there are stations between two boundaries or beyond them; of the damping each mode has its own, without
-    what it takes from others.
+    L = Phi^T J C a mode is an inertia s^2 on a spring s^2 omega^2 that the boundaries carry by the shares L / s.
+    Besides they carry sum L^T L of the modes left out, rigidly, and C^T K C, as springs between them and to the frame.
+    What hangs on one boundary alone, without a support, follows it, C = 1. At one boundary s = L, and the spring of the
+    mode sits at this place. Every frequency is an upper bound; with two unknowns and no support beyond the kept link it
+    is the model of two groups. Gaps are taken as closed where there are stations between two boundaries or beyond them;
+    of the damping each mode has its own, without what it takes from others.
 
     Args:
         chain: stations with inertia, or with a prescribed speed.
@@ -171,74 +122,53 @@ def truncated(chain: Chain, unknowns: int, kept: int) -> ModalChain:
     """
     inertias = np.array([station.inertia for station in chain.stations])
     boundaries = tuple(k for k, held in enumerate(chain.prescribed) if held or k in (kept, kept + 1))
-    bounds = pairwise((-1, *boundaries, len(inertias)))
-    pieces = [_piece(chain, inertias, boundaries, number, range(a + 1, b)) for number, (a, b) in enumerate(bounds)]
+    bounds = list(pairwise((-1, *boundaries, len(inertias))))
+    pieces = [piece_of(chain, len(boundaries), number, range(a + 1, b)) for number, (a, b) in enumerate(bounds)]
     found = (mode for piece in pieces for mode in piece.modes)
     modes = sorted(found, key=lambda mode: mode.c / mode.inertia)[: unknowns - len(boundaries)]
     still, ends, carried = np.zeros((len(inertias), len(boundaries))), inertias[list(boundaries)], []
     still[list(boundaries)] = np.eye(len(boundaries))
     for piece in pieces:
         still += piece.still
-        rest = piece.inertias - sum(
-            mode.inertia * np.outer(mode.base, mode.base) for mode in modes if mode in piece.modes
-        )
-        common = _common(rest, piece.between) if len(piece.between) > 1 else None
-        if common:
-            carried.append(common)
-            rest -= common.inertia * np.outer(common.base, common.base)
+        left_out = (mode for mode in piece.modes if mode not in modes)
+        rest = sum((mode.inertia * np.outer(mode.base, mode.base) for mode in left_out), np.zeros(2 * still.shape[1:]))
+        shared = common(rest, piece.between) if len(piece.between) > 1 else None
+        if shared:
+            carried.append(shared)
+            rest -= shared.inertia * np.outer(shared.base, shared.base)
         ends = ends + np.maximum(rest.diagonal(), 0.0)
-    return ModalChain(chain, kept, boundaries, ends, tuple(carried), tuple(modes), still)
+    joints = tuple(_joint(chain.links[a:b], piece) for (a, b), piece in zip(bounds[1:-1], pieces[1:-1], strict=True))
+    support = np.sum([piece.support for piece in pieces], axis=0)
+    return ModalChain(chain, kept, boundaries, ends, joints, support, tuple(carried), tuple(modes), still)
 
 
-def _piece(chain: Chain, inertias: Array, boundaries: Sequence[int], number: int, inner: range) -> Piece:
-    """The stations before a boundary of this number, behind the one before."""
-    between = tuple(k for k in (number - 1, number) if 0 <= k < len(boundaries))
-    still = np.zeros((len(inertias), len(boundaries)))
-    if len(between) == 1:
-        still[inner, between[0]] = 1.0
-    elif inner:
-        passed = np.cumsum([1 / link.c for link in chain.links[inner.start - 1 : inner.stop]])
-        still[inner, between[1]] = passed[:-1] / passed[-1]
-        still[inner, between[0]] = 1 - still[inner, between[1]]
-    rigid = still.T @ (inertias[:, None] * still)
-    return Piece(still, rigid, between, tuple(_modes(chain, inertias, still, between, np.array(inner, dtype=int))))
+def _joint(links: Sequence[Link], piece: Piece) -> Link:
+    """The links between two boundaries as one."""
+    if len(links) == 1:
+        return links[0]
+    c, d = piece.joint
+    return replace(series(links), c=c, d=d, gap=0.0)
 
 
-def _modes(chain: Chain, inertias: Array, still: Array, between: tuple[int, ...], beyond: Array) -> Iterator[Mode]:
-    """The modes of stations while the boundaries beside them are held."""
-    if not beyond.size:
-        return
-    inner = np.ix_(beyond, beyond)
-    stiffness, damping = (row_matrix([getattr(link, name) for link in chain.links])[inner] for name in ("c", "d"))
-    squares, shapes = eigh(stiffness, np.diag(inertias[beyond]))
-    for square, shape in zip(squares, shapes.T, strict=True):
-        size, base = _scaled((shape * inertias[beyond]) @ still[beyond])
-        shares = np.zeros(len(inertias))
-        shares[beyond] = size * shape
-        c, d = size**2 * float(square), size**2 * float(shape @ damping @ shape)
-        yield Mode(size**2, base, between, c, d, shares)
+def _names(chain: Chain) -> frozenset[str]:
+    """Of its parts and nodes."""
+    riders = (item for station in chain.stations for item in station.riders)
+    placed = [*chain.circuits, *riders, *(item for link in chain.links for item in link.placed)]
+    inertias = (name for station in chain.stations for name, _ in station.inertias)
+    nodes = (node for item in placed for node in item.nodes)
+    own = (name for link in chain.links for name in link.parts)
+    stations = (station.node for station in chain.stations)
+    return frozenset((*(item.part.name for item in placed), *inertias, *nodes, *own, *stations))
 
 
-def _scaled(participation: Array) -> tuple[float, Array]:
-    """A size and shares that multiply to a participation: shares that sum to one, unless they nearly cancel."""
-    total, norm = float(participation.sum()), math.hypot(*participation)
-    size = total if abs(total) > norm / 2 else norm
-    return size, participation / size
+def _free(taken: frozenset[str], name: str) -> str:
+    """A name that nothing has yet."""
+    while name in taken:
+        name += "'"
+    return name
 
 
-def _common(inertias: Array, between: tuple[int, ...]) -> Carried | None:
-    """What couples two boundaries, as an inertia that both carry and that leaves neither with less than nothing."""
-    first, second = (max(float(inertias[k, k]), 0.0) for k in between)
-    shared, largest = float(inertias[between]), math.sqrt(first * second)
-    if abs(shared) <= NOTHING * inertias.max() or not largest:
-        return None
-    parts = np.zeros(len(inertias))
-    parts[list(between)] = math.sqrt(first), math.copysign(math.sqrt(second), shared)
-    size, base = _scaled(math.sqrt(min(abs(shared) / largest, 1.0)) * parts)
-    return Carried(size**2, base, between)
-
-
-def _add_sum(net: Network, node: str, nodes: Sequence[str], shares: Array) -> str:
+def _add_sum(net: Network, node: str, nodes: Sequence[str], shares: Array, named: Callable[[str], str]) -> str:
     """Add planetary gears by which a node turns as the sum of shares of others, and return its name.
 
     What shares lack of one has the frame. Positive ones first, the largest of all first, every sum on the way is
@@ -248,8 +178,8 @@ def _add_sum(net: Network, node: str, nodes: Sequence[str], shares: Array) -> st
     terms = [(float(share), each) for share, each in pairs if abs(share) > NOTHING]
     (total, here), *rest = sorted(terms, reverse=True)
     for number, (share, other) in enumerate(rest, 1):
-        there = node if number == len(rest) else f"{node}, {number + 1} terms"
-        gear = f"sum {number} of {node}"
+        there = node if number == len(rest) else named(f"{node}, {number + 1} terms")
+        gear = named(f"sum {number} of {node}")
         if share > 0:
             net.add(PlanetaryGear(gear, ratio=share / total), here, there, other)
         else:

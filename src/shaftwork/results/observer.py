@@ -50,6 +50,10 @@ class Observer(Protocol):
         """By part, at times t (k,) with states x (k, n): lost power in W, supplied power in W."""
         ...
 
+    def nodes_of(self, name: str) -> tuple[str, ...]:
+        """The moving nodes that a torque or speed is of, by its name in `units`; none for other quantities."""
+        ...
+
     def part(self, name: str) -> Any:
         """A component of the network, with the parameter values of this motion."""
         ...

@@ -69,6 +69,11 @@ class FrequencySensitivities:
         )
 
     def __str__(self) -> str:
+        if not self.rates.size:
+            return (
+                f"{self.name}: no mode swings here, each is damped critically or more, or has no stiffness: there is "
+                "no frequency to change. Network.modes() shows them all."
+            )
         header = [f"{frequency:.6g} Hz" for frequency in self.frequencies]
         return _text(f"{self.name}: percent of a frequency for a percent of a parameter", header, self.relative)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import reprlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, overload
@@ -59,6 +59,8 @@ class Solution:
         observer: recovers quantities from states.
         events: (time, part, from, to) of every change of mode, times in s.
         phases: the spans of time between them.
+        parameters: what the network was made of, "part.parameter" to value in SI, where it is not zero.
+        initial: the start values that were given.
     """
 
     name: str
@@ -72,6 +74,8 @@ class Solution:
     observer: Observer
     events: tuple[tuple[float, str, str, str], ...] = ()
     phases: tuple[PhaseRow, ...] = ()
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    initial: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def steps(self) -> Array:

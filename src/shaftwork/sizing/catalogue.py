@@ -151,11 +151,11 @@ def catalogue(path: str | Path | None = None) -> tuple[CatalogueMotor, ...]:
             f"The catalogue '{file}' has no motors. Its first line names the columns, {', '.join(NEEDED)}; every other "
             "line is a motor."
         )
-    header, *rows = zip((number for number, _ in lines), csv.reader(line for _, line in lines), strict=True)
-    columns = [name.strip() for name in header[1]]
+    columns = [name.strip() for name in _cells(lines[0][1])]
     _refuse_columns(file, columns)
     made, wrong = list[CatalogueMotor](), list[str]()
-    for number, cells in rows:
+    for number, line in lines[1:]:
+        cells = _cells(line)
         try:
             made.append(_motor(columns, cells, TYPICAL if path is None else file.name))
         except ParameterError as error:
@@ -185,12 +185,22 @@ def _refuse_columns(file: Path, columns: list[str]) -> None:
         )
 
 
+def _cells(line: str) -> list[str]:
+    """The cells of a line; none where a quote in it does not close."""
+    try:
+        return next(csv.reader([line], strict=True))
+    except csv.Error:
+        return []
+
+
 def _motor(columns: list[str], cells: list[str], source: str) -> CatalogueMotor:
     """A motor from a line.
 
     Raises:
         ParameterError: the line is wrong.
     """
+    if not cells:
+        raise ParameterError("its quotes do not match. A motor is one line, and what is in quotes ends in it.")
     if len(cells) != len(columns):
         raise ParameterError(f"it has {len(cells)} cells, and there are {len(columns)} columns.")
     given: dict[str, Any] = {"source": source}

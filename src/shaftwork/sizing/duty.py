@@ -36,17 +36,19 @@ def duty(
         solution: the motion.
         motor: name of a part that gives torque to a shaft; a motor with ratio and efficiency is seen at its own shaft.
         torque: instead of `motor`, name of a torque that drives, such as "gear.tau_a".
-        speed: and of its speed, such as "rotor.omega".
+        speed: and of a speed of a node on which it acts, such as "rotor.omega".
         ratio: motor speed over this speed, of a gear that is not in the network.
         efficiency: of this gear, in the direction of power flow.
         cycle: duration of the cycle in s; after the motion the motor rests without torque. By default the motion's.
         at_rest: "holds": torque at standstill counts; "released": a brake holds there, and the motor has none.
         cooling: heat that the motor gives off at standstill over that at full speed; it rises with the speed along a
             straight line. 1 for a fan of its own.
-        n_cooling: speed in 1/min from which cooling is full, the rated one; by default the highest of the motion.
+        n_cooling: speed in 1/min from which cooling is full, the rated one; by default the highest of the motion. A
+            motor that never turns is cooled as at standstill.
 
     Raises:
-        ParameterError: the arguments do not go together, or one is out of its range.
+        ParameterError: the arguments do not go together, the torque does not act where the speed is, or one is out of
+            its range.
         SignalError: there is no such part or quantity.
     """
     if at_rest not in ("holds", "released"):

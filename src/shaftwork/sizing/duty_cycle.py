@@ -75,7 +75,7 @@ class Duty:
         held: time at standstill with torque, s; it is part of `loaded`.
         cooled: the cycle in time of full cooling, integral of the cooling over the time, s.
         cooling: heat given off at standstill over that at full cooling.
-        n_cooling: speed from which cooling is full, 1/min.
+        n_cooling: speed from which cooling is full, 1/min; 0 for the highest one of a motor that never turns.
         shaft: where torque and speed are read.
         panels: of the motion, torque and power smooth in each.
     """
@@ -257,7 +257,8 @@ class Duty:
         if (later := self.jumps[self.jumps > start]).size:
             made.append(f"the speed jumps at {later[0]:.6g} s; {last}")
         if self.cooling < 1:
-            made.append(f"cooling {self.cooling:g} at standstill, full from {self.n_cooling:.6g} 1/min on")
+            full = f"full from {self.n_cooling:.6g} 1/min on" if self.n_cooling else "where it is all the time"
+            made.append(f"cooling {self.cooling:g} at standstill, {full}")
         if self.duration > LONG_CYCLE:
             made.append("the cycle is longer than 10 min; the motor may come to its limits before an average tells")
         return tuple(made)
@@ -269,7 +270,7 @@ class Duty:
 
 def cooling_at(n: Array, cooling: float, n_cooling: Any) -> Array:
     """Cooling over full cooling at speeds in 1/min: a straight line from standstill on."""
-    share = np.minimum(n / n_cooling, 1.0) if np.all(n_cooling) else np.ones_like(n)
+    share = np.minimum(n / n_cooling, 1.0) if np.all(n_cooling) else np.zeros_like(n)  # it never turns
     return np.asarray(cooling + (1.0 - cooling) * share)
 
 

@@ -16,6 +16,7 @@ from shaftwork.components.base import Component
 from shaftwork.components.sources import SpeedSource
 from shaftwork.core.errors import ParameterError, SignalError
 from shaftwork.core.parameters import in_si
+from shaftwork.network.wording import at_nodes, listed
 from shaftwork.results.observer import Array
 from shaftwork.results.quadrature import Panels
 from shaftwork.results.solution import Solution
@@ -174,7 +175,20 @@ def motor_shaft(
         raise SignalError(
             f"'{torque}' is in {units[0]}, '{speed}' in {units[1]}. Name a torque in N*m, a speed in rad/s."
         )
+    _refuse_other_shaft(solution, torque, speed)
     return MotorShaft(solution, torque, speed, None, *_besides(gear), released=released)
+
+
+def _refuse_other_shaft(solution: Solution, torque: str, speed: str) -> None:
+    """A torque times the speed of a node on which it does not act is no power."""
+    nodes_of, units = solution.observer.nodes_of, solution.observer.units
+    acts, turns = nodes_of(torque), nodes_of(speed)
+    if not set(turns) <= set(acts):
+        fitting = [name for name in units if units[name] == "rad/s" and set(nodes_of(name)) <= set(acts)]
+        raise ParameterError(
+            f"'{torque}' acts at {at_nodes(acts)}, and '{speed}' is the speed of {at_nodes(turns)}. Name a speed "
+            f"there: {listed(fitting)}; ratio= is the gear between that place and the motor."
+        )
 
 
 def _of_part(solution: Solution, name: str, gear: tuple[Any, Any], *, released: bool) -> MotorShaft:

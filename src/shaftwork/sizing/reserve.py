@@ -25,6 +25,10 @@ INSTANTS = 257
 """At which the pull-out torque of a motor is looked for that changes with time; between them it is a straight line."""
 NO_LIMIT = 1e9
 """Torque over its limit where there is none left of it."""
+AS_ARRAY = (
+    "Let it take an array of speeds in 1/min and give as many torques in N m: lambda n: np.where(n < 1500, 20.0, 10.0)."
+)
+"""How a function is a limit."""
 
 
 @dataclass(frozen=True)
@@ -87,13 +91,19 @@ def limits(shaft: MotorShaft, limit: Limit) -> Limited:
             )
         return lambda _, n: np.asarray(interpolate(n, points))
     if callable(limit):
-        return lambda _, n: _checked(limit(n), n)
+        return lambda _, n: _checked(limit, n)
     most = in_si("limit", limit, "N*m", above=0)
     return lambda _, n: np.full_like(n, most)
 
 
-def _checked(values: Any, n: Array) -> Array:
-    made = np.broadcast_to(np.asarray(values, dtype=float), n.shape)
+def _checked(limit: Callable[[Array], Any], n: Array) -> Array:
+    try:
+        given = np.asarray(limit(n), dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ParameterError(f"limit fails for an array of speeds: {error}. {AS_ARRAY}") from error
+    if given.ndim > 1 or given.size not in (1, n.size):
+        raise ParameterError(f"limit gives {given.size} torques for {n.size} speeds. {AS_ARRAY}")
+    made = np.broadcast_to(given, n.shape)
     if np.isnan(made).any() or made.min() < 0:
         raise ParameterError(
             "limit gives torques that are below zero or no numbers. Give the size in N m at any speed."

@@ -11,6 +11,7 @@ from shaftwork.pipeline.sensitivities.derivatives import frequency_sensitivities
 from shaftwork.pipeline.sensitivities.derivatives import motion_sensitivities as of_motion
 from shaftwork.results.measures import Measure
 from shaftwork.results.sensitivities import FrequencySensitivities, MotionSensitivities
+from shaftwork.studies.arguments import by_name
 
 
 def frequency_sensitivities(
@@ -61,11 +62,13 @@ def motion_sensitivities(
         SimulationError: there is no derivative: something is only touched, what comes together has no order, a
             prescribed speed jumps against an inertia, or two extremes are of one height.
     """
-    if not isinstance(measures, Mapping):
-        measures = {text: text for text in ((measures,) if isinstance(measures, str) else measures)}
-    if not measures:
-        raise ParameterError("Name a measure, such as 'max shaft.tau'.")
-    read = {name: Measure.read(text) for name, text in measures.items()}
+    named = by_name(measures)
+    if others := [name for name, text in named.items() if not isinstance(text, str)]:
+        raise ParameterError(
+            f"measure '{others[0]}' = {named[others[0]]!r} must be a name, such as 'max shaft.tau': of anything else "
+            "nothing here knows the derivative. Take differences of two runs."
+        )
+    read = {name: Measure.read(text) for name, text in named.items()}
     model = network_of(net).compile()
     return of_motion(model, read, t_end, parameters=_listed(parameters), initial=initial, rtol=rtol)
 

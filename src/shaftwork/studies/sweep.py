@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping
+from itertools import compress, product
 from pathlib import Path
 from typing import Any
 
@@ -20,13 +20,13 @@ from shaftwork.results.fatigue import SNLine
 from shaftwork.results.measures import Measure
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
-from shaftwork.studies.arguments import engine_names
+from shaftwork.studies.arguments import by_name, engine_names, repeated
 from shaftwork.studies.sweep_processes import chunks
-from shaftwork.studies.sweep_result import Limits, Sweep
+from shaftwork.studies.sweep_result import VERDICTS, Limits, Sweep
 from shaftwork.studies.sweep_store import Store
-from shaftwork.studies.sweep_task import Reader, Task, Worker
+from shaftwork.studies.sweep_task import Chunk, Reader, Task, Worker
 
-LEFT = "a zero, an impact or a change of mode that is not beyond doubt is left to `simulate`"
+LEFT = "a zero, an impact, a stiff motion or a change of mode that is not beyond doubt is left to `simulate`"
 """Why variants have left those beside them."""
 
 Measures = Mapping[str, "str | Callable[[Solution], float]"] | Iterable[str]
@@ -51,7 +51,10 @@ def sweep(
     """Simulate variants of a network and measure each of them; nothing is compiled anew.
 
     Where all measures have names, many variants run side by side in compiled code (extra `fast`), and those that it
-    cannot follow run one by one; results do not depend on the number of processes and on the order.
+    cannot follow run one by one. Results do not depend on the number of processes, and that of a variant not on those
+    beside it, except the first: that one gives the nominal sizes of the states, on which the absolute part of the
+    tolerance rests, and says in which modes variants run side by side. Another first one changes results within the
+    tolerance.
 
     Args:
         net: the network.
@@ -63,12 +66,14 @@ def sweep(
             `results.measures.KINDS`.
         require: by measure, (low, high); None leaves a side open.
         sn: S-N line for measures of damage, or one by quantity.
-        rtol: relative tolerance.
+        rtol: relative tolerance of a step; the absolute one beside it is `rtol` times the size of a state at a speed of
+            0.001 rad/s.
         engine: as in `Model.simulate`.
         initial: start values, as there.
         t_eval: output times of the solutions that functions get, as there; names measure the motion, not the outputs.
         processes: how many; by default as many as there are cores, where the sweep takes long enough.
         store: a file to which all that is done is appended. The same call with the same file goes on where it stopped.
+            It is for one call at a time.
 
     Raises:
         ParameterError: an argument is out of its range, there is no such parameter or measure, or the store is that of
@@ -77,7 +82,7 @@ def sweep(
         SignalError: a measure is of a quantity that does not exist.
     """
     columns = _columns(network_of(net).netlist(), parameters, samples)
-    readers = _readers(measures)
+    readers = _readers(measures, columns)
     limits = _limits(require, readers)
     _, end = time_span(0.0, t_end)
     (name,) = engine_names([engine])
@@ -105,20 +110,22 @@ def _run(task: Task, worker: Worker, processes: int | None, store: Store | None)
     values, reasons = np.full((len(task), len(task.measures)), np.nan), [""] * len(task)
     open_, progress, alone, failed = np.ones(len(task), dtype=bool), Progress(), 0, 0
 
-    def take(variants: Any, found: Array, why: Iterable[str]) -> None:
-        values[variants], open_[variants] = found, False
-        for variant, reason in zip(variants.tolist(), why, strict=True):
+    def take(chunk: Chunk) -> None:
+        nonlocal alone, failed
+        new = open_[chunk.variants]  # two calls at once on one store have done some twice
+        alone += min(chunk.left, int(new.sum()))
+        failed += sum(bool(reason) for reason in compress(chunk.reasons, new))
+        values[chunk.variants], open_[chunk.variants] = chunk.values, False
+        for variant, reason in zip(chunk.variants.tolist(), chunk.reasons, strict=True):
             reasons[variant] = reason
 
     for chunk in [] if store is None else store.chunks:
-        take(chunk.variants, chunk.values, chunk.reasons)
-        alone, failed = alone + chunk.left, failed + sum(map(bool, chunk.reasons))
+        take(chunk)
     try:
         for chunk in chunks(worker, task, np.flatnonzero(open_), processes):
             if store is not None:
                 store.append(chunk)
-            take(chunk.variants, chunk.values, chunk.reasons)
-            alone, failed = alone + chunk.left, failed + sum(map(bool, chunk.reasons))
+            take(chunk)
             done, remark = len(task) - int(open_.sum()), f", {failed} failed" if failed else ""
             progress.show(done / len(task), f"{done} of {len(task)} variants{remark}")
     finally:
@@ -139,7 +146,10 @@ def _columns(netlist: Netlist, parameters: Any, samples: Any) -> dict[str, Array
     given = samples if parameters is None else parameters
     if not hasattr(given, "items"):
         raise ParameterError(f"{given!r} must map parameters to their values, such as {{'shaft.c': [2e4, 3e4]}}.")
-    checked = {str(name): _checked(netlist, str(name), _plain(values)) for name, values in given.items()}
+    named = [(str(name), _plain(values)) for name, values in given.items()]
+    if twice := repeated(name for name, _ in named):  # a data frame may have two columns of one name
+        raise ParameterError(f"There are two columns '{twice}'. Give each parameter one.")
+    checked = {name: _checked(netlist, name, values) for name, values in named}
     if not checked or not all(len(values) for values in checked.values()):
         raise ParameterError("A sweep needs at least one parameter, and a value for each.")
     if parameters is None:
@@ -147,7 +157,7 @@ def _columns(netlist: Netlist, parameters: Any, samples: Any) -> dict[str, Array
             lengths = ", ".join(f"{name} {len(values)}" for name, values in checked.items())
             raise ParameterError(f"The columns of samples differ in length: {lengths}.")
         return checked
-    rows = np.array(list(itertools.product(*checked.values())))
+    rows = np.array(list(product(*checked.values())))
     return {name: rows[:, k].copy() for k, name in enumerate(checked)}
 
 
@@ -169,29 +179,31 @@ def _plain(values: Any) -> Any:
 
 
 def _telling(values: Array) -> list[float]:
-    """Of many numbers those that tell whether all are admissible: bounds are on values and on sizes, or refuse zero."""
+    """Of many numbers those that tell whether all are admissible.
+
+    Bounds are on values and on sizes, refuse zero, or refuse what is not whole.
+    """
     if not np.isfinite(values).all():
         return [float(values[~np.isfinite(values)][0])]
     ends = [values[pick(values)] for pick in (np.argmin, np.argmax)] if values.size else []
     sizes = np.abs(values[values != 0.0])
     smallest = values[values != 0.0][[sizes.argmin()]] if sizes.size else sizes
-    return [*map(float, ends), *smallest.tolist(), *([0.0] if sizes.size < values.size else [])]
+    broken = values[[np.abs(values - np.round(values)).argmax()]] if values.size else values
+    return [*map(float, ends), *smallest.tolist(), *broken.tolist(), *([0.0] if sizes.size < values.size else [])]
 
 
-def _readers(measures: Measures) -> dict[str, Reader]:
-    if isinstance(measures, str):
-        measures = [measures]
-    if not isinstance(measures, Iterable):
-        raise ParameterError(f"measures = {measures!r} must be a list of names, such as ['max shaft.tau'].")
-    if not isinstance(measures, Mapping):
-        measures = {str(name): str(name) for name in measures}
+def _readers(measures: Measures, columns: Iterable[str]) -> dict[str, Reader]:
+    """Measures by name, none of them that of another column of the table."""
     readers: dict[str, Reader] = {}
-    for name, reader in measures.items():
+    for name, reader in by_name(measures).items():
         if not isinstance(reader, str) and not callable(reader):
             raise ParameterError(f"measure '{name}' = {reader!r} must be a name, 'max shaft.tau', or a function.")
-        readers[str(name)] = Measure.read(reader) if isinstance(reader, str) else reader
-    if not readers:
-        raise ParameterError("A sweep needs a measure, such as measures=['max shaft.tau'].")
+        readers[name] = Measure.read(reader) if isinstance(reader, str) else reader
+    if taken := [name for name in (*columns, *VERDICTS) if name in readers]:
+        raise ParameterError(
+            f"No measure can be called '{taken[0]}': the table has another column of that name. Give it another one, "
+            f"measures={{'my {taken[0]}': ...}}."
+        )
     return readers
 
 

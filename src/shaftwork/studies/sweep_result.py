@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 SHOWN = 12
 """Rows of a printed table."""
+VERDICTS = ("passed", "reason")
+"""Columns of the table behind those of parameters and measures."""
 
 Limits = tuple[float | None, float | None]
 """The least and the most that is allowed; None leaves a side open."""
@@ -66,12 +68,8 @@ class Sweep:
     @property
     def columns(self) -> dict[str, Any]:
         """Parameters, measures, whether the requirements are met, and reasons, each a column."""
-        return {
-            **self.parameters,
-            **self.measures,
-            "passed": self.passed,
-            "reason": np.array(self.reasons, dtype=object),
-        }
+        verdicts = self.passed, np.array(self.reasons, dtype=object)
+        return {**self.parameters, **self.measures, **dict(zip(VERDICTS, verdicts, strict=True))}
 
     def table(self) -> pd.DataFrame:
         """The columns as a data frame (extra `data`)."""

@@ -18,7 +18,7 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.stores import Stores
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import CompileError, NetworkError
-from shaftwork.integrate.lanes import LaneRun, Steps
+from shaftwork.integrate.lanes import LaneRun, Room, Steps
 from shaftwork.network.graph import GraphPart
 from shaftwork.pipeline.ensemble.equations import Entry, Equations
 from shaftwork.pipeline.ensemble.extremes import largest
@@ -40,6 +40,8 @@ SAME = 1e-9
 """What is stored has gone over unchanged where it differs by less than this, of the largest of its kind and of 1."""
 ON, OVER, LOST = -1, -2, -3
 """What a lane has met where that is no guard: nothing, the end of the motion, and what it cannot pass."""
+FADING = "A law fades to a constant, as exp and tanh do, and a long step might pass over where it changes."
+CLOCKED = "A limit at which a mode ends changes with the time by itself, and a long step might pass over that."
 MEASURED = ("max", "min", "peak", "mean", "rms", "end")
 
 
@@ -70,13 +72,14 @@ class Ensemble:
         self.model, self.names, self.measures = model, tuple(names), tuple(measures)
         self.span, self.rtol = span, rtol
         self._first = dict(first)
-        self._equations: dict[ModeNames, Equations | None] = {}
+        self._equations: dict[ModeNames, Equations | str] = {}
         self._codes: dict[Model, EnsembleCode] = {}
+        self.room = Room()
         self._refuse()
         self.start = self._first_modes(first)
         """The modes in which the first variant starts."""
         if self.equations(self.start) is None:
-            raise CompileError("The equations at the start have no program for variants side by side.")
+            raise CompileError(self._equations[self.start])
 
     def _refuse(self) -> None:
         form, model = self.model.form, self.model
@@ -132,9 +135,10 @@ class Ensemble:
                 assembly = None if self.phased is None else self.phased.phases.assembly(modes)
                 code = self._code(assembly)
                 self._equations[modes] = Equations(code, assembly, modes, self._first, self.names, self.span)
-            except (CompileError, NetworkError):
-                self._equations[modes] = None
-        return self._equations[modes]
+            except (CompileError, NetworkError) as error:
+                self._equations[modes] = str(error)
+        made = self._equations[modes]
+        return None if isinstance(made, str) else made
 
     def _code(self, assembly: Assembly | None) -> EnsembleCode:
         """The programs of a set of equations, which several combinations of modes may share."""
@@ -144,7 +148,11 @@ class Ensemble:
                 bound = model.prepare(model.vector(self._first)).symbolic()
                 program, stores = None if bound is None else bound.program, Stores(model.form)
             else:
-                program, stores = None if assembly.clocks else assembly.program, assembly.stores
+                program, stores = assembly.program, assembly.stores
+            if program is not None and program.fading:
+                raise CompileError(FADING)
+            if assembly is not None and assembly.clocks:
+                raise CompileError(CLOCKED)
             self._codes[model] = EnsembleCode(model, program, stores, self.measures)
         return self._codes[model]
 
@@ -239,7 +247,9 @@ class _Way:
         span, code, size = self.ensemble.span, equations.code, len(group.x)
         rates = code.motion(group.t, group.x, p)[0]
         limits = span[1], LONGEST * (span[1] - span[0])
-        run = LaneRun(code.step, group.x, rates, group.t, p, equations.sizes, limits, self.ensemble.rtol)
+        run = LaneRun(
+            code.step, self.ensemble.room, group.x, rates, group.t, p, equations.sizes, limits, self.ensemble.rtol
+        )
         ends = _Ends(replace(group, t=group.t.copy(), x=group.x.copy()), np.full(group.lanes.size, LOST))
         while run.lanes.size:
             own = run.lanes

@@ -10,7 +10,7 @@ import numpy as np
 
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.expressed import Expressed
-from shaftwork.codegen.lane_program import LaneFunction, LaneProgram, lane_expressions, lane_program
+from shaftwork.codegen.lane_program import LaneProgram, lane_expressions, lane_function, lane_program
 from shaftwork.codegen.lanes import LaneStep, Use
 from shaftwork.codegen.stores import Stores
 from shaftwork.core.errors import CompileError
@@ -51,12 +51,12 @@ class EnsembleCode:
         """By measure, which of the integrals behind the states is its."""
         self.program: LaneProgram = lane_program(program, model.rows, read)
         uses = [Use(EXTREMES.get(measure.kind, ()), POWERS.get(measure.kind, 0)) for measure in measures]
-        self.step = LaneStep(self.program, uses)
+        self.step = LaneStep(self.program, tuple(uses))
         self._parts = {"rates": self.program.rates, "guards": self.program.guards, "shown": self.program.quantities}
         stored = [self._expressed.store(name) for name in stores.names] if self.program.guards else []
         self._parts["stored"] = lane_expressions(self._rows, stored)
         made = tuple(one for part in self._parts.values() for one in part)
-        self._points = LaneFunction(made, self.program.variables)
+        self._points = lane_function(made, self.program.variables)
         """What is asked for at the ends of phases."""
 
     def extreme(self, row: int) -> int:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.linalg import norm
 from numpy.typing import NDArray
-from scipy.linalg import eig
+from scipy.linalg import eig, matrix_balance
 from sympy import Symbol
 
 from shaftwork.codegen.derivatives import Derivatives
@@ -26,7 +27,9 @@ from shaftwork.results.sensitivities import FrequencySensitivities, MotionSensit
 from shaftwork.results.slopes import Complex
 
 APART = 1e-6
-"""Rates that differ by less than this part of the largest are one rate, which has no derivative of its own."""
+"""Rates that differ by less than this part of themselves are one rate, which has no derivative of its own."""
+ROUNDINGS = 16
+"""Roundings that the rate of a mode may have taken, each as large as its condition makes it."""
 TIGHTER, TIGHTEST = 1e-2, 1e-13
 """Of the tolerance of derivatives is that of the motion, and no engine takes a smaller one."""
 
@@ -52,10 +55,11 @@ def frequency_sensitivities(
     equations, p, x, time = _near(model, at, t)
     names = smooth_parameters(model, parameters, (model, equations))
     derivatives = Derivatives(rows_of(equations), tuple(Symbol(name, real=True) for name in names))
-    rates, left, right = eig(derivatives.by_states(time, x, p), left=True, right=True)
+    matrix = derivatives.by_states(time, x, p)
+    rates, left, right = eig(matrix, left=True, right=True)
     swinging = np.flatnonzero(rates.imag > 0)
     swinging = swinging[np.argsort(np.abs(rates[swinging]), kind="stable")]
-    _refuse_equal(rates, swinging)
+    _refuse_equal(rates, swinging, _roundings(matrix, left, right))
     changes = derivatives.jacobian_slopes(time, x, p)
     slopes = np.array([_slope(left[:, k], changes, right[:, k]) for k in swinging]).reshape(len(swinging), len(names))
     values = dict(zip(equations.parameters, p.tolist(), strict=True))
@@ -69,11 +73,21 @@ def _slope(left: Complex, changes: Array, right: Complex) -> Complex:
     return made
 
 
-def _refuse_equal(rates: Complex, chosen: NDArray[np.intp]) -> None:
-    size = np.abs(rates).max(initial=0.0)
+def _roundings(matrix: Array, left: Complex, right: Complex) -> Array:
+    """(n,) how far rounding may have moved each rate: that of the matrix times the condition 1 / |y* x| of the rate.
+
+    Both depend on the units of the states, which are chosen as the solver chooses them: rows as large as columns.
+    """
+    balanced, (scale, _) = matrix_balance(matrix, permute=False, separate=True)
+    sizes = norm(left * scale[:, None], axis=0) * norm(right / scale[:, None], axis=0)
+    condition = sizes / np.abs((left.conj() * right).sum(axis=0))
+    return np.asarray(ROUNDINGS * np.finfo(float).eps * norm(balanced) * condition)
+
+
+def _refuse_equal(rates: Complex, chosen: NDArray[np.intp], roundings: Array) -> None:
     for number, k in enumerate(chosen.tolist()):
         others = np.delete(rates, k)
-        if others.size and np.abs(others - rates[k]).min() < APART * size:
+        if others.size and np.abs(others - rates[k]).min() < APART * np.abs(rates[k]) + roundings[k]:
             raise SimulationError(
                 f"Mode {number + 1}, {abs(rates[k]) / (2 * np.pi):.6g} Hz, has the rate of another one: a frequency "
                 "that two modes share has no derivative. Make what is alike in the network a little different."
