@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heyoka
 
-ROOM = 2**27
+ROOM = 2**25
 """Bytes of compiled code that are kept, of the most recently used: opening it takes longer the more there is, 0.3 s of
 each process for 1 GiB, which is more than most networks take to compile."""
 
