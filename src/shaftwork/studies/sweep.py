@@ -71,7 +71,8 @@ def sweep(
         engine: as in `Model.simulate`.
         initial: start values, as there.
         t_eval: output times of the solutions that functions get, as there; names measure the motion, not the outputs.
-        processes: how many; by default as many as there are cores, where the sweep takes long enough.
+        processes: how many; by default as many as there are cores, where the sweep takes long enough. Variants side by
+            side are divided only then: in the seconds that a process needs to start, 50 000 are done.
         store: a file to which all that is done is appended. The same call with the same file goes on where it stopped.
             It is for one call at a time.
 

@@ -38,11 +38,12 @@ def chunks(worker: Worker, task: Task, variants: Index, processes: int | None) -
         worker: of this process.
         task: the sweep.
         variants: (k,) what is to be done.
-        processes: how many; None for as many as there are cores, where what is left takes long enough.
+        processes: how many; None for as many as there are cores. Variants side by side take to them only where what is
+            left takes long enough, others also where so many are asked for.
     """
     parts = [variants[first : first + worker.chunk] for first in range(0, variants.size, worker.chunk)]
     asked = processes if processes is not None else cores() if _can_be_sent(task) else 1
-    if processes is not None and asked > 1:
+    if processes is not None and asked > 1 and worker.why:
         yield from _in_processes(task, parts, asked)
         return
     for number, part in enumerate(parts):
