@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import sympy
 
 import shaftwork as sw
 from shaftwork.equations.report import PREAMBLE
@@ -221,3 +222,41 @@ def test_the_table_of_frequencies_prints_inside_the_margins(tmp_path: Path) -> N
     assert tables[0].count("lost") == 2
     log = compile_latex("\n\n".join((PREAMBLE, r"\begin{document}", *tables, r"\end{document}")), tmp_path)
     assert max(overfull(log), default=0.0) < 1.0
+
+
+def driven(law: sympy.Expr, load: str = "a") -> sw.Network:
+    """Three masses, the same but for a law and where a load is."""
+    net = sw.Network("driven")
+    net.add(sw.TorqueSource("T", tau=law), "a")
+    net.add(sw.Inertia("J0", J=1.0), "a")
+    net.add(sw.Spring("s", c=100.0, d=0.2), "a", "b")
+    net.add(sw.Inertia("J1", J=2.0), "b")
+    net.add(sw.Spring("q", c=300.0), "b", "c")
+    net.add(sw.Inertia("J2", J=1.0), "c")
+    net.add(sw.ViscousLoad("L", d=1.0), load)
+    return net
+
+
+LAW = 10 + 3 * sympy.sin(3 * sw.t)
+
+
+@pytest.mark.parametrize(
+    ("other", "text"),
+    [
+        (driven(30 * sympy.sin(3 * sw.t)), r"'T' is TorqueSource .*30\*sin\(3\*t\) instead of TorqueSource .*3\*sin"),
+        (driven(sw.Table([0, 1, 2], [5, 0, 9])), r"'T' is TorqueSource .*Table"),
+        (driven(LAW, "c"), r"'L' is ViscousLoad \(a c\) instead of ViscousLoad \(a a\)"),
+    ],
+)
+def test_a_motion_under_another_law_or_of_another_wiring_is_refused(other: sw.Network, text: str) -> None:
+    made = sw.reduce.simplify(driven(LAW), 3, "s")
+    assert made.compare(2.0, before=driven(LAW).simulate(2.0)).rms_error == pytest.approx(0.0, abs=1e-9)
+    with pytest.raises(sw.ParameterError, match=text):
+        made.compare(2.0, before=other.simulate(2.0))
+
+
+def test_a_comparison_may_start_late_and_take_any_outputs() -> None:
+    made = sw.reduce.simplify(driven(LAW), 3, "s")
+    assert made.compare(3.0, t_start=1.0).rms_error == pytest.approx(0.0, abs=1e-9)
+    early = driven(LAW).simulate(4.0, t_eval=[1.0, 2.0, 3.0])
+    assert made.compare(4.0, before=early).rms_error == pytest.approx(0.0, abs=1e-9)

@@ -93,3 +93,21 @@ def test_a_torque_and_a_speed_of_its_own_shaft_make_a_duty(torque: str, speed: s
 def test_a_function_that_is_no_limit_of_every_speed_is_refused(limit: Callable[[Any], Any], says: str) -> None:
     with pytest.raises(sw.ParameterError, match=says):
         sw.sizing.duty(holding(), "motor").reserve(limit)
+
+
+def test_a_cycle_as_long_as_a_motion_that_starts_late() -> None:
+    """0.4 s - 0.3 s is more than 0.1 s in the last bit."""
+    net = sw.Network("n")
+    net.add(sw.TorqueSource("T", tau=1.0), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    sol = net.simulate(0.4, t_start=0.3)
+    assert sw.sizing.duty(sol, "T", cycle=0.1).power_mean == sw.sizing.duty(sol, "T").power_mean
+
+
+def test_the_speed_of_a_member_that_is_held_is_refused() -> None:
+    net = sw.Network("held")
+    net.add(sw.TorqueSource("T", tau=1.0), "sun")
+    net.add(sw.PlanetaryGear("pg", ratio=3.0), "sun", "arm", "ground")
+    net.add(sw.Inertia("J", J=1.0), "arm")
+    with pytest.raises(sw.ParameterError, match="is the speed of no node"):
+        sw.sizing.duty(net.simulate(1.0), torque="T.tau", speed="pg.omega_ring")

@@ -77,6 +77,11 @@ class Quantities:
         units |= {f"{part.name}.power": "W" for part in self._graph.parts}
         return units | {f"{part.name}.energy": "J" for part in self._graph.parts}
 
+    @property
+    def wiring(self) -> Mapping[str, str]:
+        """See `CircuitGraph.wiring`."""
+        return self._graph.wiring
+
     def nodes_of(self, name: str) -> tuple[str, ...]:
         """Names of the nodes that a signal of a part or the speed of a node is of, the reference not among them."""
         if name not in self.signals:
@@ -113,6 +118,11 @@ class ModelObserver:
     def units(self) -> Mapping[str, str]:
         """Every quantity that can be read and its unit; where a part and a node share a name, the part's is meant."""
         return self.quantities.units
+
+    @property
+    def wiring(self) -> Mapping[str, str]:
+        """By part, what it is, where it is, and what is no number of it."""
+        return self.quantities.wiring
 
     def nodes_of(self, name: str) -> tuple[str, ...]:
         """The moving nodes that a torque or speed is of, by its name in `units`; none for other quantities."""

@@ -119,6 +119,11 @@ class PhaseObserver:
         """Every quantity that can be read and its unit."""
         return self._first.units
 
+    @property
+    def wiring(self) -> Mapping[str, str]:
+        """By part, what it is, where it is, and what is no number of it."""
+        return self._first.wiring
+
     def nodes_of(self, name: str) -> tuple[str, ...]:
         """The moving nodes that a torque or speed is of, by its name in `units`; none for other quantities."""
         return self._first.nodes_of(name)

@@ -117,6 +117,17 @@ class CircuitGraph:
             if made.has_integral or (made.label in named and made.kind is not Kind.COUPLING):
                 yield index
 
+    @property
+    def wiring(self) -> dict[str, str]:
+        """By part, what it is, where it is, and what is no number of it: its laws, tables and models."""
+        made = {}
+        for part in self.parts:
+            nodes = ", ".join(f"{end} {self.node_name(number)}" for end, number in part.nodes.items())
+            values = part.component.values.items()
+            laws = (f"{name} = {value}" for name, value in values if not isinstance(value, float | None))
+            made[part.name] = "; ".join((f"{type(part.component).__name__} ({nodes})", *laws))
+        return made
+
     def node_name(self, number: int) -> str:
         """Name of a node by its number."""
         return REFERENCE if number == GROUND else self.nodes[number]

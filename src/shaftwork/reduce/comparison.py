@@ -101,7 +101,7 @@ def check_motion(before: Any, train: Network, start: float, end: float) -> None:
     """Raise `ParameterError` where something is no motion of a train from rest, from a time in s to another."""
     if not isinstance(before, Solution):
         raise ParameterError(f"compare: before = {before!r} is no motion. Give what `simulate` of the train returns.")
-    for what, time, wanted in (("starts", before.steps[0], start), ("ends", before.t[-1], end)):
+    for what, time, wanted in (("starts", before.steps[0], start), ("ends", before.steps[-1], end)):
         if not math.isclose(float(time), wanted, abs_tol=1e-12 * end):
             name = "t_start" if wanted == start else "t_end"
             raise ParameterError(f"compare: the motion `before` {what} at {time:g} s, and {name} is {wanted:g} s.")
@@ -110,9 +110,14 @@ def check_motion(before: Any, train: Network, start: float, end: float) -> None:
         raise ParameterError(
             f"compare: the motion `before` does not start from rest, but with {', '.join(given)}. The small models do."
         )
-    known, found = train.graph().parameters, before.parameters
+    graph, there = train.graph(), before.observer.wiring
+    known, found = graph.parameters, before.parameters
     pairs = {name: (found.get(name, 0.0), known.get(name, 0.0)) for name in (*known, *found)}
     other = [f"{name} = {was:g} instead of {now:g}" for name, (was, now) in pairs.items() if was != now]
+    if not other:  # what differs in a law or a node
+        here = graph.wiring
+        names = dict.fromkeys(name for name in (*here, *there) if here.get(name) != there.get(name))
+        other = [f"'{n}' is {there.get(n, 'not there')} instead of {here.get(n, 'not there')}" for n in names]
     if other:
         shown = ", ".join([*other[:SHOWN], *(["..."] if len(other) > SHOWN else [])])
         raise ParameterError(

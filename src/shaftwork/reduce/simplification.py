@@ -108,10 +108,11 @@ class Simplified:
             raise ParameterError("compare: there is no kept shaft. Simplify with keep='...', the name of one.")
         end = in_si("t_end", t_end, "s", above=0)
         refuse_changes(options)
+        start = options.get("t_start", 0.0)
         if before is None:
-            before = self.train.simulate(end, **{"t_eval": np.linspace(0.0, end, POINTS), **options})
+            before = self.train.simulate(end, **{"t_eval": np.linspace(start, end, POINTS), **options})
         else:
-            check_motion(before, self.train, options.get("t_start", 0.0), end)
+            check_motion(before, self.train, start, end)
         options |= {"t_eval": before.t}
         own = f"{self.keep}.tau" if f"{self.keep}.tau" in before.names else f"{self.keep}.f"
         single = len(self.groupings[0].groups) == 1

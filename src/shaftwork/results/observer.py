@@ -50,6 +50,11 @@ class Observer(Protocol):
         """By part, at times t (k,) with states x (k, n): lost power in W, supplied power in W."""
         ...
 
+    @property
+    def wiring(self) -> Mapping[str, str]:
+        """By part, what it is, where it is, and what is no number of it."""
+        ...
+
     def nodes_of(self, name: str) -> tuple[str, ...]:
         """The moving nodes that a torque or speed is of, by its name in `units`; none for other quantities."""
         ...

@@ -145,7 +145,9 @@ def catalogue(path: str | Path | None = None) -> tuple[CatalogueMotor, ...]:
         text = file.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise ParameterError(f"The catalogue '{file}' cannot be read: {error}. Give the path of a CSV file.") from None
-    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and line[0] != "#"]
+    lines = [
+        (number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and line.strip()[0] != "#"
+    ]
     if len(lines) < 2:
         raise ParameterError(
             f"The catalogue '{file}' has no motors. Its first line names the columns, {', '.join(NEEDED)}; every other "

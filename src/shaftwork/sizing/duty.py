@@ -16,6 +16,9 @@ from shaftwork.results.turning import turning_points
 from shaftwork.sizing.duty_cycle import Duty, Flow, cooling_at
 from shaftwork.sizing.motor_shaft import RPM, SMALLEST, MotorShaft, motor_shaft
 
+ROUNDING = 1e-12
+"""Part of a motion by which a cycle of its length may seem shorter: it starts and ends at times of any size."""
+
 
 def duty(
     solution: Any,
@@ -58,11 +61,11 @@ def duty(
     shaft = motor_shaft(solution, motor, (torque, speed), (ratio, efficiency), released=at_rest == "released")
     motion = float(shaft.steps[-1] - shaft.steps[0])
     whole = motion if cycle is None else in_si("cycle", cycle, "s", above=0)
-    if whole < motion:
+    if whole < motion * (1 - ROUNDING):
         raise ParameterError(f"cycle = {whole:g} s is shorter than the motion of {motion:g} s. Simulate less of it.")
     cold = in_si("cooling", cooling, above=0, at_most=1)
     n_full = shaft.omega_top * RPM if n_cooling is None else in_si("n_cooling", n_cooling, "1/min", above=0)
-    return _measured(shaft, motion, whole, cold, n_full)
+    return _measured(shaft, motion, max(whole, motion), cold, n_full)
 
 
 def _measured(shaft: MotorShaft, motion: float, whole: float, cold: float, n_full: float) -> Duty:

@@ -183,8 +183,8 @@ def _refuse_other_shaft(solution: Solution, torque: str, speed: str) -> None:
     """A torque times the speed of a node on which it does not act is no power."""
     nodes_of, units = solution.observer.nodes_of, solution.observer.units
     acts, turns = nodes_of(torque), nodes_of(speed)
-    if not set(turns) <= set(acts):
-        fitting = [name for name in units if units[name] == "rad/s" and set(nodes_of(name)) <= set(acts)]
+    if not turns or not set(turns) <= set(acts):
+        fitting = [name for name in units if units[name] == "rad/s" and set(nodes_of(name) or ("",)) <= set(acts)]
         raise ParameterError(
             f"'{torque}' acts at {at_nodes(acts)}, and '{speed}' is the speed of {at_nodes(turns)}. Name a speed "
             f"there: {listed(fitting)}; ratio= is the gear between that place and the motor."
