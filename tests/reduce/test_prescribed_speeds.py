@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.linalg import eigh
 
 import shaftwork as sw
 from tests.properties.examples import share_of_examples
+from tests.reduce.test_supports import projected
 
 INERTIAS, STIFFNESSES = (1.0, 0.5, 2.0, 1.0, 3.0), (2e3, 1e3, 4e3, 1e3)
 
@@ -132,32 +132,12 @@ def test_by_modes_the_node_of_a_prescribed_speed_is_a_boundary(
         net.add(sw.SpeedSource(f"drive{place}", omega=1.0), f"{place}")
     masses = min(max(masses, len({*boundaries} | {k + 1 for k in places} | {k - 1 for k in places})), count)
     small = sw.reduce.simplify(net, masses, f"s{kept}")
-    wanted = _clamped(inertias, stiffnesses, boundaries, places, masses)
+    wanted = projected(inertias, stiffnesses, [0.0] * len(inertias), boundaries, places, masses)
     listed = [row.by_modes for row in small.frequencies if row.by_modes is not None]
     assert listed == pytest.approx(wanted, rel=1e-8)
     assert own_frequencies(small.by_modes) == pytest.approx(wanted, rel=1e-7)
     true = [row.before for row in small.frequencies]
     assert all(found >= exact * (1 - 1e-9) for found, exact in zip(listed, true, strict=False))
-
-
-def _clamped(
-    inertias: list[float], stiffnesses: list[float], boundaries: list[int], places: list[int], masses: int
-) -> np.ndarray:
-    count = len(inertias)
-    stiffness = np.zeros((count, count))
-    for k, c in enumerate(stiffnesses):
-        stiffness[k : k + 2, k : k + 2] += c * np.array([[1, -1], [-1, 1]])
-    rest = [k for k in range(count) if k not in boundaries]
-    basis = np.zeros((count, masses))
-    basis[np.ix_(boundaries, range(len(boundaries)))] = np.eye(len(boundaries))
-    if rest:
-        inner = stiffness[np.ix_(rest, rest)]
-        basis[np.ix_(rest, range(len(boundaries)))] = -np.linalg.solve(inner, stiffness[np.ix_(rest, boundaries)])
-        shapes = eigh(inner, np.diag(np.array(inertias)[rest]))[1]
-        basis[np.ix_(rest, range(len(boundaries), masses))] = shapes[:, : masses - len(boundaries)]
-    basis = basis[:, [k for k in range(masses) if k >= len(boundaries) or boundaries[k] not in places]]
-    squares = eigh(basis.T @ stiffness @ basis, basis.T @ np.diag(inertias) @ basis, eigvals_only=True)
-    return np.sqrt(squares) / (2 * np.pi)
 
 
 @pytest.mark.parametrize(

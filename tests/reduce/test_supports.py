@@ -35,7 +35,7 @@ def test_the_modes_of_a_supported_train_are_those_of_the_textbook(
     masses = min(max(masses, len(boundaries) + (bool(fixed) and kept + 1 < count - 2)), count)
     small = sw.reduce.simplify(net, masses, f"c{kept}")
     listed = [row.by_modes for row in small.frequencies if row.by_modes is not None]
-    wanted = _projected(inertias, stiffnesses, held, boundaries, fixed, masses)
+    wanted = projected(inertias, stiffnesses, held, boundaries, fixed, masses)
     # the projection squares the frequencies: eps (f_max / f)^2, with 100 between them at most 1e-12
     assert listed == pytest.approx(wanted, rel=1e-9)
     assert sorted(small.by_modes.modes().frequencies)[-len(listed) :] == pytest.approx(wanted, rel=1e-7)
@@ -43,7 +43,7 @@ def test_the_modes_of_a_supported_train_are_those_of_the_textbook(
     assert all(found >= exact * (1 - 1e-12) for found, exact in zip(listed, true, strict=False))
 
 
-def _projected(
+def projected(
     inertias: list[float],
     stiffnesses: list[float],
     held: list[float],
@@ -51,6 +51,7 @@ def _projected(
     fixed: list[int],
     masses: int,
 ) -> np.ndarray:
+    """Frequencies above zero, Hz, of a chain with the modes of Craig and Bampton alone, by matrices."""
     count = len(inertias)
     stiffness = np.diag(held[:count])
     for k, c in enumerate(stiffnesses):
