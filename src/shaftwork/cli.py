@@ -132,6 +132,8 @@ def _load(name: str) -> tuple[Network, Scene | None]:
 
 
 def _run(options: argparse.Namespace) -> None:
+    from shaftwork.results.summary import summary
+
     net, scene = _load(options.model)
     if options.out:
         _make_folder(options.out)
@@ -145,7 +147,7 @@ def _run(options: argparse.Namespace) -> None:
     print(f"engine {solution.engine}: {solution.why}")
     print(", ".join(f"{count} {name}" for name, count in solution.statistics.items()), end="; ")
     print(f"energy residual {solution.energy_residual:.1e} of the work done\n")
-    _table(solution, signals)
+    print(summary(solution, signals))
     _phases(solution)
     if options.out:
         _write(solution, signals, options.out)
@@ -205,19 +207,6 @@ def _worth_seeing(solution: Solution) -> tuple[str, ...]:
     """The states of a model that no scene comments; the first and last few where there are many."""
     names = tuple(name for name in solution.states if name in solution)
     return names if len(names) <= 12 else (*names[:6], *names[-6:])
-
-
-def _table(solution: Solution, signals: Sequence[str]) -> None:
-    width = max(len(name) for name in signals)
-    print(f"{'':{width}}  {'unit':8} {'minimum':>12} {'at s':>8} {'maximum':>12} {'at s':>8} {'mean':>12} {'end':>12}")
-    for name in signals:
-        values, t = solution[name] + 0.0, solution.t  # no -0 on the screen
-        low, high = int(values.argmin()), int(values.argmax())
-        mean = float(((values[1:] + values[:-1]) / 2) @ (t[1:] - t[:-1]) / (t[-1] - t[0]))
-        print(
-            f"{name:{width}}  {solution.observer.units[name]:8} {values[low]:12.5g} {t[low]:8.4g} "
-            f"{values[high]:12.5g} {t[high]:8.4g} {mean:12.5g} {values[-1]:12.5g}"
-        )
 
 
 def _phases(solution: Solution) -> None:
