@@ -46,18 +46,20 @@ class Table(sympy.Atom):  # type: ignore[misc]
 
     `Table(x, y)` alone, where a law is expected, is a law of time; `Table(x, y)(argument)` is a sympy expression of
     any argument, such as a motor's torque over its speed.
-
-    Args:
-        x: n >= 2 strictly increasing arguments, in the unit of the argument.
-        y: n values, in the unit of the law.
-
-    Raises:
-        ParameterError: a value is no finite number, x does not increase, or the lengths differ.
     """
 
     is_commutative = True
 
     def __new__(cls, x: Sequence[float] | NDArray[Any], y: Sequence[float] | NDArray[Any]) -> Self:
+        """The curve through the points.
+
+        Args:
+            x: n >= 2 strictly increasing arguments, in the unit of the argument.
+            y: n values, in the unit of the law.
+
+        Raises:
+            ParameterError: a value is no finite number, x does not increase, or the lengths differ.
+        """
         xs, ys = _finite_floats("x", x), _finite_floats("y", y)
         if len(xs) != len(ys) or len(xs) < 2:
             raise ParameterError(

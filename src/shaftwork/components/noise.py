@@ -118,10 +118,6 @@ class HeldNoise(sympy.Function):  # type: ignore[misc]
 
     `22.4 + 10 * sw.HeldNoise(sw.t / 0.05, 1)` changes every 0.05 s, with mean 22.4 and standard deviation 10. The
     argument may also be an angle over a pitch. Its derivative is zero.
-
-    Args:
-        x: the argument, an expression.
-        seed: any number; other seeds give independent noise.
     """
 
     nargs = 2
@@ -130,7 +126,12 @@ class HeldNoise(sympy.Function):  # type: ignore[misc]
 
     @classmethod
     def eval(cls, x: sympy.Expr, seed: sympy.Expr) -> sympy.Expr | None:
-        """A number for numbers; else the noise of the whole number below x."""
+        """A number for numbers; else the noise of the whole number below x.
+
+        Args:
+            x: the argument, an expression.
+            seed: any number; other seeds give independent noise.
+        """
         if x.is_number and seed.is_number:
             return sympy.Float(held(float(x), float(seed)))
         # so all that makes a law switch at whole numbers is its floors
@@ -152,11 +153,6 @@ class SmoothNoise(sympy.Function):  # type: ignore[misc]
     Law: sum_k B(x - k) w_k / sqrt(sum_k B(x - k)^2), with w_k number k of the standard normal numbers of a seed and B
     the cubic spline over five whole numbers. Two derivatives are continuous. The power spectrum is that of the spline,
     sinc(f)^8 with f in cycles for each 1 of x: half at f = 0.22, and 99.9 % of the power below f = 0.6.
-
-    Args:
-        x: the argument, an expression.
-        seed: any number; other seeds give independent noise.
-        order: of a derivative by x.
     """
 
     nargs = (2, 3)
@@ -164,7 +160,13 @@ class SmoothNoise(sympy.Function):  # type: ignore[misc]
 
     @classmethod
     def eval(cls, x: sympy.Expr, seed: sympy.Expr, order: sympy.Expr = sympy.S.Zero) -> sympy.Expr | None:
-        """A number for numbers, else None: it stays as it is."""
+        """A number for numbers, else None: it stays as it is.
+
+        Args:
+            x: the argument, an expression.
+            seed: any number; other seeds give independent noise.
+            order: of a derivative by x.
+        """
         return sympy.Float(smooth(float(x), float(seed), order)) if x.is_number and seed.is_number else None
 
     @property

@@ -33,7 +33,7 @@ if TYPE_CHECKING:  # the record proves and prints itself through these modules
 class Square(NamedTuple):
     """Half of a coefficient times the square of a position or speed: an energy, or half of a loss.
 
-    Args:
+    Attributes:
         branch: number of the branch.
         coefficient: inertia, stiffness or damping.
         along: what is squared.

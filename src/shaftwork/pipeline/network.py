@@ -41,14 +41,15 @@ LOOP = "algebraic loop"
 class Network(NetworkBuilder):
     """A drive train: parts joined at nodes.
 
-    >>> import shaftwork as sw
-    >>> net = sw.Network("two masses")
-    >>> _ = net.add(sw.TorqueSource("motor", tau=10.0), "rotor")
-    >>> _ = net.add(sw.Inertia("J1", J=2.0), "rotor")
-    >>> _ = net.add(sw.Spring("shaft", c=1e4, d=1.0), "rotor", "wheel")
-    >>> _ = net.add(sw.Inertia("J2", J=3.0), "wheel")
-    >>> round(float(net.simulate(t_end=1.0)["J1.omega"][-1]), 2)
-    2.0
+    Examples:
+        >>> import shaftwork as sw
+        >>> net = sw.Network("two masses")
+        >>> _ = net.add(sw.TorqueSource("motor", tau=10.0), "rotor")
+        >>> _ = net.add(sw.Inertia("J1", J=2.0), "rotor")
+        >>> _ = net.add(sw.Spring("shaft", c=1e4, d=1.0), "rotor", "wheel")
+        >>> _ = net.add(sw.Inertia("J2", J=3.0), "wheel")
+        >>> round(float(net.simulate(t_end=1.0)["J1.omega"][-1]), 2)
+        2.0
     """
 
     def check(self) -> tuple[Problem, ...]:
