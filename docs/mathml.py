@@ -33,5 +33,7 @@ def _mathml(formula: re.Match[str]) -> str:
     latex, block = unescape(formula["latex"]).strip(), formula["tag"] == "div"
     drawn = convert(latex, display="block" if block else "inline")
     if unknown := LEFT_OVER.search(drawn):
-        raise ValueError(f"The formula {latex} would show {unknown[0][1:-1]!r} as it stands. Write it in other commands.")
+        raise ValueError(
+            f"The formula {latex} would show {unknown[0][1:-1]!r} as it stands. Write it in other commands."
+        )
     return f'<div class="formula">{drawn}</div>' if block else drawn
