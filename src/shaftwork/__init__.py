@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from shaftwork.components.shafts import *
     from shaftwork.components.sources import *
     from shaftwork.components.translation import *
+    from shaftwork.core.domains import ELECTRICAL, ROTATION, TRANSLATION
     from shaftwork.core.errors import (
         AccuracyWarning,
         CompileError,
@@ -98,6 +99,7 @@ _HOME = {
     "shaftwork.components.bucket_wheel": ("Soil",),
     "shaftwork.components.noise": ("HeldNoise", "SmoothNoise"),
     "shaftwork.components.laws": ("Ramp", "Step", "Table", "omega", "phi", "psi", "s", "t", "u", "v"),
+    "shaftwork.core.domains": ("ELECTRICAL", "ROTATION", "TRANSLATION"),
     "shaftwork.core.errors": (
         "AccuracyWarning",
         "CompileError",

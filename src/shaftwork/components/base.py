@@ -7,6 +7,7 @@ import inspect
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any, ClassVar, Literal, Self, TypeVar, dataclass_transform, get_args
 
@@ -14,11 +15,15 @@ from sympy import Expr
 
 from shaftwork.components.branches import Branch, End
 from shaftwork.components.modes import Modes
-from shaftwork.core.domains import ELECTRICAL, ROTATION, Domain
+from shaftwork.core.declarations import is_label, is_pair, refuse_fields
+from shaftwork.core.domains import DOMAIN_NAMES, DOMAINS, ELECTRICAL, ROTATION, Domain
 from shaftwork.core.errors import NetworkWarning, ParameterError, ShaftworkError
 from shaftwork.core.parameters import Parameter, parameter
 
 Role = Literal["store", "loss", "source", "coupling"]
+SignalKind = Literal["through", "across", "twist", "store"]
+SIGNAL_KINDS: tuple[str, ...] = get_args(SignalKind)
+_PAIR = "a pair of ports, such as ('a', 'b'), or ('a', None) against the reference"
 
 
 @dataclass(frozen=True)
@@ -28,6 +33,14 @@ class Port:
     name: str
     domain: Domain | None = ROTATION
     optional: bool = False
+
+    def __post_init__(self) -> None:
+        refuse_fields(
+            self,
+            name=(is_label(self.name), "a text without dots, such as 'a'"),
+            domain=(self.domain is None or self.domain in DOMAINS, f"{DOMAIN_NAMES}, or None for any node"),
+            optional=(isinstance(self.optional, bool), "True or False"),
+        )
 
 
 @dataclass(frozen=True)
@@ -42,11 +55,21 @@ class Signal:
         label: of the through store, where the part has several.
     """
 
-    kind: Literal["through", "across", "twist", "store"]
+    kind: SignalKind
     ends: tuple[End, End]
     domain: Domain | None
     sign: int = 1
     label: str = ""
+
+    def __post_init__(self) -> None:
+        refuse_fields(
+            self,
+            kind=(self.kind in SIGNAL_KINDS, f"one of {', '.join(map(repr, SIGNAL_KINDS))}"),
+            ends=(is_pair(self.ends), _PAIR),
+            domain=(self.domain is None or self.domain in DOMAINS, f"{DOMAIN_NAMES}, or None"),
+            sign=(self.sign in (1, -1), "1 or -1"),
+            label=(self.label == "" or is_label(self.label), "a text without dots"),
+        )
 
 
 @dataclass(frozen=True)
@@ -71,6 +94,35 @@ class Profile:
     domain: Domain
     lines: tuple[tuple[str, float], ...] = ()
 
+    def __post_init__(self) -> None:
+        refuse_fields(
+            self,
+            kind=(self.kind in ("across", "through"), "'across' or 'through'"),
+            places=(_are_shares(self.places), "shares of the way from 0 to 1, ascending"),
+            length=(is_label(self.length), "the name of a parameter"),
+            of=(_are_sums(self.of), "for each place the sum that it is, such as ((1.0, 'a'),)"),
+            domain=(self.domain in DOMAINS, DOMAIN_NAMES),
+            lines=(_are_pairs(self.lines, str, float | int), "for each place a label and a share, such as ('h', 0.5)"),
+        )
+
+
+def _are_pairs(value: Any, first: Any, second: Any) -> bool:
+    return isinstance(value, tuple | list) and all(
+        isinstance(pair, tuple | list) and len(pair) == 2 and isinstance(pair[0], first) and isinstance(pair[1], second)
+        for pair in value
+    )
+
+
+def _are_sums(value: Any) -> bool:
+    return isinstance(value, tuple | list) and all(_are_pairs(terms, float | int, str) for terms in value)
+
+
+def _are_shares(value: Any) -> bool:
+    try:
+        return all(0 <= low <= high <= 1 for low, high in pairwise((0.0, *value, 1.0)))
+    except TypeError:
+        return False
+
 
 @dataclass(frozen=True)
 class Derived:
@@ -89,6 +141,14 @@ class Derived:
     unit: str
     meaning: str
     latex: str
+
+    def __post_init__(self) -> None:
+        refuse_fields(
+            self,
+            name=(isinstance(self.name, str) and self.name.isidentifier(), "a name such as 'omega_k'"),
+            law=(isinstance(self.law, Expr), "an expression of p.name"),
+            **{field: (isinstance(getattr(self, field), str), "a text") for field in ("unit", "meaning", "latex")},
+        )
 
 
 @dataclass(frozen=True)
@@ -178,6 +238,7 @@ def component(cls: type[C]) -> type[C]:
             "make it a ClassVar if all parts share it."
         )
     made.declared = {field.name: field.metadata["declare"](field.name) for field in fields}
+    _refuse_wrong_parameters(made)
     _explain_wrong_arguments(made)
     REGISTRY[made.__name__] = made
     return made
@@ -195,6 +256,17 @@ def _refuse_wrong_class(cls: type[Component]) -> None:
     names = [port.name for port in (*cls.ports, *cls.inner)]
     if not cls.ports or len(set(names)) < len(names):
         raise ShaftworkError(f"{name}: its ports are {names}. Give it one or more, each with a name of its own.")
+
+
+def _refuse_wrong_parameters(made: type[Component]) -> None:
+    for name, declared in made.declared.items():
+        if name in dir(Component) or name in ("form", "mode") or name.startswith(("form_", "mode_")):
+            raise ParameterError(
+                f"{made.__name__}: a parameter is named '{name}', which has a meaning here. Rename it."
+            )
+        _, objection = (None, None) if declared.required else declared.magnitude(declared.default)
+        if objection is not None:
+            raise ParameterError(f"{made.__name__}: the default of {name} = {declared.default!r} {objection}.")
 
 
 def _explain_wrong_arguments(made: type[Component]) -> None:

@@ -14,6 +14,8 @@ from typing import Any
 
 from sympy import Expr, Function, Integer, S, Symbol
 
+from shaftwork.core.declarations import is_label, is_pair, refuse_fields
+
 ACROSS = Symbol("across", real=True)
 """The across variable of the branch in whose law it stands."""
 INTEGRAL = Symbol("integral", real=True)
@@ -66,6 +68,30 @@ End = str | None
 """A port or an inner node of the component; None is the reference of the domain (speed zero)."""
 
 
+_PAIR = "None for the first two ports, or a pair of ports such as ('a', 'b'), where None is the reference"
+
+
+def _refuse_wiring(branch: Any) -> None:
+    """Refuse ends and labels that are none. Laws are looked at where the branch is used, with its part's name."""
+    refuse_fields(
+        branch,
+        ends=(branch.ends is None or is_pair(branch.ends), _PAIR),
+        label=(branch.label == "" or is_label(branch.label), "a text without dots"),
+    )
+
+
+def _refuse_terms(coupling: Any) -> None:
+    """Refuse terms of a coupling that are none."""
+    terms = coupling.terms
+    right = isinstance(terms, tuple | list) and len(terms) > 0
+    right = right and all(isinstance(term, tuple | list) and len(term) == 3 and is_pair(term[1:]) for term in terms)
+    refuse_fields(
+        coupling,
+        terms=(right, "one or more triples (coefficient, first port, second port), such as ((1, 'a', None),)"),
+        label=(coupling.label == "" or is_label(coupling.label), "a text without dots"),
+    )
+
+
 @dataclass(frozen=True)
 class AcrossStore:
     """Through = capacity * d(across)/dt: inertia, mass, capacitor."""
@@ -73,6 +99,9 @@ class AcrossStore:
     capacity: Expr
     ends: tuple[End, End] | None = None
     label: str = ""
+
+    def __post_init__(self) -> None:
+        _refuse_wiring(self)
 
 
 @dataclass(frozen=True)
@@ -82,6 +111,9 @@ class ThroughStore:
     stiffness: Expr
     ends: tuple[End, End] | None = None
     label: str = ""
+
+    def __post_init__(self) -> None:
+        _refuse_wiring(self)
 
 
 @dataclass(frozen=True)
@@ -99,6 +131,10 @@ class ThroughLaw:
     conservative: bool = False
     stored: Expr = S.Zero
 
+    def __post_init__(self) -> None:
+        _refuse_wiring(self)
+        refuse_fields(self, conservative=(isinstance(self.conservative, bool), "True or False"))
+
 
 @dataclass(frozen=True)
 class AcrossLaw:
@@ -111,6 +147,9 @@ class AcrossLaw:
     ends: tuple[End, End] | None = None
     label: str = ""
 
+    def __post_init__(self) -> None:
+        _refuse_wiring(self)
+
 
 @dataclass(frozen=True)
 class IdealCoupling:
@@ -122,6 +161,9 @@ class IdealCoupling:
 
     terms: tuple[tuple[Expr, End, End], ...]
     label: str = ""
+
+    def __post_init__(self) -> None:
+        _refuse_terms(self)
 
 
 @dataclass(frozen=True)
@@ -136,6 +178,11 @@ class LossyCoupling:
     through: tuple[Expr, ...]
     label: str = ""
 
+    def __post_init__(self) -> None:
+        _refuse_terms(self)
+        right = isinstance(self.through, tuple | list) and len(self.through) == len(self.terms)
+        refuse_fields(self, through=(right, "a tuple of numbers or expressions, one for each term"))
+
 
 @dataclass(frozen=True)
 class DelayLine:
@@ -149,6 +196,9 @@ class DelayLine:
     delay: Expr
     ends: tuple[str, str] | None = None
     label: str = "h"
+
+    def __post_init__(self) -> None:
+        _refuse_wiring(self)
 
 
 Branch = AcrossStore | ThroughStore | ThroughLaw | AcrossLaw | IdealCoupling | LossyCoupling | DelayLine

@@ -13,11 +13,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import isfinite
 
 from sympy import Expr, Symbol, false, true
 from sympy.logic.boolalg import Boolean
 
 from shaftwork.components.branches import ACROSS, THROUGH, End, named_in
+from shaftwork.core.declarations import is_label, is_pair, refuse_fields
+
+ANEW = ""
+"""Of a `Leave`: to whichever mode a motion would start in, other than the one that ends."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +44,15 @@ class Leave:
     to: str
     rebound: Expr | None = None
     rest: Expr | None = None
+
+    def __post_init__(self) -> None:
+        refuse_fields(
+            self,
+            when=(isinstance(self.when, Expr), "an expression that rises above zero where the mode ends"),
+            to=(isinstance(self.to, str), "the name of a mode, or ANEW"),
+            rebound=(self.rebound is None or isinstance(self.rebound, Expr), "an expression of p.name, or None"),
+            rest=(self.rest is None or isinstance(self.rest, Expr), "an expression of p.name, or None"),
+        )
 
     @cached_property
     def by_torque(self) -> bool:
@@ -79,6 +93,19 @@ class Mode:
     says: str = ""
     at_rest: str | None = None
 
+    def __post_init__(self) -> None:
+        leaves = isinstance(self.leaves, tuple) and all(isinstance(leave, Leave) for leave in self.leaves)
+        refuse_fields(
+            self,
+            name=(isinstance(self.name, str) and bool(self.name), "a text such as 'open'"),
+            leaves=(leaves, "a tuple of Leave(when, to)"),
+            value=(isinstance(self.value, int | float) and isfinite(self.value), "a finite number"),
+            form=(isinstance(self.form, str), "a text"),
+            starts=(isinstance(self.starts, Boolean), "a condition such as ACROSS > 0, or NEVER"),
+            says=(isinstance(self.says, str), "a text"),
+            at_rest=(self.at_rest is None or isinstance(self.at_rest, str), "the name of a form, or None"),
+        )
+
     @property
     def words(self) -> str:
         """How phases and events call it."""
@@ -112,6 +139,19 @@ class Modes:
     ends: tuple[End, End] | None = None
     angle: str = ""
     label: str = ""
+
+    def __post_init__(self) -> None:
+        right = isinstance(self.options, tuple) and all(isinstance(mode, Mode) for mode in self.options)
+        options = self.options if right else ()
+        names = [mode.name for mode in options]
+        words = "one or more Mode(...) in a tuple, each with a name of its own"
+        refuse_fields(
+            self,
+            options=(0 < len(names) == len({*names}), words),
+            ends=(self.ends is None or is_pair(self.ends), "None, or a pair of ports such as ('a', 'b')"),
+            angle=(isinstance(self.angle, str), "the label of a branch"),
+            label=(self.label == "" or is_label(self.label), "a text without dots"),
+        )
 
     def __getitem__(self, name: str) -> Mode:
         """A mode by name."""
@@ -164,9 +204,6 @@ def has_mode(law: Expr) -> bool:
     """Whether the number of a mode stands in a law."""
     return any(symbol.name == "mode" or symbol.name.startswith("mode_") for symbol in law.free_symbols)
 
-
-ANEW = ""
-"""Of a `Leave`: to whichever mode a motion would start in, other than the one that ends."""
 
 NEVER = false
 """The condition of a mode in which no motion begins."""

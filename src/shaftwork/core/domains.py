@@ -43,3 +43,5 @@ ELECTRICAL = Domain(
     integral=Quantity("psi", r"\psi", "V*s"),
 )
 DOMAINS = (ROTATION, TRANSLATION, ELECTRICAL)
+DOMAIN_NAMES = "ROTATION, TRANSLATION or ELECTRICAL of this package"
+"""What a user can give as a domain, in words."""

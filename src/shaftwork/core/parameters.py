@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from operator import index
 from typing import Any
 
+from shaftwork.core.declarations import refuse_fields
 from shaftwork.core.errors import ParameterError
 
 REQUIRED: Any = object()
@@ -17,6 +18,8 @@ REQUIRED: Any = object()
 SMALLEST, LARGEST = 1e-60, 1e60
 """Sizes of values in SI: beyond them products of a few parameters leave the range of floating-point numbers."""
 ANGLES = ("radian", "degree", "turn", "revolution", "gradian", "arc")
+BOUNDS = ("above", "at_least", "at_most", "nonzero", "whole", "law", "record")
+"""Fields of `Parameter` that say which values are admissible."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,20 @@ class Parameter:
     law: bool = False
     latex: str = ""
     record: Any = None
+
+    def __post_init__(self) -> None:
+        for bound in ("above", "at_least", "at_most"):
+            value = getattr(self, bound)
+            number = value is None or (isinstance(value, int | float) and not math.isnan(value))
+            refuse_fields(self, **{bound: (number, "a number, or None")})
+        for field in ("unit", "meaning", "latex"):
+            refuse_fields(self, **{field: (isinstance(getattr(self, field), str), "a text")})
+        for field in ("nonzero", "whole", "law"):
+            refuse_fields(self, **{field: (isinstance(getattr(self, field), bool), "True or False")})
+        readable = self.record is None or (
+            isinstance(self.record, type) and callable(getattr(self.record, "read", None))
+        )
+        refuse_fields(self, record=(readable, "a class with a class method `read`, or None"))
 
     @property
     def required(self) -> bool:
@@ -160,11 +177,17 @@ def parameter(unit: str, meaning: str, *, default: Any = REQUIRED, latex: str = 
         default: value where the user gives none; without it the parameter is required.
         latex: LaTeX symbol, by default the name.
         **bounds: `above`, `at_least`, `at_most`, `nonzero`, `whole`, `law`, `record` of `Parameter`.
+
+    Raises:
+        ParameterError: there is no such bound, or an argument is of the wrong kind.
     """
+    if unknown := [name for name in bounds if name not in BOUNDS]:
+        raise ParameterError(f"parameter() takes no '{unknown[0]}'. It takes: default, latex, {', '.join(BOUNDS)}.")
 
     def declare(name: str) -> Parameter:
         return Parameter(name=name, unit=unit, meaning=meaning, default=default, latex=latex or name, **bounds)
 
+    declare("")  # what is wrong is said here, where it is written
     metadata: dict[str, Callable[[str], Parameter]] = {"declare": declare}
     given = dataclasses.MISSING if default is REQUIRED else default
     return dataclasses.field(default=given, metadata=metadata, kw_only=True)

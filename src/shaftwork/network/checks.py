@@ -23,10 +23,10 @@ from shaftwork.components.laws import SYMBOLS, Interpolation, InterpolationSlope
 from shaftwork.core.domains import Domain
 from shaftwork.core.errors import Problem, ShaftworkError
 from shaftwork.network.controlled import check_readings
+from shaftwork.network.declared import check_declared
 from shaftwork.network.grammar import FUNCTION_NAMES, FUNCTIONS
 from shaftwork.network.graph import GROUND, CircuitGraph, resolve
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
-from shaftwork.network.stores import check_stores
 from shaftwork.network.templates import BranchTemplate, Kind, make_template, substitution
 from shaftwork.network.textfile import MAXIMUM_NAME, is_name
 from shaftwork.network.wording import Spelling, at_nodes, listed, title
@@ -247,11 +247,12 @@ def _law_faults(part: Component, values: Mapping[str, Any]) -> Iterator[_Fault]:
     faults = tuple(fault for name, law in laws.items() if (fault := _fault_of_law(part, name, law)))
     yield from faults
     sound = {**values, **dict.fromkeys((fault.parameter for fault in faults), 1.0)}
-    templates = make_template(part, sound).branches
+    made = make_template(part, sound)
+    templates = made.branches
     _check_ends(part, templates)
     check_readings(part, templates)
-    check_stores(part, templates)
-    for template in {(made.kind, made.law, made.terms, made.through, made.stored): made for made in templates}.values():
+    check_declared(part, made)
+    for template in {(x.kind, x.law, x.terms, x.through, x.stored): x for x in templates}.values():
         if unreadable := _unreadable("", template.law) or _unreadable("", template.stored):
             yield unreadable._replace(what=f"a branch law {unreadable.what}")
         elif not (strange := _strange_symbols(template)):

@@ -55,5 +55,5 @@ def nominal_tolerances(form: StateForm, coefficients: Array) -> Array:
     typical = float(np.median(inertias)) if inertias.size else 1.0
     springs = list(form.through_states)
     beside = damping[[graph.branches[index].part for index in springs]]
-    torques = np.maximum(np.sqrt(coefficients[springs] * typical), beside)
+    torques = np.maximum(np.sqrt(np.abs(coefficients[springs]) * typical), beside)
     return NOMINAL * np.concatenate([np.ones(len(inertias)), torques, np.ones(len(form.integrals))])
