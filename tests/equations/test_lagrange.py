@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from collections.abc import Callable
 from itertools import chain
 from typing import Any
@@ -20,6 +21,7 @@ from shaftwork.equations.second_order import second_order
 from shaftwork.reduction.tree import normal_tree
 from tests.beds import bed_of, registered
 from tests.equations.networks import MECHANICAL, dc_drive, equations_of, from_pieces, mixed_train, shaft
+from tests.properties.examples import inner_drives
 from tests.strategies import Network, networks
 from tests.trains import Train, trains
 
@@ -156,6 +158,56 @@ def test_a_gear_with_losses_is_a_constraint_whose_reaction_does_work(mode: str) 
 @given(pieces=networks(max_inertias=6))
 def test_they_are_kirchhoffs_for_random_networks(pieces: Network) -> None:
     proof = lagrangian(equations_of(from_pieces(pieces))).proof()
+    assert proof.holds, str(proof)
+
+
+PRESCRIBED = {
+    "number": 3.0,
+    "time": 2.0 * sw.t,
+    "sine": 1.0 + 0.2 * sympy.sin(30.0 * sw.t),
+    "step": sw.Step(5.0, 0.1),
+    "ramp": sw.Ramp(5.0, 0.3, 0.1),
+    "table": sw.Table([0.0, 0.2, 0.5], [0.0, 4.0, 3.0]),
+    "table of a sine": sw.Table([-1.0, 0.0, 1.0], [0.0, 4.0, 3.0])(sympy.sin(sw.t)),
+    "largest": sympy.Max(1.0, 3.0 * sw.t),
+    "least": sympy.Min(sw.Ramp(2.0, 1.0), sympy.Abs(sw.t - 0.5)),
+    "pieces": sympy.Piecewise((sw.t, sw.t < 1.0), (1.0 / (1.0 + sw.t), True)),
+    "root": sympy.sqrt(1.0 + sw.t),
+    "noise": sw.SmoothNoise(10.0 * sw.t, 3),
+    "product": sw.Step(2.0, 0.1) * sympy.exp(-sw.t),
+}
+
+
+@pytest.mark.parametrize("law", PRESCRIBED)
+@pytest.mark.parametrize(("driven", "heavy"), [("sun", "carrier"), ("carrier", "ring"), ("ring", "sun")])
+def test_they_are_kirchhoffs_beside_a_prescribed_speed_of_any_law(law: str, driven: str, heavy: str) -> None:
+    """The speed enters the coordinates through the planetary gear, so its law stands in sums that must cancel."""
+    net = wired(
+        "planetary",
+        (sw.SpeedSource("drive", omega=PRESCRIBED[law]), driven),
+        (sw.PlanetaryGear("planetary", ratio=3.0), "sun", "carrier", "ring"),
+        (sw.Inertia("J1", J=0.1), heavy),
+        *((sw.Damper(f"bearing of {port}", d=2.0), port) for port in ("sun", "carrier", "ring")),
+        (sw.Spring("s", c=100.0, d=1.0), "carrier", "load"),
+        (sw.Inertia("J2", J=0.2), "load"),
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", sw.NetworkWarning)  # a step drives an inertia by an impulse
+        proof = net.lagrangian().proof()
+    assert proof.holds, str(proof)
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=MANY)
+@given(pieces=networks(max_inertias=5), data=st.data())
+def test_they_are_kirchhoffs_for_random_networks_with_speeds_of_any_law(pieces: Network, data: st.DataObject) -> None:
+    laws = st.sampled_from(list(PRESCRIBED))
+    pieces = (*pieces, *data.draw(inner_drives(pieces)))
+    sources = {p.name: PRESCRIBED[data.draw(laws)] for p in pieces if p.type in ("SpeedSource", "VoltageSource")}
+    made = [
+        dataclasses.replace(p, values=dict.fromkeys(p.values, sources[p.name])) if p.name in sources else p
+        for p in pieces
+    ]
+    proof = lagrangian(equations_of(from_pieces(made))).proof()
     assert proof.holds, str(proof)
 
 

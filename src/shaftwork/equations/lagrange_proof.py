@@ -18,7 +18,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from sympy import Add, Expr, Float, Integer, Poly, Symbol, cancel, expand, fraction, together
+from sympy import Add, Dummy, Expr, Float, Integer, Poly, Symbol, cancel, expand, fraction, together
+from sympy.core.function import Application
 
 from shaftwork.equations.coordinates import coordinates
 from shaftwork.equations.quantities import rate_of
@@ -174,7 +175,7 @@ class _Comparisons:
             rates = [rate for rate in self.lagrangian.velocities if rate in residual.free_symbols]
             conditions = [*(residual.diff(rate) for rate in rates), residual.xreplace(dict.fromkeys(rates, Integer(0)))]
             for condition in conditions:
-                found = self._solved(cancel(together(condition.xreplace(given))))
+                found = self._solved(_cancelled(condition.xreplace(given)))
                 given = {symbol: value.xreplace(found) for symbol, value in given.items()} | found
         return given
 
@@ -193,4 +194,14 @@ class _Comparisons:
     def zero(self, expression: Expr) -> Expr:
         """An expression that should be zero, in the form that is, where it is."""
         exact = expand(exactly(expression.xreplace(self.given)), power_exp=False, power_base=False, log=False)
-        return in_decimals(exact if exact == 0 else cancel(together(exact)))
+        return in_decimals(exact if exact == 0 else _cancelled(exact))
+
+
+def _cancelled(expression: Expr) -> Expr:
+    """A sum as one fraction without common factors.
+
+    sympy cancels nothing beside a law of pieces. To an identity of fractions a function is one more unknown.
+    """
+    unknowns = {function: Dummy() for function in expression.atoms(Application)}
+    functions = {unknown: function for function, unknown in unknowns.items()}
+    return cancel(together(expression.xreplace(unknowns))).xreplace(functions)
