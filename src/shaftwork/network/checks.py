@@ -27,6 +27,7 @@ from shaftwork.network.declared import check_declared
 from shaftwork.network.grammar import FUNCTION_NAMES, FUNCTIONS
 from shaftwork.network.graph import GROUND, CircuitGraph, resolve
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
+from shaftwork.network.sharing import Shared
 from shaftwork.network.templates import BranchTemplate, Kind, make_template, substitution
 from shaftwork.network.textfile import MAXIMUM_NAME, is_name
 from shaftwork.network.wording import Spelling, at_nodes, listed, title
@@ -92,7 +93,7 @@ class _Examination:
         self._named: dict[str, str] = {}
         self._domains: dict[str, tuple[Domain, str]] = {}
         self._dotted: dict[str, None] = {}
-        self._faults: dict[Any, tuple[_Fault, ...]] = {}
+        self._faults = Shared(lambda part, values, _: tuple(_law_faults(part, values)))
 
     def report(self, kind: str, message: str, hint: str, placed: Placed | None = None) -> None:
         """Put down an error, with the part and the nodes that it concerns."""
@@ -226,12 +227,7 @@ class _Examination:
             if not isinstance(value, float) and (not isinstance(value, sympy.Expr) or value.is_Matrix)
             if part.declared[name].record is None and (value is not None or part.declared[name].default is not None)
         )
-        if odd:
-            return odd
-        key = (type(part), tuple(bool(value) if isinstance(value, float) else value for value in values.values()))
-        if key not in self._faults:
-            self._faults[key] = tuple(_law_faults(part, values))
-        return self._faults[key]
+        return odd or self._faults.of(part, values)[0]
 
 
 def _instead_of(value: Any) -> str:

@@ -16,7 +16,8 @@ from shaftwork.components.laws import Table, as_expression
 from shaftwork.components.modes import Modes
 from shaftwork.core.domains import ROTATION, Domain
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
-from shaftwork.network.templates import BranchTemplate, Kind, Template, make_template, with_factors
+from shaftwork.network.sharing import Shared
+from shaftwork.network.templates import BranchTemplate, Kind, make_template, with_factors
 
 GROUND = -1
 """Node number of the reference."""
@@ -53,6 +54,7 @@ class GraphPart:
     """A part with its nodes by port name, the places of its parameters in the parameter vector, and its branches.
 
     The derived quantities are those in whose letters its laws are printed; the modes are of its elements that change.
+    Of the parameters consulted its branches need the numbers themselves: other numbers may be other branches.
     """
 
     component: Component
@@ -61,6 +63,7 @@ class GraphPart:
     branches: tuple[int, ...]
     derived: tuple[Derived, ...]
     modes: tuple[Modes, ...] = ()
+    consulted: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -187,20 +190,13 @@ class _Table:
     def __init__(self) -> None:
         self.numbers: dict[str, int] = {REFERENCE: GROUND}
         self.domains: list[Domain] = []
-        self.templates: dict[Any, Template] = {}
+        self.templates = Shared(make_template)
 
     def node(self, name: str, domain: Domain | None) -> int:
         if name not in self.numbers:
             self.numbers[name] = len(self.domains)
             self.domains.append(domain or ROTATION)
         return self.numbers[name]
-
-    def template(self, placed: Placed, values: Mapping[str, Any]) -> Template:
-        pattern = tuple(bool(value) if isinstance(value, float) else value for value in values.values())
-        key = (type(placed.part), pattern, placed.choices)
-        if key not in self.templates:
-            self.templates[key] = make_template(placed.part, values, placed.choices)
-        return self.templates[key]
 
 
 def build_graph(netlist: Netlist) -> CircuitGraph:
@@ -217,7 +213,7 @@ def build_graph(netlist: Netlist) -> CircuitGraph:
     branches: list[GraphBranch] = []
     for item in resolved:
         part, values = item.placed.part, item.values
-        template = table.template(item.placed, values)
+        template, read = table.templates.of(part, values, item.placed.choices)
         places: dict[str, int] = {}
         for name in template.parameters:
             places[name] = len(parameters)
@@ -226,9 +222,9 @@ def build_graph(netlist: Netlist) -> CircuitGraph:
         nodes = _port_nodes(item.placed, table)
         first = len(branches)
         branches.extend(_place(made, first + k, len(parts), nodes) for k, made in enumerate(template.branches))
-        parts.append(
-            GraphPart(part, nodes, places, tuple(range(first, len(branches))), template.derived, template.modes)
-        )
+        numbers = tuple(range(first, len(branches)))
+        consulted = tuple(name for name in read if isinstance(values.get(name), float))
+        parts.append(GraphPart(part, nodes, places, numbers, template.derived, template.modes, consulted))
     names = tuple(table.numbers)[1:]
     return CircuitGraph(
         netlist.name, names, tuple(table.domains), tuple(parts), tuple(branches), parameters, tuple(zeros)

@@ -10,18 +10,16 @@ import numpy as np
 
 from shaftwork.codegen.elements import Array
 from shaftwork.components.base import Component
-from shaftwork.components.shaft_models import Auto
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
+from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.netlist import Netlist
 
 OUTPUTS, MOST_OUTPUTS = 1001, 10_000_000
 """Output times when the user gives none, and the most that can be asked for."""
 FINEST_RTOL = float(np.finfo(float).eps)
 """What doubles can keep; a smaller tolerance would promise what no engine holds."""
-DELAYING = ("length", "density", "shear_modulus")
-"""What the delay of a shaft depends on, and with it the choice of its model."""
 OutputTimes = int | Sequence[float] | Array | Literal["steps"] | None
 
 
@@ -173,8 +171,8 @@ def _numbers(part: Component) -> tuple[str, ...]:
     return tuple(key for key, given in part.declared.items() if isinstance(given.magnitude(part.values[key])[0], float))
 
 
-def meshes_anew(netlist: Netlist, values: Mapping[str, float]) -> bool:
-    """Whether `Auto` chooses another model of a shaft for new values in SI.
+def branches_anew(graph: CircuitGraph, values: Mapping[str, float]) -> bool:
+    """Whether a part may have other branches for new values in SI: `Auto` chooses another mesh for a shaft, say.
 
     Raises:
         ParameterError: a shaft has become too long for one polynomial.
@@ -182,11 +180,10 @@ def meshes_anew(netlist: Netlist, values: Mapping[str, float]) -> bool:
     changed: dict[str, dict[str, Any]] = {}
     for name, value in values.items():
         owner, _, parameter = name.rpartition(".")
-        if parameter in DELAYING:
-            changed.setdefault(owner, {})[parameter] = value
-    shafts = (placed.part for placed in netlist.placed if placed.part.name in changed)
+        changed.setdefault(owner, {})[parameter] = value
+    consulting = (p for p in graph.parts if p.name in changed and not changed[p.name].keys().isdisjoint(p.consulted))
     return any(
-        dataclasses.replace(shaft, **changed[shaft.name]).resolved != shaft.resolved
-        for shaft in shafts
-        if isinstance(shaft, Shaft) and isinstance(shaft.model, Auto)
+        not isinstance(part.component, Shaft)
+        or part.component.changed(**changed[part.name]).resolved != part.component.resolved
+        for part in consulting
     )

@@ -24,8 +24,8 @@ from shaftwork.pipeline.arguments import (
     Demand,
     OutputTimes,
     absolute_tolerances,
+    branches_anew,
     checked_parameters,
-    meshes_anew,
     output_times,
     relative_tolerance,
     time_span,
@@ -357,8 +357,9 @@ class Model(CompiledModel):
         """Whether other equations hold for new values: a value becomes zero or ceases to, ratios meet, `Auto`."""
         if not values:
             return False
-        decisive = frozenset((*self.form.graph.zeros, *self.form.tree.frozen))
-        if any(name in decisive or value == 0 for name, value in values.items()) or meshes_anew(self.netlist, values):
+        graph = self.form.graph
+        decisive = frozenset((*graph.zeros, *self.form.tree.frozen))
+        if any(name in decisive or value == 0 for name, value in values.items()) or branches_anew(graph, values):
             return True
         return self.arrays.assembly.degenerates(self.vector(values))
 
