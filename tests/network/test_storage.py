@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 import sympy
 from hypothesis import given
@@ -11,6 +12,8 @@ from hypothesis import strategies as st
 
 import shaftwork as sw
 from shaftwork.network.graph import resolve
+from shaftwork.scenes import SCENES
+from tests.beds import bed_of, registered
 from tests.reference.mna import Piece
 from tests.strategies import networks
 
@@ -175,3 +178,48 @@ def test_no_text_runs_or_crashes(tmp_path_factory: pytest.TempPathFactory, text:
     path.write_bytes(text.encode("utf-8", "surrogatepass"))
     with pytest.raises(sw.ModelFileError):
         sw.Network.load(path)
+
+
+@pytest.mark.filterwarnings("ignore:CageMotor:shaftwork.NetworkWarning")  # the excavator's own curve turns once more
+@pytest.mark.parametrize("scene", SCENES)
+def test_every_scene_is_saved_and_loaded_as_the_same_network(scene: str, tmp_path: Path) -> None:
+    net = SCENES[scene]()
+    net.save(tmp_path / "scene.toml")
+    loaded = sw.Network.load(tmp_path / "scene.toml")
+    assert loaded.netlist() == net.netlist()
+    loaded.save(tmp_path / "again.toml")
+    assert (tmp_path / "again.toml").read_bytes() == (tmp_path / "scene.toml").read_bytes()
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        sw.BucketWheelLoad("w", radius=3.0, edge=0.5, soil="fault zone", buckets=6),
+        sw.BucketWheelLoad("w", radius=3.0, edge=0.5, soil=sw.Soil(mean=5e4, std=1e3)),
+        sw.RandomLoad("w", mean=20.0, std=1.0, interval=0.1, kind="band-limited"),
+        sw.Shaft("w", length=1.0, diameter=0.1, model="Spectral(8)"),
+        sw.Inertia("w", J=1.0, symbol=""),
+        sw.Inertia("w", J=1),
+        sw.Inertia("w", J=np.float64(0.1)),
+    ],
+    ids=repr,
+)
+def test_a_part_comes_back_equal_however_its_values_were_given(part: sw.Component, tmp_path: Path) -> None:
+    net = sw.Network("one part")
+    net.add(part, *"ab"[: len(part.ports)])
+    net.save(tmp_path / "part.toml")
+    assert sw.Network.load(tmp_path / "part.toml").netlist() == net.netlist()
+
+
+def test_a_record_is_the_same_whether_it_is_given_itself_by_name_or_as_text() -> None:
+    def wheel(soil: object) -> sw.Component:
+        return sw.BucketWheelLoad("w", radius=3.0, edge=0.5, soil=soil)
+
+    assert wheel("grey clay") == wheel(sw.Soil(mean=69200.0, std=15800.0)) == wheel("Soil(mean=69200.0, std=15800.0)")
+
+
+@pytest.mark.parametrize("name", registered())
+def test_every_component_of_the_library_comes_back_equal(name: str, tmp_path: Path) -> None:
+    net = bed_of(name)
+    net.save(tmp_path / "bed.toml")
+    assert sw.Network.load(tmp_path / "bed.toml").netlist() == net.netlist()

@@ -176,6 +176,12 @@ class Component:
             )
         return super().__new__(cls)
 
+    def __post_init__(self) -> None:
+        """Hold records as records, also where their name or text was given: the same part is then equal to itself."""
+        for name, declared in self.declared.items():
+            if declared.record is not None:
+                object.__setattr__(self, name, declared.magnitude(getattr(self, name))[0])
+
     def branches(self, p: Any) -> Iterator[Branch]:
         """Yield the branches; `p.name` is the symbol of parameter `name` (0 where its value is exactly zero)."""
         raise NotImplementedError

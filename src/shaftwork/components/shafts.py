@@ -51,16 +51,15 @@ class Shaft(Component):
     model: ShaftModel = parameter("1", "how it becomes equations", default=Lumped(20), record=ShaftModel)
 
     def __post_init__(self) -> None:
-        made, objection = self.declared["model"].magnitude(self.model)
-        if objection is not None:
+        super().__post_init__()
+        if (objection := self.declared["model"].magnitude(self.model)[1]) is not None:
             raise ParameterError(f"Shaft '{self.name}': model {objection}.")
-        object.__setattr__(self, "model", made)
         if self._value("inner_diameter") >= self._value("diameter"):
             raise ParameterError(
                 f"Shaft '{self.name}': inner_diameter = {self.inner_diameter!r} must be smaller than the diameter "
                 f"{self.diameter!r}."
             )
-        if isinstance(made, Wave) and self._value("damping") != 0:
+        if isinstance(self.model, Wave) and self._value("damping") != 0:
             raise ParameterError(
                 f"Shaft '{self.name}': damping = {self.damping!r} with model=Wave(), whose waves travel without "
                 "internal damping. Take Spectral(16) or Lumped(100), or leave the damping out."

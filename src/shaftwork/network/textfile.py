@@ -68,7 +68,7 @@ class PartText:
         name: name of the part.
         nodes: the nodes that it is wired to, in the order of its ports.
         parameters: its parameters in the order of the file; an int stays an int, a float a float.
-        symbol: LaTeX symbol, or None.
+        symbol: subscript in LaTeX, empty for none, or None for the name.
 
     Raises:
         ModelFileError: a field could not stand in a file.
@@ -88,7 +88,7 @@ class PartText:
             raise ModelFileError(f'nodes {found}. Give one node or more, such as nodes = ["rotor", "wheel"].')
         for node in self.nodes:
             _check_name("nodes", node)
-        if self.symbol is not None:
+        if self.symbol not in (None, ""):  # parts with an empty symbol have letters without a subscript
             _check_name("symbol", self.symbol)
         object.__setattr__(self, "parameters", {key: _checked(key, value) for key, value in self.parameters.items()})
 
