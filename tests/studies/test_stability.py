@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -227,6 +228,27 @@ def test_the_table_is_written_and_drawn(study: sw.studies.Stability, tmp_path: P
     pytest.importorskip("matplotlib")
     figure = study.plot()
     assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == list(SAMPLE)
+
+
+@pytest.mark.parametrize("engines", [["auto"], ["auto", "exact", "scipy"]], ids=len)
+def test_every_cell_has_a_place_of_its_own_in_the_picture_and_no_label_covers_another(engines: list[str]) -> None:
+    pytest.importorskip("matplotlib")
+    printed = "CentralDifference(10, closure='printed')"
+    models = ["CentralDifference(10)", printed, "CentralDifference(12, order=4)", "Lumped(10)", "Lumped(20)", "Wave()"]
+    study = stability(["clamped end", "m = 2"], models=models, engines=engines)
+    figure = study.plot()
+    figure.canvas.draw()
+    cells = figure.axes[0]
+    places = [text.get_position() for text in cells.texts]
+    assert len(places) == len(set(places)) == sum(np.isfinite(cell.error) for cell in study.cells)
+    above = cells.child_axes[0].get_xticklabels()
+    assert [label.get_text().replace("\n", "") for label in above] == [
+        "CentralDifference", "CentralDifference(closure='printed')", "CentralDifference(order=4)",
+        "Lumped(m=10)", "Lumped(m=20)", "Wave",
+    ]  # fmt: skip
+    for labels in (above, cells.get_xticklabels(), cells.get_yticklabels()):
+        boxes = [label.get_window_extent() for label in labels]
+        assert not any(one.overlaps(other) for one, other in pairwise(boxes))
 
 
 def test_unknown_names_are_answered_with_those_there_are() -> None:

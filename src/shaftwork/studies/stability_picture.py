@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +13,7 @@ from shaftwork.core.errors import MissingExtraError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from shaftwork.studies.stability import Cell, Stability
+    from shaftwork.studies.stability import Stability
 
 COLOURS = {
     "right": "#2e8b57",
@@ -26,12 +28,15 @@ COLOURS = {
 ABSENT = "#ffffff"
 LEAST = 1e-16
 """Errors below are drawn as this one."""
+COLUMN, LETTER = 0.24, 0.075
+"""Least width of a column, and width of a letter above the columns, in inches."""
+SIZE = re.compile(r"\b(?:m|n|places)=\d+(?:, )?")
 
 
 def stability_figure(study: Stability) -> Figure:
     """Cases downwards; models, and in each of them engines, from left to right; the exponent of the error in each cell.
 
-    Models that differ by their size alone share a column.
+    Models that differ by their size alone share columns, unless a case has several of them.
     """
     try:
         from matplotlib.colors import ListedColormap
@@ -40,14 +45,17 @@ def stability_figure(study: Stability) -> Figure:
     except ImportError:
         raise MissingExtraError("matplotlib", "plot", "Stability.plot()") from None
     engines, cases = study.engines, tuple(dict.fromkeys(cell.case for cell in study.cells))
-    kinds = tuple(dict.fromkeys(_kind(cell) for cell in study.cells))
+    kind_of = _kinds(study)
+    kinds = tuple(dict.fromkeys(kind_of.values()))
     numbers = np.zeros((len(cases), len(kinds) * len(engines)))
     names = list(COLOURS)
-    figure = Figure(figsize=(2.5 + 0.24 * numbers.shape[1], 2.2 + 0.22 * len(cases)), layout="constrained")
+    longest = max(len(line) for kind in kinds for line in kind.splitlines())
+    width = max(COLUMN * len(engines), LETTER * (longest + 2)) * len(kinds)
+    figure = Figure(figsize=(max(2.5 + width, 8.0), 2.4 + 0.22 * len(cases)), layout="constrained")
     axes = figure.subplots()
     for cell in study.cells:
         row = cases.index(cell.case)
-        column = kinds.index(_kind(cell)) * len(engines) + engines.index(cell.engine)
+        column = kinds.index(kind_of[cell.model]) * len(engines) + engines.index(cell.engine)
         numbers[row, column] = 1 + names.index(cell.verdict)
         if np.isfinite(cell.error):
             exponent = int(np.ceil(np.log10(max(cell.error, LEAST))))
@@ -71,5 +79,10 @@ def stability_figure(study: Stability) -> Figure:
     return figure
 
 
-def _kind(cell: Cell) -> str:
-    return cell.model.partition("(")[0]
+def _kinds(study: Stability) -> dict[str, str]:
+    """The heading over the columns of each model: its name, and in a second line what it is beside its size."""
+    models = tuple(dict.fromkeys(cell.model for cell in study.cells))
+    short = {model: SIZE.sub("", model).replace(", )", ")").replace("()", "") for model in models}
+    beside = Counter((case, short[model]) for case, model in study.rows)
+    several = {kind for (_, kind), count in beside.items() if count > 1}
+    return {model: (model if kind in several else kind).replace("(", "\n(", 1) for model, kind in short.items()}
