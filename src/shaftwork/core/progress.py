@@ -1,33 +1,46 @@
-"""A line on a terminal's standard error that shows how far something long has come."""
+"""A line on a terminal that shows how far something long has come."""
 
 from __future__ import annotations
 
 import sys
-import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
 
-WIDTH = 40
-"""Characters of the bar."""
-PATIENCE, PAUSE = 1.0, 0.2
-"""Nothing is shown of what takes less than the first, and then not more often than every second of these, s."""
+Show = Callable[[float, str], None]
+"""Told how much is done, and a word or two on it."""
+FORMAT = "{desc}: {percentage:3.0f}%|{bar}| {n:.4g} of {total:.4g} {unit} [{elapsed}<{remaining}]"
+PAUSE = 0.2
+"""The line is drawn anew not more often than every so many seconds."""
 
 
-class Progress:
-    """Shows how far something has come, where standard error is a terminal."""
+@contextmanager
+def progress(total: float, unit: str, stage: str) -> Iterator[Show]:
+    """Show on standard error, where that is a terminal and tqdm is installed (extra `progress`), how far something is.
 
-    def __init__(self) -> None:
-        self._next = time.monotonic() + PATIENCE
-        self._shown = False
+    Args:
+        total: how much there is to do.
+        unit: of what.
+        stage: words for the time before anything is done.
+    """
+    bar_of = _tqdm() if sys.stderr.isatty() else None
+    if bar_of is None:
+        yield lambda _done, _stage: None
+        return
+    with bar_of(
+        total=total, desc=stage, unit=unit, bar_format=FORMAT, mininterval=PAUSE, leave=False, dynamic_ncols=True
+    ) as bar:
 
-    def show(self, share: float, text: str) -> None:
-        """Draw the bar anew where it is time, with a text behind it."""
-        if time.monotonic() < self._next or not sys.stderr.isatty():
-            return
-        filled = int(WIDTH * min(max(share, 0.0), 1.0))
-        sys.stderr.write(f"\r[{'=' * filled}{' ' * (WIDTH - filled)}] {text}")
-        sys.stderr.flush()
-        self._next, self._shown = time.monotonic() + PAUSE, True
+        def show(done: float, stage: str) -> None:
+            bar.set_description_str(stage, refresh=False)
+            bar.update(max(done - bar.n, 0))  # engines may look at a time twice
 
-    def close(self) -> None:
-        """Leave the line."""
-        if self._shown:
-            sys.stderr.write("\n")
+        yield show
+
+
+def _tqdm() -> Any:
+    try:
+        from tqdm import tqdm
+    except ImportError:
+        return None
+    return tqdm

@@ -12,7 +12,7 @@ import numpy as np
 
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import whole
-from shaftwork.core.progress import Progress
+from shaftwork.core.progress import progress
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import OutputTimes, checked_parameter, relative_tolerance, time_span
 from shaftwork.pipeline.network import Network, network_of
@@ -109,7 +109,7 @@ def _count(processes: int | None) -> int | None:
 def _run(task: Task, worker: Worker, processes: int | None, store: Store | None) -> tuple[Array, tuple[str, ...], int]:
     """(variants, measures), why variants failed, and how many could not be followed side by side."""
     values, reasons = np.full((len(task), len(task.measures)), np.nan), [""] * len(task)
-    open_, progress, alone, failed = np.ones(len(task), dtype=bool), Progress(), 0, 0
+    open_, alone, failed = np.ones(len(task), dtype=bool), 0, 0
 
     def take(chunk: Chunk) -> None:
         nonlocal alone, failed
@@ -122,15 +122,12 @@ def _run(task: Task, worker: Worker, processes: int | None, store: Store | None)
 
     for chunk in [] if store is None else store.chunks:
         take(chunk)
-    try:
+    with progress(len(task), "variants", "compiling") as show:
         for chunk in chunks(worker, task, np.flatnonzero(open_), processes):
             if store is not None:
                 store.append(chunk)
             take(chunk)
-            done, remark = len(task) - int(open_.sum()), f", {failed} failed" if failed else ""
-            progress.show(done / len(task), f"{done} of {len(task)} variants{remark}")
-    finally:
-        progress.close()
+            show(len(task) - int(open_.sum()), f"{failed} failed" if failed else "sweep")
     return values, tuple(reasons), alone
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import os
 import subprocess
 import sys
@@ -219,11 +220,26 @@ def test_the_command_is_installed_and_its_help_fits_on_one_screen() -> None:
         assert name in done.stdout
 
 
-def test_a_long_run_shows_its_progress_on_a_terminal(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    clock = iter(range(10**9))
-    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
-    monkeypatch.setattr("shaftwork.core.progress.time.monotonic", lambda: float(next(clock)))
-    assert main(["run", "crane-start", "--engine", "scipy", "--t-end", "0.1", "--rtol", "1e-4"]) == DONE
-    assert "of 0.1 s" in capsys.readouterr().err
+def test_the_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["--version"])
+    assert end.value.code == DONE
+    assert capsys.readouterr().out == f"shaftwork {sw.__version__}\n"
+
+
+def test_help_loads_nothing_heavy() -> None:
+    heavy = ("sympy", "scipy", "numpy", "matplotlib", "heyoka", "networkx", "pint", "pandas", "tqdm")
+    code = (
+        "import sys; from shaftwork.cli import main\n"
+        "try: main(['--help'])\n"
+        f"except SystemExit: print([name for name in {heavy!r} if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.endswith("[]\n")
+
+
+def test_scenes_are_listed_for_machines_too(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["scenes", "--json"]) == DONE
+    (first, *_) = json.loads(capsys.readouterr().out)["scenes"]
+    assert first["name"] == "crane-start"
+    assert first["t_end"] == 6.5

@@ -1,0 +1,10 @@
+"""`python -m shaftwork.cli` is the command."""
+
+from __future__ import annotations
+
+import sys
+
+from shaftwork.cli.program import main
+
+if __name__ == "__main__":
+    sys.exit(main())

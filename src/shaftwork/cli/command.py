@@ -1,0 +1,63 @@
+"""What a command is, and the options that several have."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+Say = Callable[[str], None]
+"""Prints a line for people; with `--json` nothing."""
+Data = Mapping[str, Any]
+"""A result for machines."""
+
+FALLBACK_END = 10.0
+"""End time of a model file when none is given, s."""
+ENGINES = ("auto", "scipy", "scipy-radau", "heyoka", "sundials", "exact", "banded", "wave")
+
+
+@dataclass(frozen=True)
+class Command:
+    """One of the commands of `shaftwork`.
+
+    Args:
+        name: as it is written.
+        text: what it does, one line.
+        run: does it; says lines for people and returns the same for machines.
+        arguments: declares its options.
+        model: whether it is about a scene or a model file.
+        machines: whether it takes `--json`.
+    """
+
+    name: str
+    text: str
+    run: Callable[[Namespace, Say], Data]
+    arguments: Callable[[ArgumentParser], None] = lambda _: None
+    model: bool = True
+    machines: bool = False
+
+
+def folder_option(parser: ArgumentParser, what: str) -> None:
+    """The option `--out`."""
+    parser.add_argument("--out", metavar="DIR", type=_folder, help=f"folder for {what}; files of an older run go")
+
+
+def end_option(parser: ArgumentParser, default: str) -> None:
+    """The option `--t-end`."""
+    parser.add_argument("--t-end", metavar="S", type=float, help=f"end of the motion in s (default: {default})")
+
+
+def solver_options(parser: ArgumentParser) -> None:
+    """The options `--rtol` and `--engine`."""
+    parser.add_argument("--rtol", type=float, default=1e-8, help="relative tolerance (default %(default)g)")
+    parser.add_argument(
+        "--engine", default="auto", choices=ENGINES, metavar="NAME", help=f"one of {', '.join(ENGINES)}"
+    )
+
+
+def _folder(text: str) -> Path:
+    if not text.strip():
+        raise ArgumentTypeError("'' names no folder. Write --out . for this one.")
+    return Path(text)

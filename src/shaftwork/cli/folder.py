@@ -1,0 +1,103 @@
+"""The folder of `--out`: it holds the files of one run, and files of the user, which stay as they are."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import tempfile
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from shaftwork.core.errors import MissingExtraError, ParameterError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MANIFEST = "shaftwork.json"
+"""The file that lists the others of the run."""
+PIXELS = 150
+"""Of a picture to an inch."""
+
+
+class Folder:
+    """A folder for the files of a run.
+
+    Args:
+        path: of the folder; it comes to be where there is none.
+        names: of all files that the command may write.
+        line: the words of the command line, to be written beside the results.
+
+    Raises:
+        ParameterError: nothing can be written there, or a file of the user has one of these names.
+    """
+
+    def __init__(self, path: Path, names: Sequence[str], line: Sequence[str]) -> None:
+        self.path, self._line = path, tuple(line)
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise ParameterError(f"--out {path} is no folder to write to: {error}. Give another folder.") from None
+        if not os.access(path, os.W_OK):
+            raise ParameterError(f"--out {path} is a folder that you may not write to. Give another folder.")
+        older = self._files()
+        if foreign := [name for name in names if (path / name).exists() and name not in older]:
+            raise ParameterError(
+                f"--out {path} has a file {foreign[0]} that its {MANIFEST} does not list, so no earlier run "
+                "wrote it. Move it away, or give another folder."
+            )
+
+    @contextmanager
+    def new_files(self) -> Iterator[Path]:
+        """A folder to write into; all in it takes the place of the older run's files once everything is written."""
+        draft = Path(tempfile.mkdtemp(prefix=".shaftwork-", dir=self.path))
+        try:
+            yield draft
+            names = sorted(path.name for path in draft.iterdir())
+            manifest = {"command": ["shaftwork", *self._line], "files": names}
+            (draft / MANIFEST).write_text(json.dumps(manifest, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+            for name in self._files():
+                (self.path / name).unlink(missing_ok=True)
+            for name in [MANIFEST, *names]:  # the list first: whatever happens next, the next run knows these files
+                (draft / name).replace(self.path / name)
+        finally:
+            shutil.rmtree(draft, ignore_errors=True)
+
+    def written(self) -> str:
+        """What is there, in words."""
+        return f"written: {', '.join(str(self.path / name) for name in self._files())}"
+
+    def _files(self) -> list[str]:
+        """Names of the files of the run that is there."""
+        place = self.path / MANIFEST
+        if not place.exists():
+            return []
+        try:
+            names = json.loads(place.read_text(encoding="utf-8"))["files"]
+            if all(Path(name).name == name for name in names):
+                return [str(name) for name in names]
+        except (OSError, ValueError, TypeError, KeyError):
+            pass
+        raise ParameterError(
+            f"--out {self.path} has a {MANIFEST} that no run has written, so that nobody knows which files are of an "
+            "older run. Move it away, or give another folder."
+        )
+
+
+def write_rows(path: Path, head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Write a table as CSV."""
+    import csv
+
+    with path.open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows([head, *rows])
+
+
+def write_picture(path: Path, draw: Callable[[], Figure]) -> None:
+    """Write a picture as PNG; where matplotlib is not installed, warn that it is left out."""
+    try:
+        draw().savefig(path, dpi=PIXELS)
+    except MissingExtraError as error:
+        warnings.warn(f"{path.name} is left out. {error}", stacklevel=2)

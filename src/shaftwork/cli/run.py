@@ -1,0 +1,104 @@
+"""`shaftwork run`."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from typing import TYPE_CHECKING
+
+from shaftwork.cli.command import Command, Data, Say, end_option, folder_option, solver_options
+from shaftwork.cli.folder import Folder, write_picture, write_rows
+from shaftwork.cli.models import end_of, load
+from shaftwork.core.progress import progress
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from shaftwork.pipeline.network import Network
+    from shaftwork.results.solution import Solution
+
+FILES = ("signals.csv", "signals.png", "phases.csv", "events.csv")
+LISTED = 12
+"""Phases shown of the beginning, and as many of the end, of a motion that has more."""
+
+
+def arguments(parser: ArgumentParser) -> None:
+    """The options of the command."""
+    folder_option(parser, "plots and CSV")
+    end_option(parser, "that of the scene, else 10")
+    solver_options(parser)
+
+
+def run(options: Namespace, say: Say) -> Data:
+    """The motion as a table, and as curves and CSV in a folder."""
+    from shaftwork.results.summary import summary
+
+    net, scene = load(options)
+    t_end = end_of(options, scene)
+    folder = Folder(options.out, FILES, options.line) if options.out else None
+    say(f"{net.name}: {t_end:g} s of motion" + (f" ({scene.source})" if scene else ""))
+    for line in scene.chosen if scene else ():
+        say(f"  chosen: {line}")
+    solution = _motion(net, t_end, options)
+    signals = scene.signals if scene else _worth_seeing(solution)
+    say(f"engine {solution.engine}: {solution.why}")
+    counts = ", ".join(f"{count} {name}" for name, count in solution.statistics.items())
+    say(f"{counts}; energy residual {solution.energy_residual:.1e} of the work done\n")
+    say(summary(solution, signals))
+    _say_phases(solution, say)
+    if folder:
+        with folder.new_files() as place:
+            _write(solution, signals, place)
+        say(f"\n{folder.written()}")
+    return {}
+
+
+def _motion(net: Network, t_end: float, options: Namespace) -> Solution:
+    reached = 0.0
+    try:
+        with progress(t_end, "s", f"{net.name}, compiling") as show:
+
+            def report(t: float) -> None:
+                nonlocal reached
+                reached = max(reached, t)
+                show(t, net.name)
+
+            return net.compile().simulate(t_end, rtol=options.rtol, engine=options.engine, progress=report)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"the motion had come to t = {reached:.4g} of {t_end:g} s") from None
+
+
+def _worth_seeing(solution: Solution) -> tuple[str, ...]:
+    """The states of a model that no scene comments; the first and last few where there are many."""
+    names = tuple(name for name in solution.states if name in solution)
+    return names if len(names) <= 12 else (*names[:6], *names[-6:])
+
+
+def _say_phases(solution: Solution, say: Say) -> None:
+    """The phases of a motion in words; those in the middle of a long list are counted alone."""
+    rows = solution.phases
+    if not rows:
+        return
+    say(f"\n{'from s':>9} {'to s':>9}  {len(rows)} phases, {len(solution.events)} events")
+    for number, row in enumerate(rows):
+        if not LISTED <= number < len(rows) - LISTED:
+            say(f"{row.start:9.4f} {row.end:9.4f}  {row.name}")
+        elif number == LISTED:
+            say(f"{'...':>9} {'...':>9}  {len(rows) - 2 * LISTED} more")
+
+
+def _write(solution: Solution, signals: Sequence[str], place: Path) -> None:
+    import numpy as np
+
+    columns = np.column_stack([solution.t, *(solution[name] for name in signals)])
+    header = ",".join(["t [s]", *(f"{name} [{solution.observer.units[name]}]" for name in signals)])
+    np.savetxt(place / "signals.csv", columns, delimiter=",", header=header, comments="", fmt="%.12g")
+    if solution.phases:
+        parts = solution.phases[0].modes
+        phases = ((row.start, row.end, *row.modes.values()) for row in solution.phases)
+        write_rows(place / "phases.csv", ("start [s]", "end [s]", *parts), phases)
+        write_rows(place / "events.csv", ("t [s]", "part", "from", "to"), solution.events)
+    write_picture(place / "signals.png", lambda: solution.plot(*signals))
+
+
+COMMAND = Command("run", "simulate: a table on the screen, plots and CSV in DIR", run, arguments)
