@@ -8,24 +8,29 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
-    from shaftwork import reduce, scenes, sizing, studies
-    from shaftwork.components.base import Component, Port, Signal, component
+if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
+    from shaftwork import reduce as reduce, scenes as scenes, sizing as sizing, studies as studies
+    from shaftwork.components.base import (
+        Component as Component,
+        Port as Port,
+        Signal as Signal,
+        component as component,
+    )
     from shaftwork.components.bldc import *
     from shaftwork.components.branches import (
-        ACROSS,
-        INTEGRAL,
-        THROUGH,
-        AcrossLaw,
-        AcrossStore,
-        IdealCoupling,
-        LossyCoupling,
-        ThroughLaw,
-        ThroughStore,
-        across_of,
-        integral_of,
-        rigid,
-        through_of,
+        ACROSS as ACROSS,
+        INTEGRAL as INTEGRAL,
+        THROUGH as THROUGH,
+        AcrossLaw as AcrossLaw,
+        AcrossStore as AcrossStore,
+        IdealCoupling as IdealCoupling,
+        LossyCoupling as LossyCoupling,
+        ThroughLaw as ThroughLaw,
+        ThroughStore as ThroughStore,
+        across_of as across_of,
+        integral_of as integral_of,
+        rigid as rigid,
+        through_of as through_of,
     )
     from shaftwork.components.bucket_wheel import *
     from shaftwork.components.contacts import *
@@ -34,37 +39,56 @@ if TYPE_CHECKING:
     from shaftwork.components.electrical import *
     from shaftwork.components.friction import *
     from shaftwork.components.induction_machine import *
-    from shaftwork.components.laws import Ramp, Step, Table, omega, phi, psi, s, t, u, v
+    from shaftwork.components.laws import (
+        Ramp as Ramp,
+        Step as Step,
+        Table as Table,
+        omega as omega,
+        phi as phi,
+        psi as psi,
+        s as s,
+        t as t,
+        u as u,
+        v as v,
+    )
     from shaftwork.components.loads import *
     from shaftwork.components.lossy_gear import *
     from shaftwork.components.machines import *
-    from shaftwork.components.modes import Leave, Mode, Modes
-    from shaftwork.components.motor_catalogue import motors
+    from shaftwork.components.modes import Leave as Leave, Mode as Mode, Modes as Modes
+    from shaftwork.components.motor_catalogue import motors as motors
     from shaftwork.components.motors import *
-    from shaftwork.components.noise import HeldNoise, SmoothNoise
+    from shaftwork.components.noise import HeldNoise as HeldNoise, SmoothNoise as SmoothNoise
     from shaftwork.components.rotation import *
-    from shaftwork.components.shaft_models import Auto, CentralDifference, Lumped, OneSpring, Rigid, Spectral, Wave
+    from shaftwork.components.shaft_models import (
+        Auto as Auto,
+        CentralDifference as CentralDifference,
+        Lumped as Lumped,
+        OneSpring as OneSpring,
+        Rigid as Rigid,
+        Spectral as Spectral,
+        Wave as Wave,
+    )
     from shaftwork.components.shafts import *
     from shaftwork.components.sources import *
     from shaftwork.components.translation import *
-    from shaftwork.core.domains import ELECTRICAL, ROTATION, TRANSLATION
+    from shaftwork.core.domains import ELECTRICAL as ELECTRICAL, ROTATION as ROTATION, TRANSLATION as TRANSLATION
     from shaftwork.core.errors import (
-        AccuracyWarning,
-        CompileError,
-        MissingExtraError,
-        ModelFileError,
-        NetworkError,
-        NetworkWarning,
-        ParameterError,
-        ShaftworkError,
-        SignalError,
-        SimulationError,
+        AccuracyWarning as AccuracyWarning,
+        CompileError as CompileError,
+        MissingExtraError as MissingExtraError,
+        ModelFileError as ModelFileError,
+        NetworkError as NetworkError,
+        NetworkWarning as NetworkWarning,
+        ParameterError as ParameterError,
+        ShaftworkError as ShaftworkError,
+        SignalError as SignalError,
+        SimulationError as SimulationError,
     )
-    from shaftwork.core.parameters import parameter
-    from shaftwork.pipeline.model import Model
-    from shaftwork.pipeline.network import Network
-    from shaftwork.results.fatigue import SNLine
-    from shaftwork.results.solution import Solution
+    from shaftwork.core.parameters import parameter as parameter
+    from shaftwork.pipeline.model import Model as Model
+    from shaftwork.pipeline.network import Network as Network
+    from shaftwork.results.fatigue import SNLine as SNLine
+    from shaftwork.results.solution import Solution as Solution
 
 __version__ = "0.1.0"
 
