@@ -2,6 +2,7 @@
 
     python docs/generate.py             writes README.md and docs/*.md anew where something has changed
     python docs/generate.py PAGE ...    these pages alone
+    python docs/generate.py --slow ...  with the tables that take minutes
 
 A page is Markdown. Its `python` blocks run from top to bottom in one namespace and in an empty folder; a `text`, `toml`
 or `latex` block right after one holds what it printed. A `console` block holds command lines after "$ " and what they
@@ -21,6 +22,7 @@ from __future__ import annotations
 import contextlib
 import inspect
 import io
+import math
 import os
 import re
 import shlex
@@ -28,6 +30,7 @@ import sys
 import tempfile
 import warnings
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -36,6 +39,7 @@ from shaftwork.cli import main as command_line
 from shaftwork.components import REGISTRY, Component, Port
 from shaftwork.core.parameters import Parameter
 from shaftwork.scenes import SCENES
+from shaftwork.studies.stability import Stability, stability
 
 ROOT = Path(__file__).parents[1]
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
@@ -65,23 +69,31 @@ FAMILIES = (
     "electrical",
 )
 """The modules of components in the order in which they are shown."""
+ROUNDING = 1e-8
+"""Errors below this are not told apart: they are rounding, which differs from one machine to the next."""
 MACHINE = re.compile(r"^\d+(?= steps[,;])|(?<=; energy residual )\S+(?= of the work done)", re.MULTILINE)
 """What the command says of its own arithmetic: steps and the rounding that is left in the energy balance. Both differ
 from one machine to the next; nothing else on a page may."""
 
 
-def remade(page: Path, text: str) -> str:
+def remade(page: Path, text: str, *, slow: bool = False) -> str:
     """The text of a page with everything in it that is made from the code made anew.
 
     Args:
         page: its file, for messages.
         text: the page as it stands.
+        slow: whether what takes minutes is made anew, too.
 
     Raises:
         ValueError: an example prints something that the page does not show.
         Exception: whatever an example raises.
     """
-    text = MADE_PART.sub(lambda match: f"{match['start']}{MADE[match['name']]()}{match['end']}", text)
+
+    def made(match: re.Match[str]) -> str:
+        name = match["name"]
+        return match[0] if name in SLOW and not slow else f"{match['start']}{MADE[name]()}{match['end']}"
+
+    text = MADE_PART.sub(made, text)
     # components that a page defines are forgotten after it
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder), mock.patch.dict(REGISTRY):
         return "".join(_executed(page, text))
@@ -162,15 +174,14 @@ def components() -> dict[str, type[Component]]:
     return dict(sorted(own, key=lambda item: FAMILIES.index(item[1].__module__.rpartition(".")[2])))
 
 
-def component_table() -> str:
-    """One table of all components, a line for each parameter."""
-    rows = ["| component | ports | parameter | unit | bound | default | meaning |", "|---|---|---|---|---|---|---|"]
+def component_list() -> str:
+    """A line for each component: what it is, in the first sentence of its docstring, its ports and parameters."""
+    lines = ["| component | what it is | ports | parameters |", "|---|---|---|---|"]
     for name, cls in components().items():
-        declared = tuple(cls.declared.values()) or (None,)
-        for number, item in enumerate(declared):
-            head = (f"`{name}`", _ports(cls)) if number == 0 else ("", "")
-            rows.append(f"| {' | '.join((*head, *_cells(item)))} |")
-    return "\n".join(rows) + "\n"
+        what = inspect.cleandoc(cls.__doc__ or "").split("\n\n")[0].replace("\n", " ")
+        declared = ", ".join(f"`{item}`" for item in cls.declared)
+        lines.append(f"| [`{name}`](#{name.lower()}) | {what} | {_ports(cls)} | {declared} |")
+    return "\n".join(lines) + "\n"
 
 
 def _ports(cls: type[Component]) -> str:
@@ -225,18 +236,59 @@ def scene_table() -> str:
     return "| scene | what | source | chosen, because not printed there |\n|---|---|---|---|\n" + "".join(rows)
 
 
+@cache
+def extreme_drives() -> Stability:
+    """Every extreme drive with every model and every engine: some minutes."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the table counts them
+        return stability()
+
+
+def stability_models() -> str:
+    """What each model of a shaft does in each case, by the engine auto."""
+    kinds = ("Rigid", "OneSpring", "Lumped", "CentralDifference", "Spectral", "Wave")
+    rows: dict[str, dict[str, str]] = {}
+    for cell in extreme_drives().cells:
+        if cell.engine == "auto":
+            error = "" if math.isnan(cell.error) else " < 1e-08" if cell.error < ROUNDING else f" {cell.error:.0e}"
+            rows.setdefault(cell.case, {})[cell.model.partition("(")[0]] = f"{cell.verdict}{error}"
+    head = f"| case | {' | '.join(f'`{kind}`' for kind in kinds)} |\n|---|{'---|' * len(kinds)}\n"
+    return head + "".join(
+        f"| {case} | {' | '.join(row.get(kind, '') for kind in kinds)} |\n" for case, row in rows.items()
+    )
+
+
+def stability_engines() -> str:
+    """How often each engine comes to which verdict; travelling waves have an engine of their own."""
+    study = extreme_drives()
+    verdicts = [verdict for verdict, count in study.counts.items() if count]
+    lines = [f"| engine | {' | '.join(verdicts)} | no deviation beyond |", f"|---|{'---|' * (len(verdicts) + 1)}"]
+    for engine in study.engines:
+        cells = [c for c in study.cells if c.engine == engine and (c.model.startswith("Wave") == (engine == "wave"))]
+        counts = (sum(cell.verdict == verdict for cell in cells) for verdict in verdicts)
+        largest = max(cell.deviation for cell in cells if not math.isnan(cell.deviation))
+        power = math.ceil(math.log10(max(largest, ROUNDING)))
+        lines.append(f"| `{engine}` | {' | '.join(map(str, counts))} | 1e{power:03d} |")
+    return "\n".join(lines) + "\n"
+
+
 MADE: dict[str, Callable[[], str]] = {
-    "component table": component_table,
+    "component list": component_list,
     "component pages": component_pages,
     "scene table": scene_table,
+    "stability models": stability_models,
+    "stability engines": stability_engines,
 }
+SLOW = ("stability models", "stability engines")
+"""What is made anew only where it is asked for: `python docs/generate.py --slow`, and the tests marked slow."""
 
 
 def main() -> None:
     """Write every page anew that differs from what the code makes of it."""
-    for page in [Path(name).resolve() for name in sys.argv[1:]] or PAGES:
+    slow = "--slow" in sys.argv
+    for page in [Path(name).resolve() for name in sys.argv[1:] if name != "--slow"] or PAGES:
         text = page.read_text(encoding="utf-8")
-        made = remade(page, text)
+        made = remade(page, text, slow=slow)
         if not same(text, made):
             page.write_text(made, encoding="utf-8")
             sys.stdout.write(f"written: {page.relative_to(ROOT)}\n")
