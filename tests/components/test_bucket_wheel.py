@@ -115,3 +115,11 @@ def test_wrong_wheels_are_answered_with_what_there_is(wrong: dict, answer: str) 
     net.add(sw.SpeedSource("drive", omega=1.0), "shaft")
     net.add(sw.BucketWheelLoad("dig", **{"radius": 3.0, "edge": 0.7, **wrong}), "shaft")
     assert any(answer in str(problem) for problem in net.check())
+
+
+@pytest.mark.parametrize("name", ["Gray clay", "grey clay", "GREY  CLAY", "Fault zone", "Transitional Zone"])
+def test_a_soil_is_read_as_the_source_prints_it(name: str) -> None:
+    """Table 1 of the source has capitals, and "gray"."""
+    wheel = sw.BucketWheelLoad("wheel", radius=3.0, edge=0.6, soil=name)
+    assert sw.Soil.read(name) == SOILS[name.lower().replace("gray", "grey").replace("  ", " ")]
+    assert wheel.mean_torque == sw.BucketWheelLoad("wheel", radius=3.0, edge=0.6, soil=sw.Soil.read(name)).mean_torque

@@ -388,3 +388,24 @@ def test_a_stiff_train_of_a_hundred_inertias_is_solved_by_the_sparse_implicit_en
     assert sol.engine == "sundials"
     assert sol.energy_residual < 1e-5
     assert sol["J0.omega"][-1] == pytest.approx(1000 * 2 * math.pi / 60, rel=1e-3)
+
+
+def test_an_angle_that_is_not_recorded_is_refused_with_the_next_step() -> None:
+    net = sw.Network("one mass")
+    net.add(sw.TorqueSource("motor", tau=2.0), "rotor")
+    net.add(sw.Inertia("J1", J=2.0), "rotor")
+    for angles in ("J1", ["J1"]):
+        with pytest.raises(sw.ParameterError, match=r"record the angle of 'J1'.*net\.compile\(angles=\['J1'\]\)"):
+            net.compile().simulate(1.0, angles=angles)
+        sol = net.compile(angles=angles).simulate(1.0, angles=angles)
+        assert sol["J1.phi"][-1] == pytest.approx(0.5, rel=1e-7)  # t^2 / 2 to the tolerance of the run
+
+
+def test_options_of_the_compilation_are_taken_by_simulate_of_a_network() -> None:
+    net = sw.scenes.shaft_chain()
+    short = sw.Network("shaft")
+    short.add(sw.TorqueSource("pull", tau=1.0), "a")
+    short.add(sw.Shaft("line", length=1.0, diameter=0.02, model=sw.Lumped(2)), "a", "b")
+    short.add(sw.Inertia("J", J=1.0), "b")
+    assert "line c 1.tau" in short.simulate(0.01, expand=True)
+    assert "c1.tau" in net.simulate(0.001, expand=True)

@@ -132,3 +132,33 @@ def test_a_solution_says_what_it_is(sol: sw.Solution) -> None:
     assert sol.engine in repr(sol)
     assert sol.events == ((pytest.approx(0.0139, abs=1e-4), "load", "stuck", "slipping forward"),)
     assert [row.name for row in sol.phases] == ["load stuck", "load slipping forward"]
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("J1", "'J1' has: J1.omega, J1.tau, J1.power, J1.energy."),
+        ("rotor", "'rotor' has: rotor.omega."),
+        ("J1.tua", "'J1' has: J1.omega"),
+        ("J11", "There is no part or node 'J11'. Close to it: J1"),
+        ("J11.omega", "There is no part or node 'J11'. Close to it: J1"),
+    ],
+)
+def test_a_wrong_name_is_answered_with_what_the_part_has(name: str, words: str) -> None:
+    net = sw.Network("two masses")
+    net.add(sw.TorqueSource("motor", tau=10.0), "rotor")
+    net.add(sw.Inertia("J1", J=2.0), "rotor")
+    net.add(sw.Spring("shaft", c=1e4, d=1.0), "rotor", "wheel")
+    net.add(sw.Inertia("J2", J=3.0), "wheel")
+    sol, modes = net.simulate(t_end=0.1), net.modes()
+    for read in (
+        lambda: sol[name],
+        lambda: sol.plot(name),
+        lambda: sol.to_pandas(name),
+        lambda: modes.shapes[name],
+        lambda: sw.studies.sweep(net, {"shaft.c": [1e4, 2e4]}, t_end=0.1, measures=[f"max {name}"]),
+    ):
+        with pytest.raises(sw.SignalError) as caught:
+            read()
+        assert f"No quantity '{name}' in 'two masses" in str(caught.value)
+        assert words.removesuffix(".") in str(caught.value)

@@ -41,13 +41,13 @@ class Soil:
 
     @classmethod
     def read(cls, text: Any) -> Soil:
-        """A soil from its name, such as "grey clay", or from its text "Soil(mean=69200.0, std=15800.0)".
+        """A soil from its name, such as "grey clay" or "Gray Clay", or from its text "Soil(mean=69200.0, std=15800.0)".
 
         Raises:
             ParameterError: it is no soil.
         """
-        if isinstance(text, str) and text in SOILS:
-            return SOILS[text]
+        if isinstance(text, str) and (name := " ".join(text.lower().split()).replace("gray", "grey")) in SOILS:
+            return SOILS[name]
         try:
             call = ast.parse(text, mode="eval").body
             if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == cls.__name__:

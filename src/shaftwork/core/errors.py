@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import Literal
 
 Severity = Literal["error", "warning", "note"]
@@ -95,3 +97,24 @@ class SignalError(ShaftworkError, KeyError):
 
     def __str__(self) -> str:
         return str(self.args[0])
+
+
+def no_quantity(name: object, title: str, names: Iterable[str]) -> SignalError:
+    """The error of a quantity that is not there: what its part has, or else which parts are like it.
+
+    Args:
+        name: what was asked for, "shaft.tua" or "shaft".
+        title: of the network.
+        names: of all quantities, "part.quantity".
+    """
+    by_owner: dict[str, list[str]] = {}
+    for other in names:
+        by_owner.setdefault(other.rpartition(".")[0], []).append(other)
+    text = str(name)
+    owner = text if text in by_owner else text.rpartition(".")[0] or text
+    if owner in by_owner:
+        there = f"'{owner}' has: {', '.join(by_owner[owner])}."
+    else:
+        close = get_close_matches(owner, by_owner, n=3) or list(by_owner)[:12]
+        there = f"There is no part or node '{owner}'. Close to it: {', '.join(close)}."
+    return SignalError(f"No quantity '{name}' in '{title}'. {there}")

@@ -95,8 +95,10 @@ class _Examination:
         self._dotted: dict[str, None] = {}
         self._faults = Shared(lambda part, values, _: tuple(_law_faults(part, values)))
 
-    def report(self, kind: str, message: str, hint: str, placed: Placed | None = None) -> None:
-        """Put down an error, with the part and the nodes that it concerns."""
+    def report(self, kind: str, message: str, hint: str, placed: Placed | None = None, parameter: str = "") -> None:
+        """Put down an error, with the part and the nodes that it concerns, and its place in a model file."""
+        if placed is not None and placed.origin is not None:
+            message = f"{message.removesuffix('.')} ({placed.origin.of(parameter)})."
         parts = (str(placed.part.name),) if placed else ()
         nodes = tuple(node for node in placed.nodes if isinstance(node, str) and node) if placed else ()
         self.problems.append(Problem(kind, message, hint, parts, tuple(dict.fromkeys(nodes))))
@@ -204,7 +206,7 @@ class _Examination:
             return None
         for name, what, hint in faults:
             kind = "law" if name else "component"
-            self.report(kind, f"{title(part)}: {f'{name} ' if name else ''}{what}.", hint, placed)
+            self.report(kind, f"{title(part)}: {f'{name} ' if name else ''}{what}.", hint, placed, name)
         if any(not fault.parameter for fault in faults):
             return None
         usable: dict[str, Any] = {fault.parameter: 1.0 for fault in faults}
@@ -217,7 +219,7 @@ class _Examination:
         unit = "" if declared.record is not None else unit
         shown = "" if kind == "wrong unit" else f" = {reprlib.repr(given)}"
         hint = f"Give {name} ({declared.meaning}){unit}{f', {declared.bounds}' if declared.bounds else ''}."
-        self.report(kind, f"{title(part)}: {name}{shown} {objection}.", hint, placed)
+        self.report(kind, f"{title(part)}: {name}{shown} {objection}.", hint, placed, name)
 
     def _faults_of(self, part: Component, values: Mapping[str, Any]) -> tuple[_Fault, ...]:
         """Faults of the laws, found once for parts that have the same."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from shaftwork.components.base import Component
@@ -14,6 +14,23 @@ REFERENCE = "ground"
 
 
 @dataclass(frozen=True)
+class Origin:
+    """Where a part stands in a model file.
+
+    Args:
+        file: its path.
+        lines: that of the part under "", and that of each parameter.
+    """
+
+    file: str
+    lines: Mapping[str, int]
+
+    def of(self, parameter: str = "") -> str:
+        """The place of a parameter in words, "crane.toml, line 8"; of the part where it is not in the file."""
+        return f"{self.file}, line {self.lines.get(parameter, self.lines[''])}"
+
+
+@dataclass(frozen=True)
 class Placed:
     """A component and the nodes at its ports, in the order of the ports.
 
@@ -21,11 +38,13 @@ class Placed:
         part: the component.
         nodes: one for each port.
         choices: of a part with modes, what is chosen for each of its elements; by default its first modes.
+        origin: where it stands in a model file, if it comes from one.
     """
 
     part: Component
     nodes: tuple[str, ...]
     choices: tuple[Choice, ...] = ()
+    origin: Origin | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True)

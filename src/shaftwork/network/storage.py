@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import reprlib
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from shaftwork.core.errors import ModelFileError, ParameterError
 from shaftwork.network import expressions, textfile
 from shaftwork.network.expression_reader import parse
 from shaftwork.network.grammar import fault_of, tokens_of
-from shaftwork.network.netlist import Netlist, Placed
+from shaftwork.network.netlist import Netlist, Origin, Placed
 from shaftwork.network.textfile import ModelText, PartText
 from shaftwork.network.wording import title
 
@@ -48,7 +49,7 @@ def read_netlist(path: str | Path) -> Netlist:
     model = textfile.read(_path_of(path))
     try:
         _refuse_endless_laws(model)
-        return Netlist(model.name, tuple(_placed(part) for part in model.parts))
+        return Netlist(model.name, tuple(_placed(part, str(path)) for part in model.parts))
     except ModelFileError as error:
         raise ModelFileError(f"{path}: {error}") from None
 
@@ -61,25 +62,25 @@ def _path_of(path: str | Path) -> Path:
 
 
 def _refuse_endless_laws(model: ModelText) -> None:
-    laws = [
-        value
-        for part in model.parts
-        for name, value in part.parameters.items()
-        if isinstance(value, str) and not _is_record(REGISTRY.get(part.type), name)
-    ]
     words = 0
-    for law in laws:
-        words += len(tokens_of(law))
-        if words > MAXIMUM_LAW_WORDS:
-            raise ModelFileError(
-                f"The laws of the file have more than {MAXIMUM_LAW_WORDS} words together ({len(laws)} laws). "
-                f"Give curves as tables, or build the network in Python."
-            )
+    for part in model.parts:
+        for name, value in part.parameters.items():
+            if not isinstance(value, str) or not _is_law(REGISTRY.get(part.type), name):
+                continue
+            try:
+                words += len(tokens_of(value))
+            except ModelFileError as error:
+                raise _fault(part, name, f"{name}: {error}") from None
+            if words > MAXIMUM_LAW_WORDS:
+                raise ModelFileError(
+                    f"The laws of the file have more than {MAXIMUM_LAW_WORDS} words together. Give curves as tables, "
+                    "or build the network in Python."
+                )
 
 
-def _is_record(cls: type[Component] | None, name: str) -> bool:
-    """Whether a parameter is a record with a text of its own, such as the model of a shaft."""
-    return cls is not None and name in cls.declared and cls.declared[name].record is not None
+def _is_law(cls: type[Component] | None, name: str) -> bool:
+    """Whether a text of this parameter is read as a law."""
+    return cls is not None and name in cls.declared and cls.declared[name].law
 
 
 def _part_text(placed: Placed) -> PartText:
@@ -113,31 +114,44 @@ def _written(part: Component, name: str) -> Any:
         raise ModelFileError(f"{title(part)}: {name} cannot be saved: {error}") from None
 
 
-def _placed(part: PartText) -> Placed:
+def _placed(part: PartText, path: str) -> Placed:
     cls = REGISTRY.get(part.type)
     if cls is None:
         close = get_close_matches(part.type, REGISTRY, n=3) or tuple(REGISTRY)
-        raise ModelFileError(
-            f"Part '{part.name}': there is no component '{part.type}'. Close to it: {', '.join(close)}. "
-            f"A component of your own must be imported before the file is loaded."
+        raise _fault(
+            part,
+            "type",
+            f"there is no component '{part.type}'. Close to it: {', '.join(close)}. "
+            "A component of your own must be imported before the file is loaded.",
         )
     values = {name: _read(part, cls, name, value) for name, value in part.parameters.items()}
     try:
-        return Placed(cls(part.name, symbol=part.symbol, **values), part.nodes)
+        made = cls(part.name, symbol=part.symbol, **values)
     except ParameterError as error:
-        raise ModelFileError(str(error)) from None
+        reason = str(error).removeprefix(f"{part.type} '{part.name}': ")
+        named = [name for name in values if name not in cls.declared] or [reason.split(maxsplit=1)[0]]
+        raise _fault(part, named[0], reason) from None
+    return Placed(made, part.nodes, origin=Origin(path, part.lines))
 
 
 def _read(part: PartText, cls: type[Component], name: str, value: Any) -> Any:
-    if not isinstance(value, str) or _is_record(cls, name):
+    """A value of the file as the component takes it."""
+    declared = cls.declared.get(name)
+    if declared is None or declared.record is not None or not isinstance(value, str):
         return value
-    if name not in cls.declared or not cls.declared[name].law:
-        raise ModelFileError(
-            f"Part '{part.name}': {name} = '{value}' must be a number. The laws of {part.type} are: "
-            f"{', '.join(key for key, declared in cls.declared.items() if declared.law) or 'none'}."
-        )
+    if not declared.law:
+        unit = "pure number" if declared.unit == "1" else f"number in {declared.unit}"
+        reason = f"{name} = {reprlib.repr(value)} must be a {unit} ({declared.meaning}), written without quotes"
+        raise _fault(part, name, f"{reason} and without a unit, such as {name} = 1.0.")
     try:
         law = parse(value)
         return law if law.free_symbols else float(law)
     except ModelFileError as error:
-        raise ModelFileError(f"Part '{part.name}', {name}: {error}") from None
+        raise _fault(part, name, f"{name}: {error}") from None
+
+
+def _fault(part: PartText, key: str, reason: str) -> ModelFileError:
+    """What is wrong with a part, with its line in the file and, of a law, the unit of its values."""
+    declared = getattr(REGISTRY.get(part.type), "declared", {}).get(key)
+    unit = f" It is a law for {key} in {declared.unit}." if declared is not None and declared.law else ""
+    return ModelFileError(f"line {part.lines.get(key, part.lines[''])}, {part.type} '{part.name}': {reason}{unit}")

@@ -69,6 +69,7 @@ class PartText:
         nodes: the nodes that it is wired to, in the order of its ports.
         parameters: its parameters in the order of the file; an int stays an int, a float a float.
         symbol: subscript in LaTeX, empty for none, or None for the name.
+        lines: of the file, counted from 1: that of its header under "", and that of each key.
 
     Raises:
         ModelFileError: a field could not stand in a file.
@@ -79,6 +80,7 @@ class PartText:
     nodes: tuple[str, ...]
     parameters: Mapping[str, Value] = field(default_factory=dict)
     symbol: str | None = None
+    lines: Mapping[str, int] = field(default_factory=dict, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         _check_name("type", self.type)
@@ -170,9 +172,9 @@ def _text_of(path: Path) -> str:
         raise ModelFileError(f"{path}, line {line}: is not UTF-8 ({error.reason}). Save it as UTF-8.") from None
 
 
-def _part_lines(text: str) -> list[int]:
-    """Line of each part's header, counted from 1, after a check that every word is one of the format."""
-    lines: list[int] = []
+def _part_lines(text: str) -> list[dict[str, int]]:
+    """Lines of each part's header and keys, counted from 1, after a check that every word is one of the format."""
+    parts: list[dict[str, int]] = []
     line, depth, starts, words = 1, 0, True, 0
     for match in _WORD.finditer(text):
         kind = match.lastgroup
@@ -181,9 +183,11 @@ def _part_lines(text: str) -> list[int]:
             continue
         words += 1
         if kind == "header" and starts:
-            lines.append(line)
+            parts.append({"": line})
         elif fault := _word_fault(str(kind), match[str(kind)], starts=starts):
             raise ModelFileError(f"line {line}: {fault}")
+        elif starts and kind == "bare" and parts:
+            parts[-1][match[kind]] = line
         depth += (kind == "open") - (kind == "close")
         if depth > MAXIMUM_DEPTH:
             raise ModelFileError(
@@ -192,7 +196,7 @@ def _part_lines(text: str) -> list[int]:
         if words > MAXIMUM_WORDS:
             raise ModelFileError(f"line {line}: there are more than {MAXIMUM_WORDS} words. Split the model.")
         starts = starts and kind == "comment"
-    return lines
+    return parts
 
 
 _USE = (
@@ -247,10 +251,10 @@ def _model(text: str, *, is_file: bool) -> ModelText:
     parts = tables.get("part", [])
     if not isinstance(parts, list) or len(parts) != len(lines):
         raise ModelFileError(f"part is {_shown(parts)}. {_USE}")
-    return ModelText(name, tuple(_part(table, line, text) for table, line in zip(parts, lines, strict=True)))
+    return ModelText(name, tuple(_part(table, place) for table, place in zip(parts, lines, strict=True)))
 
 
-def _part(table: dict[str, Any], line: int, text: str) -> PartText:
+def _part(table: dict[str, Any], lines: Mapping[str, int]) -> PartText:
     fields: dict[str, Any] = {key: table.get(key) for key in _RESERVED}
     kind, name, nodes, symbol = fields.values()
     try:
@@ -259,20 +263,10 @@ def _part(table: dict[str, Any], line: int, text: str) -> PartText:
             for key, value in table.items()
             if key not in _RESERVED
         }
-        return PartText(kind, name, tuple(nodes) if isinstance(nodes, list) else nodes, parameters, symbol)
+        return PartText(kind, name, tuple(nodes) if isinstance(nodes, list) else nodes, parameters, symbol, lines)
     except ModelFileError as error:
-        place = _line_of(str(error).split(maxsplit=1)[0], line, text)
-        raise ModelFileError(f"line {place}, part {_shown(name) if name else 'without a name'}: {error}") from None
-
-
-def _line_of(key: str, header: int, text: str) -> int:
-    """Line of a key of the part whose header stands in a line; that line where the part has no such key."""
-    for number, row in enumerate(text.split("\n")[header:], header + 1):
-        if row.lstrip().startswith("[["):
-            break
-        if row.partition("=")[0].strip() == key:
-            return number
-    return header
+        line = lines.get(str(error).split(maxsplit=1)[0], lines[""])
+        raise ModelFileError(f"line {line}, part {_shown(name) if name else 'without a name'}: {error}") from None
 
 
 def _table(key: str, value: dict[str, Any]) -> Table:

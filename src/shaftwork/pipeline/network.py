@@ -156,10 +156,11 @@ class Network(NetworkBuilder):
         *,
         angles: Sequence[str] = (),
         algebraic_loops: Literal["refuse", "solve"] = "refuse",
+        expand: bool = False,
         **options: Any,
     ) -> Solution:
         """Compile and integrate; the options are those of `compile` and of `Model.simulate`."""
-        return self.compile(angles=angles, algebraic_loops=algebraic_loops).simulate(t_end, **options)
+        return self.compile(angles=angles, algebraic_loops=algebraic_loops, expand=expand).simulate(t_end, **options)
 
     def modes(
         self,
@@ -252,8 +253,7 @@ class Network(NetworkBuilder):
     @classmethod
     def _of(cls, netlist: Netlist) -> Self:
         made = cls(netlist.name)
-        for placed in netlist.placed:
-            made.add(placed.part, *placed.nodes)
+        made._placed += netlist.placed
         return made
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy import sparse
 
-from shaftwork.core.errors import MissingExtraError, ParameterError, SignalError
+from shaftwork.core.errors import MissingExtraError, ParameterError, no_quantity
 from shaftwork.core.parameters import in_si, whole
 from shaftwork.results.eigenvalues import eigenmodes
 from shaftwork.results.observer import Array
@@ -115,9 +115,7 @@ class _Shapes(Mapping[str, Complex]):
 
     def __getitem__(self, name: str) -> Complex:
         if name not in self._slopes.units and name not in self._slopes.profiles:
-            own = [known for known in self._slopes.units if known.rpartition(".")[0] == str(name).rpartition(".")[0]]
-            listed = ", ".join(own or list(self._slopes.units)[:12])
-            raise SignalError(f"No quantity '{name}' in '{self._title}'. There are: {listed}.")
+            raise no_quantity(name, self._title, (*self._slopes.units, *self._slopes.profiles))
         return np.asarray(self._read(name))
 
     def __contains__(self, name: object) -> bool:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import reprlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
 
-from shaftwork.core.errors import MissingExtraError, SignalError
+from shaftwork.core.errors import MissingExtraError, SignalError, no_quantity
 from shaftwork.results.energy import EnergyBalance, energy_balance
 from shaftwork.results.fatigue import Damage, SNLine
 from shaftwork.results.life import damage_of, damages, load_cycles
@@ -217,16 +216,11 @@ class Solution:
             )
         if name in units:
             return name
+        error = no_quantity(name, self.name, units)
         owner, _, quantity = name.rpartition(".")
-        if own := [other for other in units if other.rpartition(".")[0] == owner]:
-            hint = f"'{owner}' has: {', '.join(own)}."
-            if quantity in ("phi", "s", "psi"):
-                hint += f" An angle is recorded when asked for: simulate(angles=['{owner}'])."
-        else:
-            owners = tuple(dict.fromkeys(other.rpartition(".")[0] for other in units))
-            close = get_close_matches(owner, owners, n=3) or owners[:12]
-            hint = f"There is no part or node '{owner}'. Close to it: {', '.join(close)}."
-        raise SignalError(f"No quantity '{name}' in '{self.name}'. {hint}")
+        if quantity in ("phi", "s", "psi") and any(other.rpartition(".")[0] == owner for other in units):
+            raise SignalError(f"{error} An angle is recorded when asked for: net.compile(angles=['{owner}']).")
+        raise error
 
     def __repr__(self) -> str:
         return (

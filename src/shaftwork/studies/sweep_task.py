@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from shaftwork.codegen.observer import ModelObserver
 from shaftwork.components.base import Component
-from shaftwork.core.errors import CompileError, NetworkError, ParameterError, ShaftworkError, SignalError
+from shaftwork.core.errors import CompileError, NetworkError, ParameterError, ShaftworkError, no_quantity
 from shaftwork.integrate.choice import available
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.network import Network
@@ -107,11 +107,7 @@ class Worker:
         read = [reader.quantity for reader in self._task.measures.values() if isinstance(reader, Measure)]
         for quantity in (*read, *map(str, initial)):
             if quantity not in {**observer.units, **observer.profiles}:
-                owner = quantity.rpartition(".")[0]
-                own = [name for name in observer.units if name.rpartition(".")[0] == owner]
-                owners = dict.fromkeys(name.rpartition(".")[0] for name in observer.units)
-                there = f"'{owner}' has: {', '.join(own)}" if own else f"Parts and nodes are: {', '.join(owners)}"
-                raise SignalError(f"No quantity '{quantity}' in '{self._model.name}'. {there}.")
+                raise no_quantity(quantity, self._model.name, observer.units)
 
     def _side_by_side(self) -> Ensemble | None:
         task, options = self._task, self._task.options
