@@ -31,8 +31,6 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace, say: Say) -> Data:
     """The motion as a table, and as curves and CSV in a folder."""
-    from shaftwork.results.summary import summary
-
     net, scene = load(options)
     t_end = end_of(options, scene)
     folder = Folder(options.out, FILES, options.line) if options.out else None
@@ -44,7 +42,7 @@ def run(options: Namespace, say: Say) -> Data:
     say(f"engine {solution.engine}: {solution.why}")
     counts = ", ".join(f"{count} {name}" for name, count in solution.statistics.items())
     say(f"{counts}; energy residual {solution.energy_residual:.1e} of the work done\n")
-    say(summary(solution, signals))
+    say(solution.extremes.table(signals))
     _say_phases(solution, say)
     if folder:
         with folder.new_files() as place:

@@ -26,6 +26,8 @@ OWN_INTERVALS = 500
 DENSE_RATE, SPARSE_CALL, SPARSE_RATE = 1e10, 1e-5, 5e8
 # Products with A that the truncated Taylor series of `expm_multiply` takes for a unit of (norm of A) * time.
 TAYLOR_PRODUCTS = 6.0
+# Of the first interval after a jump of an input: the shortest is still told from rounding.
+MOST_HALVINGS = 40
 # States up to which inputs that are no straight lines are followed mode by mode.
 LARGEST_DRIVEN = 600
 # A forcing may differ from a straight line by this part of its size before it is refused.
@@ -71,13 +73,13 @@ def solve(problem: Problem) -> Trajectory:
         x = span.end
         if not np.isfinite(x).all():
             raise failure(problem, "exact", piece.end, x, "the motion is unbounded")
-    dense = _ExactDense(tuple(spans))
+    dense = _ExactDense(tuple(spans), system.norm)
     if problem.t_eval is None:
         t, states = both_sides(problem, [span.times for span in spans], [span.at(span.times) for span in spans])
     else:
         t = np.asarray(problem.t_eval, dtype=float)
         states = dense(t)
-    return Trajectory(t, states, dense, {"steps": dense.steps.size - 1})
+    return Trajectory(t, states, dense, {"steps": sum(span.times.size - 1 for span in spans)})
 
 
 def drivable(problem: Problem) -> bool:
@@ -209,15 +211,26 @@ class _Span:
 
 
 class _ExactDense:
-    """The motion at any time of the run."""
+    """The motion at any time of the run.
 
-    def __init__(self, spans: tuple[_Span, ...]) -> None:
-        self._spans = spans
+    Args:
+        spans: the pieces.
+        rate: no mode is faster, 1/s.
+    """
+
+    def __init__(self, spans: tuple[_Span, ...], rate: float) -> None:
+        self._spans, self._rate = spans, rate
         self._starts = np.array([span.times[0] for span in spans])
 
     @property
     def steps(self) -> Array:
-        return np.unique(np.concatenate([span.times for span in self._spans]))
+        """The nodes, and ever longer steps after the start of a piece: what fades fast there lies between some."""
+        return np.unique(np.concatenate([self._graded(span.times) for span in self._spans]))
+
+    def _graded(self, nodes: Array) -> Array:
+        first = float(nodes[1] - nodes[0])
+        halvings = int(np.clip(np.ceil(np.log2(max(1.0, self._rate * first))), 0, MOST_HALVINGS))
+        return np.concatenate([nodes[:1] + first * 0.5 ** np.arange(halvings, 0, -1), nodes])
 
     def __call__(self, times: Array) -> Array:
         times = np.atleast_1d(np.asarray(times, dtype=float))

@@ -5,18 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from shaftwork.core.errors import ParameterError, SignalError
 from shaftwork.results.fatigue import Damage, SNLine, damage
-from shaftwork.results.observer import Array
 from shaftwork.results.rainflow import Rainflow, rainflow
 
 if TYPE_CHECKING:
     from shaftwork.results.solution import Solution
-
-BLOCK = 50_000
-"""Times that are read at once."""
 
 
 def load_cycles(solution: Solution, name: str, place: int | None, smallest: float) -> Rainflow:
@@ -35,10 +29,7 @@ def load_cycles(solution: Solution, name: str, place: int | None, smallest: floa
     else:
         raise SignalError(f"'{name}' is not read along a part. Leave out place={place!r}.")
 
-    def read(times: Array) -> Array:
-        blocks = (solution.at(times[first : first + BLOCK])[name] for first in range(0, len(times), BLOCK))
-        return np.concatenate([block if place is None else block[:, place] for block in blocks])
-
+    read = solution.reader.quantity(name, place)
     return rainflow(read, solution.steps, title=solution.name, name=title, unit=unit, smallest=smallest)
 
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from shaftwork.core.errors import ParameterError
+from shaftwork.results.course import Read
 from shaftwork.results.fatigue import SNLine
 from shaftwork.results.observer import Array
 from shaftwork.results.quadrature import Panels, integrate
 from shaftwork.results.solution import Solution
-from shaftwork.results.turning import Read, turning_points
 
 KINDS: Mapping[str, str] = {
     "max": "the largest value",
@@ -24,8 +24,6 @@ KINDS: Mapping[str, str] = {
     "damage": "the share of the life that the motion takes, with `sn`",
 }
 """What a measure may say of a quantity."""
-BLOCK = 50_000
-"""Times that are read at once."""
 SMALLEST = 1e-6
 """Ups and downs of less than this part of the range make no peak."""
 
@@ -76,23 +74,13 @@ class Measure:
             return solution.damage(self.quantity, sn=(sn or {})[self.quantity]).damage
         if self.kind == "end":
             return _worst(np.atleast_2d(solution.at([solution.steps[-1]])[self.quantity]))
-        count = len(solution.places.get(self.quantity, (0,)))
-        along = self.quantity in solution.places
-        return max((self._at(solution, place if along else None) for place in range(count)), key=self._rank)
-
-    def _rank(self, value: float) -> float:
-        return -value if self.kind == "min" else abs(value) if self.kind == "mean" else value
-
-    def _at(self, solution: Solution, place: int | None) -> float:
-        def read(times: Array) -> Array:
-            blocks = (solution.at(times[k : k + BLOCK])[self.quantity] for k in range(0, len(times), BLOCK))
-            return np.concatenate([block if place is None else block[:, place] for block in blocks])
-
-        if self.kind in ("mean", "rms"):
-            return _mean(read, solution.steps, 2 if self.kind == "rms" else 1)
-        values = turning_points(read, solution.steps, smallest=SMALLEST).values
-        picked = {"max": values.max, "min": values.min, "peak": np.abs(values).max}[self.kind]()
-        return float(picked)
+        if self.kind in ("max", "min", "peak"):
+            least, most = solution.extremes[self.quantity]
+            return float({"max": most, "min": least, "peak": max(most, -least)}[self.kind])
+        places = range(len(solution.places.get(self.quantity, ()))) or (None,)
+        power = 2 if self.kind == "rms" else 1
+        means = (_mean(solution.reader.quantity(self.quantity, place), solution.steps, power) for place in places)
+        return max(means, key=abs)
 
 
 def _worst(values: Array) -> float:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shaftwork.results.observer import Array
 
@@ -74,8 +76,8 @@ class Panels:
         """(p, 8) derivatives by time of the polynomials through values (p, 8)."""
         return np.asarray(values @ _SLOPES.T * 2 / self.length[:, None])
 
-    def taken(self, which: Array) -> Panels:
-        """Some of them, marked."""
+    def taken(self, which: NDArray[Any]) -> Panels:
+        """Some of them, marked or numbered."""
         return Panels(self.start[which], self.end[which])
 
 

@@ -9,8 +9,9 @@ import numpy as np
 
 from shaftwork.core.errors import MissingExtraError, ParameterError
 from shaftwork.core.parameters import in_si, whole
+from shaftwork.results.course import Read
 from shaftwork.results.observer import Array
-from shaftwork.results.turning import Read, TurningPoints, turning_points
+from shaftwork.results.turning import TurningPoints, turning_points
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,10 +12,12 @@ import numpy as np
 
 from shaftwork.core.errors import MissingExtraError, SignalError, no_quantity
 from shaftwork.results.energy import EnergyBalance, energy_balance
+from shaftwork.results.extremes import Extreme, Extremes
 from shaftwork.results.fatigue import Damage, SNLine
 from shaftwork.results.life import damage_of, damages, load_cycles
 from shaftwork.results.observer import Array, Dense, Observer
 from shaftwork.results.rainflow import SMALLEST, Rainflow
+from shaftwork.results.reader import Reader
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -131,6 +133,34 @@ class Solution:
             )
         fields = {name: getattr(self, name) for name in self.__dataclass_fields__}
         return Solution(**(fields | {"t": times, "x": self.dense(times)}))
+
+    @cached_property
+    def reader(self) -> Reader:
+        """Reads quantities at any times, many of them at the same times."""
+        return Reader(self)
+
+    @cached_property
+    def extremes(self) -> Extremes:
+        """Minimum and maximum of every quantity, by name, each searched when it is first asked for."""
+        return Extremes(self)
+
+    def max(self, name: str) -> Extreme:
+        """The largest value of a quantity, such as "shaft.tau", and its time; along a part that of the worst place.
+
+        It is that of the motion, from the dense output, not of the output times.
+
+        Raises:
+            SignalError: there is no such quantity.
+        """
+        return self.extremes[name][1]
+
+    def min(self, name: str) -> Extreme:
+        """The smallest value of a quantity, as `max`.
+
+        Raises:
+            SignalError: there is no such quantity.
+        """
+        return self.extremes[name][0]
 
     @cached_property
     def energy(self) -> EnergyBalance:

@@ -1,0 +1,175 @@
+"""A quantity over a motion as polynomials: panels of time are parted until polynomials of degree 7 follow it.
+
+Law: a panel's polynomial goes through the values at Lobatto's eight points. Where it follows the quantity its Chebyshev
+coefficients fall, and the last of them say what it misses. Source: Trefethen, Approximation Theory and Approximation
+Practice, chapters 3 and 8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
+
+from shaftwork.results.observer import Array
+from shaftwork.results.quadrature import NODES, SHARE, Panels
+
+Read = Callable[[Array], Array]
+"""From ascending times (k,) to the values of a quantity there."""
+Mask = NDArray[np.bool_]
+
+ROUGH, FINE, EVEN = 1e-3, 1e-9, 1e-6
+"""Of the range: what a polynomial may miss anywhere, where it may hold an extreme, and where all turns are wanted.
+
+A turn is read where the polynomial has it, so its height is right to the square of these.
+"""
+TAIL, SAFETY = 3, 8.0
+"""So many last coefficients say what a polynomial misses, with this factor: those of noise are as large as all."""
+CLOSE, SHAKES = 1e-6 * np.arange(6), 20.0
+"""Of a panel: times so close that only rounding bends what is read there; misses up to so many times this are noise."""
+ROUNDINGS = 100 * float(np.finfo(float).eps)
+"""Of the largest value: what rounding alone makes a polynomial miss."""
+SHORTEST = 16
+"""Rounding units of time: a panel so short holds a jump, and its ends are the two sides of it."""
+MOST = 2_000_000
+"""Panels of a course, which take 128 MB; where a motion asks for more, as mere noise does, the rest stays rough."""
+LOOKS = np.cos(np.pi * np.arange(32, -1, -1) / 32)
+"""Where in a panel, from -1 to 1, its polynomial is looked at."""
+NEWTON = 5
+"""Steps to a turn between two looks."""
+
+_DEGREE = len(NODES) - 1
+_TAILS = np.linalg.inv(chebyshev.chebvander(NODES, _DEGREE))[-TAIL:]
+_POWERS = np.linalg.inv(np.vander(NODES, increasing=True))
+_SLOPES = _POWERS[1:] * np.arange(1, _DEGREE + 1)[:, None]
+_BENDS = _SLOPES[1:] * np.arange(1, _DEGREE)[:, None]
+_VALUES_THERE = np.vander(LOOKS, _DEGREE + 1, increasing=True) @ _POWERS
+_SLOPES_THERE = np.vander(LOOKS, _DEGREE, increasing=True) @ _SLOPES
+_BETWEEN = 1.0 / np.cos(0.5 * np.pi * _DEGREE / (len(LOOKS) - 1))
+"""No polynomial of this degree is larger between the looks by more than this factor (Ehlich and Zeller, 1964)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A quantity as polynomials.
+
+    Args:
+        read: the quantity itself.
+        panels: ascending, without gaps.
+        values: (p, 8) at their nodes.
+        end: value at the very end.
+    """
+
+    read: Read
+    panels: Panels
+    values: Array
+    end: float
+
+    @property
+    def mean(self) -> float:
+        """Over time."""
+        return float(self.panels.integrals(self.values).sum() / self.panels.length.sum())
+
+    def extremes(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Time and value of the first minimum, and of the first maximum; on either side of a jump too."""
+        times, values = self.points(_may_hold_extremes(self.values))
+        low, high = int(values.argmin()), int(values.argmax())
+        return (float(times[low]), float(values[low])), (float(times[high]), float(values[high]))
+
+    def points(self, chosen: Mask | None = None) -> tuple[Array, Array]:
+        """Times and values, ascending: the nodes, and the turns between them in all panels or in those chosen."""
+        rows = np.arange(len(self.values)) if chosen is None else np.flatnonzero(chosen)
+        slopes = np.sign(self.values[rows] @ _SLOPES_THERE.T)
+        which, place = np.nonzero(slopes[:, :-1] * slopes[:, 1:] < 0)
+        rows = rows[which]
+        at = _turns(self.values[rows], LOOKS[place], LOOKS[place + 1])
+        turns = self.panels.start[rows] + self.panels.length[rows] * (at + 1) / 2
+        times, values = np.append(self.panels.times, self.panels.end[-1]), np.append(self.values, self.end)
+        if len(turns):
+            times, values = np.append(times, turns), np.append(values, self.read(turns))
+            order = np.argsort(times, kind="stable")
+            times, values = times[order], values[order]
+        return times, values
+
+
+def course(read: Read, steps: Array, *, even: bool = False) -> Course:
+    """A quantity as polynomials that are fine where it may be largest or smallest, and rough elsewhere.
+
+    Args:
+        read: the quantity.
+        steps: (s,) times between which it is smooth; kinks and jumps elsewhere are closed in by parting.
+        even: whether they are to be as good everywhere.
+    """
+    edges = np.unique(steps)
+    panels = Panels(edges[:-1], edges[1:])
+    shortest = SHORTEST * np.spacing(np.abs(edges).max())
+    settled: list[tuple[Panels, Array]] = []
+    end_value = float(read(edges[-1:])[0])
+    low, high, count = end_value, end_value, 0
+    while True:
+        values = read(panels.times.ravel()).reshape(-1, len(NODES))
+        low, high = min(low, float(values.min())), max(high, float(values.max()))
+        count += len(values)
+        size, miss = high - low, _missed(values) - ROUNDINGS * max(-low, high)
+        rough = miss > (EVEN if even else ROUGH) * size
+        if not even:
+            rough |= (miss > FINE * size) & _may_hold_extremes(values, low, high)
+        parted = np.flatnonzero(rough & (panels.length > shortest) & (count < MOST))
+        parted = parted[miss[parted] > SHAKES * _noise(read, panels.taken(parted))]
+        settled.append((panels.taken(np.delete(np.arange(len(values)), parted)), np.delete(values, parted, axis=0)))
+        if not len(parted):
+            break
+        panels = panels.taken(parted).parted()
+    start, end = (np.concatenate([getattr(part, side) for part, _ in settled]) for side in ("start", "end"))
+    order = np.argsort(start, kind="stable")
+    return Course(
+        read, Panels(start[order], end[order]), np.concatenate([part for _, part in settled])[order], end_value
+    )
+
+
+def _missed(values: Array) -> Array:
+    """(p,) about how far polynomials through values (p, 8) are off."""
+    return np.asarray(SAFETY * np.abs(values @ _TAILS.T).sum(axis=1))
+
+
+def _noise(read: Read, panels: Panels) -> Array:
+    """(p,) how far rounding moves what is read in panels."""
+    if not len(panels.start):
+        return np.empty(0)
+    times = panels.start[:, None] + panels.length[:, None] * (SHARE + CLOSE)
+    return np.asarray(np.abs(np.diff(read(times.ravel()).reshape(times.shape), 2)).max(axis=1))
+
+
+def _may_hold_extremes(values: Array, low: float | None = None, high: float | None = None) -> Mask:
+    """(p,) whether a quantity may be lower or higher there than its lowest or highest value known; from (p, 8)."""
+    there = values @ _VALUES_THERE.T
+    bottom, top = there.min(axis=1), there.max(axis=1)
+    room = 0.5 * (top - bottom) * (_BETWEEN - 1.0) + _missed(values)
+    least, most = values.min() if low is None else low, values.max() if high is None else high
+    return np.asarray((bottom - room <= least) | (top + room >= most))
+
+
+def _turns(values: Array, low: Array, high: Array) -> Array:
+    """Where in their panels polynomials through values (k, 8) turn between two places: Newton's steps, or halves."""
+    slope, bend = values @ _SLOPES.T, values @ _BENDS.T
+    rising = _at(slope, low) > 0
+    middle = 0.5 * (low + high)
+    for _ in range(NEWTON):
+        value = _at(slope, middle)
+        ahead = (value > 0) == rising
+        low, high = np.where(ahead, middle, low), np.where(ahead, high, middle)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            new = middle - value / _at(bend, middle)
+        middle = np.where((new >= low) & (new <= high), new, 0.5 * (low + high))
+    return middle
+
+
+def _at(powers: Array, places: Array) -> Array:
+    """Polynomials (k, d), their lowest power first, each at a place (k,)."""
+    value = powers[:, -1]
+    for column in powers.T[-2::-1]:
+        value = value * places + column
+    return np.asarray(value)
