@@ -6,6 +6,7 @@ import importlib.util
 import os
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 # The matrices of the tests are small: threads that wait for each other would cost several times the work. This must be
 # said before numpy is loaded.
@@ -18,6 +19,23 @@ if importlib.util.find_spec("heyoka") is not None:
     # Thousands of random networks are compiled once each: they are not worth keeping, on disk or in memory.
     heyoka.llvm_state.set_diskcache_enabled(False)
     heyoka.llvm_state.set_memcache_limit(2**28)
+
+# A property is tried on 20 examples, in CI on 500, an expensive one on its share of them (`share_of_examples`).
+# They are the same in every run: a red test must mean a change of the code, not of the dice.
+settings.register_profile(
+    "random networks",
+    max_examples=int(os.environ.get("SHAFTWORK_EXAMPLES", "20")),
+    deadline=None,
+    database=None,
+    derandomize=True,
+    suppress_health_check=[
+        HealthCheck.too_slow,
+        HealthCheck.data_too_large,
+        HealthCheck.large_base_example,
+        HealthCheck.filter_too_much,
+    ],
+)
+settings.load_profile("random networks")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

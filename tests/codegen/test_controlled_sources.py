@@ -113,6 +113,7 @@ def test_without_inductance_the_current_is_no_state_and_cannot_be_read() -> None
         _direct(ControlledMachine, L=0.0).compile()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["scipy", "heyoka", "sundials"])
 def test_phases_in_star_follow_the_equations_written_by_hand(engine: str) -> None:
     """One of the three currents is dependent, and laws read it like the others."""

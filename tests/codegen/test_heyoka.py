@@ -69,6 +69,7 @@ def test_a_translated_expression_has_sympys_value(expression):
         assert evaluate(expression, state, time, parameters) == pytest.approx(expected, rel=1e-13, abs=1e-14)
 
 
+@pytest.mark.slow
 def test_a_table_is_interpolated_and_constant_beyond_its_ends():
     for state, time, parameters in points():
         found = evaluate(CURVE(x + v) * 2, state, time, parameters)

@@ -24,11 +24,13 @@ def run(folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=folder, env=kept | environment, capture_output=True, text=True, check=True)
 
 
+@pytest.mark.slow
 def test_compiled_code_is_kept_in_a_folder_of_its_own(tmp_path: Path) -> None:
     run(tmp_path, XDG_CACHE_HOME=str(tmp_path / "cache"))
     assert [made.name for made in (tmp_path / "cache").iterdir()] == ["shaftwork"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("environment", [{}, {"HOME": "/proc/nowhere"}])
 def test_without_a_place_nothing_is_kept_and_nothing_is_said(tmp_path: Path, environment: dict[str, str]) -> None:
     made = run(tmp_path, **environment)

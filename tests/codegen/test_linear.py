@@ -165,6 +165,7 @@ def test_power_and_energy_have_the_slopes_of_their_products_at_the_point() -> No
             assert linear.C[row, k] == pytest.approx(slope, rel=1e-6, abs=1e-6 * np.abs(linear.C[row]).max())
 
 
+@pytest.mark.slow
 def test_a_motion_at_one_time_is_a_point() -> None:
     model = _nonlinear().compile()
     sol = model.simulate(0.5)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from sympy import Symbol
 
@@ -24,6 +25,7 @@ def differences(function: object, value: float) -> Array:
     return (4 * central(step / 2) - central(step)) / 3
 
 
+@pytest.mark.slow
 @given(networks(max_inertias=6))
 @share_of_examples(0.02)
 def test_derivatives_of_stores_and_states_equal_central_differences(pieces: Network) -> None:

@@ -40,6 +40,7 @@ def train(tau: Expr, *parts: sw.Component) -> sw.Network:
     return net
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["auto", "scipy", "scipy-radau", "sundials"])
 @pytest.mark.parametrize("rubs", [False, True], ids=["smooth", "with modes"])
 @pytest.mark.parametrize("name", LAWS)
@@ -50,6 +51,7 @@ def test_a_law_is_asked_for_the_branch_that_holds_alone(name: str, rubs: bool, e
     np.testing.assert_allclose(found["J1.omega"], wanted["J1.omega"], rtol=0, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", [sw.Brake, sw.Clutch])
 def test_a_condition_of_a_part_is_asked_for_the_branch_that_holds_alone(part: type[sw.Brake]) -> None:
     speeds = []
@@ -71,6 +73,7 @@ def test_a_part_whose_condition_has_no_value_at_the_start_is_refused(on: Expr, e
         train(t, sw.Brake("shoe", tau=1.0, on=on)).simulate(1.0, engine=engine)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "part", "said"),
     [

@@ -75,6 +75,7 @@ def lost(net: sw.Network, engine: str = "auto", **options: Any) -> tuple[float, 
     return float(found[1]), found[2]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_law_of_the_speed_is_named_when_the_motion_leaves_it(engine: str) -> None:
     """w' = sqrt(1 - w) + 1/2 brings w to 1 at 2 - ln 3; CVODE finds the edge to its tolerance, as it has no slope."""
@@ -90,6 +91,7 @@ CONDITIONS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("name", CONDITIONS)
 def test_a_condition_that_is_neither_true_nor_false_is_named(name: str, engine: str) -> None:
@@ -118,6 +120,7 @@ def test_a_law_beside_travelling_waves_is_named() -> None:
     assert t == pytest.approx(1.0, abs=3e-3)
 
 
+@pytest.mark.slow
 def test_a_law_in_an_algebraic_loop_is_named() -> None:
     pytest.importorskip("sksundae")
     net = wheel(sw.Inertia("J2", J=1.0))

@@ -42,6 +42,7 @@ def _truth(**changed: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 CASES = [{}, {"flat": 1.8}, {"dead_time": 1e-4}]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("changed", CASES, ids=str)
 @pytest.mark.parametrize("engine", ["scipy", "heyoka", "sundials"])
 def test_every_engine_follows_the_motor_written_by_hand(engine: str, changed: dict[str, float]) -> None:
@@ -103,6 +104,7 @@ def test_a_locked_rotor_takes_the_current_of_two_phases_in_series() -> None:
     assert np.all(sol["m.i_c"] == 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pole_pairs", [1.0, 2.0])
 def test_the_mean_of_the_steady_motion_is_that_of_the_averaged_motor(pole_pairs: float) -> None:
     """The average leaves out the resistance within a step and the fall of the back EMF while a phase hands over."""

@@ -27,6 +27,7 @@ def turning(wheel: sw.Component, omega: float, t_end: float, t_eval: object = No
     return net.simulate(t_end, t_eval=t_eval)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("omega", [5.0, -3.0])
 @pytest.mark.parametrize(
     ("buckets", "alpha"), [(8, 2.0), (8, 0.75 * math.pi), (7, 2.5), (9, math.pi), (3, 1.6), (20, 1.8)]
@@ -50,6 +51,7 @@ def test_the_torque_is_that_of_the_algorithm_at_every_angle(buckets: int, alpha:
     np.testing.assert_allclose(-np.sign(omega) * sol["dig.tau"], wanted, atol=1e-11 * max(wanted), rtol=0)
 
 
+@pytest.mark.slow
 def test_the_mean_torque_is_that_of_the_closed_form() -> None:
     """Of the mean over n passes, each a draw of variance std^2, and exact otherwise: whole pitches at even steps."""
     passes, each = 4096, 64
@@ -62,6 +64,7 @@ def test_the_mean_torque_is_that_of_the_closed_form() -> None:
     assert -sol["dig.tau"].mean() == pytest.approx(wheel.mean_torque, rel=spread)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [25.0, -25.0])
 def test_at_a_shaft_before_its_reducer_the_wheel_gives_the_torque_that_comes_there(ratio: float) -> None:
     values = {"radius": 3.0, "edge": 0.7, "soil": "fault zone", "seed": 4.0}
@@ -70,6 +73,7 @@ def test_at_a_shaft_before_its_reducer_the_wheel_gives_the_torque_that_comes_the
     assert ratio * before == pytest.approx(there, rel=1e-9, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_the_torque_is_continuous_where_buckets_come_and_go() -> None:
     """The steepest profile climbs by 1 / (2 - pi/2) per rad: a fine step in the angle changes the torque by no more."""
     wheel = sw.BucketWheelLoad("dig", radius=3.0, edge=0.7, seed=4.0)
@@ -78,6 +82,7 @@ def test_the_torque_is_continuous_where_buckets_come_and_go() -> None:
     assert np.abs(np.diff(sol["dig.tau"][1:])).max() < largest * 1e-4
 
 
+@pytest.mark.slow
 def test_digging_begins_when_it_is_told_to_and_as_slowly() -> None:
     full = turning(sw.BucketWheelLoad("dig", radius=3.0, edge=0.7), 1.0, 4.0, 401)
     late = turning(sw.BucketWheelLoad("dig", radius=3.0, edge=0.7, t_on=1.0), 1.0, 4.0, 401)
@@ -100,6 +105,7 @@ def test_a_wrong_resistance_of_a_soil_is_said_of_the_soil() -> None:
         sw.Soil(-5, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("wrong", "answer"),
     [

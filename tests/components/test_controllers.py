@@ -46,6 +46,7 @@ def test_without_integral_time_it_is_a_damper_to_the_reference_and_without_state
     assert model.states == ("J.omega",)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
     [{"tau_max": 5.0}, {"tau_max": 5.0, "tau_min": -1.0, "t_track": 0.05}, {"tau_max": 5.0, "t_on": 0.3, "t_off": 5.0}],
@@ -81,6 +82,7 @@ def test_limits_and_back_calculation_are_those_of_the_equations_by_hand(engine: 
     assert least <= dense["c.tau"].min() < dense["c.tau"].max() <= 5.0
 
 
+@pytest.mark.slow
 def test_anti_windup_takes_away_the_overshoot_that_a_wound_up_integral_makes() -> None:
     """A step that needs 2 s at the limit of the torque; t_track of 1e6 s is no anti-windup at all."""
     overshoot = {}

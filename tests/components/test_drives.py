@@ -61,6 +61,7 @@ def test_as_printed_the_pull_out_slip_is_kept_and_the_pull_out_torque_falls_with
     assert (torque(drive, [0.99 * n, 1.01 * n]) < wanted).all()
 
 
+@pytest.mark.slow
 def test_a_boost_raises_the_flux_at_low_frequency_alone() -> None:
     """Torque goes with the square of the flux: 1.2^2 at standstill, 1.1^2 in the middle, 1 from f_boost on."""
     for f, flux in ((0.0, 1.2), (5.0, 1.1), (10.0, 1.0), (30.0, 1.0)):
@@ -81,6 +82,7 @@ def test_a_start_by_a_ramp_follows_the_field_with_the_lag_that_its_torque_needs(
     np.testing.assert_allclose(field - sol["J.omega"], lag, rtol=1e-6)  # 100 rtol of the speed, which is 90 lags
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
     [
@@ -138,6 +140,7 @@ def test_a_drive_at_its_pull_out_point_holds_the_torque_and_goes_over_into_kloss
     np.testing.assert_allclose(torque(held, above), torque(sw.KlossMotor("m", **MOTOR), above), atol=1e-12)
 
 
+@pytest.mark.slow
 def test_with_overspeed_it_goes_through_the_pull_out_points_of_the_printed_drive() -> None:
     """Curve 2 of figure 6, to 100 Hz; from there on it is the drive at 100 Hz."""
     held = sw.PullOutDrive("m", **MOTOR, overspeed=2.0)
@@ -151,6 +154,7 @@ def test_with_overspeed_it_goes_through_the_pull_out_points_of_the_printed_drive
         sw.PullOutDrive("m", tau_k=8.0, s_k=1.2, n_sync=3000.0)
 
 
+@pytest.mark.slow
 def test_a_frequency_may_be_any_law_of_time() -> None:
     drive = sw.FrequencyDrive("m", **MOTOR, f=30.0 + 5.0 * sympy.sin(sw.t))
     assert torque(drive, 60.0 * (30.0 + 5.0 * math.sin(0.4)), time=0.4) == pytest.approx(0.0, abs=1e-12)

@@ -78,6 +78,7 @@ def _by_hand(t: float, x: np.ndarray) -> list[float]:
     return [rates[0].real, rates[0].imag, rates[1].real, rates[1].imag, (tau - LOAD * omega) / J]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["scipy", "heyoka"])
 def test_a_start_from_rest_follows_the_space_vector_equations(engine: str) -> None:
     pytest.importorskip("heyoka" if engine == "heyoka" else "scipy")

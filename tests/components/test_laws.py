@@ -42,6 +42,7 @@ def test_a_table_is_linear_between_its_points_and_constant_beyond() -> None:
     assert math.isnan(value(math.nan))
 
 
+@pytest.mark.slow
 @given(st.lists(FLOATS, min_size=2, max_size=8, unique=True).map(sorted), st.data())
 def test_one_number_and_an_array_give_the_same_value(x: list[float], data: st.DataObject) -> None:
     # numpy's compiled formula may fuse a multiplication and an addition: a few roundings of the largest value
@@ -84,6 +85,7 @@ def test_a_table_survives_copies_and_other_processes() -> None:
     assert law.args[1].atoms(Table).pop().xs == (0.0, 1.0, 3.0)
 
 
+@pytest.mark.slow
 def test_a_table_prints_the_same_in_every_process() -> None:
     program = (
         "import sympy; from shaftwork.components.laws import *; law = Table([0, 1], [2, 3])(omega)*t + Table([0, 2],"

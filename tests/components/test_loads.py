@@ -141,6 +141,7 @@ def random_load(kind: str, *, intervals: int, seed: float = 1.0, std: float = 10
     return -net.simulate(0.05 * intervals, t_eval=times)["w.tau"]
 
 
+@pytest.mark.slow
 def test_a_held_random_load_has_the_asked_distribution_with_nothing_below_zero() -> None:
     """Kolmogorov's test against the normal distribution above zero; below it is what the normal one has there."""
     n = 4000
@@ -153,6 +154,7 @@ def test_a_held_random_load_has_the_asked_distribution_with_nothing_below_zero()
     np.testing.assert_array_equal(random_load("held", intervals=5, std=0.0), 22.4)
 
 
+@pytest.mark.slow
 def test_a_random_load_is_a_function_of_time_and_seed_alone() -> None:
     """Not of the length of the run; the sample numbers are those of the noise itself, bit for bit."""
     for kind, function in (("held", noise.held), ("band-limited", noise.smooth)):
@@ -173,6 +175,7 @@ def test_another_seed_needs_no_new_model() -> None:
         assert found == pytest.approx(-22.4 - 10.0 * noise.normal(0, seed))
 
 
+@pytest.mark.slow
 def test_a_random_load_is_saved_by_its_numbers(tmp_path: Path) -> None:
     net = sw.Network("travel")
     net.add(sw.SpeedSource("drive", omega=FAST), "shaft")

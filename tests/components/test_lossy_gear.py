@@ -185,6 +185,7 @@ def _stage(torque: float, omega: float, efficiency: float, back: float) -> float
     return torque / efficiency if torque * omega > 0 else torque * back
 
 
+@pytest.mark.slow
 def test_two_stages_with_a_spring_between_move_as_by_hand() -> None:
     """Each mesh takes its own side of the law by the power through it; nothing sticks, so the rates by hand suffice.
 
@@ -370,6 +371,7 @@ TRAINS: tuple[Callable[[], sw.Component], ...] = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gear", TRAINS, ids=("both ways", "self-locking"))
 def test_engines_agree_through_standstill_and_gap(gear: Callable[[], sw.Component]) -> None:
     """With a gap and dry friction beside it; errors grow through some thirty events."""

@@ -63,6 +63,7 @@ def pieces(motor: Component) -> list[sympy.Expr]:
     return [pair.expr for pair in (-branch.through).args]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("given", [{"n_k": 930.0}, {"n_k": 930.0, "n_s": 260.0}, {"n_s": 300.0}, {}], ids=str)
 def test_a_cage_curve_has_the_values_and_slopes_of_its_points_exactly(given: dict[str, float]) -> None:
     """To 40 digits, differentiated on both sides of the points: no error of rounding could hide one of the formula."""
@@ -82,6 +83,7 @@ def test_a_cage_curve_has_the_values_and_slopes_of_its_points_exactly(given: dic
     assert starting.diff(ACROSS, 5).expand() == 0
 
 
+@pytest.mark.slow
 def test_a_compiled_cage_curve_keeps_its_points_to_rounding() -> None:
     """1e-12 of the torque, and of torque over speed: a few hundred roundings."""
     motor = sw.CageMotor("m", **EXCAVATOR)
@@ -266,6 +268,7 @@ def test_a_start_over_resistors_takes_the_time_of_the_closed_form_of_each_step()
     assert sol["J.omega"][-1] == pytest.approx(0.95 * synchronous, rel=1e-9)  # 100 rtol
 
 
+@pytest.mark.slow
 def test_an_excavator_start_is_the_same_with_every_engine_and_by_hand() -> None:
     """100 rtol between the engines. The differential equations by hand are run piece by piece from event to event."""
     net = sw.Network("excavator")

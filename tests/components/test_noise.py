@@ -42,6 +42,7 @@ def test_numbers_and_arrays_in_any_order_give_the_same_bits(function) -> None:
     np.testing.assert_array_equal(function(PLACES, seeds), [function(PLACES, seed) for seed in (1.0, 3.0, 0.0)])
 
 
+@pytest.mark.slow
 def test_other_processes_give_the_same_bits() -> None:
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         found = pool.submit(noise.smooth, PLACES, 3.0).result()
@@ -54,6 +55,7 @@ def test_no_place_has_no_noise(function) -> None:
     assert np.isnan(function(np.array([np.inf, np.nan]), 1.0)).all()
 
 
+@pytest.mark.slow
 def test_numbers_are_normal_and_independent() -> None:
     """Kolmogorov's test; and the correlations along a seed and from one seed to others, of variance 1/n."""
     n = 100_000
@@ -66,6 +68,7 @@ def test_numbers_are_normal_and_independent() -> None:
         assert abs(np.mean(first * other)) < SIGMAS / np.sqrt(n)
 
 
+@pytest.mark.slow
 def test_smooth_noise_is_standard_normal_between_whole_numbers_as_well() -> None:
     """Of the mean of n squares the variance is 2/n; places four apart share no number."""
     n = 20_000

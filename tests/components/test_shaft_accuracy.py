@@ -118,6 +118,7 @@ def test_central_differences_have_twice_the_modes() -> None:
     assert list(below.values()) == [4, 4, 9, 8]
 
 
+@pytest.mark.slow
 def test_the_damping_of_every_mode_is_right_to_second_order_and_half_of_it_as_printed() -> None:
     """The exact one: damping that goes with the stiffness keeps the modes, and zeta = D' omega / (2 C')."""
     omega = 2 * np.pi * exact_frequencies(count=3)
@@ -192,6 +193,7 @@ def test_the_printed_closure_needs_something_at_its_ends() -> None:
         net.compile()
 
 
+@pytest.mark.slow
 def test_the_torque_along_central_differences_is_that_of_springs_and_dampers() -> None:
     """Heavily damped: the torque at a third of the length, to the order of each model."""
     exact, central, as_printed = (

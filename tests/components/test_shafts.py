@@ -102,6 +102,7 @@ def test_momentum_and_energy_are_kept_by_every_model(model: object) -> None:
     assert sol.energy_residual < 1e-9  # the quadrature of the powers, not the motion
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", [sw.Lumped(60), sw.CentralDifference(60, order=4), sw.Spectral(24)], ids=repr)
 def test_damped_models_agree_with_each_other(model: object) -> None:
     """With internal damping the motion is smooth, and fine models see the same one."""
@@ -215,6 +216,7 @@ def test_quantities_along_the_shaft_have_a_column_for_each_place() -> None:
     np.testing.assert_array_equal(sol["line.omega"][:, -1], sol["Jm.omega"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", [sw.Rigid(), sw.Lumped(2), sw.Spectral(2), sw.Wave(3)], ids=repr)
 def test_places_follow_the_length_in_any_unit_and_of_the_run(model: object) -> None:
     units = pytest.importorskip("pint").UnitRegistry()
@@ -230,6 +232,7 @@ def test_places_follow_the_length_in_any_unit_and_of_the_run(model: object) -> N
         np.testing.assert_array_equal(longer.places[name], 2.0 * shares)
 
 
+@pytest.mark.slow
 def test_a_law_of_the_speed_may_stand_at_either_end() -> None:
     """A nonlinear motor and a smooth brake: the same motion by an explicit and an implicit engine."""
     net = train(sw.Spectral(6), damping=0.5)
@@ -258,6 +261,7 @@ def test_auto_takes_the_smallest_spectral_model_that_is_right_up_to_its_frequenc
     assert part.resolved.n == 1 or error(part.resolved.n - 1) > tolerance / 10  # the clamped shaft decides too
 
 
+@pytest.mark.slow
 def test_auto_chooses_again_for_the_parameters_of_a_run() -> None:
     """A shaft of ten times the length has the model that a new network takes; another inertia asks for no new one."""
 

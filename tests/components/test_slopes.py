@@ -45,6 +45,7 @@ def test_what_jumps_is_told_from_what_does_not() -> None:
     assert not jumps(omega**2, omega)
 
 
+@pytest.mark.slow
 def test_the_inverse_function_of_what_is_clipped_on_both_sides_begins_no_new_turn() -> None:
     """A trapezoid over an angle is made so: its corners are those of the clipping, which laws are looked at for."""
     x = sympy.Symbol("x", real=True)

@@ -36,6 +36,7 @@ TEST = re.compile(r"`(test_\w+)`")
 LARGEST_PICTURE = 150_000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_a_page_is_what_the_code_makes_of_it(page: Path) -> None:
     """Examples run, outputs, tables and help texts are up to date; `python docs/generate.py` makes them so."""

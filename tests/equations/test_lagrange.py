@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 import sympy
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from sympy import Rational, Symbol, cancel, expand, powsimp
 
@@ -21,11 +21,9 @@ from shaftwork.equations.second_order import second_order
 from shaftwork.reduction.tree import normal_tree
 from tests.beds import bed_of, registered
 from tests.equations.networks import MECHANICAL, dc_drive, equations_of, from_pieces, mixed_train, shaft
-from tests.properties.examples import inner_drives
+from tests.properties.examples import inner_drives, share_of_examples
 from tests.strategies import Network, networks
 from tests.trains import Train, trains
-
-MANY = [HealthCheck.too_slow, HealthCheck.data_too_large]
 
 
 def of(name: str) -> Lagrangian:
@@ -114,6 +112,7 @@ def test_so_they_are_with_circuits_controllers_and_long_shafts(name: str) -> Non
     assert proof.holds, str(proof)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sw.scenes.SCENES)
 def test_so_they_are_in_every_phase_of_every_scene(name: str) -> None:
     scene = sw.scenes.SCENES[name]
@@ -136,6 +135,7 @@ def test_so_they_are_with_every_component_in_every_mode(name: str) -> None:
     assert made.latex(values=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("legs", [("high", "low", "open"), ("open", "high", "low"), ("open", "open", "open")])
 def test_so_they_are_for_every_way_a_bldc_motor_is_fed(legs: tuple[str, ...]) -> None:
     """The voltage of each leg is prescribed, and each flux linkage has a letter of its own."""
@@ -154,7 +154,7 @@ def test_a_gear_with_losses_is_a_constraint_whose_reaction_does_work(mode: str) 
     assert len(made.constraints) == (mode != "stuck")
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=MANY)
+@share_of_examples(0.5)
 @given(pieces=networks(max_inertias=6))
 def test_they_are_kirchhoffs_for_random_networks(pieces: Network) -> None:
     proof = lagrangian(equations_of(from_pieces(pieces))).proof()
@@ -197,7 +197,7 @@ def test_they_are_kirchhoffs_beside_a_prescribed_speed_of_any_law(law: str, driv
     assert proof.holds, str(proof)
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=MANY)
+@share_of_examples(0.2)
 @given(pieces=networks(max_inertias=5), data=st.data())
 def test_they_are_kirchhoffs_for_random_networks_with_speeds_of_any_law(pieces: Network, data: st.DataObject) -> None:
     laws = st.sampled_from(list(PRESCRIBED))
@@ -212,7 +212,7 @@ def test_they_are_kirchhoffs_for_random_networks_with_speeds_of_any_law(pieces: 
 
 
 @pytest.mark.filterwarnings("ignore::shaftwork.core.errors.NetworkWarning")
-@settings(max_examples=40, deadline=None, suppress_health_check=MANY)
+@share_of_examples(0.2)
 @given(train=trains(most=5), data=st.data())
 def test_they_are_kirchhoffs_in_any_phase_of_random_trains(train: Train, data: st.DataObject) -> None:
     net = wired("train", *((getattr(sw, part.type)(part.name, **part.values), *part.nodes) for part in train.parts))
@@ -227,7 +227,8 @@ def test_lagranges_equations_are_the_second_order_form(name: str) -> None:
     assert_second_order(of(name), {})
 
 
-@settings(max_examples=30, deadline=None, suppress_health_check=MANY)
+@pytest.mark.slow
+@share_of_examples(0.2)
 @given(pieces=networks(max_inertias=6, electrical=False))
 def test_lagranges_equations_are_the_second_order_form_of_random_networks(pieces: Network) -> None:
     """Symbol by symbol, but for ratios whose values the structure rests on: 2 and 1/2 in a row twist no spring."""

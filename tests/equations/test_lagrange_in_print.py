@@ -23,6 +23,7 @@ def test_the_print_is_balanced_and_has_no_marks(name: str) -> None:
         assert not any("\ue000" <= character <= "\ue003" for character in text)
 
 
+@pytest.mark.slow
 def test_a_shaft_with_weights_is_printed_as_sums() -> None:
     text = WHOLE["spectral"]().lagrangian().latex()
     assert r"\frac{1}{2} \, L \, J' \, \sum_{i = 0}^{8} h_{i} \, \dot{\varphi}_{i}^{2}" in text
@@ -43,6 +44,7 @@ PRINTED: dict[str, Callable[[], Lagrangian]] = {
 }
 
 
+@pytest.mark.slow
 @compiles
 @pytest.mark.parametrize("name", PRINTED)
 @pytest.mark.parametrize("values", [False, True])
@@ -70,6 +72,7 @@ def test_a_document_has_all_that_is_printed_and_says_what_its_letters_are(name: 
     assert (r"\section{Phase}" in text) is bool(made.phase)
 
 
+@pytest.mark.slow
 @compiles
 @pytest.mark.parametrize("form", ["kirchhoff", "lagrange"])
 def test_a_motor_by_its_catalogue_keeps_inside_the_margins_with_values(form: str, tmp_path: Path) -> None:

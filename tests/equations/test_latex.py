@@ -53,6 +53,7 @@ def overfull(log: str) -> list[float]:
     return [float(width) for width in re.findall(r"Overfull \\hbox \(([0-9.]+)pt too wide\)", log)]
 
 
+@pytest.mark.slow
 @compiles
 @pytest.mark.parametrize("name", ["crane", "train of 50", "50 parts", "planetary hoist", "dc drive"])
 @pytest.mark.parametrize("values", [False, True])
@@ -61,6 +62,7 @@ def test_a_document_compiles_and_keeps_inside_its_margins(name: str, values: boo
     assert max(overfull(log), default=0.0) < 10.0  # points: what sticks out is less than a letter and a half
 
 
+@pytest.mark.slow
 @compiles
 @pytest.mark.parametrize("scene", ["excavator", "bldc-shaft"])
 @pytest.mark.parametrize("values", [False, True])
@@ -73,6 +75,7 @@ def test_the_document_of_a_scene_with_long_laws_keeps_inside_its_margins(
     assert max(overfull(log), default=0.0) < 10.0
 
 
+@pytest.mark.slow
 @compiles
 def test_names_with_any_characters_compile(tmp_path: Path) -> None:
     net = NetworkBuilder(r"50% of {A} & B_1 \x ~^#$ ü ω 中 <|>")
@@ -149,6 +152,7 @@ def test_parts_whose_subscripts_coincide_are_told_apart() -> None:
     assert (names["s1.c"], names["k1.c"]) == ("c_{1}", r"c_{\mathrm{k},1}")
 
 
+@pytest.mark.slow
 def test_a_series_of_equal_rows_is_one_general_row() -> None:
     text = equations_of(train()).latex()
     general = r"J_{k} \, \frac{d \omega_{k}}{d t} &= \tau_{k-1} - \tau_{k} \qquad \text{for } k = 2, \dots, 49"
@@ -284,6 +288,7 @@ def test_a_coefficient_that_is_a_sum_keeps_its_brackets() -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_same_network_prints_the_same_bytes_in_another_process() -> None:
     code = (
         "from tests.equations.networks import *;"
@@ -324,6 +329,7 @@ def test_a_parameter_that_looks_like_a_variable_gets_a_subscript(monkeypatch: py
     assert (names["p.tau"], names["tau(p)"]) == (r"\tau_{0,\mathrm{p}}", r"\tau_{\mathrm{p}}")
 
 
+@pytest.mark.slow
 @compiles
 @pytest.mark.parametrize("name", ["crane", "50 parts", "dc drive"])
 def test_a_document_is_right_after_one_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

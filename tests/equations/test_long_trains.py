@@ -23,6 +23,7 @@ def row_of_gears(count: int) -> sw.Network:
     return net
 
 
+@pytest.mark.slow
 def test_a_row_of_sixty_gears_is_one_inertia_and_each_reaction_drives_what_is_beyond() -> None:
     """J = sum J_k / (i_1 i_2 ... i_k)^2 at the motor; at a gear what is beyond it, at its first shaft."""
     equations = row_of_gears(60).equations()
@@ -38,6 +39,7 @@ def test_a_row_of_sixty_gears_is_one_inertia_and_each_reaction_drives_what_is_be
     assert torques == pytest.approx(beyond, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_energies_of_a_row_of_gears_lead_to_the_same_equations() -> None:
     made = row_of_gears(24).lagrangian()
     values = {Symbol(name, real=True): value for name, value in made.kirchhoff.values.items()}

@@ -104,6 +104,7 @@ def test_equations_without_modes_name_no_phase() -> None:
     assert "Phase" not in equations.latex() + equations._repr_latex_() + equations.document()
 
 
+@pytest.mark.slow
 def test_a_curve_of_several_pieces_that_is_switched_is_one_list_of_cases() -> None:
     """The cases of the time come first; the torque is the same as before the switch, and zero after it."""
     net = sw.Network("switched")

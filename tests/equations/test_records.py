@@ -10,7 +10,7 @@ from unittest import mock
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from sympy import Expr, Symbol
 
 from shaftwork.components.base import REGISTRY, Component, Derived, Port, component
@@ -46,6 +46,7 @@ from tests.equations.networks import (
     shaft,
     train,
 )
+from tests.properties.examples import share_of_examples
 from tests.strategies import Network, networks
 
 
@@ -164,7 +165,7 @@ def test_a_derived_quantity_does_not_take_the_name_of_a_parameter() -> None:
             graph_of(net)
 
 
-@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@share_of_examples(0.2)
 @given(pieces=networks(max_inertias=6))
 def test_printed_rates_are_the_compiled_rates_of_random_networks(pieces: Network) -> None:
     assert_agrees_with_compiled_rows(equations_of(from_pieces(pieces)))

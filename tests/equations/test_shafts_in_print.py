@@ -62,6 +62,7 @@ def test_the_waves_of_both_halves_have_letters_and_words_of_their_own() -> None:
         assert f"$h_{{{letter}}}$ & torque wave that arrives at {end} & line" in document
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", [sw.CentralDifference(80), sw.Spectral(5)], ids=repr)
 def test_rates_of_twist_are_defined_once_and_not_called_nodes(model: object) -> None:
     equations = drive(model, damping=0.05).equations()
@@ -72,11 +73,13 @@ def test_rates_of_twist_are_defined_once_and_not_called_nodes(model: object) -> 
     assert [row.what for row in equations.eliminated if row.kind == "speed"] == ["inertia J2"]
 
 
+@pytest.mark.slow
 def test_central_differences_take_no_more_lines_for_more_nodes() -> None:
     small, large = (drive(sw.CentralDifference(m), damping=0.05).equations().document() for m in (40, 80))
     assert len(small.splitlines()) == len(large.splitlines())
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="pdflatex is not installed")
 def test_a_product_with_a_long_sum_is_broken_inside_the_sum(tmp_path: Path) -> None:
     net = drive(sw.Spectral(4), damping=0.1)
@@ -86,6 +89,7 @@ def test_a_product_with_a_long_sum_is_broken_inside_the_sum(tmp_path: Path) -> N
     assert max(map(float, re.findall(r"Overfull \\hbox \(([0-9.]+)pt", log)), default=0.0) < 10.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("losses", [{}, {"damping": 0.1, "friction": 0.2}], ids=["lossless", "lossy"])
 def test_a_shaft_of_high_degree_is_printed_as_sums(losses: dict[str, float]) -> None:
     small = drive(sw.Spectral(16), **losses).equations()
@@ -119,6 +123,7 @@ def test_the_weights_are_what_is_printed_about_them() -> None:
     np.testing.assert_allclose(mesh.lengths, weights, atol=1e-14)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("values", [False, True])
 def test_sums_are_printed_by_value_too_and_in_the_second_order_form(values: bool) -> None:  # noqa: FBT001
     net = sw.Network("line")

@@ -96,6 +96,7 @@ def test_letters_of_european_languages_are_kept(name: str, printed: str) -> None
     assert escaped(name) == printed
 
 
+@pytest.mark.slow
 @compiles
 def test_every_accented_letter_that_is_printed_as_it_is_compiles(tmp_path: Path) -> None:
     letters = re.findall(f"[{ACCENTED}]", "".join(map(chr, range(0xC0, 0x250))))

@@ -192,6 +192,7 @@ def test_a_singular_matrix_is_told(size):
         ShiftedMatrix(matrix - sparse.eye_array(size)).factor(-1.0 + 0.0j)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("linear", [True, False])
 @pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8])
 def test_the_error_of_a_damped_chain_follows_the_tolerance(rtol, linear):
@@ -206,6 +207,7 @@ def test_the_error_of_a_damped_chain_follows_the_tolerance(rtol, linear):
     assert np.abs(torques(trajectory.dense(np.sort(times))) - between).max() < 10 * rtol * np.abs(truth).max()
 
 
+@pytest.mark.slow
 def test_ten_thousand_elements_meet_the_continuous_shaft():
     trajectory = banded.solve(shaft(10000, rtol=3e-6))
     found = torques(trajectory.x[1:])
@@ -215,6 +217,7 @@ def test_ten_thousand_elements_meet_the_continuous_shaft():
     assert np.abs(found[:, [0, 5000, 9999]] - truth).max() < 1e-5 * np.abs(truth).max()
 
 
+@pytest.mark.slow
 def test_the_number_of_steps_does_not_grow_with_the_chain():
     # With a bandwidth that stays the same, the cost of a step is linear in the number of elements.
     steps = [banded.solve(shaft(m, rtol=1e-5)).statistics["steps"] for m in (100, 1000, 4000)]
@@ -244,6 +247,7 @@ def test_an_undamped_chain_keeps_its_energy_at_any_tolerance():
     assert np.abs(stored / stored[0] - 1).max() < 1e-10
 
 
+@pytest.mark.slow
 def test_a_damped_chain_loses_what_its_dampers_take():
     problem, inertias, stiffness = released(40, 1e-7, DAMPING_TIME)
     trajectory = banded.solve(problem)
@@ -330,6 +334,7 @@ def against_a_stop(m=20) -> Problem:
     return Problem(rhs, jacobian, np.zeros(n), 0.0, 0.1, (), 1e-9 * size, 1e-6, t_eval=np.linspace(0.0, 0.1, 101))
 
 
+@pytest.mark.slow
 def test_a_stop_that_no_step_foresees_is_met():
     # Before the contact the equations are linear, so the contraction of Newton's method is perfect there and says
     # nothing of the step that meets the stop; nor has the Jacobian its entries.
@@ -344,6 +349,7 @@ def test_a_stop_that_no_step_foresees_is_met():
     assert (np.abs(again - trajectory.x).max(axis=0) < 1e-6 * np.abs(truth).max(axis=0)).all()
 
 
+@pytest.mark.slow
 def test_a_run_can_be_repeated_to_the_last_bit():
     problem = against_a_stop()
     first, second = (banded.solve(problem) for _ in range(2))
@@ -351,6 +357,7 @@ def test_a_run_can_be_repeated_to_the_last_bit():
     assert np.array_equal(first.steps, second.steps)
 
 
+@pytest.mark.slow
 def test_a_network_of_shaft_and_motor_agrees_with_another_stiff_engine():
     net = sw.Network("shaft")
     net.add(sw.KlossMotor("motor", tau_k=TORQUE, s_k=0.2, n_sync=1500), "n0")
@@ -367,6 +374,7 @@ def test_a_network_of_shaft_and_motor_agrees_with_another_stiff_engine():
     assert found.energy_residual < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("rhs", "reason"),
     [

@@ -96,6 +96,7 @@ def test_every_engine_of_the_table_can_be_loaded():
         assert callable(choice.load(name))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["auto", "exact", "scipy"])
 def test_a_run_that_another_engine_makes_does_not_load_heyoka(engine: str) -> None:
     code = (

@@ -89,6 +89,7 @@ def modal_speeds(times, modes=20000):
 KINDS = {"steady": {"steady": True}, "driven": {}, "marched": {"linear": False}}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_step_torque_is_answered_as_by_modes_and_by_taylor_series(kind):
     # Asked 1e-9; the modes left out weigh about 1 / (2 modes**2) = 1e-9 of the first, which is a tenth of the speed.
@@ -311,6 +312,7 @@ def joined_lines(rtol, times, delays=(T1, T2), jacobian=np.asarray) -> DelayProb
     )
 
 
+@pytest.mark.slow
 def test_lines_of_incommensurate_delays_converge_with_the_tolerance():
     times = np.linspace(0, 0.03, 211)
     truth = delay.solve(joined_lines(1e-11, times))
@@ -342,6 +344,7 @@ def lumped_chain(cells, times):
     return solve_ivp(rhs, (0, times[-1]), y0, "RK45", times, rtol=1e-6, atol=1e-8).y[[0, 2 * cells]].T
 
 
+@pytest.mark.slow
 def test_lumped_chains_come_nearer_with_the_square_of_their_cells():
     times = np.linspace(0, 0.02, 101)
     found = delay.solve(joined_lines(1e-8, times)).x

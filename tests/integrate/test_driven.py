@@ -33,6 +33,7 @@ def chain(law: object) -> sw.Network:
     return net
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", SMOOTH, ids=str)
 def test_smooth_inputs_are_followed_to_rounding(law: object) -> None:
     """Against DOP853 at its tightest tolerance, whose own error is some 1e-9 of the stiff spring's torque."""

@@ -97,6 +97,7 @@ def test_a_run_can_be_repeated_to_the_last_bit(oscillator, engine):
     assert np.array_equal(first.dense(first.t), second.dense(second.t))
 
 
+@pytest.mark.slow
 def test_a_lazy_dense_output_repeats_the_run_that_filled_the_grid(oscillator):
     for engine in ("heyoka", "CVODE-BDF"):
         trajectory = ENGINES[engine](oscillator.problem)

@@ -12,13 +12,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import sympy
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 import shaftwork as sw
 from shaftwork.codegen.timeline import timeline
+from tests.properties.examples import share_of_examples
 
 pytestmark = pytest.mark.filterwarnings("ignore:jumping source:shaftwork.core.errors.NetworkWarning")
 
@@ -150,7 +151,7 @@ def sides(terms: list[Term], x: Array) -> tuple[Array, Array]:
     return before, after
 
 
-RUN = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+RUN = share_of_examples(0.2)
 
 
 @given(st.lists(TERMS, min_size=1, max_size=4), st.sampled_from(ENGINES))
@@ -166,6 +167,7 @@ def test_a_free_body_has_the_integral_of_any_law(terms: list[Term], engine: str)
         assert sol["J.omega"][k] == pytest.approx(speed, abs=1e-6)
 
 
+@pytest.mark.slow
 @given(st.lists(TERMS, min_size=1, max_size=4), st.sampled_from(ENGINES))
 @RUN
 def test_a_geared_speed_gives_every_impulse_once(terms: list[Term], engine: str) -> None:
@@ -180,6 +182,7 @@ def test_a_geared_speed_gives_every_impulse_once(terms: list[Term], engine: str)
     assert sol.energy_residual < 1e-6
 
 
+@pytest.mark.slow
 @given(st.lists(TERMS, min_size=1, max_size=4), st.sampled_from(ENGINES))
 @RUN
 def test_springs_in_series_share_every_jump_of_the_torque_between_them(terms: list[Term], engine: str) -> None:
@@ -279,6 +282,7 @@ def test_a_bell_that_lies_between_two_samples_is_found(engine: str) -> None:
     assert speed == pytest.approx(1e4 * 2 * width * np.sqrt(np.log(2)), rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inside", [1 / sw.t, 1 / (sw.t - 0.3)], ids=str)
 def test_a_law_that_jumps_without_end_is_refused_with_its_part_and_condition(inside: sympy.Expr) -> None:
     with pytest.raises(sw.ParameterError, match=r"'m0'.*sin\(1/.*too often between t = 0 s and 1 s"):
@@ -328,6 +332,7 @@ def test_a_power_of_a_negative_base_ends_the_run_where_it_is_met(engine: str, la
     assert float(str(caught.value).split("At t = ")[1].split(" s")[0]) == pytest.approx(time, abs=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_condition_of_time_alone_never_sticks(engine: str) -> None:
     law = sympy.Max(5 * sympy.sin(7 * sw.t), 2, 3 - 10 * sw.t)

@@ -54,6 +54,7 @@ LOADS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOADS)
 def test_engines_agree_on_a_two_mass_train(name: str) -> None:
     """To what each is worth at 1e-9, against heyoka at 1e-13."""
@@ -66,6 +67,7 @@ def test_engines_agree_on_a_two_mass_train(name: str) -> None:
             assert error < WORTH[engine] * 1e-9 * np.abs(true[signal]).max(), (engine, signal)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_load_is_the_same_bits_in_every_engine(engine: str) -> None:
     """As a function of time, or of the angle that the engine finds; four pitches to the radian round nowhere."""
@@ -95,6 +97,7 @@ def steps_of_angle(pitch: float, drive: float, drag: float, seed: float, t_end: 
     return omega
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_noise_of_the_angle_steps_where_an_independent_march_from_pitch_to_pitch_has_it_step(engine: str) -> None:
     sol = body(3 - 0.2 * sw.omega + sw.HeldNoise(sw.phi / 0.5, 7.0)).simulate(5.0, engine=engine, rtol=1e-10)
@@ -115,6 +118,7 @@ def slips_and_sticks(tau: float, J: float, load: np.ndarray, interval: float) ->
     return np.array(speeds)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_mass_sticks_and_breaks_away_as_its_random_resistance_rises_and_falls(engine: str) -> None:
     """While it sticks no law of a branch changes, and the step of the resistance alone sets it free."""
@@ -148,6 +152,7 @@ HARD = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", HARD)
 def test_the_series_follows_steps_of_the_angle_as_the_stepper_does(name: str) -> None:
     """scipy locates every step by itself, within its tolerance of 1e-9; a missed one would be wrong by parts of one."""
@@ -164,6 +169,7 @@ def test_steps_in_time_are_known_before_the_run() -> None:
     assert model.switching.known(model.vector({})) == ()  # they have no end
 
 
+@pytest.mark.slow
 def test_noise_of_time_leaves_a_linear_network_to_the_exact_engine() -> None:
     """Between its steps it is constant: 1 kg m^2 gains the sum of all samples times the interval."""
     sol = body(sw.HeldNoise(sw.t / 0.1, 5)).simulate(100.0)
@@ -208,6 +214,7 @@ def _work(engine: str, samples: int) -> int:
     return calls
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["scipy", "sundials"])
 def test_a_run_of_many_samples_takes_no_more_work_for_each_of_them(engine: str) -> None:
     """Four times as many samples are four times the calls; what looked back at all before would make it more."""

@@ -26,6 +26,7 @@ def test_a_slow_ramp_breaks_a_friction_away_on_time_whatever_is_asked_for(size: 
     assert net.simulate(9800.0, engine="heyoka", **asked).events[0][0] == pytest.approx(expected, rel=0, abs=EVENT)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("asked", [{"rtol": 1e-9}, {"rtol": 1e-9, "t_eval": 5001}], ids=str)
 def test_a_brake_that_fades_slowly_slips_on_time_and_as_often_as_with_another_engine(asked: dict[str, float]) -> None:
     net = sw.Network("brake")

@@ -9,13 +9,14 @@ import mpmath
 import numpy as np
 import pytest
 import sympy
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import shaftwork as sw
 from shaftwork.core.errors import AccuracyWarning
 from shaftwork.integrate.choice import ENGINES, available
+from tests.properties.examples import share_of_examples
 
 STIFFNESS, TORQUE, PERIODS = 1000.0, 10.0, 3.0
 INSTALLED = tuple(name for name in ENGINES if available(name))
@@ -61,7 +62,8 @@ def coupling_torque(ratio: float, heavy: float, times: np.ndarray) -> np.ndarray
         return np.array([torque(float(t)) for t in times])
 
 
-@settings(max_examples=12, deadline=None)  # an explicit engine takes a second
+@pytest.mark.slow
+@share_of_examples(0.05)  # an explicit engine takes a second
 @given(
     exponent=st.floats(-3, 4),
     heavy=st.sampled_from([0.01, 0.5, 1.0, 30.0]),
@@ -95,6 +97,7 @@ def test_the_ends_of_the_range_are_right_with_every_engine(engine: str, ratio: f
 RATIOS = {name: (0.1, 100.0) if name in EXPLICIT else (0.1, 100.0, 1e6) for name in INSTALLED if name != "exact"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("engine", "ratio"), [(name, ratio) for name, ratios in RATIOS.items() for ratio in ratios])
 def test_a_nonlinear_load_behind_a_strong_damper_is_as_right(engine: str, ratio: float) -> None:
     """Against Radau in the mean speed, the twist and the torque of the damper as a state: there nothing cancels."""
@@ -189,6 +192,7 @@ def test_an_ordinary_run_is_not_made_twice() -> None:
     assert run.statistics["steps"] < 1.2 * (10.0 / 0.1) * 10.0 / 6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [0.5, 30.0, 1000.0])
 @pytest.mark.parametrize("engine", EXPLICIT)
 def test_beside_a_part_with_modes_it_is_as_right(engine: str, ratio: float) -> None:
@@ -201,6 +205,7 @@ def test_beside_a_part_with_modes_it_is_as_right(engine: str, ratio: float) -> N
     np.testing.assert_allclose(found, wanted, rtol=0, atol=BOUND[engine] * np.abs(wanted).max())
 
 
+@pytest.mark.slow
 def test_a_phase_is_made_twice_only_where_stability_bounds_its_steps() -> None:
     """Flanks that strike each other again and again: every oscillation has many steps of its own."""
     net = sw.Network("rattle")

@@ -131,6 +131,7 @@ MOTIONS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_every_engine_follows_a_motion_through_its_switches(motion: str, engine: str) -> None:

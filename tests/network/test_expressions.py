@@ -12,7 +12,7 @@ from itertools import product
 
 import pytest
 import sympy
-from hypothesis import HealthCheck, assume, given, reject, settings
+from hypothesis import assume, given, reject
 from hypothesis import strategies as st
 
 from shaftwork.components.laws import SYMBOLS, Ramp, Step, Table, omega, phi, t, v
@@ -60,7 +60,6 @@ EXPRESSIONS = st.recursive(
 )
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow])
 @given(st.data())
 def test_every_expression_in_the_grammar_reads_back_as_itself(data: st.DataObject) -> None:
     try:
@@ -87,7 +86,6 @@ def _texts(inner: st.SearchStrategy[str]) -> st.SearchStrategy[str]:
     return st.one_of(call, pair, case, extreme)
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.filter_too_much])
 @given(st.recursive(st.sampled_from(["t", "-omega", "2", "1/3", "0.1", "pi", "1e-3"]), _texts, max_leaves=8))
 def test_what_was_read_can_be_written(text: str) -> None:
     try:
@@ -265,6 +263,7 @@ for text in json.load(sys.stdin):
 """
 
 
+@pytest.mark.slow
 def test_no_text_within_the_limits_hangs() -> None:
     # a process of its own can be ended; each text takes milliseconds, and those that are not limited take hours
     texts = json.dumps(list(SLOW.values()))

@@ -172,6 +172,7 @@ def test_a_part_that_has_no_text_form_is_named(tmp_path: Path) -> None:
         net.save(tmp_path / "m.toml")
 
 
+@pytest.mark.slow
 @given(st.text(max_size=200))
 def test_no_text_runs_or_crashes(tmp_path_factory: pytest.TempPathFactory, text: str) -> None:
     path = tmp_path_factory.mktemp("models") / "any.toml"

@@ -11,7 +11,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from shaftwork.components.laws import Table
@@ -86,7 +86,6 @@ def test_a_model_is_written_as_the_documented_text() -> None:
     assert read(CRANE_TEXT) == CRANE
 
 
-@settings(deadline=None)
 @given(MODELS)
 def test_every_model_reads_back_as_itself(model: ModelText) -> None:
     again = read(write(model))
@@ -182,7 +181,6 @@ def test_a_wrong_text_ends_in_an_error_that_names_the_place(text: str, says: str
         read(text)
 
 
-@settings(max_examples=300, deadline=None)
 @given(st.lists(st.sampled_from([*"[]{}=\"'#,.\n\r\\ ", "[[part]]", "name", "nodes", "x", "1", "1e9", "\x00", "é"])))
 def test_any_text_is_a_model_or_a_named_error(words: list[str]) -> None:
     try:
@@ -222,6 +220,7 @@ for kind, text in json.load(sys.stdin).items():
 """
 
 
+@pytest.mark.slow
 def test_a_hostile_text_ends_in_a_named_error() -> None:
     # a process of its own can be ended; each text takes milliseconds, and those that are not limited take hours
     done = subprocess.run(
@@ -235,6 +234,7 @@ def test_a_hostile_text_ends_in_a_named_error() -> None:
     assert done.stdout.splitlines() == list(HOSTILE)
 
 
+@pytest.mark.slow
 def test_a_model_of_20000_parts_is_within_the_limits() -> None:
     parts = tuple(
         PartText("Spring", f"shaft{i}", (f"n{i}", f"n{i + 1}"), {"c": 24206.0, "d": 14.0}) for i in range(20000)

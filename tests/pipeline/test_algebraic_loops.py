@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 import shaftwork as sw
 
 
+@pytest.mark.slow
 def test_a_step_ends_where_a_law_in_a_loop_bends() -> None:
     """The fan takes 3 omega, and 8 omega - 5 beyond 1 rad/s; the equations solved for its speed by hand."""
     pytest.importorskip("sksundae")
@@ -40,6 +41,7 @@ def folded() -> sw.Model:
     return net.compile(algebraic_loops="solve")
 
 
+@pytest.mark.slow
 def test_the_instants_of_a_motion_stay_on_the_branch_on_which_each_one_after_the_other_does() -> None:
     """The torque swings beyond both folds, where the speed goes from one branch to another: a hysteresis."""
     model = folded()

@@ -129,6 +129,7 @@ def test_a_brake_whose_torque_comes_and_goes_holds_a_load_lets_it_run_free_and_b
     assert sol["J.omega"][-1] == pytest.approx(wanted, abs=EXACT)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_brake_of_no_torque_lets_a_load_swing_through_rest(engine: str) -> None:
     """2 w' = sin(2 t), as if it were not there, though it locks for an instant at each rest."""

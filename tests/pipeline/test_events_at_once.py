@@ -45,6 +45,7 @@ TRAINS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TRAINS)
 def test_every_engine_names_the_same_events_in_the_same_order(name: str) -> None:
     model, initial = TRAINS[name].compiled(), TRAINS[name].initial

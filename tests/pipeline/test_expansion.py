@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import shaftwork as sw
+from tests.properties.examples import share_of_examples
 
 
 def train(model: object, **shaft: float) -> sw.Network:
@@ -21,7 +22,8 @@ def train(model: object, **shaft: float) -> sw.Network:
     return net
 
 
-@settings(max_examples=12, deadline=None)
+@pytest.mark.slow
+@share_of_examples(0.04)
 @given(
     m=st.integers(1, 7),
     ends=st.sampled_from(["half", "full"]),

@@ -71,6 +71,7 @@ def test_friction_that_has_given_way_at_rest_holds_again_what_a_brake_lets_go(en
     }
 
 
+@pytest.mark.slow
 def test_a_bend_of_a_torque_leaves_who_carries_as_it_is() -> None:
     net = pulled(
         sw.Table([0.0, 12.0, 19.0], [0.0, 12.0, 5.0]), friction("shoe", 3.0, 10.0), sw.Brake("brake", tau=20.0)
@@ -92,6 +93,7 @@ def test_friction_beside_a_backstop_lets_go_of_it_where_it_holds_alone(engine: s
     assert not sol["J.omega"].any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("falls", [(0.0, 1.0), (1.0, 0.0)])
 def test_frictions_on_both_sides_of_a_gear_do_what_one_of_their_sums_does(

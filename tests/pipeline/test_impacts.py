@@ -254,6 +254,7 @@ def test_what_cannot_go_on_says_which_parts_contradict_each_other(
         net.simulate(2.0)
 
 
+@pytest.mark.slow
 def test_flanks_without_a_gap_that_lose_nothing_hit_each_other_for_ever() -> None:
     model = row(sw.Backlash("gap", gap=0.2, restitution=1.0)).compile()
     with pytest.raises(sw.SimulationError, match="'gap' changes for ever between open and rebound"):
@@ -317,6 +318,7 @@ def pressed() -> sw.Model:
     return net.compile()
 
 
+@pytest.mark.slow
 def test_contacts_that_part_each_other_come_to_rest() -> None:
     """Two that push the same inertia the same way: an impact of either parts the other, by ever less."""
     runs = {engine: pressed().simulate(3.0, engine=engine, t_eval=2) for engine in ENGINES}

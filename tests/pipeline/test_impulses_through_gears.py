@@ -8,10 +8,11 @@ from random import Random
 from typing import Any
 
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import shaftwork as sw
+from tests.properties.examples import share_of_examples
 
 J_H, J_B, J_C = 1.0, 0.5, 2.0
 
@@ -73,7 +74,8 @@ def felt(hit: str, ratio: float, efficiency: float, back: float) -> tuple[float,
     return J_C + ratio**2 * J_B / back if back > 0 else math.inf, J_C + efficiency * ratio**2 * J_B
 
 
-@settings(max_examples=60, deadline=None)
+@pytest.mark.slow
+@share_of_examples(0.2)
 @given(
     hit=st.sampled_from("bc"),
     ratio=st.sampled_from([2.0, -2.0, 0.5, -7.0]),
@@ -117,6 +119,7 @@ def test_what_a_gear_loses_in_an_impact_is_its_own(e: float) -> None:
     assert sol.energy.lost_in["gap"] == pytest.approx(impulse * (1 - e) * 10.0 / 2, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_an_impact_through_a_gear_is_the_limit_of_a_stiff_contact() -> None:
     """Braked, at rest and turned round within it: the contact is damped 60 times as much as it takes not to swing."""
     start = {"H.omega": 10.0, "B.omega": -4.0, "C.omega": -2.0}
@@ -195,6 +198,7 @@ def test_a_jump_of_a_prescribed_speed_is_supplied_and_what_a_gear_loses_in_it_is
     assert sol.energy.lost_in["part"] == pytest.approx(lost, rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gears", [1, 3])
 def test_small_impacts_leave_gears_alone_that_they_do_not_reach(gears: int) -> None:
     """Ever slower impacts on the one side of a spring, heavy gears on the other: they have rounding, and no impulse."""
@@ -253,6 +257,7 @@ def test_what_an_impact_at_the_very_start_loses_in_a_gear_is_in_no_balance() -> 
     assert set(sol.energy.lost_in.values()) == {0.0}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials"])
 def test_a_flank_that_cannot_open_where_a_gear_jams_does_not_become_the_other_one(engine: str) -> None:
     """The lower flank would have to pull at what jams. It went on as the upper one, on which pulling is pressing."""

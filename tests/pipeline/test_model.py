@@ -33,6 +33,7 @@ def two_masses(**source: object) -> sw.Network:
     return net
 
 
+@pytest.mark.slow
 def test_auto_solves_the_crane_to_1e_8_of_the_largest_torque_at_rtol_1e_9() -> None:
     sol = crane().simulate(t_end=6.5, rtol=1e-9, t_eval=651)
     truth = shaft_torque(Crane(tau_k=9.6, s_k=0.25), sol.t)
@@ -78,6 +79,7 @@ def test_output_times_are_those_asked_for() -> None:
     assert model.simulate(2.0, t_start=1.0).t[0] == 1.0
 
 
+@pytest.mark.slow
 def test_dense_output_agrees_with_output_times() -> None:
     model = crane().compile()
     for engine in ENGINES:
@@ -203,11 +205,13 @@ def test_steady_operation_is_where_the_start_runs_to() -> None:
     assert again["J2.omega"] == pytest.approx(np.full(11, steady["J2.omega"]), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_no_steady_operation_is_said_with_the_state_that_keeps_changing() -> None:
     with pytest.raises(sw.SimulationError, match="omega"):
         two_masses().compile().steady_state()
 
 
+@pytest.mark.slow
 def test_an_impossible_law_fails_with_time_state_and_reason() -> None:
     net = two_masses(tau=1 / (sw.t - sympy.Rational(1, 2)) ** 2)
     for engine in ("scipy", "heyoka", "sundials"):
@@ -289,6 +293,7 @@ def test_ratios_may_be_changed_into_and_out_of_a_locked_loop() -> None:
     assert stuck["J1.omega"].tolist() == [0.0, 0.0, 0.0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["auto", "scipy", "scipy-radau"])
 def test_an_algebraic_loop_is_solved_on_request(engine: str) -> None:
     net = sw.Network("massless rotor")
@@ -325,6 +330,7 @@ def test_the_generated_code_reads_like_the_equations() -> None:
     assert source.count("\n") < 20
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["auto", "scipy"])
 def test_a_law_alone_at_a_massless_node_gives_its_speed(engine: str) -> None:
     net = sw.Network("hydraulic brake")
@@ -355,6 +361,7 @@ def test_a_loop_without_a_solution_is_named() -> None:
         net.simulate(0.5, algebraic_loops="solve")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "speed"), [(sympy.sqrt(sw.t), 2 / 3), (sw.t ** sympy.Rational(5, 2), 2 / 7), (3 * sw.t**3, 3 / 4)]
 )
@@ -377,6 +384,7 @@ def test_signals_of_laws_that_switch_can_be_read(law: sympy.Expr) -> None:
         assert one[name] == pytest.approx(two[name], rel=1e-7, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_stiff_train_of_a_hundred_inertias_is_solved_by_the_sparse_implicit_engine() -> None:
     net = sw.Network("stiff")
     for k in range(101):

@@ -63,6 +63,7 @@ def test_a_motion_that_starts_held_has_a_phase_and_no_event() -> None:
     assert [(phase.start, phase.end, phase.name) for phase in sol.phases] == [(0.0, 1.0, "brake locked")]
 
 
+@pytest.mark.slow
 def test_every_phase_is_what_the_equations_can_be_printed_for() -> None:
     net = crane()
     equations = net.equations()
@@ -104,6 +105,7 @@ def test_small_motions_are_those_of_the_phase_at_their_point() -> None:
     assert closed == pytest.approx(math.sqrt(1000.0 * 1.5) / (2.0 * math.pi), rel=1e-3)  # damped by 1 N m s/rad
 
 
+@pytest.mark.slow
 def test_a_file_keeps_everything_that_changes_modes(tmp_path: Path) -> None:
     net = crane()
     net.add(sw.Freewheel("backstop"), "ground", "a")
@@ -165,6 +167,7 @@ def test_an_instant_between_two_phases_is_read_in_the_later_one() -> None:
     assert at["J.omega"][1:].tolist() == [0.0, 0.0]
 
 
+@pytest.mark.slow
 def test_a_table_holds_what_each_phase_gives() -> None:
     table = motion().to_pandas("J1.omega", "gap.tau", "brake.tau")
     assert list(table.columns) == ["J1.omega", "gap.tau", "brake.tau"]
@@ -203,6 +206,7 @@ def test_an_engine_that_follows_no_modes_is_refused_with_those_that_do(engine: s
         model().simulate(1.0, engine=engine)
 
 
+@pytest.mark.slow
 def test_auto_goes_on_with_scipy_where_a_law_in_the_midst_of_contacts_has_no_taylor_series() -> None:
     """A torque of sqrt(|omega|) passes zero again and again, between the contacts that one run of heyoka passes."""
     net = sw.Network("rattle")
@@ -253,6 +257,7 @@ def test_a_light_wheel_is_pushed_along_without_a_step_for_each_of_its_transients
         assert sol[wheel][-1] == pytest.approx(1.0 / (1.0 + 1e-9), abs=1e-8)
 
 
+@pytest.mark.slow
 def test_auto_stays_with_heyoka_where_a_stiff_contact_is_over_before_it_costs_much() -> None:
     """A wheel of 1e-6 kg m2 is thrown off in 0.03 ms, which takes an implicit method some hundred steps."""
     net = sw.Network("thrown")
@@ -281,6 +286,7 @@ def test_modes_that_contradict_each_other_keep_no_frames_of_those_who_asked() ->
     assert depths[1] == depths[2]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_motion_is_freed_with_its_last_holder(engine: str) -> None:
     """Else each one waits for the garbage collector, which costs a short run a tenth of its time and more."""

@@ -61,6 +61,7 @@ def compared(sol: sw.Solution, wanted: Motion) -> tuple[float, float]:
     return times, float(np.abs(np.array(end) - wanted.end).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("engine", "rtol"), ASKED)
 def test_every_engine_finds_every_event_of_the_crane_at_every_tolerance(engine: str, rtol: float) -> None:
     """62 events: 58 of the gap, breakaway and rest of the load, and the brake, which acts from 6.5 s on and locks."""
@@ -72,6 +73,7 @@ def test_every_engine_finds_every_event_of_the_crane_at_every_tolerance(engine: 
     assert times <= 100.0 * rtol
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("load", "engine"),
     # CVODE's first steps after an event are rough: without a load it sees one contact of no length too many
@@ -82,6 +84,7 @@ def test_the_crane_that_never_rests_is_followed_as_well(load: Load, engine: str)
     assert max(compared(sol, stored(load))) < 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials"])
 def test_a_brake_that_is_too_weak_slips_as_often_as_it_must(engine: str) -> None:
     """100 N m of load and a brake of 150 N m: it locks five times and gives way four times, both ways round."""
@@ -142,6 +145,7 @@ def test_a_block_on_a_belt_sticks_and_slips_with_the_period_of_its_limit_cycle(e
     np.testing.assert_allclose(sol["spring.phi_rel"], [block.angle(t) for t in sol.t.tolist()], atol=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials"])
 def test_an_oscillator_with_dry_friction_loses_4_tau_over_c_a_cycle_and_rests_off_the_middle(engine: str) -> None:
     swing = friction.CoulombOscillator(J=1.3, c=50.0, tau_c=0.7, tau_s=0.7, start=0.52)
@@ -179,6 +183,7 @@ def test_an_inertia_bounces_on_a_stop_at_the_times_of_a_geometric_series(engine:
     np.testing.assert_allclose(flights["J.omega"], 0.0, atol=1e-8)  # half-way through a flight it turns
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials", "scipy-radau"])
 @pytest.mark.parametrize("rtol", [1e-3, 1e-5, 1e-7, 1e-9, 1e-12])
 @pytest.mark.parametrize(("restitution", "omega_rest"), [(0.9, 2e-3), (0.85, 1e-4), (0.6, 1e-5)])

@@ -18,6 +18,7 @@ def wave(phase: Array, level: Array, t: Array) -> Array:
     return np.array([np.cos(t + phase) - level, -np.sin(t + phase), -np.cos(t + phase)])
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10**6), st.floats(0.2, 1.2))
 def test_the_first_rise_of_a_wave_is_that_of_its_formula(seed: int, length: float) -> None:
     """Levels are up to 1e-8 below the top, where a rise and a fall lie between the same two samples, and above it."""
@@ -39,6 +40,7 @@ def test_the_first_rise_of_a_wave_is_that_of_its_formula(seed: int, length: floa
     assert (t[rises.at[found] + 1, found] >= rises.t[found]).all()
 
 
+@pytest.mark.slow
 def test_a_stop_that_is_touched_between_two_steps_is_seen() -> None:
     """An inertia swings on a spring up to a stop, 1e-10 of its way deep or not quite to it; the energy says how far."""
     pytest.importorskip("heyoka")

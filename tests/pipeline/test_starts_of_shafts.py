@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import shaftwork as sw
+from tests.properties.examples import share_of_examples
 
 GEOMETRY = {"length": 1.7, "diameter": 0.031}
 MESHES = (
@@ -53,7 +54,8 @@ def start(net: sw.Network, initial: dict[str, float]) -> sw.Solution:
     return model.simulate(1e-6, initial=initial, t_eval=[0.0, 1e-6], engine=engine)
 
 
-@settings(max_examples=8, deadline=None)
+@pytest.mark.slow
+@share_of_examples(0.05)
 @given(st.sampled_from(MESHES), TORQUES, ENDS, st.sampled_from([0.0, 4.0]), st.sampled_from([-5.0, 0.0, 0.3]))
 def test_a_torque_of_an_end_stands_all_along_the_shaft(
     model: sw.ShaftModel, torque: float, ends: tuple[str, ...], damping: float, speed: float
@@ -68,7 +70,7 @@ def test_a_torque_of_an_end_stands_all_along_the_shaft(
         assert sol["line.tau_a"][0] == pytest.approx(torque, abs=1e-10 * size)
 
 
-@settings(max_examples=5, deadline=None)
+@share_of_examples(0.05)
 @given(TORQUES, ENDS, st.sampled_from([0.0, 0.05]))
 def test_a_wave_reads_the_torque_that_was_asked(torque: float, ends: tuple[str, ...], friction: float) -> None:
     """Nothing moves at the start, and no inertia of the shaft is at its ends."""
@@ -80,6 +82,7 @@ def test_a_wave_reads_the_torque_that_was_asked(torque: float, ends: tuple[str, 
     assert abs(sol["J1.omega"][0]) < 1e-12 * abs(torque)
 
 
+@pytest.mark.slow
 def test_a_wave_reads_its_start_before_the_first_wave_has_crossed() -> None:
     """Against a fine mesh, up to a third of the delay: 2e-3 is its polynomial at kinks, read between stations."""
     given = {"line.tau_a": 5.0, "J1.omega": 1.0, "J2.omega": -2.0}
@@ -90,6 +93,7 @@ def test_a_wave_reads_its_start_before_the_first_wave_has_crossed() -> None:
             assert np.abs(row - read)[1:-1].max() < 2e-3 * size
 
 
+@pytest.mark.slow
 def test_a_wound_up_shaft_lets_go_alike_in_all_models() -> None:
     """Against the wave, after a while of many delays: what meshes differ by is the sharp front, not the swing."""
     times = np.linspace(0, 0.02, 41)
@@ -118,7 +122,8 @@ def test_a_torque_beside_all_states_of_another_motion_contradicts_them() -> None
         model.simulate(1e-4, initial=model.steady_state() | {"line.tau_a": 5.0})
 
 
-@settings(max_examples=5, deadline=None)
+@pytest.mark.slow
+@share_of_examples(0.05)
 @given(st.sampled_from((*MESHES[1:], sw.Wave())), TORQUES, st.sampled_from([0.5, 3.0, 7.1]))
 def test_a_wound_up_shaft_behind_a_gear_contradicts_nothing(model: sw.ShaftModel, torque: float, ratio: float) -> None:
     net = pair(model, friction=0.01)
@@ -134,7 +139,8 @@ def test_a_wound_up_shaft_behind_a_gear_contradicts_nothing(model: sw.ShaftModel
 HOLDING = (*MESHES, *(sw.Spectral(n) for n in range(3, 25, 3)), sw.Lumped(40), sw.CentralDifference(30), sw.Wave())
 
 
-@settings(max_examples=8, deadline=None)
+@pytest.mark.slow
+@share_of_examples(0.05)
 @given(st.sampled_from(HOLDING), st.sampled_from([1e-3, 20.0, 1000.0]), st.sampled_from([None, 300.0, 1e5]))
 def test_a_drive_comes_to_rest_under_load(model: sw.ShaftModel, torque: float, stiffness: float | None) -> None:
     """The torque is that of the motor all along, and the speeds are rounding of the energy that it has wound up."""

@@ -73,6 +73,7 @@ def test_a_free_end_reflects_the_torque_with_the_opposite_sign_and_a_clamped_one
     assert clamped["line.omega_a"][back] == pytest.approx(-2.0 / SECTION.impedance, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_nonlinear_motor_drives_waves() -> None:
     """A Kloss motor with the law of the exact solution, which solves it by its own Newton iteration."""
     net = sw.Network("kloss")
@@ -92,6 +93,7 @@ def test_a_nonlinear_motor_drives_waves() -> None:
     assert np.abs(sol["line.tau_b"] - expected).max() < 1e-7 * np.abs(expected).max()
 
 
+@pytest.mark.slow
 def test_two_shafts_of_incommensurate_length_meet_at_a_gear() -> None:
     """Against the spectral model, whose end speeds are good to 1e-7 at degree 16, as those of degree 24 and 32 say."""
 
@@ -110,12 +112,14 @@ def test_two_shafts_of_incommensurate_length_meet_at_a_gear() -> None:
         assert np.abs(waves[name] - reference[name]).max() < 1e-6 * np.abs(reference[name]).max()
 
 
+@pytest.mark.slow
 def test_bearing_friction_is_lumped() -> None:
     """Right for motions slower than the delay: the decay of the lowest mode, not of the wave fronts."""
     waves, reference = (train(model, friction=0.03).simulate(0.2) for model in (sw.Wave(), sw.Spectral(24)))
     assert np.abs(waves["Jm.omega"] - reference["Jm.omega"]).max() < 1e-3 * reference["Jm.omega"].max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("share", "bound"), [(0.09, 0.006), (0.77, 0.03)])
 def test_heavy_bearing_friction_warns_from_where_the_torque_is_half_a_per_cent_off(share: float, bound: float) -> None:
     """Also where it is heavy by a parameter of the run; not in the frequency domain, which has it spread out."""
@@ -173,6 +177,7 @@ def test_a_turning_shaft_goes_on_turning() -> None:
     np.testing.assert_allclose(sol["line.tau"], 0.0, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("given", [{"Je.omega": 1.0}, {"Je.omega": 3.0, "Jm.omega": -1.0}])
 def test_a_start_with_unequal_ends_is_that_of_a_fine_mesh(given: dict[str, float]) -> None:
     """Both run straight from end to end, without a front, so polynomials converge: in torques to 2e-7 at degree 32."""
@@ -237,11 +242,13 @@ def test_the_energy_on_its_way_is_part_of_the_balance(friction: float) -> None:
     )  # interpolated between panels
 
 
+@pytest.mark.slow
 def test_the_energy_of_waves_equals_that_of_a_fine_mesh() -> None:
     wave, mesh = (train(model).simulate(0.05, rtol=1e-10, t_eval=101) for model in (sw.Wave(), sw.Spectral(24)))
     assert np.abs(wave["line.energy"] - mesh["line.energy"]).max() < 1e-5 * mesh["line.energy"].max()
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::shaftwork.AccuracyWarning")
 def test_energy_is_kept_over_a_hundred_thousand_periods() -> None:
     """Of the first mode, 8e6 delays; bar 3 asks 1e-9."""
@@ -253,6 +260,7 @@ def test_energy_is_kept_over_a_hundred_thousand_periods() -> None:
     np.testing.assert_allclose(stored, stored[0], rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_waves_that_are_not_resolved_any_more_say_so() -> None:
     net = train(sw.Wave(), drive=sympy.Piecewise((12.7, sw.t < 0.1), (0, True)))
     with pytest.warns(sw.AccuracyWarning, match=r"delays the modes have run out of step.*of the largest wave is not"):
@@ -267,6 +275,7 @@ def beside(part: sw.Component, *nodes: str, model: object = None) -> sw.Network:
     return net
 
 
+@pytest.mark.slow
 def test_friction_beside_a_wave_is_rounded_and_says_so_once() -> None:
     with pytest.warns(
         sw.AccuracyWarning, match=r"\('line'\) nothing sticks; the friction of 'load' is rounded"
@@ -278,6 +287,7 @@ def test_friction_beside_a_wave_is_rounded_and_says_so_once() -> None:
     assert modes.rates == pytest.approx(damped.rates, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_brake_beside_a_wave_comes_on_at_its_time() -> None:
     """Rounding over 0.01 rad/s changes a speed of some 10 rad/s by nothing before it is at rest."""
     brake, times = sw.Brake("brake", tau=5.0, t_on=0.1), [0.05, 0.1, 0.12, 0.15]

@@ -50,6 +50,7 @@ def network(drive: Drive, lengths: tuple[float, float]) -> sw.Network:
     return net
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("lengths", "gap", "c", "d"),
     [((10.0, 10.0 * np.sqrt(2)), 0.02, 2e5, 20.0), ((8.0, 8.0), 1e-4, 5e4, 0.0), ((7.0, 9.1), 0.05, 1e6, 0.0)],

@@ -1,12 +1,11 @@
 """How many random networks are tried, and how a list of pieces becomes a network of the library.
 
-``SHAFTWORK_EXAMPLES`` sets the number for the main comparison (500 by default); every other property takes a share of
-it. The examples are the same in every run: a red test must mean a change of the code, not of the dice.
+``tests/conftest.py`` sets the number for the main comparison; every other property takes the share of it that its cost
+allows.
 """
 
 from __future__ import annotations
 
-import os
 import signal
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
@@ -14,7 +13,7 @@ from contextlib import contextmanager
 from types import FrameType
 
 import numpy as np
-from hypothesis import HealthCheck, settings
+from hypothesis import settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -23,19 +22,12 @@ from shaftwork.components import REGISTRY
 from tests.reference.mna import GROUND, Piece
 from tests.strategies import Network as Pieces
 
-EXAMPLES = int(os.environ.get("SHAFTWORK_EXAMPLES", "500"))
 Array = NDArray[np.float64]
 
 
 def share_of_examples(share: float = 1.0) -> settings:
-    """Hypothesis settings for a property that is tried on this share of the examples."""
-    return settings(
-        max_examples=max(5, round(share * EXAMPLES)),
-        deadline=None,
-        database=None,
-        derandomize=True,
-        suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_base_example],
-    )
+    """Hypothesis settings for a property that is tried on this share of the examples, and on five at least."""
+    return settings(max_examples=max(5, round(share * settings().max_examples)))
 
 
 @contextmanager

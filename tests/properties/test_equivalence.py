@@ -57,6 +57,7 @@ def _random_state(model: sw.Model, seed: int) -> tuple[float, Any]:
     return float(dice.uniform(0.0, 2.0)), dice.normal(scale=3.0, size=len(model.states))
 
 
+@pytest.mark.slow
 @share_of_examples(0.2)
 @given(nonlinear_networks(), SEEDS)
 def test_symbolic_rows_equal_the_array_program(net: sw.Network, seed: int) -> None:

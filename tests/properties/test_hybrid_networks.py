@@ -142,6 +142,7 @@ class Witness:
         yield "breaks its law", wrong - self._weak(tau)
 
 
+@pytest.mark.slow
 @given(trains())
 @share_of_examples(0.3)
 def test_every_step_lies_in_the_region_of_its_modes(train: Train) -> None:
@@ -198,6 +199,7 @@ def test_engines_agree_in_the_end_and_in_the_events(train: Train) -> None:
         assert_alike(train, found["heyoka"], found[engine])
 
 
+@pytest.mark.slow
 @given(trains(most=5))
 @share_of_examples(0.1)
 def test_energy_goes_to_the_parts_that_lose_it_and_none_is_left_over(train: Train) -> None:
@@ -223,6 +225,7 @@ def turned(part: Part) -> Part:
     return replace(part, nodes=part.nodes[::-1])
 
 
+@pytest.mark.slow
 @given(trains(most=5), st.randoms(use_true_random=False))
 @share_of_examples(0.1)
 def test_names_order_and_direction_of_parts_change_nothing(train: Train, random: object) -> None:
@@ -241,6 +244,7 @@ def test_names_order_and_direction_of_parts_change_nothing(train: Train, random:
             assert speeds[0] == pytest.approx(speeds[1], rel=AGREE, abs=AGREE), part.name
 
 
+@pytest.mark.slow
 def test_a_train_that_cannot_go_on_ends_in_one_named_error() -> None:
     """A wheel between two stops that throw back all its speed, a billionth of a radian apart."""
     train = Train(

@@ -5,13 +5,14 @@ from __future__ import annotations
 import warnings
 
 import numpy as np
-from hypothesis import given, settings
+import pytest
+from hypothesis import given
 from hypothesis import strategies as st
 
 import shaftwork as sw
 from shaftwork.results.measures import Measure
 from shaftwork.studies import motion_sensitivities
-from tests.properties.examples import EXAMPLES, Array, share_of_examples
+from tests.properties.examples import Array, share_of_examples
 from tests.trains import Train, trains
 
 STEP = 2e-6
@@ -23,8 +24,9 @@ MOST_EVENTS = 40
 """An error grows with every event, and that of a difference is the same error over its step."""
 
 
+@pytest.mark.slow
 @given(st.lists(trains(most=3), min_size=5, max_size=5))
-@settings(share_of_examples(), max_examples=max(2, EXAMPLES // 250))
+@share_of_examples(0.004)
 def test_sensitivities_equal_central_differences_and_are_seldom_refused(several: list[Train]) -> None:
     assert sum(not agrees(train) for train in several) <= MOST_REFUSED
 

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -47,6 +48,7 @@ def _assert_same_motion(first: Network, second: Network, found_as: Callable[[str
     assert_equal_signals(found, wanted, ROUNDING)
 
 
+@pytest.mark.slow
 @share_of_examples(0.1)
 @given(networks(max_inertias=12), st.randoms(use_true_random=False))
 def test_names_of_parts_and_nodes_change_nothing(pieces: Network, dice: st.Random) -> None:
@@ -64,6 +66,7 @@ def test_names_of_parts_and_nodes_change_nothing(pieces: Network, dice: st.Rando
     _assert_same_motion(pieces, renamed, found_as)
 
 
+@pytest.mark.slow
 @share_of_examples(0.1)
 @given(networks(max_inertias=12), st.randoms(use_true_random=False))
 def test_the_order_of_the_parts_changes_nothing(pieces: Network, dice: st.Random) -> None:
@@ -146,6 +149,7 @@ def _in_another_process(hash_seed: int) -> bytes:
     return done.stdout
 
 
+@pytest.mark.slow
 def test_another_process_prints_the_same_equations_code_and_states_byte_by_byte() -> None:
     """Hash seeds order sets of texts differently, so a set on the way would show."""
     first, second = _in_another_process(1), _in_another_process(2)

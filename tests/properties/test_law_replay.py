@@ -54,6 +54,7 @@ def test_every_law_holds_in_the_motion_of_a_random_drive(train: Train) -> None:
     assert replayed(train, "heyoka") == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["scipy", "sundials"])
 @given(drives(most=2))
 @share_of_examples(0.03)
@@ -121,6 +122,7 @@ def motion() -> Motion:
     return Motion(moved(DRIVE))
 
 
+@pytest.mark.slow
 def test_the_replayed_drive_has_no_objection_and_meets_what_is_to_be_judged(motion: Motion) -> None:
     assert all_objections(DRIVE.parts, motion) == []
     said = {(name, mode) for phase in motion.sol.phases for name, mode in phase.modes.items()}

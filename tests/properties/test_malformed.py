@@ -133,6 +133,7 @@ def _survives(pieces: Network) -> sw.ShaftworkError | None:
     return None
 
 
+@pytest.mark.slow
 @share_of_examples(2)
 @given(malformed_networks())
 def test_a_network_broken_on_purpose_is_refused_or_runs(broken: tuple[Network, str]) -> None:
@@ -165,6 +166,7 @@ def torn_networks(draw: st.DrawFn) -> Network:
     return tuple(torn)
 
 
+@pytest.mark.slow
 @share_of_examples(2)
 @given(torn_networks())
 def test_a_network_torn_at_random_is_refused_or_runs(pieces: Network) -> None:

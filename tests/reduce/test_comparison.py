@@ -36,6 +36,7 @@ def parallel() -> sw.Network:
     return net
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("keep", "share"), [("s", 0.3), ("beside", 0.7), ("oil", 0.0)])
 def test_of_one_mass_the_kept_part_has_its_share_of_the_torque_beside_others(keep: str, share: float) -> None:
     """Once the swing is damped out the train carries as much in this part, but for what the load takes by and by."""
@@ -85,6 +86,7 @@ def test_a_known_motion_is_that_of_the_train_as_it_is() -> None:
     assert small.compare(2.0, before=own).rms_error < 1e-6
 
 
+@pytest.mark.slow
 def test_a_motion_says_what_it_was_made_of() -> None:
     net = geared(damping=0.0)
     for found, damping in ((net.simulate(1.0), None), (net.simulate(1.0, parameters={"s.d": 0.3}), 0.3)):
@@ -96,6 +98,7 @@ def test_a_motion_says_what_it_was_made_of() -> None:
     assert (started.parameters["shaft.c"], dict(started.initial)) == (3e4, {"crane.v": 1.0})
 
 
+@pytest.mark.slow
 def test_names_of_modes_are_free_whatever_the_nodes_and_parts_are_called() -> None:
     """Names of the train stay; a node "mode 1" with a load on it is no mode."""
 
@@ -141,6 +144,7 @@ def test_what_goes_with_time_and_speed_is_no_stiffness() -> None:
     assert sw.reduce.simplify(sw.scenes.crane_train(), 2, "shaft").by_angle == ()
 
 
+@pytest.mark.slow
 def test_the_limit_of_validity_is_missed_by_as_much_as_its_documentation_says() -> None:
     """0.30 f_l is the limit of one mode; all modes together have been measured, with 1621 chains."""
     missed = [error for seed in range(160) if (error := _missed_at_the_limit(seed)) is not None]
@@ -255,6 +259,7 @@ def test_a_motion_under_another_law_or_of_another_wiring_is_refused(other: sw.Ne
         made.compare(2.0, before=other.simulate(2.0))
 
 
+@pytest.mark.slow
 def test_a_comparison_may_start_late_and_take_any_outputs() -> None:
     made = sw.reduce.simplify(driven(LAW), 3, "s")
     assert made.compare(3.0, t_start=1.0).rms_error == pytest.approx(0.0, abs=1e-9)

@@ -77,6 +77,7 @@ def without(inertias: tuple[float, ...], places: tuple[int, ...]) -> tuple[float
     return tuple(0.0 if place in places else size for place, size in enumerate(inertias))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("places", "keep"), [((0,), "s1"), ((0,), "s0"), ((2,), "s1"), ((2,), "s0"), ((0, 4), "s3"), ((0, 4), "s1")]
 )
@@ -140,6 +141,7 @@ def test_by_modes_the_node_of_a_prescribed_speed_is_a_boundary(
     assert all(found >= exact * (1 - 1e-9) for found, exact in zip(listed, true, strict=False))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("places", "keep"), [((0,), "s2"), ((0, 4), "s2"), ((0, 4), "s1"), ((0, 2), "s3"), ((1,), "s3")]
 )

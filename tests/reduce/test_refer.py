@@ -94,6 +94,7 @@ def referred(pieces: Pieces, pick: int) -> tuple[sw.Network, sw.reduce.Referred]
             raise
 
 
+@pytest.mark.slow
 @share_of_examples(0.7)
 @given(trains, st.integers(0, 63), st.integers(0, 2**31))
 def test_energies_torques_and_natural_frequencies_are_those_of_the_train(pieces: Pieces, pick: int, seed: int) -> None:
@@ -140,6 +141,7 @@ def _assert_rigid_parts_turn(pieces: Pieces, small: sw.reduce.Referred) -> None:
     assert not {type(part).__name__ for part in small.network.parts} & set(ROWS)
 
 
+@pytest.mark.slow
 @share_of_examples(0.62)
 @given(networks(electrical=False, loops=False, max_inertias=5), st.integers(0, 63))
 def test_simulated_torques_and_energies_are_those_of_the_train(pieces: Pieces, pick: int) -> None:
@@ -167,6 +169,7 @@ def _torques(sol: sw.Solution, net: sw.Network) -> dict[str, Array]:
     return {part: sol[name] for part, name in names if name in sol.names}
 
 
+@pytest.mark.slow
 @share_of_examples(0.01)
 @given(trains_with_modes(3), st.integers(0, 63))
 def test_gaps_frictions_brakes_and_motors_act_as_in_the_train(train: Train, pick: int) -> None:
@@ -191,6 +194,7 @@ def test_gaps_frictions_brakes_and_motors_act_as_in_the_train(train: Train, pick
         assert torque == pytest.approx(others[name], abs=1e-9 * scale)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("limits", "there"),
     [
@@ -252,6 +256,7 @@ def test_the_crane_at_its_wheel_shaft_has_the_numbers_of_the_source() -> None:
     assert small.absorbed == ("reducer", "rail")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("gear", "to"),
     [(sw.Gear("reducer", ratio=-35.5), "wheel"), (REDUCER, "motor shaft"), (REDUCER, "wheel")],
@@ -277,6 +282,7 @@ FLANKS: dict[str, dict[str, float]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flanks", FLANKS)
 @pytest.mark.parametrize("radius", [0.2, -0.2])
 def test_a_gap_closes_and_opens_as_in_the_train_where_the_reference_translates(flanks: str, radius: float) -> None:
@@ -312,6 +318,7 @@ def test_a_gap_closes_and_opens_as_in_the_train_where_the_reference_translates(f
     assert isinstance(back, sw.Backlash)
 
 
+@pytest.mark.slow
 def test_a_conveyor_goes_down_behind_a_gear_that_reverses_where_it_went_up() -> None:
     """Weight, friction and drag are those of the train at any time, to the tolerance of two runs."""
     net = sw.Network("conveyor")

@@ -80,6 +80,7 @@ def test_the_kept_shaft_and_the_inertia_on_either_side_of_it_stay() -> None:
         assert total == pytest.approx(sum(INERTIAS), rel=1e-14)
 
 
+@pytest.mark.slow
 def test_as_many_masses_as_there_are_lose_nothing() -> None:
     small = sw.reduce.simplify(chain(INERTIAS, STIFFNESSES, damping=1e-4), 5, "c2")
     assert [row.error for row in small.frequencies] == pytest.approx([0.0] * 4, abs=1e-12)
@@ -218,6 +219,7 @@ def test_a_massless_end_and_a_shaft_without_a_spring_are_named() -> None:
         sw.reduce.simplify(net, 2, "c0")
 
 
+@pytest.mark.slow
 def test_the_peaks_that_are_compared_lie_between_the_output_times_too() -> None:
     """As many masses as there are: with the output times far apart both must find the peak of the closed form."""
     net = chain([1.0, 2.0], [1e8])

@@ -101,6 +101,7 @@ def test_a_light_mass_behind_a_stiff_coupling_leaves_the_lowest_frequency_right(
     assert small.valid_up_to > 1e6
 
 
+@pytest.mark.slow
 @share_of_examples(0.08)
 @given(wide, stiffness, st.integers(0, 99), st.sampled_from([0.0, 1e-3, 1e12]))
 def test_all_modes_together_have_the_frequencies_of_the_train_beside_stiff_couplings(

@@ -88,6 +88,7 @@ def test_what_a_support_holds_at_rest_is_held_in_the_model_by_modes() -> None:
     assert lost.by_modes[-1] == pytest.approx(1.0, rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("keep", ["c0", "c2", "c4"])
 @pytest.mark.parametrize("drive", ["torque", "speed"])
 def test_with_all_modes_a_supported_train_moves_as_it_is(keep: str, drive: str) -> None:

@@ -41,6 +41,7 @@ TRAINS = {
 }
 
 
+@pytest.mark.slow
 @compiles
 @pytest.mark.parametrize("name", TRAINS)
 def test_tables_keep_inside_the_margins(name: str, tmp_path: Path) -> None:

@@ -37,6 +37,7 @@ def test_the_ten_masses_of_the_crane_reduce_to_the_printed_numbers(mesh: str) ->
     assert parts["load"].tau == 22.4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mesh", ["elastic", "rigid"])
 def test_the_eleven_masses_of_the_excavator_reduce_to_the_printed_numbers(mesh: str) -> None:
     net = sw.scenes.excavator_train(mesh=mesh)
@@ -56,6 +57,7 @@ def test_losses_in_the_gears_take_their_share_of_inertia_and_brake() -> None:
     assert lossy.table["rotor.J"].referred == pytest.approx(0.95 * plain.table["rotor.J"].referred, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_the_loss_of_two_masses_is_what_the_train_and_the_crane_of_the_source_differ_by() -> None:
     """Both simulated on their own; the scene `crane` was written down from the source."""
     net, train = crane()
@@ -72,6 +74,7 @@ def test_the_loss_of_two_masses_is_what_the_train_and_the_crane_of_the_source_di
     assert lost.rms_error > 0.1  # the peak is nearly the same, at another time: two masses swing faster
 
 
+@pytest.mark.slow
 def test_the_loss_of_three_masses_is_that_of_its_network_and_modes_have_their_own() -> None:
     net, train = crane()
     small = sw.reduce.simplify(net, 3, "shaft")
@@ -82,6 +85,7 @@ def test_the_loss_of_three_masses_is_that_of_its_network_and_modes_have_their_ow
     assert [line.split()[0] for line in str(lost).splitlines()] == ["model", "train", "groups", "modes"]
 
 
+@pytest.mark.slow
 def test_every_step_from_seven_masses_to_one_loses_more() -> None:
     net, train = crane(mesh="rigid")
     steps = [sw.reduce.simplify(net, masses, "shaft") for masses in (7, 3, 2, 1)]
@@ -91,6 +95,7 @@ def test_every_step_from_seven_masses_to_one_loses_more() -> None:
     assert [step.valid_up_to for step in steps] == sorted((step.valid_up_to for step in steps), reverse=True)
 
 
+@pytest.mark.slow
 def test_one_mass_has_the_torque_that_moves_what_is_beyond_the_shaft() -> None:
     net, train = crane()
     one = sw.reduce.simplify(net, 1, "shaft")
@@ -103,6 +108,7 @@ def test_one_mass_has_the_torque_that_moves_what_is_beyond_the_shaft() -> None:
     assert lost.peak_error < -0.3
 
 
+@pytest.mark.slow
 def test_the_excavator_loses_little_to_two_masses() -> None:
     net = sw.scenes.excavator_train(mesh="rigid")
     small = sw.reduce.simplify(net, 2, "shaft")

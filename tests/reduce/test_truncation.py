@@ -60,6 +60,7 @@ def _projected(inertias: list[float], stiffnesses: list[float], kept: int, masse
 INERTIAS, STIFFNESSES = [2.0, 0.2, 0.5, 1.0, 0.3, 3.0], [900.0, 3000.0, 500.0, 2000.0, 800.0]
 
 
+@pytest.mark.slow
 def test_with_all_modes_it_moves_as_the_train_wherever_a_torque_acts() -> None:
     """Damping as a share of stiffness, which each mode has by itself."""
     net = chain(INERTIAS, STIFFNESSES, damping=1e-3)
@@ -71,6 +72,7 @@ def test_with_all_modes_it_moves_as_the_train_wherever_a_torque_acts() -> None:
     assert abs(lost.peak_error_by_modes) < 1e-10
 
 
+@pytest.mark.slow
 def test_one_mode_more_is_nearer_to_the_train() -> None:
     net = chain(INERTIAS, STIFFNESSES, damping=1e-4)
     errors = [
@@ -81,6 +83,7 @@ def test_one_mode_more_is_nearer_to_the_train() -> None:
     assert errors[-1] < 1e-9
 
 
+@pytest.mark.slow
 def test_a_gap_that_is_kept_is_kept_by_modes_as_well() -> None:
     net = sw.Network("gap")
     net.add(sw.TorqueSource("motor", tau=10 * sw.t), "a")
@@ -101,6 +104,7 @@ def test_a_network_by_modes_is_saved_and_read(tmp_path: Path) -> None:
     assert sw.Network.load(tmp_path / "modes.toml").netlist() == small.by_modes.netlist()
 
 
+@pytest.mark.slow
 def test_a_brake_that_locks_a_place_which_all_modes_move_leaves_equations_to_compile() -> None:
     """Its place is held by the sum of all speeds there. The train, whose brake holds one of them, moves alike."""
     net = sw.Network("braked")

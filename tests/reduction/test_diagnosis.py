@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import pytest
 import sympy
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 
 from shaftwork.components import bldc, electrical, induction_machine, loads, machines, rotation, sources, translation  # noqa: F401 - registers all
 from shaftwork.components.base import REGISTRY
@@ -336,16 +335,11 @@ def test_problems_of_a_kind_come_in_the_order_of_the_parts() -> None:
     assert [problem.parts for problem in said] == [(f"s{k}",) for k in range(50)]
 
 
-fuzz: Callable[..., Any] = settings(
-    max_examples=150, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
-)
-
-
 def placed(net: Network) -> tuple[Placed, ...]:
     return tuple(part(piece.type, piece.name, *piece.nodes, **piece.values) for piece in net)
 
 
-@fuzz
+@pytest.mark.slow
 @given(networks())
 def test_no_well_posed_network_is_refused(net: Network) -> None:
     assert [problem for problem in diagnose(Netlist("random", placed(net)))[2] if problem.severity == "error"] == []
@@ -354,7 +348,7 @@ def test_no_well_posed_network_is_refused(net: Network) -> None:
 ALLOWED = ("locked_gear_loop", "missing_node")  # locked is a warning; the missing node may be that of an optional port
 
 
-@fuzz
+@pytest.mark.slow
 @given(malformed_networks())
 def test_every_malformed_network_is_refused_in_words_that_name_the_place(broken: tuple[Network, str]) -> None:
     net, kind = broken

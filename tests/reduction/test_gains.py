@@ -16,6 +16,7 @@ VALUES = {Symbol("a", real=True): 2.0, Symbol("b", real=True): 0.5, Symbol("c", 
 COMBINED = {"*": operator.mul, "+": lambda first, second: add(first, second, []), "/": divide}
 
 
+@pytest.mark.slow
 @given(st.lists(st.sampled_from("*+/"), min_size=1, max_size=8), st.randoms(use_true_random=False))
 def test_combined_ratios_are_simplified_alike_alone_and_together(operations: list[str], random: Random) -> None:
     """Made of each other at random; each is equal to its value, and has no common factor above and below."""

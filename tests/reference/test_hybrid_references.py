@@ -20,6 +20,7 @@ def distance(one: Motion, other: Motion) -> float:
     return max(*times, *(abs(a - b) for a, b in zip(one.end, other.end, strict=True)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("load", "method", "step"),
     [
@@ -33,6 +34,7 @@ def test_every_method_finds_the_stored_motion_of_the_crane(load: Load, method: M
     assert distance(motion(Crane(load), step=step, method=method), stored(load)) < 1e-11
 
 
+@pytest.mark.slow
 def test_a_brake_that_is_too_weak_breaks_away_again() -> None:
     crane = Crane("constant", tau_w=100.0, tau_brake=150.0)
     found = motion(crane, t_end=10.5)

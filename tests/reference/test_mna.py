@@ -10,9 +10,10 @@ from math import exp, pi, tanh
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import assume, given
 
 from tests.malformations import BREAKERS
+from tests.properties.examples import share_of_examples
 from tests.reference.chain import chain, equal_chain
 from tests.reference.crane import Crane, kloss_slip, shaft_torque, taylor
 from tests.reference.mna import (
@@ -236,6 +237,7 @@ def test_ida_agrees_on_a_nonlinear_motor_with_the_hand_typed_crane() -> None:
     assert close(simulate_nonlinear(net, laws, times).through["shaft.through"], shaft_torque(crane, times), 2e-7)
 
 
+@pytest.mark.slow
 def test_the_crane_reference_is_good_to_1e_12() -> None:
     times = [0.0, 0.01, 0.05, 0.1, 0.2]
     assert close(shaft_torque(Crane(), times), taylor(Crane(), times), 1e-12)
@@ -282,7 +284,8 @@ def _power(net: Network, r: Response) -> np.ndarray:
     return total
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+@pytest.mark.slow
+@share_of_examples(0.5)
 @given(networks(max_inertias=12))
 def test_random_networks_are_well_posed_passive_and_rest_unambiguously(net: Network) -> None:
     eigenvalues = spectrum(net)
@@ -293,7 +296,7 @@ def test_random_networks_are_well_posed_passive_and_rest_unambiguously(net: Netw
     assert all(np.abs(history).max() == 0.0 for history in r.across.values())
 
 
-@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+@share_of_examples(0.5)
 @given(networks(max_inertias=8))
 def test_powers_sum_to_zero_in_random_networks(net: Network) -> None:
     r = simulate(net, None, np.linspace(0.0, 0.5, 6))
@@ -302,7 +305,8 @@ def test_powers_sum_to_zero_in_random_networks(net: Network) -> None:
     assert np.abs(_power(net, r)).max() <= 1e-8 * max(1.0, largest)
 
 
-@settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+@pytest.mark.slow
+@share_of_examples(0.3)
 @given(networks(max_inertias=8))
 def test_ida_and_the_exponential_agree_on_random_networks(net: Network) -> None:
     times, rate = np.linspace(0.0, 0.2, 5), 15.0

@@ -25,6 +25,7 @@ def bouncing(d: float = 0.0, tau: float = 0.0) -> sw.Network:
     return net
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_between_undamped_stops_nothing_is_lost_at_any_instant(engine: str) -> None:
     sol = bouncing().simulate(3.0, engine=engine, initial={"J.omega": 4.0}, t_eval=301)
@@ -87,6 +88,7 @@ def test_flanks_that_start_beyond_their_limit_and_part_at_once_lose_all_they_sto
     assert sol["J.omega"][-1] == -20.0
 
 
+@pytest.mark.slow
 def test_a_gap_beside_a_shaft_of_waves_stores_what_it_is_pressed_in() -> None:
     net = sw.Network("line")
     net.add(sw.TorqueSource("drive", tau=200.0), "a")
@@ -116,6 +118,7 @@ class Stiffening(sw.Component):
         yield sw.ThroughLaw(torque, stored=p.c * sw.INTEGRAL**2 / 2 + p.c3 * sw.INTEGRAL**4 / 4)  # type: ignore[attr-defined]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("d", [0.0, 0.5])
 def test_a_law_stores_what_it_says_and_loses_the_rest(d: float, engine: str) -> None:

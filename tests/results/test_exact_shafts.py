@@ -16,6 +16,7 @@ from shaftwork.shafts.exact_modes import modes as line_modes
 from shaftwork.shafts.exact_modes import natural_frequencies
 from shaftwork.shafts.exact_response import frequency_response
 from shaftwork.shafts.line import Line, Section
+from tests.properties.examples import share_of_examples
 
 STEEL = {"density": 7900.0, "shear_modulus": 77.5e9}
 SECTION = Section.of_geometry(1.0, 0.02, **STEEL)
@@ -92,6 +93,7 @@ def _assert_equal_rates(found: Any, wanted: Any, tolerance: float = ROUNDING) ->
     np.testing.assert_allclose(found.rates, wanted.rates, rtol=tolerance, atol=0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("J", "printed"),
     [(0.11, (38.88573365, 1567.02210303, 3132.59539509)), (0.025, (49.64737792, 1567.62972935, 3132.89957778))],
@@ -369,7 +371,7 @@ _SHAFT = st.tuples(
 )
 
 
-@settings(max_examples=5, deadline=None, phases=(Phase.generate,))
+@settings(share_of_examples(0.01), phases=(Phase.generate,))
 @given(st.lists(_SHAFT, min_size=1, max_size=3), st.sampled_from([0.2, 1.0, 3.7]), st.booleans())
 def test_random_trains_are_those_of_a_converged_mesh(shafts: list[Any], ratio: float, branched: bool) -> None:  # noqa: FBT001
     """One to three shafts, in a row or from one wheel, hollow, lossy, with or without discs; four half waves each."""

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from shaftwork.results.quadrature import MOST, Panels, integrate
@@ -10,7 +10,6 @@ from shaftwork.results.quadrature import MOST, Panels, integrate
 STEPS = np.array([0.0, 1.0, 3.0])
 
 
-@settings(deadline=None)
 @given(st.floats(0.0, 3.0))
 def test_a_jump_and_a_kink_within_a_step_are_integrated_to_1e_10(place: float) -> None:
     def integrand(panels: Panels) -> np.ndarray:

@@ -10,11 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import shaftwork as sw
 from shaftwork.sizing.catalogue import OWN, TYPICAL
+from tests.properties.examples import share_of_examples
 
 MOTORS = {motor.name: motor for motor in sw.sizing.catalogue()}
 MOTOR = MOTORS["112M 4 kW 4-pole"]
@@ -31,7 +32,7 @@ def motion(top: float, J: float, load: float, lengths: tuple[float, float, float
     return net.simulate(float(t[3]))
 
 
-@settings(max_examples=15, deadline=None)
+@share_of_examples(0.1)
 @given(
     share=st.floats(0.3, 1.4),
     load=st.floats(1.0, 40.0),

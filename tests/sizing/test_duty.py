@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 
 import shaftwork as sw
+from tests.properties.examples import share_of_examples
 
 TOLERANCE = 1e-10
 """The bar of the issue, relative to the largest value of its kind."""
@@ -102,7 +103,7 @@ def assert_as_by_hand(made: sw.sizing.Duty, hand: Hand, end: float) -> None:
 POSITIVE = st.floats(0.2, 20.0)
 
 
-@settings(max_examples=25, deadline=None, phases=(Phase.explicit, Phase.reuse, Phase.generate))
+@settings(share_of_examples(0.1), phases=(Phase.explicit, Phase.reuse, Phase.generate))
 @example(lengths=(1.00001, 3.1327969124830384, 17.0, 1.0), top=2.0, J=1.0, d=1.0, load=0.0)  # a peak before a jump
 @given(
     lengths=st.tuples(POSITIVE, POSITIVE, POSITIVE, POSITIVE),

@@ -26,6 +26,7 @@ def ours(motion: Motion) -> np.ndarray:
     return np.column_stack([sol[name] for name in ("m.i_a", "m.i_b", "m.i_c", "m.omega")])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MOTIONS)
 def test_the_motor_carries_the_currents_of_its_circuit_and_turns_as_fast(name: str) -> None:
     record = stored(name)
@@ -37,6 +38,7 @@ def test_the_motor_carries_the_currents_of_its_circuit_and_turns_as_fast(name: s
         assert error < tolerance
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(
     shutil.which("ngspice") is None and "CI" not in os.environ, reason="needs ngspice (Debian package); CI has it"
 )
