@@ -46,7 +46,6 @@ def test_no_file_is_longer_than_400_lines() -> None:
     assert {name: length for name, length in lengths.items() if length > 400} == {}
 
 
-@pytest.mark.slow
 def test_95_percent_of_the_functions_have_at_most_40_lines() -> None:
     lengths = dict(functions())
     long = {name: length for name, length in lengths.items() if length > 40}
@@ -93,7 +92,6 @@ def undocumented() -> Iterator[str]:
                         yield f"{place(file, method)} {node.name}.{method.name}"
 
 
-@pytest.mark.slow
 def test_every_public_name_has_a_docstring() -> None:
     assert list(undocumented()) == []
 
@@ -127,7 +125,6 @@ def test_code_run_from_data_is_recognised(line: str) -> None:
     assert any(map(runs_foreign_code, ast.walk(ast.parse(line))))
 
 
-@pytest.mark.slow
 def test_no_line_runs_code_from_data() -> None:
     """But for the one place where equations become functions, whose code holds names of its own alone."""
     files = [file for file in FILES if file.name != "code.py"]
@@ -147,7 +144,6 @@ def test_there_is_no_import_cycle() -> None:
     assert list(nx.simple_cycles(graph)) == []
 
 
-@pytest.mark.slow
 def test_no_module_imports_the_package_itself() -> None:
     """Inside the package, names come from the module that defines them, so that the import direction can be checked."""
     top = {path.stem for path in SOURCE.iterdir()}
