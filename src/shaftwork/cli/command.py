@@ -57,6 +57,17 @@ def solver_options(parser: ArgumentParser) -> None:
     )
 
 
+def point_options(parser: ArgumentParser) -> None:
+    """The options that say about which point a network is linearised, and how many modes are wanted."""
+    parser.add_argument(
+        "--at", metavar="NAME=X", action="append", default=[], help="a speed, twist or torque of the point, in SI"
+    )
+    parser.add_argument("--steady", action="store_true", help="about the steady operation instead of rest")
+    parser.add_argument("--count", metavar="N", type=int, help="modes wanted, the lowest (default: all)")
+    parser.add_argument("--f-max", metavar="HZ", type=float, help="highest frequency in Hz")
+    parser.add_argument("--exact", action="store_true", help="shafts as they are, without a mesh")
+
+
 def _folder(text: str) -> Path:
     if not text.strip():
         raise ArgumentTypeError("'' names no folder. Write --out . for this one.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import sys
 from argparse import ArgumentParser, Namespace
@@ -13,7 +14,7 @@ from shaftwork.cli.models import end_of, load
 from shaftwork.core.errors import ParameterError
 
 if TYPE_CHECKING:
-    from shaftwork.studies.work_precision import Trial, WorkPrecision
+    from shaftwork.studies.work_precision import Trial
 
 FILES = ("work-precision.csv", "work-precision.png")
 COMPARED = 1.0
@@ -40,7 +41,7 @@ def run(options: Namespace, say: Say) -> Data:
         raise ParameterError(
             f"'{net.name}' has no shaft whose models could be compared. Try: shaftwork compare shaft-step."
         )
-    t_end = end_of(options, scene, COMPARED)
+    t_end = end_of(options, scene)
     t_end = t_end if options.t_end is not None else min(t_end, COMPARED)
     folder = Folder(options.out, FILES, options.line) if options.out else None
     begun = f"comparing over {t_end:g} s of motion (set by --t-end), after the exact solution:"
@@ -48,9 +49,11 @@ def run(options: Namespace, say: Say) -> Data:
     study = work_precision(net, options.shaft or shafts[0], t_end=t_end, report=_done)
     say(f"{study}\n\n{study.advice}")
     if folder:
-        _write(study, folder)
+        with folder.new_files() as place:
+            study.to_csv(place / "work-precision.csv")
+            write_picture(place / "work-precision.png", study.plot)
         say(f"\n{folder.written()}")
-    return {}
+    return dataclasses.asdict(study)
 
 
 def _done(trial: Trial) -> None:
@@ -58,10 +61,4 @@ def _done(trial: Trial) -> None:
     print(f"{trial.model} on {trial.engine}: {what}", file=sys.stderr, flush=True)
 
 
-def _write(study: WorkPrecision, folder: Folder) -> None:
-    with folder.new_files() as place:
-        study.to_csv(place / "work-precision.csv")
-        write_picture(place / "work-precision.png", study.plot)
-
-
-COMMAND = Command("compare", "lumped against distributed shafts: error against run time", run, arguments)
+COMMAND = Command("compare", "lumped against distributed shafts: error against run time", run, arguments, machines=True)

@@ -13,12 +13,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from shaftwork.cli import check, compare, latex, run, scenes
+from shaftwork.cli import campbell, check, compare, export, latex, modes, run, scenes, sweep
 from shaftwork.cli.command import Command
 from shaftwork.core.errors import ShaftworkError, SimulationError
 
 DONE, FAILED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
-COMMANDS: tuple[Command, ...] = tuple(module.COMMAND for module in (scenes, run, latex, compare, check))
+COMMANDS: tuple[Command, ...] = tuple(
+    module.COMMAND for module in (scenes, check, latex, run, modes, campbell, sweep, compare, export)
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -109,6 +111,13 @@ def _parser() -> argparse.ArgumentParser:
         own.set_defaults(command=command, json=False)
         if command.model:
             own.add_argument("model", metavar="SCENE|FILE.toml", help="a ready scene or a model file")
+            own.add_argument(
+                "--set",
+                metavar="PART.PARAMETER=X",
+                action="append",
+                default=[],
+                help="another value, in SI or with its unit: shaft.c=2e4, 'J1.J=3 kg*m^2'; as often as needed",
+            )
         command.arguments(own)
         if command.machines:
             own.add_argument("--json", action="store_true", help="the result as JSON instead of words")

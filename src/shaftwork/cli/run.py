@@ -8,16 +8,20 @@ from typing import TYPE_CHECKING
 from shaftwork.cli.command import Command, Data, Say, end_option, folder_option, solver_options
 from shaftwork.cli.folder import Folder, write_picture, write_rows
 from shaftwork.cli.models import end_of, load
+from shaftwork.core.domains import DOMAINS
 from shaftwork.core.progress import progress
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from shaftwork.pipeline.model import Model
     from shaftwork.pipeline.network import Network
     from shaftwork.results.solution import Solution
 
 FILES = ("signals.csv", "signals.png", "phases.csv", "events.csv")
+INTEGRALS = tuple(domain.integral.name for domain in DOMAINS)
+"""Quantities that are recorded only when asked for."""
 LISTED = 12
 """Phases shown of the beginning, and as many of the end, of a motion that has more."""
 
@@ -27,6 +31,9 @@ def arguments(parser: ArgumentParser) -> None:
     folder_option(parser, "plots and CSV")
     end_option(parser, "that of the scene, else 10")
     solver_options(parser)
+    parser.add_argument(
+        "--signals", metavar="NAME,...", action="append", default=[], help="quantities to show, such as shaft.tau"
+    )
 
 
 def run(options: Namespace, say: Say) -> Data:
@@ -37,8 +44,9 @@ def run(options: Namespace, say: Say) -> Data:
     say(f"{net.name}: {t_end:g} s of motion" + (f" ({scene.source})" if scene else ""))
     for line in scene.chosen if scene else ():
         say(f"  chosen: {line}")
-    solution = _motion(net, t_end, options)
-    signals = scene.signals if scene else _worth_seeing(solution)
+    wanted = tuple(name.strip() for text in options.signals for name in text.split(","))
+    solution = _motion(net, t_end, wanted, options)
+    signals = wanted or (scene.signals if scene else _worth_seeing(solution))
     say(f"engine {solution.engine}: {solution.why}")
     counts = ", ".join(f"{count} {name}" for name, count in solution.statistics.items())
     say(f"{counts}; energy residual {solution.energy_residual:.1e} of the work done\n")
@@ -51,7 +59,8 @@ def run(options: Namespace, say: Say) -> Data:
     return {}
 
 
-def _motion(net: Network, t_end: float, options: Namespace) -> Solution:
+def _motion(net: Network, t_end: float, wanted: tuple[str, ...], options: Namespace) -> Solution:
+    """The run, in which the wanted quantities can be read, or a line on how far it came until it was interrupted."""
     reached = 0.0
     try:
         with progress(t_end, "s", f"{net.name}, compiling") as show:
@@ -61,9 +70,29 @@ def _motion(net: Network, t_end: float, options: Namespace) -> Solution:
                 reached = max(reached, t)
                 show(t, net.name)
 
-            return net.compile().simulate(t_end, rtol=options.rtol, engine=options.engine, progress=report)
+            model = net.compile(angles=_angles(net, wanted))
+            _refuse_unknown(model, wanted)
+            return model.simulate(t_end, rtol=options.rtol, engine=options.engine, progress=report)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"the motion had come to t = {reached:.4g} of {t_end:g} s") from None
+
+
+def _angles(net: Network, wanted: tuple[str, ...]) -> tuple[str, ...]:
+    """The parts whose angle, position or flux linkage is wanted."""
+    parts = {part.name for part in net.parts}
+    owners = (name.rpartition(".")[0] for name in wanted if name.rpartition(".")[2] in INTEGRALS)
+    return tuple(dict.fromkeys(owner for owner in owners if owner in parts))
+
+
+def _refuse_unknown(model: Model, wanted: tuple[str, ...]) -> None:
+    """Refuse a quantity that there will not be, before anything is computed."""
+    from shaftwork.codegen.observer import ModelObserver
+    from shaftwork.core.errors import no_quantity
+
+    units = ModelObserver(model.form, lambda: model.bind(model.defaults)).units
+    for name in wanted:
+        if name not in units:
+            raise no_quantity(name, model.name, units)
 
 
 def _worth_seeing(solution: Solution) -> tuple[str, ...]:

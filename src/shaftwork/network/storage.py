@@ -22,16 +22,24 @@ MAXIMUM_LAW_WORDS = 4000
 """Numbers, names and signs of all laws of a file together, some 400 laws: more take too long to read."""
 
 
-def write_netlist(netlist: Netlist, path: str | Path) -> None:
-    """Write a netlist to a file.
+def netlist_text(netlist: Netlist) -> str:
+    """The text of a model file.
 
     A law without symbols, such as pi or 2 pi, is written as its number.
 
     Raises:
+        ModelFileError: a parameter has no text form.
+    """
+    return textfile.write(ModelText(netlist.name, tuple(_part_text(placed) for placed in netlist.placed)))
+
+
+def write_netlist(netlist: Netlist, path: str | Path) -> None:
+    """Write a netlist to a file, as `netlist_text`.
+
+    Raises:
         ModelFileError: a parameter has no text form, or the file cannot be written.
     """
-    place = _path_of(path)
-    text = textfile.write(ModelText(netlist.name, tuple(_part_text(placed) for placed in netlist.placed)))
+    place, text = _path_of(path), netlist_text(netlist)
     try:
         place.write_text(text, encoding="utf-8", newline="\n")
     except (OSError, ValueError) as error:

@@ -1,0 +1,56 @@
+"""`shaftwork campbell`."""
+
+from __future__ import annotations
+
+import math
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+
+from shaftwork.cli.command import Command, Data, Say, folder_option, point_options
+from shaftwork.cli.folder import Folder, write_picture, write_rows
+from shaftwork.cli.models import load, point_of
+
+SPEEDS = 61
+
+
+def arguments(parser: ArgumentParser) -> None:
+    """The options of the command."""
+    parser.add_argument("--n-max", metavar="N", type=float, required=True, help="highest speed in 1/min")
+    parser.add_argument("--n-min", metavar="N", type=float, default=0.0, help="lowest speed in 1/min (default 0)")
+    parser.add_argument(
+        "--orders", metavar="K,...", type=_orders, default=(1.0, 2.0, 3.0), help="excitations per turn (default 1,2,3)"
+    )
+    point_options(parser)
+    folder_option(parser, "the diagram and its crossings as CSV")
+
+
+def run(options: Namespace, say: Say) -> Data:
+    """Where excitation orders of a turning shaft meet natural frequencies."""
+    import numpy as np
+
+    net, _ = load(options)
+    folder = Folder(options.out, ("campbell.csv", "campbell.png"), options.line) if options.out else None
+    speeds = np.linspace(options.n_min, options.n_max, SPEEDS) * math.pi / 30
+    diagram = net.campbell(
+        speeds, options.orders, options.f_max, at=point_of(options, net), count=options.count, exact=options.exact
+    )
+    say(str(diagram))
+    rows = [
+        (made.speed * 30 / math.pi, made.speed, made.order, made.frequency, made.mode) for made in diagram.crossings
+    ]
+    if folder:
+        with folder.new_files() as place:
+            write_rows(place / "campbell.csv", ("speed [1/min]", "speed [rad/s]", "order", "f [Hz]", "mode"), rows)
+            write_picture(place / "campbell.png", diagram.plot)
+        say(f"\n{folder.written()}")
+    keys = ("n", "speed", "order", "frequency", "mode")
+    return {"network": diagram.title, "crossings": [dict(zip(keys, row, strict=True)) for row in rows]}
+
+
+def _orders(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(order) for order in text.split(","))
+    except ValueError:
+        raise ArgumentTypeError(f"{text!r} must be numbers with commas between them, such as 1,2,3.") from None
+
+
+COMMAND = Command("campbell", "natural frequencies and orders over the speed of a shaft", run, arguments, machines=True)

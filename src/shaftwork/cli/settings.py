@@ -1,0 +1,155 @@
+"""Values of parameters and quantities as they are written on the command line."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from shaftwork.core.errors import MissingExtraError, ModelFileError, ParameterError
+
+if TYPE_CHECKING:
+    from shaftwork.components.base import Component
+    from shaftwork.core.parameters import Parameter
+    from shaftwork.pipeline.network import Network
+
+_QUANTITY = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*[^\W\d].*")
+"""A number and a unit behind it; no law reads so."""
+
+
+def with_settings(net: Network, settings: Iterable[str]) -> Network:
+    """The network with other values, each written as part.parameter=value.
+
+    Raises:
+        ParameterError: there is no such parameter, or the value is not admissible.
+        MissingExtraError: a value has a unit, and pint is not installed.
+    """
+    values = dict(setting(net, text) for text in settings)
+    if not values:
+        return net
+    varied = type(net)(net.name)
+    for placed in net.netlist().with_values(values).placed:
+        varied.add(placed.part, *placed.nodes)
+    return varied
+
+
+def setting(net: Network, text: str) -> tuple[str, Any]:
+    """The parameter and the value of part.parameter=value.
+
+    Raises:
+        ParameterError: there is no such parameter, or the value is not admissible.
+        MissingExtraError: the value has a unit, and pint is not installed.
+    """
+    name, written = named(text, "--set", "shaft.c=2e4")
+    part, declared = parameter_of(net, name)
+    value = _value(name, declared, written)
+    _, objection = declared.magnitude(value)
+    if objection is not None:
+        unit = "" if declared.record is not None or declared.unit == "1" else f" in {declared.unit}"
+        raise ParameterError(
+            f"{text}: {declared.name} of {type(part).__name__} '{part.name}' {objection}. Give it "
+            f"({declared.meaning}){unit}{f', {declared.bounds}' if declared.bounds else ''}."
+        )
+    return name, value
+
+
+def numbers(net: Network, text: str) -> tuple[str, list[Any]]:
+    """The parameter and the values of part.parameter=value,value,... or part.parameter=first:last:count.
+
+    Raises:
+        ParameterError: there is no such parameter, or these are no values.
+        MissingExtraError: a value has a unit, and pint is not installed.
+    """
+    import numpy as np
+
+    name, written = named(text, "--vary", "shaft.c=2e4,3e4 or shaft.c=2e4:4e4:11")
+    _, declared = parameter_of(net, name)
+    ends = written.split(":")
+    if len(ends) == 1:
+        return name, [_value(name, declared, item) for item in written.split(",")]
+    if len(ends) != 3 or not ends[2].strip().isdigit() or int(ends[2]) < 2:
+        raise ParameterError(f"{text}: write first:last:count with a count of 2 or more, such as {name}=1:2:11.")
+    first, last = (declared.magnitude(_value(name, declared, end)) for end in ends[:2])
+    if objection := first[1] or last[1]:
+        raise ParameterError(f"{text}: {name} {objection}.")
+    return name, np.linspace(first[0], last[0], int(ends[2])).tolist()
+
+
+def point(texts: Iterable[str]) -> dict[str, float]:
+    """Quantities and their values, each written as name=value.
+
+    Raises:
+        ParameterError: one is none.
+    """
+    values: dict[str, float] = {}
+    for text in texts:
+        name, written = named(text, "--at", "J1.omega=100")
+        try:
+            values[name] = float(written)
+        except ValueError:
+            raise ParameterError(f"{text}: {written!r} must be a number in SI.") from None
+    return values
+
+
+def named(text: str, option: str, example: str) -> tuple[str, str]:
+    """Both sides of the first equals sign.
+
+    Raises:
+        ParameterError: a side is empty.
+    """
+    name, _, written = (side.strip() for side in text.partition("="))
+    if not name or not written:
+        raise ParameterError(f"{option} {text!r}: write name=value, such as {option} {example}.")
+    return name, written
+
+
+def parameter_of(net: Network, name: str) -> tuple[Component, Parameter]:
+    """A part and the declaration of one of its parameters, by "part.parameter".
+
+    Raises:
+        ParameterError: there is none; the message lists what there is.
+    """
+    owner, _, parameter = name.rpartition(".")
+    part = next((part for part in net.parts if part.name == owner), None)
+    if part is None:
+        raise ParameterError(f"There is no part '{owner}'. The parts are: {_some([made.name for made in net.parts])}.")
+    if parameter not in part.declared:
+        listed = _some([f"{owner}.{key}" for key in part.declared])
+        raise ParameterError(f"There is no parameter '{name}'. {type(part).__name__} '{owner}' has: {listed}.")
+    return part, part.declared[parameter]
+
+
+def _value(name: str, declared: Parameter, text: str) -> Any:
+    """A number in SI, a quantity with its unit, a law, or the text of a record."""
+    if declared.record is not None:
+        return text
+    try:
+        return float(text)
+    except ValueError:
+        pass
+    if _QUANTITY.fullmatch(text.strip()):
+        return _quantity(name, text)
+    if not declared.law:
+        raise ParameterError(f"{name}={text}: give a number in {declared.unit} ({declared.meaning}), or with a unit.")
+    from shaftwork.network.expressions import parse
+
+    try:
+        law = parse(text)
+    except ModelFileError as error:
+        raise ParameterError(f"{name}={text}: {error}") from None
+    return law if law.free_symbols else float(law)
+
+
+def _quantity(name: str, text: str) -> Any:
+    try:
+        from pint import application_registry
+    except ImportError:
+        raise MissingExtraError("pint", "units", f"{name}={text} with a unit") from None
+    try:
+        return application_registry.Quantity(text)
+    except Exception as error:  # noqa: BLE001 (pint raises what its tokeniser does, too)
+        raise ParameterError(f"{name}={text} is no number with a unit: {error}.") from None
+
+
+def _some(names: Sequence[str], most: int = 20) -> str:
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

@@ -1,0 +1,187 @@
+"""Modes, interference diagram, sweep and export on the command line say what the library says."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import shaftwork as sw
+from shaftwork.cli import DONE, FAILED, INTERRUPTED, WRONG_INPUT, main
+
+
+@pytest.fixture
+def model(tmp_path: Path) -> str:
+    """Two inertias on a spring with a damper: rigid body and one mode."""
+    net = sw.Network("pair")
+    net.add(sw.TorqueSource("pull", tau=1.0), "a")
+    net.add(sw.Inertia("J1", J=2.0), "a")
+    net.add(sw.Spring("shaft", c=1e4, d=2.0), "a", "b")
+    net.add(sw.Inertia("J2", J=3.0), "b")
+    net.add(sw.Damper("loss", d=0.1), "b", "ground")
+    net.save(tmp_path / "pair.toml")
+    return str(tmp_path / "pair.toml")
+
+
+def rows(path: Path) -> list[list[str]]:
+    return list(csv.reader(path.read_text(encoding="utf-8").splitlines()))
+
+
+def test_modes_are_those_of_the_library(model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out, modes = tmp_path / "out", sw.Network.load(model).modes()
+    assert main(["modes", model, "--out", str(out)]) == DONE
+    assert capsys.readouterr().out.startswith(f"{modes}\n")
+    written = rows(out / "modes.csv")
+    assert written[0][:3] == ["mode", "frequency [Hz]", "damping"]
+    assert [float(row[1]) for row in written[1:]] == modes.frequencies.tolist()
+    assert (out / "modes.png").stat().st_size > 5_000
+    assert main(["modes", model, "--json", "--count", "1"]) == DONE
+    assert len(json.loads(capsys.readouterr().out)["modes"]) == 1
+
+
+def test_modes_about_a_point(capsys: pytest.CaptureFixture[str]) -> None:
+    """In motion the load of the crane slips, and both inertias swing against each other."""
+    found = {}
+    for point in ((), ("--steady",), ("--at", "J1.omega=8.5", "--at", "J2.omega=8.5")):
+        assert main(["modes", "crane-start", "--json", *point]) == DONE
+        found[point] = max(mode["frequency"] for mode in json.loads(capsys.readouterr().out)["modes"])
+    rest, steady, turning = found.values()
+    assert rest == pytest.approx(4.7348, rel=1e-4)  # as `check` prints it
+    assert steady == pytest.approx(5.677, rel=1e-3)
+    assert turning == pytest.approx(5.677, rel=1e-3)
+    assert main(["modes", "crane-start", "--steady", "--at", "J1.omega=1"]) == WRONG_INPUT
+    assert main(["modes", "crane-start", "--at", "J1.omega=fast"]) == WRONG_INPUT
+    assert "'fast' must be a number in SI" in capsys.readouterr().err
+
+
+def test_the_diagram_has_its_crossings_in_turns(model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    arguments = ["campbell", model, "--n-max", "2000", "--orders", "1,2"]
+    assert main([*arguments, "--out", str(out), "--json"]) == DONE
+    crossings = json.loads(capsys.readouterr().out)["crossings"]
+    (f,) = sw.Network.load(model).modes().frequencies[1:]
+    assert [(made["order"], made["n"]) for made in crossings] == [
+        (order, pytest.approx(60 * f / order, rel=1e-9)) for order in (2.0, 1.0)
+    ]
+    assert [float(row[0]) for row in rows(out / "campbell.csv")[1:]] == [made["n"] for made in crossings]
+    assert (out / "campbell.png").stat().st_size > 5_000
+    with pytest.raises(SystemExit):
+        main(["campbell", model, "--n-max", "100", "--orders", "one"])
+    assert "'one' must be numbers with commas between them" in capsys.readouterr().err
+
+
+def test_a_sweep_is_that_of_the_library(model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    arguments = ["sweep", model, "--t-end", "0.2", "--vary", "shaft.c=5e3:2e4:4", "--vary", "J2.J=1, 3"]
+    limit = ["--measure", "max shaft.tau", "--measure", "end J2.omega", "--require", "max shaft.tau<=0.9"]
+    assert main([*arguments, *limit, "--out", str(out), "--json"]) == DONE
+    found = json.loads(capsys.readouterr().out)["columns"]
+    made = sw.studies.sweep(
+        sw.Network.load(model),
+        {"shaft.c": np.linspace(5e3, 2e4, 4), "J2.J": [1.0, 3.0]},
+        t_end=0.2,
+        measures=["max shaft.tau", "end J2.omega"],
+        require={"max shaft.tau": (None, 0.9)},
+    )
+    assert found == {name: column.tolist() for name, column in made.columns.items()}
+    assert len(rows(out / "sweep.csv")) == 9
+    assert set(found["passed"]) == {True, False}
+
+
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [
+        (("--vary", "shaft.c=1:2"), "write first:last:count"),
+        (("--vary", "shaft.c=1:2:one"), "write first:last:count"),
+        (("--vary", "shaft.c=-1:2:3"), "shaft.c must be"),
+        (("--vary", "shaft.k=1,2"), "There is no parameter 'shaft.k'"),
+        (("--vary", "shaft.c"), "such as --vary shaft.c=2e4,3e4"),
+        (("--vary", "shaft.c=1,2", "--require", "max shaft.tau<300 N"), "write 'max shaft.tau<=300'"),
+        (("--vary", "shaft.c=1,2", "--require", "min shaft.tau<=300"), "there is no measure 'min shaft.tau'"),
+    ],
+)
+def test_a_wrong_sweep_is_answered_with_what_would_be_right(
+    option: tuple[str, ...], words: str, model: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["sweep", model, "--measure", "max shaft.tau", *option]) == WRONG_INPUT
+    assert words in capsys.readouterr().err
+
+
+def test_a_sweep_that_is_interrupted_goes_on_from_its_store(
+    model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from shaftwork.studies.sweep_store import Store
+
+    store, done = tmp_path / "store", []
+    append = Store.append
+
+    def interrupted(self: Store, chunk: object) -> None:
+        append(self, chunk)  # type: ignore[arg-type]
+        done.append(chunk)
+        raise KeyboardInterrupt
+
+    arguments = ["sweep", model, "--t-end", "0.01", "--vary", "J2.J=1:2:3000", "--measure", "max shaft.tau"]
+    arguments += ["--store", str(store), "--json"]
+    monkeypatch.setattr(Store, "append", interrupted)
+    assert main(arguments) == INTERRUPTED
+    assert f"interrupted: what is done is in {store}; the same command" in capsys.readouterr().err
+    size = store.stat().st_size
+    monkeypatch.setattr(Store, "append", append)
+    assert main(arguments) == DONE
+    assert len(json.loads(capsys.readouterr().out)["columns"]["J2.J"]) == 3000
+    assert store.stat().st_size > size
+
+
+@pytest.mark.filterwarnings("ignore::shaftwork.NetworkWarning")  # two scenes have a curve that is worth one
+@pytest.mark.parametrize("name", list(sw.scenes.SCENES))
+def test_the_model_file_of_a_scene_is_the_scene(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "scene.toml"
+    assert main(["export", name, str(path)]) == DONE
+    assert sw.Network.load(path).netlist() == sw.scenes.SCENES[name]().netlist()
+    capsys.readouterr()
+    assert main(["export", name]) == DONE
+    assert capsys.readouterr().out == path.read_text(encoding="utf-8")
+
+
+def test_export_writes_over_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text("mine", encoding="utf-8")
+    assert main(["export", "crane-start", str(path)]) == WRONG_INPUT
+    assert "exists already" in capsys.readouterr().err
+    assert path.read_text(encoding="utf-8") == "mine"
+    assert main(["export", "crane-start", str(tmp_path / "crane.txt")]) == WRONG_INPUT
+    assert "must end in .toml" in capsys.readouterr().err
+
+
+def test_signals_are_chosen_and_angles_recorded(model: str, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["run", model, "--t-end", "0.5", "--signals", "shaft.tau,J1.phi", "--signals", "loss.power"]
+    assert main(arguments) == DONE
+    lines = capsys.readouterr().out.splitlines()
+    table = lines[next(k for k, line in enumerate(lines) if "minimum" in line) + 1 :]
+    assert [line.split()[0] for line in table] == ["shaft.tau", "J1.phi", "loss.power"]
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("shaft.tua", "'shaft' has: shaft.tau"), ("shaft", "'shaft' has: shaft.tau"), ("axle.phi", "part or node 'axle'")],
+)
+def test_a_signal_that_does_not_exist_is_refused_before_the_run(
+    name: str, words: str, model: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from shaftwork.pipeline.model import Model
+
+    monkeypatch.setattr(Model, "simulate", None)  # a run would call it
+    assert main(["run", model, "--signals", name]) == WRONG_INPUT
+    assert words in capsys.readouterr().err
+
+
+def test_a_model_without_a_steady_operation_ends_with_1(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    net = sw.Network("free")
+    net.add(sw.TorqueSource("pull", tau=1.0), "a")
+    net.add(sw.Inertia("J1", J=2.0), "a")
+    net.save(tmp_path / "free.toml")
+    assert main(["modes", str(tmp_path / "free.toml"), "--steady"]) == FAILED
+    assert "shaftwork: " in capsys.readouterr().err

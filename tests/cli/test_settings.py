@@ -1,0 +1,88 @@
+"""Other values on the command line: numbers, units, laws and records, in every command that is about a model."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import shaftwork as sw
+from shaftwork.cli import DONE, WRONG_INPUT, main
+
+
+def model(folder: Path) -> str:
+    net = sw.Network("pair")
+    net.add(sw.TorqueSource("pull", tau=1.0), "a")
+    net.add(sw.Inertia("J1", J=2.0), "a")
+    net.add(sw.Shaft("line", length=1.0, diameter=0.02, model=sw.OneSpring()), "a", "b")
+    net.add(sw.Inertia("J2", J=3.0), "b")
+    net.save(folder / "pair.toml")
+    return str(folder / "pair.toml")
+
+
+def frequencies(capsys: pytest.CaptureFixture[str], *arguments: str) -> list[float]:
+    assert main(["modes", *arguments, "--json"]) == DONE
+    return [mode["frequency"] for mode in json.loads(capsys.readouterr().out)["modes"]]
+
+
+def test_a_value_is_set_as_often_as_wanted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Two inertias on a spring: f = sqrt(c (1/J1 + 1/J2)) / 2 pi."""
+    path = model(tmp_path)
+    c = 79.3e9 * np.pi * 0.02**4 / 32
+    for settings, (J1, J2) in (((), (2.0, 3.0)), (("--set", "J1.J=5", "--set", " J2.J = 1.5"), (5.0, 1.5))):
+        found = frequencies(capsys, path, *settings)
+        assert found[-1] == pytest.approx(np.sqrt(c * (1 / J1 + 1 / J2)) / (2 * np.pi), rel=1e-9)  # OneSpring is exact
+
+
+def test_a_value_may_have_its_unit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("pint")
+    path = model(tmp_path)
+    written = (("J1.J=5000 kg*cm^2", "J1.J=0.5"), ("line.diameter=25mm", "line.diameter=0.025"))
+    for with_unit, plain in written:
+        assert frequencies(capsys, path, "--set", with_unit) == pytest.approx(
+            frequencies(capsys, path, "--set", plain), rel=1e-12
+        )
+
+
+def test_a_model_of_a_shaft_and_a_law_are_set_as_in_a_model_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = model(tmp_path)
+    assert len(frequencies(capsys, path, "--set", "line.model=Lumped(4)")) > len(frequencies(capsys, path))
+    new = tmp_path / "new.toml"
+    assert main(["export", path, str(new), "--set", "pull.tau=2*sin(t)"]) == DONE
+    assert '"2*sin(t)"' in new.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("command", ["check", "run", "latex", "modes", "export"])
+def test_every_command_about_a_model_takes_values(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([command, model(tmp_path), "--set", "J1.K=1"]) == WRONG_INPUT
+    assert "There is no parameter 'J1.K'. Inertia 'J1' has: J1.J." in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ("J1.J", "write name=value, such as --set shaft.c=2e4"),
+        ("J1.J=", "write name=value"),
+        ("=3", "write name=value"),
+        ("J=3", "There is no part ''. The parts are: pull, J1, line, J2."),
+        ("J3.J=3", "There is no part 'J3'. The parts are: pull, J1, line, J2."),
+        ("J1.J=two", "J1.J=two: give a number in kg*m^2 (moment of inertia), or with a unit"),
+        ("J1.J=-1", "J of Inertia 'J1' must be at least 0. Give it (moment of inertia) in kg*m^2"),
+        ("J1.J=nan", "must be a finite number"),
+        ("J1.J=3 kg", "is given in 'kilogram', but needs kg*m^2"),
+        ("J1.J=3 potatoes", "is no number with a unit"),
+        ("line.model=Lumps(3)", "line.model=Lumps(3): model of Shaft 'line' is none"),
+        ("pull.tau=sine(t)", "pull.tau=sine(t): "),
+    ],
+)
+def test_a_wrong_value_is_answered_with_what_would_be_right(
+    setting: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["check", model(tmp_path), "--set", setting]) == WRONG_INPUT
+    assert words in capsys.readouterr().err
