@@ -16,7 +16,7 @@ GIVEN = re.compile(r"<!-- given: (?P<figures>.*?) -->", re.DOTALL)
 NO_FIGURE = re.compile(
     r"`[^`\n]+`|\$\$.*?\$\$|\$[^$\n]+\$|(?<=\])\([^)]*\)|<!--.*?-->"  # code, formulas, targets of links, comments
     r"|\(\d+[a-z]?\)|\b(?:[Ff]igures?|[Ss]ections?|[Tt]able|eqs?) \d+(?:(?:, | and | to |-)\d+)*(?:\.\d+)*"
-    r"|\b(?:19|20)\d\d\b|\b1/min\b|\b(?:IEC|EN|ASTM|Python|fig\.) [\w.-]+|\b[A-Za-zτωφ]+[-_]?\d[\w-]*",  # and names: J1, S1
+    r"|\b(?:19|20)\d\d\b|\b1/min\b|\b(?:IEC|EN|ASTM|Python|fig\.) [\w.-]+|\b[A-Za-zτωφ]+[-_]?\d[\w-]*",  # names: J1
     re.DOTALL,
 )
 FIGURE = re.compile(r"(?<![\w.])\d+(?:[., ]\d+)*(?:e[-+]?\d+)?(?: ?%)?")

@@ -291,7 +291,7 @@ class RandomLoad(Resistance):
     """A resistance of random size, normally distributed, always against the motion.
 
     Law: torque on the node -sign(omega) max(0, mean + std nu(t / interval)), with nu a standard normal noise:
-    held for each interval (`HeldNoise`), or smooth and band-limited, its power halved at 0.22 / interval
+    held for each interval (`HeldNoise`), or smooth and band-limited, its power halved at 0.23 / interval
     (`SmoothNoise`). Where the normal distribution falls below zero there is no resistance: nothing drives.
     The same seed gives the same load, as a function of time. Every engine starts anew at each number, so that a run
     costs as many restarts as it has intervals. Source: Marinkovic 2012, section 3, figure 11.

@@ -152,7 +152,7 @@ class SmoothNoise(sympy.Function):  # type: ignore[misc]
 
     Law: sum_k B(x - k) w_k / sqrt(sum_k B(x - k)^2), with w_k number k of the standard normal numbers of a seed and B
     the cubic spline over five whole numbers. Two derivatives are continuous. The power spectrum is that of the spline,
-    sinc(f)^8 with f in cycles for each 1 of x: half at f = 0.22, and 99.9 % of the power below f = 0.6.
+    sinc(f)^8 with f in cycles for each 1 of x: half at f = 0.23, and 99.9 % of the power below f = 0.6.
     """
 
     nargs = (2, 3)
