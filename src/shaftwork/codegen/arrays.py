@@ -31,6 +31,9 @@ class ArrayProgram:
         self.loop_places = np.array([order.index(branch) for branch in form.loop_laws], dtype=np.intp)
         self.loop_in_tree = np.array([branch in form.tree.tree[Kind.LAW] for branch in form.loop_laws], dtype=bool)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return ArrayProgram, (self.form,)  # compiled code cannot be stored
+
     @cached_property
     def potentials(self) -> GainMatrix:
         """(nodes, branches): the across variable of every node from those of the tree branches."""
@@ -50,6 +53,9 @@ class BoundArrays:
         self._controls = np.flatnonzero(program.inputs.controlled)
         loops = program.loop_places
         self.loops = LoopSolver(program.inputs, part, loops, program.loop_in_tree, self.p) if loops.size else None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _bound_again, (self.program, self.p, self.part, None if self.loops is None else self.loops.last)
 
     def with_laws(self, p: Array) -> BoundArrays:
         """The same matrices for a parameter vector that differs in the laws alone."""
@@ -126,6 +132,14 @@ class BoundArrays:
         if before is not None:
             step = step - inputs.values(before, zero, x, self.p)
         return np.asarray(x + self.part.B1 @ (step * inputs.of_time))
+
+
+def _bound_again(program: ArrayProgram, p: Array, part: LinearPart, last: Array | None) -> BoundArrays:
+    """The program for a parameter vector, whose loops go on from where they were when it was stored."""
+    bound = BoundArrays(program, p, part)
+    if bound.loops is not None and last is not None:
+        bound.loops.start_from(last)
+    return bound
 
 
 def _where(mask: Any, values: Array) -> Array:

@@ -206,7 +206,10 @@ class Linearization:
 
     @cached_property
     def _names(self) -> _Reader:
-        return _Reader(self._form, lambda: self._bound)
+        return _Reader(self._form, self._matrices)
+
+    def _matrices(self) -> BoundArrays:
+        return self._bound
 
     @cached_property
     def units(self) -> Mapping[str, str]:

@@ -62,6 +62,11 @@ class LoopSolver:
         blocks = (slice(first, first + size) for first in range(0, len(t), size))
         return np.concatenate([self._followed(t[block], x[:, block]) for block in blocks], axis=1)
 
+    @property
+    def last(self) -> Array:
+        """The unknowns (loops,) of the last solution, at which the next one begins."""
+        return self._last
+
     def start_from(self, a: Array) -> None:
         """Begin the next solution at these unknowns."""
         self._last = a

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal, Protocol
 from sympy import Add, Eq, Expr, Float, Symbol
 
 from shaftwork.core.errors import ParameterError
+from shaftwork.core.screen import counted, named, on_one_screen
 from shaftwork.equations.assembly import Assembly, Group, Sides
 from shaftwork.equations.notation import Letter, notation
 from shaftwork.reduction.form import StateForm
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from shaftwork.equations.second_order import SecondOrder
 
 Form = Literal["kirchhoff", "state", "second-order"]
+SHOWN = 5
+"""Rows of a kind that are shown on a screen."""
 
 
 class NamedPhase(Protocol):
@@ -273,6 +276,27 @@ class Equations:
                 raise ParameterError(f"phase = {phase!r}: no part of '{self.form.graph.name}' changes its mode.")
             return self.in_phase(phase).latex(form, values=values)
         return body(self, form, values=values)
+
+    def __str__(self) -> str:
+        graph = self.form.graph
+        phase = f", {self.phase}" if self.phase else ""
+        groups = (
+            ("balance", self.nodes, len(self.nodes) <= SHOWN),
+            ("loop", self.loops, len(self.loops) <= SHOWN),
+            ("coupling", self.couplings, len(self.couplings) <= SHOWN),
+            ("law", self.laws, len(self.laws) <= SHOWN),
+        )
+        sizes = ", ".join(counted(len(rows), word) for word, rows, _ in groups)
+        title = f"Equations of '{graph.name}'{phase}: {sizes}"
+        lines = named(counted(len(self.states), "state"), [row.name for row in self.states])
+        lines += named("no states", [row.what for row in self.eliminated], most=2)
+        for word, rows, few in groups:
+            shown = rows if few else rows[: SHOWN - 1]
+            lines += [f"  {word} {', '.join(row.nodes or row.parts)}: {row.left} = {row.right}" for row in shown]
+            lines += [] if few else [f"  ... and {len(rows) - len(shown)} more"]
+        return on_one_screen(title, lines, len(lines))
+
+    __repr__ = __str__
 
     def document(self, *, values: bool = False) -> str:
         """A complete LaTeX document: all forms, the states with their units, and the nomenclature with the values."""

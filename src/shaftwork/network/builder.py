@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TypeVar
+from collections.abc import Sequence
+from dataclasses import replace
+from difflib import get_close_matches
+from typing import TypeVar, overload
 
 from shaftwork.components.base import Component
-from shaftwork.core.errors import ShaftworkError
+from shaftwork.core.errors import ParameterError, ShaftworkError
 from shaftwork.network.netlist import Netlist, Placed
+from shaftwork.network.overview import overview
 
 C = TypeVar("C", bound=Component)
+N = TypeVar("N", bound="NetworkBuilder")
 
 
 class NetworkBuilder:
@@ -16,27 +21,44 @@ class NetworkBuilder:
 
     Args:
         name: title of the network, used in reports.
+        ports: of a network that is a part of others, the nodes at which it is joined to them.
+
+    Raises:
+        ParameterError: the ports are no texts, or two are the same.
     """
 
-    def __init__(self, name: str = "network") -> None:
+    def __init__(self, name: str = "network", ports: Sequence[str] = ()) -> None:
         self.name = name
+        self.ports = (ports,) if isinstance(ports, str) else tuple(ports)
+        if not all(isinstance(port, str) and port for port in self.ports) or len({*self.ports}) < len(self.ports):
+            raise ParameterError(f"ports = {ports!r} must be names of nodes, each once: ports=('in_', 'out').")
         self._placed: list[Placed] = []
 
-    def add(self, part: C, *nodes: str) -> C:
+    @overload
+    def add(self, part: C, *nodes: str) -> C: ...
+
+    @overload
+    def add(self, part: N, *nodes: str, name: str = "") -> N: ...
+
+    def add(self, part: C | N, *nodes: str, name: str = "") -> C | N:
         """Add a part with its ports at the given nodes, which come to be when first named.
 
+        A network with ports is added part by part, as it stands: what was named "shaft" in it is "first.shaft" then,
+        and so are its nodes but for the ports, which become the given nodes.
+
         Args:
-            part: a component.
+            part: a component, or a network with ports.
             *nodes: one node name for each port, in the order of the ports; "ground" is the frame (speed zero).
+            name: of a network within this one, "first"; by default its own.
 
         Returns:
             The part.
 
         Raises:
-            ShaftworkError: `part` is no component or a node is no text. Everything else that may be wrong with a
-                network is reported together by `check`.
+            ShaftworkError: `part` is neither, a node is no text, or a network is not joined at each of its ports.
+                Everything else that may be wrong with a network is reported together by `check`.
         """
-        if not isinstance(part, Component):
+        if not isinstance(part, Component | NetworkBuilder):
             raise ShaftworkError(
                 f"add() takes a component such as Inertia('J1', J=1.0), not {type(part).__name__} {part!r}."
             )
@@ -45,8 +67,58 @@ class NetworkBuilder:
                 f"{type(part).__name__} '{part.name}': a node is named by a text, not by {strange[0]!r}. "
                 f"Write net.add(part, 'rotor', 'wheel')."
             )
-        self._placed.append(Placed(part, nodes))
+        if isinstance(part, NetworkBuilder):
+            self._placed += part.netlist().within(name or part.name, nodes)
+        elif name:
+            raise ShaftworkError(
+                f"name = {name!r} is for networks within networks: a part has its name, '{part.name}'."
+            )
+        else:
+            self._placed.append(Placed(part, nodes))
         return part
+
+    def remove(self, name: str) -> None:
+        """Remove a part, or a network within this one with all its parts. Nodes where nothing is left are no more.
+
+        Raises:
+            ParameterError: there is none of this name; the message says what there is.
+        """
+        numbers = self._numbers(name) or [
+            number for number, placed in enumerate(self._placed) if str(placed.part.name).startswith(f"{name}.")
+        ]
+        if not numbers:
+            raise self._unknown(name)
+        self._placed = [placed for number, placed in enumerate(self._placed) if number not in numbers]
+
+    def replace(self, part: C) -> C:
+        """Put a part in the place of the one of its name, at the same nodes.
+
+        Returns:
+            The part.
+
+        Raises:
+            ShaftworkError: `part` is no component.
+            ParameterError: there is none of its name, or there are several; the message says what there is.
+        """
+        if not isinstance(part, Component):
+            raise ShaftworkError(f"replace() takes a component such as Inertia('J1', J=1.0), not {part!r}.")
+        numbers = self._numbers(part.name)
+        if not numbers:
+            raise self._unknown(part.name)
+        if len(numbers) > 1:
+            raise ParameterError(f"'{self.name}' has {len(numbers)} parts named '{part.name}'. Rename them first.")
+        self._placed[numbers[0]] = replace(self._placed[numbers[0]], part=part)
+        return part
+
+    def _numbers(self, name: str) -> list[int]:
+        return [number for number, placed in enumerate(self._placed) if placed.part.name == name]
+
+    def _unknown(self, name: str) -> ParameterError:
+        names = [str(placed.part.name) for placed in self._placed]
+        names = get_close_matches(str(name), names, n=3) or names[:12]
+        return ParameterError(
+            f"There is no part '{name}' in '{self.name}'. Close to it: {', '.join(names) or 'none, it has no parts'}."
+        )
 
     @property
     def parts(self) -> tuple[Component, ...]:
@@ -60,4 +132,7 @@ class NetworkBuilder:
 
     def netlist(self) -> Netlist:
         """The network as it stands, frozen."""
-        return Netlist(self.name, tuple(self._placed))
+        return Netlist(self.name, tuple(self._placed), self.ports)
+
+    def __repr__(self) -> str:
+        return overview(self.netlist())

@@ -8,57 +8,28 @@ from __future__ import annotations
 
 import dataclasses
 import reprlib
-from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import Any
 
 import networkx as nx
 import sympy
-from sympy.core.relational import Relational
-from sympy.functions.elementary.piecewise import ExprCondPair
-from sympy.logic.boolalg import BooleanAtom, BooleanFunction
 
 from shaftwork.components.base import Component
-from shaftwork.components.branches import ACROSS, HISTORY, INTEGRAL
-from shaftwork.components.laws import SYMBOLS, Interpolation, InterpolationSlope, Table, t
 from shaftwork.core.domains import Domain
 from shaftwork.core.errors import Problem, ShaftworkError
-from shaftwork.network.controlled import check_readings
-from shaftwork.network.declared import check_declared
-from shaftwork.network.grammar import FUNCTION_NAMES, FUNCTIONS
 from shaftwork.network.graph import GROUND, CircuitGraph, resolve
+from shaftwork.network.law_faults import Fault, instead_of, law_faults
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
 from shaftwork.network.sharing import Shared
-from shaftwork.network.templates import BranchTemplate, Kind, make_template, substitution
+from shaftwork.network.templates import Kind
 from shaftwork.network.textfile import MAXIMUM_NAME, is_name
 from shaftwork.network.wording import Spelling, at_nodes, listed, title
 
 LEFT_OUT = ("node name", "node count", "wrong domain", "no effect", "component")
 """Kinds of problems whose part is left out of what is examined further."""
 
-_READS: Mapping[Kind, frozenset[sympy.Symbol]] = {
-    Kind.ACROSS_SOURCE: frozenset({t}),
-    Kind.THROUGH_SOURCE: frozenset({t}),
-    Kind.LAW: frozenset({t, ACROSS, INTEGRAL}),
-}
-"""What the laws of a kind may depend on besides parameters; those not listed depend on parameters alone."""
-
-_EVALUATED = (
-    *(function.make for function in FUNCTIONS.values() if isinstance(function.make, type)),
-    *(sympy.Symbol, sympy.Number, sympy.NumberSymbol, sympy.Add, sympy.Mul, sympy.Pow, sympy.Piecewise, ExprCondPair),
-    *(Table, Interpolation, InterpolationSlope, Relational, BooleanFunction, BooleanAtom),
-)
-"""The nodes of expressions that every engine can evaluate."""
-
 Train = tuple[int, ...]
 """Numbers of the parts that hang together."""
-
-
-class _Fault(NamedTuple):
-    """What is wrong with the law given for a parameter."""
-
-    parameter: str
-    what: str
-    hint: str
 
 
 def declaration_problems(netlist: Netlist) -> tuple[Problem, ...]:
@@ -76,7 +47,7 @@ def examine(netlist: Netlist) -> tuple[Netlist, tuple[Problem, ...]]:
         A netlist that `build_graph` accepts (bad values replaced, bad parts left out, equal names told apart), and all
         problems in the order of the parts.
     """
-    work = _Examination()
+    work = _Examination(netlist)
     for placed in netlist.placed:
         work.take(placed)
     if not netlist.placed:
@@ -87,13 +58,14 @@ def examine(netlist: Netlist) -> tuple[Netlist, tuple[Problem, ...]]:
 class _Examination:
     """Goes through the parts in order and remembers names, nodes and domains."""
 
-    def __init__(self) -> None:
+    def __init__(self, netlist: Netlist) -> None:
+        self._parts = {placed.part.name for placed in netlist.placed if isinstance(placed.part.name, str)}
         self.problems: list[Problem] = []
         self.kept: list[Placed] = []
         self._named: dict[str, str] = {}
         self._domains: dict[str, tuple[Domain, str]] = {}
         self._dotted: dict[str, None] = {}
-        self._faults = Shared(lambda part, values, _: tuple(_law_faults(part, values)))
+        self._faults = Shared(lambda part, values, _: tuple(law_faults(part, values)))
 
     def report(self, kind: str, message: str, hint: str, placed: Placed | None = None, parameter: str = "") -> None:
         """Put down an error, with the part and the nodes that it concerns, and its place in a model file."""
@@ -122,9 +94,9 @@ class _Examination:
         elif not is_name(name):
             hint = f"Use 1 to {MAXIMUM_NAME} printable characters, without line ends and tabs."
             self.report("part name", f"{type(part).__name__} {reprlib.repr(name)} has no plain name.", hint, placed)
-        elif "." in name:
+        elif whole := self._unclear(name):
             hint = f"A dot joins part and quantity, as in 'shaft.tau': write '{name.replace('.', '_')}'."
-            self.report("part name", f"{title(part)} has a dot in its name.", hint, placed)
+            self.report("part name", f"{title(part)} has a dot in its name{whole}.", hint, placed)
         elif name in self._named:
             message = f"{title(part)} at {at_nodes(placed.nodes)} has the name of {self._named[name]}."
             self.report("duplicate name", message, f"Rename one of them, for example '{name}_2'.", placed)
@@ -134,6 +106,14 @@ class _Examination:
             free = f"{name} ({count})"
         self._named[free] = f"{title(part)} at {at_nodes(placed.nodes)}"
         return part if free == name else dataclasses.replace(part, name=free)
+
+    def _unclear(self, name: str) -> str:
+        """Why a name with dots could be mistaken; empty where it is that of something in a network within this one."""
+        before = [name[:place] for place, letter in enumerate(name) if letter == "."]
+        if not before or not all(word.strip() for word in name.split(".")) or before[0] == REFERENCE:
+            return " without the name of a network before it" if before else ""
+        owner = next((whole for whole in before if whole in self._parts), None)
+        return "" if owner is None else f", and '{owner}' is a part"
 
     def _stands(self, placed: Placed) -> bool:
         """Whether the part stands at nodes that suit its ports."""
@@ -147,10 +127,10 @@ class _Examination:
         if len(self.problems) == before:
             self._check_effect(placed)
         fits = len(self.problems) == before
-        for node in (node for node in nodes if "." in node and node not in self._dotted):
+        for node in (node for node in nodes if self._unclear(node) and node not in self._dotted):
             self._dotted[node] = None
             hint = f"A dot marks the nodes inside a part: write '{node.replace('.', '_')}'."
-            message = f"{title(part)} stands at node '{node}', which has a dot in its name."
+            message = f"{title(part)} stands at node '{node}', which has a dot in its name{self._unclear(node)}."
             self.problems.append(Problem("dotted node name", message, hint, (part.name,), (node,)))
         return fits
 
@@ -221,97 +201,15 @@ class _Examination:
         hint = f"Give {name} ({declared.meaning}){unit}{f', {declared.bounds}' if declared.bounds else ''}."
         self.report(kind, f"{title(part)}: {name}{shown} {objection}.", hint, placed, name)
 
-    def _faults_of(self, part: Component, values: Mapping[str, Any]) -> tuple[_Fault, ...]:
+    def _faults_of(self, part: Component, values: Mapping[str, Any]) -> tuple[Fault, ...]:
         """Faults of the laws, found once for parts that have the same."""
         odd = tuple(
-            _Fault(name, f"is a {type(value).__name__}, not a number or a law", _instead_of(value))
+            Fault(name, f"is a {type(value).__name__}, not a number or a law", instead_of(value))
             for name, value in values.items()
             if not isinstance(value, float) and (not isinstance(value, sympy.Expr) or value.is_Matrix)
             if part.declared[name].record is None and (value is not None or part.declared[name].default is not None)
         )
         return odd or self._faults.of(part, values)[0]
-
-
-def _instead_of(value: Any) -> str:
-    """What to give in place of what is no law."""
-    if isinstance(value, sympy.logic.boolalg.Boolean):
-        return "Give a formula: omega - 3 in place of omega > 3, or Piecewise((1, omega > 3), (0, True))."
-    return "Give a number, a Table or a formula."
-
-
-def _law_faults(part: Component, values: Mapping[str, Any]) -> Iterator[_Fault]:
-    """What the laws of a part read that they may not, first as given, then in the branches that they end in."""
-    laws = {name: value for name, value in values.items() if isinstance(value, sympy.Expr)}
-    faults = tuple(fault for name, law in laws.items() if (fault := _fault_of_law(part, name, law)))
-    yield from faults
-    sound = {**values, **dict.fromkeys((fault.parameter for fault in faults), 1.0)}
-    made = make_template(part, sound)
-    templates = made.branches
-    _check_ends(part, templates)
-    check_readings(part, templates)
-    check_declared(part, made)
-    for template in {(x.kind, x.law, x.terms, x.through, x.stored): x for x in templates}.values():
-        if unreadable := _unreadable("", template.law) or _unreadable("", template.stored):
-            yield unreadable._replace(what=f"a branch law {unreadable.what}")
-        elif not (strange := _strange_symbols(template)):
-            continue
-        elif template.kind is Kind.ACROSS_SOURCE and strange <= {ACROSS, INTEGRAL}:
-            for name in (name for name, law in laws.items() if law.free_symbols - {t}):
-                read = ", ".join(sorted(symbol.name for symbol in laws[name].free_symbols - {t}))
-                hint = (
-                    "A source that prescribes it must know it: write the law in t, or use a source of torque or force."
-                )
-                yield _Fault(name, f"reads {read}, but may depend on time t alone", hint)
-        else:
-            yield _Fault("", f"a branch law depends on {min(map(str, strange))}", "Use p.name, ACROSS, INTEGRAL and t.")
-
-
-def _fault_of_law(part: Component, name: str, law: sympy.Expr) -> _Fault | None:
-    if law.has(sympy.nan, sympy.oo, -sympy.oo, sympy.zoo, sympy.I):
-        return _Fault(
-            name, f"= {str(law)[:60]} is not a finite real law", "Remove what is infinite, undefined or imaginary."
-        )
-    if unreadable := _unreadable(name, law):
-        return unreadable
-    readable = (t, *substitution(part))
-    strange = sorted(law.free_symbols - set(readable), key=str)
-    if not strange:
-        return None
-    symbol, able = strange[0], f"this part can read {', '.join(str(symbol) for symbol in readable)}"
-    if symbol in SYMBOLS:
-        return _Fault(name, f"reads {symbol}, which belongs to another domain", f"Note that {able}.")
-    if symbol.name in {known.name for known in SYMBOLS}:
-        what = f"contains a symbol {symbol} of your own, which is not Shaftwork's"
-        return _Fault(name, what, f"Take the symbols from the package (shaftwork.{symbol}); {able}.")
-    return _Fault(name, f"contains the symbol {symbol}, which has no value", f"Put its number in; {able}.")
-
-
-def _unreadable(name: str, law: sympy.Expr) -> _Fault | None:
-    """The first thing in an expression that no engine can evaluate."""
-    for node in sympy.preorder_traversal(law):
-        if isinstance(node, sympy.Piecewise) and node.args[-1].cond != sympy.true:
-            what = f"has {str(node)[:60]}, without a value where no condition holds"
-            return _Fault(name, what, "End it with (value, True).")
-        if not isinstance(node, _EVALUATED):
-            hint = f"Take sums, products, powers and: {FUNCTION_NAMES}."
-            return _Fault(name, f"contains the unknown function {node.func.__name__}", hint)
-    return None
-
-
-def _strange_symbols(template: BranchTemplate) -> set[sympy.Symbol]:
-    factors = (*(coefficient for coefficient, _, _ in template.terms), *template.through)
-    found = template.law.free_symbols.union(*(factor.free_symbols for factor in factors))
-    found -= {HISTORY} if template.is_history else set()
-    found -= {*template.reads} if template.kind in (Kind.LAW, Kind.ACROSS_SOURCE) else set()
-    return set(found - {*template.symbols} - _READS.get(template.kind, frozenset()))
-
-
-def _check_ends(part: Component, templates: tuple[BranchTemplate, ...]) -> None:
-    ports = {None, *(port.name for port in (*part.ports, *part.inner_ports()))}
-    couplings = (ends for template in templates for _, *ends in template.terms)
-    ends = [end for pair in (*(template.ends for template in templates), *couplings) for end in pair]
-    if strange := [end for end in ends if end not in ports]:
-        raise ValueError(f"a branch ends at {strange[0]!r}, which is no port")
 
 
 def connection_problems(graph: CircuitGraph) -> tuple[Problem, ...]:

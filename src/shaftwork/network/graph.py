@@ -16,6 +16,7 @@ from shaftwork.components.laws import Table, as_expression
 from shaftwork.components.modes import Modes
 from shaftwork.core.domains import ROTATION, Domain
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
+from shaftwork.network.overview import overview
 from shaftwork.network.sharing import Shared
 from shaftwork.network.templates import BranchTemplate, Kind, make_template, with_factors
 
@@ -97,6 +98,12 @@ class CircuitGraph:
     branches: tuple[GraphBranch, ...]
     parameters: Mapping[str, float]
     zeros: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        return overview(Netlist(self.name, tuple(Placed(part.component, self._nodes_of(part)) for part in self.parts)))
+
+    def _nodes_of(self, part: GraphPart) -> tuple[str, ...]:
+        return tuple(self.node_name(part.nodes[port.name]) for port in part.component.ports)
 
     @cached_property
     def multigraph(self) -> nx.MultiDiGraph:

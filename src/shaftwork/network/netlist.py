@@ -8,6 +8,7 @@ from typing import Any
 
 from shaftwork.components.base import Component
 from shaftwork.components.modes import Choice
+from shaftwork.core.errors import ParameterError
 
 REFERENCE = "ground"
 """The node name that stands for the reference of every domain (speed zero)."""
@@ -49,10 +50,45 @@ class Placed:
 
 @dataclass(frozen=True)
 class Netlist:
-    """An ordered list of placed components under a name."""
+    """An ordered list of placed components under a name, and the nodes at which it is joined to other networks."""
 
     name: str
     placed: tuple[Placed, ...]
+    ports: tuple[str, ...] = ()
+
+    def within(self, name: str, nodes: tuple[str, ...]) -> tuple[Placed, ...]:
+        """The parts as those of another network, named "name.part".
+
+        Args:
+            name: of this network in the other.
+            nodes: of the other network, one for each port.
+
+        Raises:
+            ParameterError: there are no ports, another number of nodes, or a port is no node.
+        """
+        if not self.ports:
+            raise ParameterError(
+                f"Network '{self.name}' has no ports. Name the nodes at which it is joined to others: "
+                f"Network('{self.name}', ports=('in_', 'out'))."
+            )
+        if len(nodes) != len(self.ports):
+            pattern = ", ".join(f"'node {port}'" for port in self.ports)
+            raise ParameterError(
+                f"Network '{self.name}' is given {len(nodes)} nodes, but its ports are: {', '.join(self.ports)}. "
+                f"Write net.add(part, {pattern}, name='{name}')."
+            )
+        inside = dict.fromkeys(node for item in self.placed for node in item.nodes)
+        if strange := [port for port in self.ports if port not in inside or port == REFERENCE]:
+            known = ", ".join(node for node in inside if node != REFERENCE)
+            raise ParameterError(f"Network '{self.name}': its port '{strange[0]}' is no node. Its nodes are: {known}.")
+        outside = {**{node: f"{name}.{node}" for node in inside}, REFERENCE: REFERENCE}
+        outside |= dict(zip(self.ports, nodes, strict=True))
+
+        def moved(item: Placed) -> Placed:
+            part = item.part.changed(name=f"{name}.{item.part.name}")
+            return replace(item, part=part, nodes=tuple(outside[node] for node in item.nodes))
+
+        return tuple(map(moved, self.placed))
 
     def with_values(self, values: Mapping[str, Any]) -> Netlist:
         """The same parts with some parameters, "part.name", replaced."""
@@ -65,9 +101,9 @@ class Netlist:
             new = by_part.get(item.part.name)
             return item if new is None else replace(item, part=replace(item.part, **new))
 
-        return Netlist(self.name, tuple(changed(item) for item in self.placed))
+        return replace(self, placed=tuple(changed(item) for item in self.placed))
 
     def with_choices(self, choices: Mapping[str, tuple[Choice, ...]]) -> Netlist:
         """The same parts with what is chosen for those that have modes, by name of the part."""
         placed = (replace(item, choices=choices.get(item.part.name, item.choices)) for item in self.placed)
-        return Netlist(self.name, tuple(placed))
+        return replace(self, placed=tuple(placed))

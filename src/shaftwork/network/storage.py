@@ -30,7 +30,9 @@ def netlist_text(netlist: Netlist) -> str:
     Raises:
         ModelFileError: a parameter has no text form.
     """
-    return textfile.write(ModelText(netlist.name, tuple(_part_text(placed) for placed in netlist.placed)))
+    return textfile.write(
+        ModelText(netlist.name, tuple(_part_text(placed) for placed in netlist.placed), netlist.ports)
+    )
 
 
 def write_netlist(netlist: Netlist, path: str | Path) -> None:
@@ -57,7 +59,7 @@ def read_netlist(path: str | Path) -> Netlist:
     model = textfile.read(_path_of(path))
     try:
         _refuse_endless_laws(model)
-        return Netlist(model.name, tuple(_placed(part, str(path)) for part in model.parts))
+        return Netlist(model.name, tuple(_placed(part, str(path)) for part in model.parts), model.ports)
     except ModelFileError as error:
         raise ModelFileError(f"{path}: {error}") from None
 

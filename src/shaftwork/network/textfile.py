@@ -97,13 +97,20 @@ class PartText:
 
 @dataclass(frozen=True)
 class ModelText:
-    """A network as it stands in a file: its name and its parts in order."""
+    """A network as it stands in a file: its name, its parts in order, and its ports if it is a part of others."""
 
     name: str
     parts: tuple[PartText, ...] = ()
+    ports: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         _check_name("name", self.name)
+        if not isinstance(self.ports, tuple) or len({*map(str, self.ports)}) < len(self.ports):
+            raise ModelFileError(
+                f'ports is {_shown(self.ports)}. Give nodes, each once, such as ports = ["in", "out"].'
+            )
+        for port in self.ports:
+            _check_name("ports", port)
 
 
 def read(source: str | os.PathLike[str]) -> ModelText:
@@ -131,6 +138,7 @@ def is_name(value: Any) -> bool:
 def write(model: ModelText) -> str:
     """The text of a model: `read` of it is the same model, numbers to the last bit; equal models give equal texts."""
     lines = [f"format = {FORMAT}", f"name = {_quoted(model.name)}"]
+    lines += [f"ports = [{', '.join(map(_quoted, model.ports))}]"] if model.ports else []
     for part in model.parts:
         lines += ["", "[[part]]", f"type = {_quoted(part.type)}", f"name = {_quoted(part.name)}"]
         lines.append(f"nodes = [{', '.join(_quoted(node) for node in part.nodes)}]")
@@ -245,13 +253,17 @@ def _model(text: str, *, is_file: bool) -> ModelText:
             f"format is {_shown(tables['format'])}, and this version reads format {FORMAT}. "
             "Update the package if the file is newer."
         )
-    if unknown := [key for key in tables if key not in ("format", "name", "part")]:
-        raise ModelFileError(f"the key {unknown[0]} is unknown here. Before the first [[part]] stand format and name.")
+    if unknown := [key for key in tables if key not in ("format", "name", "ports", "part")]:
+        raise ModelFileError(
+            f"the key {unknown[0]} is unknown here. Before the first [[part]] stand format, name and ports."
+        )
     name: Any = tables.get("name")
+    ports: Any = tables.get("ports", [])
     parts = tables.get("part", [])
     if not isinstance(parts, list) or len(parts) != len(lines):
         raise ModelFileError(f"part is {_shown(parts)}. {_USE}")
-    return ModelText(name, tuple(_part(table, place) for table, place in zip(parts, lines, strict=True)))
+    made = tuple(_part(table, place) for table, place in zip(parts, lines, strict=True))
+    return ModelText(name, made, tuple(ports) if isinstance(ports, list) else ports)
 
 
 def _part(table: dict[str, Any], lines: Mapping[str, int]) -> PartText:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import warnings
 from collections.abc import Callable, Mapping
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -142,7 +142,7 @@ class ExactNetwork:
             profiles=ModelObserver(self._model.form, self._model.bind).profiles,
             lengths=tuple(p["length"] for p in self._values),
         )
-        return ExactModel(self._model.name, slopes, lambda radius, attempt: self._starts(values, time, radius, attempt))
+        return ExactModel(self._model.name, slopes, partial(self._starts, values, time))
 
     def _read(self, time: float, x: Array) -> dict[str, float]:
         """The states of the open network at the point, and speeds and torques of the ends of the shafts."""

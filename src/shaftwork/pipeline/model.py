@@ -32,7 +32,9 @@ from shaftwork.pipeline.arguments import (
     watched_by,
 )
 from shaftwork.pipeline.implicit import at_rest, solve_loops
+from shaftwork.pipeline.overview import model_overview
 from shaftwork.pipeline.prepared import Prepared, nominal_tolerances
+from shaftwork.pipeline.stored import Rebuild, Repetition, model_again, remember
 from shaftwork.reduction.form import StateForm
 from shaftwork.results.solution import Solution
 
@@ -47,7 +49,6 @@ VARIANTS = 8
 SIMILAR = 5.0
 """An engine suits parameters that differ by less than this factor too: looking anew would cost more than the run."""
 EngineName = Literal["auto", "scipy", "scipy-radau", "heyoka", "sundials", "exact", "banded", "wave"]
-Rebuild = Callable[[Netlist], "Model"]
 
 
 class Model(CompiledModel):
@@ -65,6 +66,12 @@ class Model(CompiledModel):
         self._prepared: tuple[bytes, Prepared] | None = None
         self._variants: dict[tuple[tuple[str, float], ...], Model] = {}
         self._choices: list[tuple[tuple[float, float, float], Array, tuple[str, str]]] = []
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return model_again, remember(self, self._rebuild)
+
+    def __repr__(self) -> str:
+        return model_overview(self)
 
     @property
     def name(self) -> str:
@@ -119,7 +126,16 @@ class Model(CompiledModel):
         times = output_times(t_eval, *span)
         demand = Demand(span, relative_tolerance(rtol), atol, times, engine, max_steps, progress)
         made = dict(zip(self.parameters, self.defaults.tolist(), strict=True)) | values
-        return replace(self._motion(values, initial, demand), parameters=made, initial=dict(initial or {}))
+        motion = self._motion(values, initial, demand)
+        call: dict[str, Any] = {"t_end": t_end, "t_start": t_start, "rtol": rtol, "atol": atol, "max_steps": max_steps}
+        call |= {"engine": self._engine_again(motion, engine), "parameters": values, "initial": initial and {**initial}}
+        call |= {"t_eval": "steps" if times is None else times.copy()}
+        again = Repetition(self._rebuild, self.netlist, call, self)
+        return replace(motion, parameters=made, initial=dict(initial or {}), again=again)
+
+    def _engine_again(self, motion: Solution, engine: EngineName) -> str:  # noqa: ARG002 (of other models)
+        """The engine that makes a motion again."""
+        return motion.engine
 
     def _motion(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
         prepared = self.prepare(self.vector(values) if values else self.defaults)

@@ -7,6 +7,7 @@ import gc
 import reprlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self
 
@@ -103,12 +104,7 @@ class Network(NetworkBuilder):
                 "all their modes in one. Leave phase out, or take another model of the shaft, such as Lumped(20)."
             )
 
-        def chosen(asked: Any) -> Equations:
-            name = getattr(asked, "name", asked)
-            made = kirchhoff(_sound(in_phase(netlist, form.graph, name)) if name else form)
-            return dataclasses.replace(made, phase=whole_name(form.graph, name), in_phase=chosen)
-
-        return chosen("" if phase is None else phase)
+        return _InPhase(netlist, form)("" if phase is None else phase)
 
     def lagrangian(self, *, expand: bool = False, phase: str | NamedPhase | None = None) -> Lagrangian:
         """Energies, generalised coordinates and forces, and Lagrange's equations, with their proof by Kirchhoff's.
@@ -148,7 +144,7 @@ class Network(NetworkBuilder):
         if algebraic_loops not in ("refuse", "solve"):
             raise ParameterError(f"algebraic_loops = {algebraic_loops!r} must be 'refuse' or 'solve'.")
         asked = (angles,) if isinstance(angles, str) else tuple(angles)
-        return _compiled(self.netlist(), asked, LOOP if algebraic_loops == "solve" else "")
+        return Compiler(asked, LOOP if algebraic_loops == "solve" else "")(self.netlist())
 
     def simulate(
         self,
@@ -231,7 +227,7 @@ class Network(NetworkBuilder):
     def _small_motions(self, *, exact: bool) -> SmallMotions:
         from shaftwork.pipeline.exact import small_motions
 
-        return small_motions(self.compile(), lambda changed: _compiled(changed, (), LOOP), every=exact)
+        return small_motions(self.compile(), Compiler((), LOOP), every=exact)
 
     def save(self, path: str | Path) -> None:
         """Write the network to a text file from which `load` makes the same network.
@@ -252,7 +248,7 @@ class Network(NetworkBuilder):
 
     @classmethod
     def _of(cls, netlist: Netlist) -> Self:
-        made = cls(netlist.name)
+        made = cls(netlist.name, netlist.ports)
         made._placed += netlist.placed
         return made
 
@@ -285,16 +281,51 @@ def _sound(netlist: Netlist, accepted: str = "") -> StateForm:
     return form
 
 
-def _compiled(netlist: Netlist, angles: tuple[str, ...], accepted: str) -> Model:
-    with _without_collection():
-        form = _sound(netlist, accepted)
-        if form.waves:
-            warn_of_rounding(form.graph)
-        if angles:
-            form = state_form(form.graph, tuple(_branch_of(form.graph, name) for name in angles))
-        chosen = form.waves or any(item.choices for item in netlist.placed)
-        made = PhasedModel if any(part.modes for part in form.graph.parts) and not chosen else Model
-        return made(form, netlist, lambda changed: _compiled(changed, angles, accepted))
+@dataclass(frozen=True)
+class Compiler:
+    """Makes models, with the options of `Network.compile`; a stored model is made again by it.
+
+    Args:
+        angles: parts whose angle is recorded.
+        accepted: kind of problem that is accepted.
+    """
+
+    angles: tuple[str, ...]
+    accepted: str
+
+    def __call__(self, netlist: Netlist) -> Model:
+        """The model of a network.
+
+        Raises:
+            NetworkError: it cannot be assembled.
+        """
+        with _without_collection():
+            form = _sound(netlist, self.accepted)
+            if form.waves:
+                warn_of_rounding(form.graph)
+            if self.angles:
+                form = state_form(form.graph, tuple(_branch_of(form.graph, name) for name in self.angles))
+            chosen = form.waves or any(item.choices for item in netlist.placed)
+            kind = PhasedModel if any(part.modes for part in form.graph.parts) and not chosen else Model
+            return kind(form, netlist, self)
+
+
+@dataclass(frozen=True, eq=False)
+class _InPhase:
+    """The equations of a network in any phase of its motion.
+
+    Args:
+        netlist: the network.
+        form: its state form in the first mode of every part.
+    """
+
+    netlist: Netlist
+    form: StateForm
+
+    def __call__(self, phase: str | NamedPhase) -> Equations:
+        name: Any = getattr(phase, "name", phase)
+        form = _sound(in_phase(self.netlist, self.form.graph, name)) if name else self.form
+        return dataclasses.replace(kirchhoff(form), phase=whole_name(self.form.graph, name), in_phase=self)
 
 
 @contextmanager

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 
 from shaftwork.components.lossy_gear import LossyGear
 from shaftwork.core.domains import ELECTRICAL
@@ -107,11 +108,15 @@ def refer(net: Network, to: str, *, drives: Mapping[str, str] | None = None) -> 
     for part in parts:
         made.add(part.placed.part, *part.placed.nodes)
     entries = tuple(entry for part in parts for entry in part.entries)
-    table = ReductionTable(to, entries, lambda: net.equations().symbol_names)
+    table = ReductionTable(to, entries, partial(_symbol_names, net))
     scales = {part.placed.part.name: part.scale for part in parts}
     absorbed = tuple(graph.parts[place].name for place in found.absorbed)
     at_rest = tuple(part.name for part in graph.parts if part.name not in scales and part.name not in absorbed)
     return Referred(made, table, to, scales, view.nodes(), absorbed, at_rest)
+
+
+def _symbol_names(net: Network) -> Mapping[str, str]:
+    return net.equations().symbol_names
 
 
 def _checked_node(graph: CircuitGraph, to: str) -> int:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import reprlib
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
 
-from shaftwork.core.errors import MissingExtraError, SignalError, no_quantity
+from shaftwork.core.errors import AccuracyWarning, MissingExtraError, SignalError, no_quantity
+from shaftwork.core.notices import warn
+from shaftwork.core.screen import counted, named, on_one_screen
 from shaftwork.results.energy import EnergyBalance, energy_balance
 from shaftwork.results.extremes import Extreme, Extremes
 from shaftwork.results.fatigue import Damage, SNLine
@@ -23,6 +25,11 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray
     from matplotlib.figure import Figure
+
+COMPILED = ("dense", "observer")
+"""What of a motion holds compiled code."""
+ALIKE = 1e-6
+"""Two runs of one motion at the usual tolerance differ by less of the largest value of a state."""
 
 
 class PhaseRow(NamedTuple):
@@ -62,6 +69,8 @@ class Solution:
         phases: the spans of time between them.
         parameters: what the network was made of, "part.parameter" to value in SI, where it is not zero.
         initial: the start values that were given.
+        again: makes the motion again. One that is stored (pickled) has no compiled code: when more of it is read than
+            is stored, the motion is made again.
     """
 
     name: str
@@ -77,6 +86,39 @@ class Solution:
     phases: tuple[PhaseRow, ...] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
     initial: Mapping[str, float] = field(default_factory=dict)
+    again: Callable[[], Solution] | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        stored = (item.name for item in fields(self) if item.name not in COMPILED)
+        return {name: getattr(self, name) for name in stored}
+
+    def __deepcopy__(self, _memo: Any) -> Solution:
+        return replace(self, t=self.t.copy(), x=self.x.copy())
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            again = vars(self).get("again") if name in COMPILED else None
+            if again is None:
+                raise AttributeError(f"A Solution has no '{name}'.")
+            motion = again()
+            self._warn_of_another(motion)
+            vars(self).update({part: getattr(motion, part) for part in COMPILED})
+            return vars(self)[name]
+
+    def _warn_of_another(self, motion: Solution) -> None:
+        """Say where a motion that was made again differs from what was stored of it."""
+        if not self.x.size:
+            return
+        inside = np.append(self.t[1:] != self.t[:-1], True)  # of two sides the later one
+        off = np.abs(motion.dense(self.t[inside]) - self.x[inside]).max(axis=0)
+        share = float((off / np.maximum(np.abs(self.x).max(axis=0), np.finfo(float).tiny)).max())
+        if share > ALIKE:
+            warn(
+                f"The stored motion of '{self.name}' was made again to be read, by other versions or on another "
+                f"machine: its states differ by up to {share:.1e} of their largest value.",
+                AccuracyWarning,
+            )
 
     @property
     def steps(self) -> Array:
@@ -131,8 +173,7 @@ class Solution:
             raise SignalError(
                 f"The run goes from t = {first:g} s to {last:g} s; asked for {times.min()} to {times.max()}."
             )
-        fields = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        return Solution(**(fields | {"t": times, "x": self.dense(times)}))
+        return replace(self, t=times, x=self.dense(times))
 
     @cached_property
     def reader(self) -> Reader:
@@ -253,10 +294,18 @@ class Solution:
         raise error
 
     def __repr__(self) -> str:
-        return (
-            f"<Solution of '{self.name}': {len(self.t)} times from {self.t[0]:g} to {self.t[-1]:g} s, "
-            f"{len(self.states)} states, engine {self.engine}>"
-        )
+        span = f"{counted(len(self.t), 'time')} from {self.t[0]:g} to {self.t[-1]:g} s"
+        title = f"Solution of '{self.name}': {span}, {counted(len(self.states), 'state')}, engine {self.engine}"
+        events = [f"{time:.6g} s {part} {after}" for time, part, _, after in self.events]
+        phases = [f"{row.name} (from {row.start:.6g} s)" for row in self.phases]
+        lines = [
+            f"  {self.why}",
+            *named("states", self.states),
+            *named(counted(len(phases), "phase"), phases, most=6),
+            *named(counted(len(events), "event"), events, most=6),
+            '  Read a quantity with sol["part.quantity"]; all are in sol.names.',
+        ]
+        return on_one_screen(title, lines, len(lines))
 
 
 def _require(library: str, extra: str, purpose: str) -> Any:

@@ -1,0 +1,49 @@
+"""What a record says of itself on one screen, whatever its size."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Sequence
+from itertools import islice
+
+LINES, COLUMNS = 25, 100
+"""Size of the screen."""
+
+
+def on_one_screen(title: str, lines: Iterable[str], count: int) -> str:
+    """A title and lines below it; of too many lines the first ones, and how many more there are.
+
+    Args:
+        title: first line.
+        lines: the others; those that do not fit are not even made.
+        count: of the lines.
+    """
+    shown = list(islice(lines, LINES - 1 if count < LINES else LINES - 2))
+    rest = [f"  ... and {count - len(shown)} more"] if count > len(shown) else []
+    return "\n".join(shorter(line) for line in (title, *shown, *rest))
+
+
+def named(title: str, names: Sequence[str], most: int = 3) -> list[str]:
+    """Names behind a title, on at most some lines; of too many names the first ones, and how many more there are."""
+    if not names:
+        return []
+    head = f"  {title}: "
+    shown, text = 0, ""
+    for name in names:
+        longer = f"{text}, {name}" if text else name
+        left = f" and {len(names) - shown} more"
+        if len(textwrap.wrap(head + longer + left, COLUMNS, subsequent_indent="    ")) > most and shown:
+            text += left
+            break
+        text, shown = longer, shown + 1
+    return textwrap.wrap(head + text, COLUMNS, subsequent_indent="    ", break_on_hyphens=False)[:most]
+
+
+def shorter(text: str) -> str:
+    """A line that fits the screen."""
+    return text if len(text) <= COLUMNS else f"{text[: COLUMNS - 3]}..."
+
+
+def counted(number: int, what: str) -> str:
+    """A number and what it counts: "1 node", "2 nodes"."""
+    return f"{number} {what}{'' if number == 1 else 's'}"

@@ -1,0 +1,68 @@
+"""Models and motions that are stored (pickled): as what they are made of, from which they are made again when needed.
+
+Compiled code cannot be stored. A model is its network and the options of its compilation; a motion is its states at the
+output times, and the call that led to them.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+from weakref import WeakValueDictionary
+
+from shaftwork.core.errors import NetworkWarning
+from shaftwork.network.netlist import Netlist
+
+if TYPE_CHECKING:
+    from shaftwork.pipeline.model import Model
+    from shaftwork.results.solution import Solution
+
+Rebuild = Callable[[Netlist], "Model"]
+
+_LIVING: WeakValueDictionary[tuple[Rebuild, Netlist], Model] = WeakValueDictionary()
+"""Models that have been stored or made again: all motions of one network that a process reads share one."""
+
+
+def remember(model: Model, rebuild: Rebuild) -> tuple[Rebuild, Netlist]:
+    """What a model is stored as."""
+    _LIVING[rebuild, model.netlist] = model
+    return rebuild, model.netlist
+
+
+def model_again(rebuild: Rebuild, netlist: Netlist) -> Model:
+    """The model of a network; its author has been warned when it was first made."""
+    model = _LIVING.get((rebuild, netlist))
+    if model is None:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", NetworkWarning)
+            model = _LIVING[rebuild, netlist] = rebuild(netlist)
+    return model
+
+
+class Repetition:
+    """The call that has led to a motion.
+
+    Args:
+        rebuild: makes the model again.
+        netlist: of which it is a motion.
+        options: of `Model.simulate`.
+        model: the model itself, where it is at hand.
+    """
+
+    def __init__(
+        self, rebuild: Rebuild, netlist: Netlist, options: Mapping[str, Any], model: Model | None = None
+    ) -> None:
+        self._rebuild, self._netlist, self._options, self._model = rebuild, netlist, options, model
+
+    def __call__(self) -> Solution:
+        """The motion, made again."""
+        model = self._model or model_again(self._rebuild, self._netlist)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # its author has seen them
+            return model.simulate(**self._options)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        if self._model is not None:
+            remember(self._model, self._rebuild)
+        return Repetition, (self._rebuild, self._netlist, self._options)
