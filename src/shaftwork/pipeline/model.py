@@ -34,7 +34,7 @@ from shaftwork.pipeline.arguments import (
 from shaftwork.pipeline.implicit import at_rest, solve_loops
 from shaftwork.pipeline.overview import model_overview
 from shaftwork.pipeline.prepared import Prepared, nominal_tolerances
-from shaftwork.pipeline.stored import Rebuild, Repetition, model_again, remember
+from shaftwork.pipeline.stored import Rebuild, Repetition, call_of, model_again, remember
 from shaftwork.reduction.form import StateForm
 from shaftwork.results.solution import Solution
 
@@ -127,15 +127,8 @@ class Model(CompiledModel):
         demand = Demand(span, relative_tolerance(rtol), atol, times, engine, max_steps, progress)
         made = dict(zip(self.parameters, self.defaults.tolist(), strict=True)) | values
         motion = self._motion(values, initial, demand)
-        call: dict[str, Any] = {"t_end": t_end, "t_start": t_start, "rtol": rtol, "atol": atol, "max_steps": max_steps}
-        call |= {"engine": self._engine_again(motion, engine), "parameters": values, "initial": initial and {**initial}}
-        call |= {"t_eval": "steps" if times is None else times.copy()}
-        again = Repetition(self._rebuild, self.netlist, call, self)
+        again = Repetition(self._rebuild, self.netlist, call_of(motion, demand, values, initial), self)
         return replace(motion, parameters=made, initial=dict(initial or {}), again=again)
-
-    def _engine_again(self, motion: Solution, engine: EngineName) -> str:  # noqa: ARG002 (of other models)
-        """The engine that makes a motion again."""
-        return motion.engine
 
     def _motion(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
         prepared = self.prepare(self.vector(values) if values else self.defaults)

@@ -15,6 +15,7 @@ from shaftwork.core.errors import NetworkWarning
 from shaftwork.network.netlist import Netlist
 
 if TYPE_CHECKING:
+    from shaftwork.pipeline.arguments import Demand
     from shaftwork.pipeline.model import Model
     from shaftwork.results.solution import Solution
 
@@ -38,6 +39,26 @@ def model_again(rebuild: Rebuild, netlist: Netlist) -> Model:
             warnings.simplefilter("ignore", NetworkWarning)
             model = _LIVING[rebuild, netlist] = rebuild(netlist)
     return model
+
+
+def call_of(
+    motion: Solution, demand: Demand, values: Mapping[str, float], initial: Mapping[str, Any] | None
+) -> dict[str, Any]:
+    """The arguments of `Model.simulate` that lead to a motion again, by the engine that was taken.
+
+    A motion through phases has an engine for each, which is chosen anew.
+    """
+    return {
+        "t_start": demand.span[0],
+        "t_end": demand.span[1],
+        "rtol": demand.rtol,
+        "atol": demand.atol,
+        "t_eval": "steps" if demand.t_eval is None else demand.t_eval.copy(),
+        "engine": demand.engine if motion.phases else motion.engine,
+        "max_steps": demand.max_steps,
+        "parameters": dict(values),
+        "initial": None if initial is None else dict(initial),
+    }
 
 
 class Repetition:

@@ -13,7 +13,7 @@ from shaftwork.codegen.operating import initial_state, steady_state
 from shaftwork.core.errors import SimulationError
 from shaftwork.pipeline.analysis import Given, Names, Point, Time, input_names, operating_point
 from shaftwork.pipeline.arguments import Demand
-from shaftwork.pipeline.model import EngineName, Model
+from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.moments import Moment
 from shaftwork.pipeline.phases.phases import Phases
 from shaftwork.pipeline.phases.run import Run
@@ -41,10 +41,6 @@ class PhasedModel(Model):
         run = Run(self.phases, values, demand)
         run.march(initial)
         return solution(run, self.name)
-
-    def _engine_again(self, motion: Solution, engine: EngineName) -> str:  # noqa: ARG002
-        """Each phase has an engine of its own."""
-        return engine
 
     def _choice(self, demand: Demand) -> tuple[str, str]:
         return Run(self.phases, {}, demand).choose()
