@@ -1,6 +1,8 @@
 """Makes the pictures of the pages.
 
 python docs/pictures.py             needs the extra `plot`, pdflatex and pdftoppm
+
+Each file says in its description what it was made of, `sources()`; the tests compare that with what the code says now.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from shaftwork.scenes.crane import WHEEL_RADIUS
 PICTURES = Path(__file__).parent / "pictures"
 RESOLUTION = 110
 """Pixels per inch: small files that are sharp in a column of text."""
+EQUATIONS, START = "crane-equations.png", "crane-start.png"
 
 MARGIN = 20
 """White pixels around what is printed."""
@@ -55,6 +58,21 @@ def crane_start() -> Figure:
     return figure
 
 
+def curves(figure: Figure) -> str:
+    """The curves of a figure, each by its label and its range to four digits."""
+    lines = (line for axes in figure.axes for line in axes.lines)
+    ranges = ((line.get_label(), np.asarray(line.get_ydata(), float)) for line in lines)
+    return "; ".join(f"{label}: {values.min():.4g} to {values.max():.4g}" for label, values in ranges)
+
+
+def sources() -> dict[str, str]:
+    """What each picture shows, as text: its LaTeX, or its curves."""
+    return {
+        EQUATIONS: scenes.crane_start().equations().latex(form="kirchhoff"),
+        START: curves(crane_start()),
+    }
+
+
 def typeset(body: str, picture: Path, height: int = 150) -> None:
     """A LaTeX body as a picture, cut to what is printed on it.
 
@@ -73,15 +91,15 @@ def typeset(body: str, picture: Path, height: int = 150) -> None:
         page = np.atleast_3d(imread(Path(folder, "page.png")))[..., 0]
     rows, columns = (np.flatnonzero((page < 1).any(axis=axis)) for axis in (1, 0))
     inside = page[: rows[-1] + MARGIN, max(0, columns[0] - MARGIN) : columns[-1] + MARGIN]
-    imsave(picture, inside, cmap="gray", vmin=0, vmax=1)
+    imsave(picture, inside, cmap="gray", vmin=0, vmax=1, metadata={"Description": body})
 
 
 def main() -> None:
     """Write all pictures."""
     PICTURES.mkdir(exist_ok=True)
-    crane_start().savefig(PICTURES / "crane-start.png", dpi=RESOLUTION)
-    equations = scenes.crane_start().equations()
-    typeset(equations.latex(form="kirchhoff"), PICTURES / "crane-equations.png")
+    texts = sources()
+    crane_start().savefig(PICTURES / START, dpi=RESOLUTION, metadata={"Description": texts[START]})
+    typeset(texts[EQUATIONS], PICTURES / EQUATIONS)
 
 
 if __name__ == "__main__":

@@ -34,6 +34,7 @@ MEMBER = re.compile(r"([A-Z][a-z]+\w*)\.([a-z]\w*)(?:\(.*\))?")
 CAPITALISED = re.compile(r"([A-Z][a-z]+\w*)(?:\(.*\))?")
 TEST = re.compile(r"`(test_\w+)`")
 LARGEST_PICTURE = 150_000
+LONGEST_README = 150
 
 
 @pytest.mark.slow
@@ -178,6 +179,24 @@ def test_every_kind_of_problem_on_the_page_is_one_of_the_code() -> None:
         "blocked speed source": "blocked {words.across} source",
     }
     assert [kind for kind in kinds if f'"{made_of_words.get(kind, kind)}"' not in code] == []
+
+
+def test_pictures_show_what_the_code_says_now() -> None:
+    """`python docs/pictures.py` makes them so."""
+    images = pytest.importorskip("PIL.Image", reason="matplotlib brings it")
+    pictures = importlib.import_module("docs.pictures")
+    shown = {picture.name: images.open(picture).text.get("Description") for picture in (DOCS / "pictures").iterdir()}
+    assert shown == pictures.sources()
+
+
+def test_the_readme_is_short() -> None:
+    assert len(TEXTS["README.md"].splitlines()) <= LONGEST_README
+
+
+@pytest.mark.parametrize("name", STORIES)
+def test_no_page_promises_anything(name: str) -> None:
+    """What was planned once was written about as planned long after it was there."""
+    assert re.findall(r"\b(?:planned|not yet|coming soon|TODO|in future|will be added)\b", STORIES[name]) == []
 
 
 def test_pictures_are_small_and_all_of_them_are_shown() -> None:
