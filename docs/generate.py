@@ -131,6 +131,10 @@ def _told(text: str, page: Path, line: int, namespace: dict[str, Any]) -> str:
             if printed := _run(match["code"], page, place + 1, namespace):
                 raise ValueError(f"{page.name}:{place}: hidden code prints {printed[:60]!r}, which is not shown.")
             return match[0]
+        if text[: match.start()].rpartition("\n")[2].strip() in ("", "-"):
+            raise ValueError(
+                f"{page.name}:{place}: a computed figure begins the line, where Markdown takes it for HTML."
+            )
         figure = eval(match["expression"], namespace)  # noqa: S307 - the examples of this repository
         return f"<!--={match['expression']}-->{figure}<!--/-->"
 
@@ -178,7 +182,7 @@ def component_list() -> str:
     """A line for each component: what it is, in the first sentence of its docstring, its ports and parameters."""
     lines = ["| component | what it is | ports | parameters |", "|---|---|---|---|"]
     for name, cls in components().items():
-        what = inspect.cleandoc(cls.__doc__ or "").split("\n\n")[0].replace("\n", " ")
+        what = inspect.cleandoc(cls.__doc__ or "").split("\n\n")[0].replace("\n", " ").partition(" Law: ")[0]
         declared = ", ".join(f"`{item}`" for item in cls.declared)
         lines.append(f"| [`{name}`](#{name.lower()}) | {what} | {_ports(cls)} | {declared} |")
     return "\n".join(lines) + "\n"

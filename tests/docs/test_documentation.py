@@ -212,3 +212,10 @@ def test_notebooks_are_stored_without_outputs(notebook: Path) -> None:
     cells = [cell for cell in json.loads(notebook.read_text(encoding="utf-8"))["cells"] if cell["cell_type"] == "code"]
     assert cells
     assert [cell["source"] for cell in cells if cell["outputs"] or cell["execution_count"] is not None] == []
+
+
+def test_a_computed_figure_that_begins_a_line_is_an_error() -> None:
+    """Markdown would take the line for HTML."""
+    for start in ("", "- ", "  "):
+        with pytest.raises(ValueError, match="begins the line"):
+            remade(Path("page.md"), f"There are\n{start}<!--= 2 + 2 -->4<!--/--> of them.\n")
