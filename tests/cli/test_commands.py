@@ -185,3 +185,38 @@ def test_a_model_without_a_steady_operation_ends_with_1(capsys: pytest.CaptureFi
     net.save(tmp_path / "free.toml")
     assert main(["modes", str(tmp_path / "free.toml"), "--steady"]) == FAILED
     assert "shaftwork: " in capsys.readouterr().err
+
+
+def test_a_run_is_told_to_machines_as_to_people(model: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", model, "--t-end", "0.5", "--json", "--signals", "shaft.tau"]) == DONE
+    said = json.loads(capsys.readouterr().out)
+    sol = sw.Network.load(model).simulate(0.5)
+    assert (said["network"], said["t_end"], said["engine"], said["why"]) == ("pair", 0.5, sol.engine, sol.why)
+    (row,) = said["signals"].values()
+    assert row["unit"] == "N*m"
+    for side, extreme in (("minimum", sol.min("shaft.tau")), ("maximum", sol.max("shaft.tau"))):
+        assert row[side] == {"value": float(extreme), "t": extreme.t, "place": None}
+    assert row["end"] == pytest.approx(sol["shaft.tau"][-1], rel=1e-9, abs=1e-12)
+    assert said["phases"] == said["events"] == []
+
+
+def test_phases_and_events_are_told_to_machines(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "crane-start", "--t-end", "0.5", "--json"]) == DONE
+    said = json.loads(capsys.readouterr().out)
+    sol = sw.scenes.crane_start().simulate(0.5)
+    assert [row["modes"] for row in said["phases"]] == [dict(row.modes) for row in sol.phases]
+    assert [tuple(event.values()) for event in said["events"]] == list(sol.events)
+
+
+def test_a_quantity_along_a_shaft_is_a_column_for_each_place(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    arguments = ["run", "shaft-step", "--t-end", "0.05", "--signals", "line.tau", "--out", str(out), "--json"]
+    assert main(arguments) == DONE
+    assert json.loads(capsys.readouterr().out)["signals"]["line.tau"]["maximum"]["place"] > 0
+    head, *table = rows(out / "signals.csv")
+    sol = sw.scenes.shaft_step().simulate(0.05)
+    places = sol.places["line.tau"]
+    assert head == ["t [s]", *(f"line.tau at {place:g} m [N*m]" for place in places)]
+    assert np.array(table, dtype=float)[:, 1:] == pytest.approx(sol["line.tau"], rel=1e-9, abs=1e-9)

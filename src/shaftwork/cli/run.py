@@ -56,7 +56,7 @@ def run(options: Namespace, say: Say) -> Data:
         with folder.new_files() as place:
             _write(solution, signals, place)
         say(f"\n{folder.written()}")
-    return {}
+    return _data(solution, signals)
 
 
 def _motion(net: Network, t_end: float, wanted: tuple[str, ...], options: Namespace) -> Solution:
@@ -89,10 +89,11 @@ def _refuse_unknown(model: Model, wanted: tuple[str, ...]) -> None:
     from shaftwork.codegen.observer import ModelObserver
     from shaftwork.core.errors import no_quantity
 
-    units = ModelObserver(model.form, lambda: model.bind(model.defaults)).units
+    observer = ModelObserver(model.form, lambda: model.bind(model.defaults))
+    there = dict.fromkeys((*observer.units, *observer.profiles))
     for name in wanted:
-        if name not in units:
-            raise no_quantity(name, model.name, units)
+        if name not in there:
+            raise no_quantity(name, model.name, there)
 
 
 def _worth_seeing(solution: Solution) -> tuple[str, ...]:
@@ -117,9 +118,16 @@ def _say_phases(solution: Solution, say: Say) -> None:
 def _write(solution: Solution, signals: Sequence[str], place: Path) -> None:
     import numpy as np
 
-    columns = np.column_stack([solution.t, *(solution[name] for name in signals)])
-    header = ",".join(["t [s]", *(f"{name} [{solution.observer.units[name]}]" for name in signals)])
-    np.savetxt(place / "signals.csv", columns, delimiter=",", header=header, comments="", fmt="%.12g")
+    units, profiles = solution.observer.units, solution.observer.profiles
+    head, columns = ["t [s]"], [solution.t]
+    for name in signals:
+        unit, places = profiles.get(name, (units.get(name, ""), ()))
+        head += [f"{name} at {place:g} m [{unit}]" for place in places] or [f"{name} [{unit}]"]
+        columns.append(solution[name])
+    rows = np.column_stack(columns)
+    np.savetxt(
+        place / "signals.csv", rows, delimiter=",", header=",".join(head), comments="", fmt="%.12g", encoding="utf-8"
+    )
     if solution.phases:
         parts = solution.phases[0].modes
         phases = ((row.start, row.end, *row.modes.values()) for row in solution.phases)
@@ -128,4 +136,29 @@ def _write(solution: Solution, signals: Sequence[str], place: Path) -> None:
     write_picture(place / "signals.png", lambda: solution.plot(*signals))
 
 
-COMMAND = Command("run", "simulate: a table on the screen, plots and CSV in DIR", run, arguments)
+def _data(solution: Solution, signals: Sequence[str]) -> Data:
+    """The same for machines."""
+    rows = {name: solution.extremes.row(name) for name in signals}
+    return {
+        "network": solution.name,
+        "t_end": solution.steps[-1],
+        "engine": solution.engine,
+        "why": solution.why,
+        "statistics": solution.statistics,
+        "energy_residual": solution.energy_residual,
+        "signals": {
+            name: {
+                "unit": row.least.unit,
+                "minimum": {"value": float(row.least), "t": row.least.t, "place": row.least.place},
+                "maximum": {"value": float(row.most), "t": row.most.t, "place": row.most.place},
+                "mean": row.mean,
+                "end": row.end,
+            }
+            for name, row in rows.items()
+        },
+        "phases": [row._asdict() for row in solution.phases],
+        "events": [dict(zip(("t", "part", "from", "to"), event, strict=True)) for event in solution.events],
+    }
+
+
+COMMAND = Command("run", "simulate: a table on the screen, plots and CSV in DIR", run, arguments, machines=True)

@@ -230,10 +230,11 @@ class Solution:
         )
 
     def plot(self, *names: str) -> Figure:
-        """Curves over time, one axis for each unit (extra `plot`)."""
+        """Curves over time, those of like size and the same unit on one axis, and the phases below (extra `plot`)."""
         from shaftwork.results.plotting import plot_signals
 
-        return plot_signals(self, tuple(self._known(name) for name in names or self.states))
+        along = tuple(self.observer.profiles)
+        return plot_signals(self, tuple(name if name in along else self._known(name) for name in names or self.states))
 
     def rainflow(self, name: str, *, place: int | None = None, smallest: float = SMALLEST) -> Rainflow:
         """The load cycles of a quantity, such as "shaft.tau", over the run (extra `life`).
@@ -287,7 +288,7 @@ class Solution:
             )
         if name in units:
             return name
-        error = no_quantity(name, self.name, units)
+        error = no_quantity(name, self.name, dict.fromkeys((*units, *self.observer.profiles)))
         owner, _, quantity = name.rpartition(".")
         if quantity in ("phi", "s", "psi") and any(other.rpartition(".")[0] == owner for other in units):
             raise SignalError(f"{error} An angle is recorded when asked for: net.compile(angles=['{owner}']).")
