@@ -40,16 +40,22 @@ FRAME = r"""\documentclass[10pt]{article}
 def crane_start() -> Figure:
     """Torques and travel speed of the crane's start."""
     scene = scenes.SCENES["crane-start"]
-    sol = scene().simulate(scene.t_end, t_eval=2601)
+    net = scene()
+    sol = net.simulate(scene.t_end, t_eval=2601)
     figure = Figure(figsize=(6.6, 5.2), layout="constrained")
     torque, speed = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     torque.plot(sol.t, sol["shaft.tau"], linewidth=0.8, label="shaft")
     torque.plot(sol.t, sol["motor.tau"], linewidth=1.4, label="motor, at the wheel shaft")
+    peak = sol.max("shaft.tau")
+    torque.plot([peak.t], [peak], "o", markersize=4, color="black", label=f"largest: {peak:.1f} N m at {peak.t:.3f} s")
     torque.set_ylabel("torque in N m")
     torque.legend(frameon=False, loc="upper right")
-    speed.plot(sol.t, WHEEL_RADIUS * sol["J2.omega"], linewidth=1.4, label="travel speed")
+    speed.plot(sol.t, WHEEL_RADIUS * sol["J2.omega"], linewidth=1.4, label="speed of the crane")
     speed.axhline(1.08, color="0.5", linewidth=0.8, linestyle="--", label="1.08 m/s, printed")
     speed.set_ylabel("speed in m/s")
+    turns = next(part.values["ratio"] for part in net.parts if part.name == "motor") * 30 / np.pi / WHEEL_RADIUS
+    of_motor = speed.secondary_yaxis("right", functions=(lambda v: v * turns, lambda n: n / turns))
+    of_motor.set_ylabel("at the motor shaft in 1/min")
     speed.set_xlabel("t in s")
     speed.legend(frameon=False, loc="lower right")
     for axis in (torque, speed):

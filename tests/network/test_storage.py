@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +21,9 @@ from tests.strategies import networks
 
 def network_of(pieces: tuple[Piece, ...]) -> sw.Network:
     net = sw.Network("random")
-    for piece in pieces:
-        net.add(getattr(sw, piece.type)(piece.name, **piece.values), *piece.nodes)
+    symbols = cycle((None, "", "q"))  # the name, none, another one
+    for piece, symbol in zip(pieces, symbols, strict=False):
+        net.add(getattr(sw, piece.type)(piece.name, symbol=symbol, **piece.values), *piece.nodes)
     return net
 
 
