@@ -10,7 +10,7 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.linear import Linearization, source_inputs
 from shaftwork.codegen.model import CompiledModel
-from shaftwork.codegen.operating import initial_state
+from shaftwork.codegen.start_values import initial_state
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
 from shaftwork.results import campbell as diagram

@@ -13,8 +13,8 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.linear import Linearization
 from shaftwork.codegen.observer import ModelObserver
-from shaftwork.codegen.operating import initial_state
 from shaftwork.codegen.recovery import History
+from shaftwork.codegen.start_values import initial_state
 from shaftwork.components.modes import ALL_IN_ONE
 from shaftwork.components.shaft_models import MOST_SPECTRAL, OneSpring, Rigid, Spectral, Wave
 from shaftwork.components.shafts import Shaft

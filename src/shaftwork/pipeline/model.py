@@ -13,7 +13,8 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.observer import ModelObserver
-from shaftwork.codegen.operating import initial_state, steady_state
+from shaftwork.codegen.operating import steady_state
+from shaftwork.codegen.start_values import initial_state
 from shaftwork.codegen.switching import Switching
 from shaftwork.codegen.valueless import rough, without_value
 from shaftwork.core.errors import CompileError, ParameterError, SimulationError

@@ -12,8 +12,8 @@ import numpy as np
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.observer import ModelObserver
-from shaftwork.codegen.operating import initial_state
 from shaftwork.codegen.recovery import History
+from shaftwork.codegen.start_values import initial_state
 from shaftwork.codegen.waves import WaveSystem
 from shaftwork.components.base import Component
 from shaftwork.components.modes import ALL_IN_ONE
@@ -103,14 +103,7 @@ def start_of_waves(
         SignalError: there is no such quantity.
         ParameterError: values are not finite or contradict each other, or the ends of a wave are given two torques.
     """
-    for name in dict.fromkeys(form.graph.part_of(end).name for end in form.waves):
-        first, last = (given.get(f"{name}.{end}") for end in ("tau_a", "tau_b"))
-        if first is not None and last is not None and first != last:
-            raise ParameterError(
-                f"The wave '{name}' cannot start with tau_a = {first} and tau_b = {last}: it starts with one torque "
-                "all along. Give one of them, or take model=Spectral(16)."
-            )
-    x = initial_state(twin, given, t0)
+    x = initial_state(twin, _all_along(form, given), t0)
     motion = np.vstack([initial_state(twin, {}, t0), x])
     times = np.full(2, just_after(t0))
     observer, history = ModelObserver(twin.program.form, lambda: twin), History(twin, times, motion)
@@ -122,6 +115,21 @@ def start_of_waves(
         speeds += [history.potentials[node, 1] - history.potentials[node, 0] for node in (spring.plus, spring.minus)]
         torques.append(history.through[spring.index, 1])
     return states, WaveStart(np.array(speeds), np.array(torques))
+
+
+def _all_along(form: StateForm, given: Mapping[str, float]) -> dict[str, float]:
+    """Start values of the twin: a torque of an end stands all along the wave."""
+    values = dict(given)
+    for name in dict.fromkeys(form.graph.part_of(end).name for end in form.waves):
+        ends = {end: values.pop(end) for end in (f"{name}.tau", f"{name}.tau_a", f"{name}.tau_b") if end in values}
+        if len({*ends.values()}) > 1:
+            listed = " and ".join(f"{end} = {value}" for end, value in ends.items())
+            raise ParameterError(
+                f"The wave '{name}' cannot start with {listed}: it starts with one torque all along. Give one of them, "
+                "or take model=Spectral(16)."
+            )
+        values |= dict.fromkeys([f"{name}.tau"] * bool(ends), next(iter(ends.values()), 0.0))
+    return values
 
 
 def _is_wave(form: StateForm, part: int) -> bool:

@@ -9,7 +9,8 @@ from functools import cached_property, partial
 import numpy as np
 
 from shaftwork.codegen.linear import Linearization
-from shaftwork.codegen.operating import initial_state, steady_state
+from shaftwork.codegen.operating import steady_state
+from shaftwork.codegen.start_values import initial_state
 from shaftwork.core.errors import SimulationError
 from shaftwork.pipeline.analysis import Given, Names, Point, Time, input_names, operating_point
 from shaftwork.pipeline.arguments import Demand

@@ -1,0 +1,136 @@
+"""What quantities are made of: of which states, of what sources prescribe, or of laws and accelerations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from shaftwork.codegen.arrays import BoundArrays
+from shaftwork.codegen.elements import Array
+from shaftwork.codegen.recovery import History
+from shaftwork.codegen.stores import Stores
+
+LARGEST_BLOCK = 2_000_000
+"""Values, branches by columns, that are made at once."""
+ROUNDING = 1e-12
+"""A part of the largest value that is rounding."""
+GOLDEN = (5**0.5 - 1) / 2
+
+Read = Callable[[History], Array]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity that is linear in states, inputs and rates.
+
+    Args:
+        name: "part.quantity" or "node.quantity".
+        is_across: whether it is a speed (velocity, voltage), and no torque (force, current).
+        read: takes it from all branch quantities.
+    """
+
+    name: str
+    is_across: bool
+    read: Read
+
+
+@dataclass(frozen=True)
+class Row:
+    """How a quantity follows from the states.
+
+    Args:
+        by_state: (n,) its slopes by the states.
+        prescribed: what sources of time alone add to it.
+        moved: whether it follows from laws of the motion or from accelerations, too.
+    """
+
+    by_state: Array
+    prescribed: float
+    moved: bool
+
+
+class _Columns(History):
+    """Branch quantities where states, inputs and rates are given, each column for itself.
+
+    Args:
+        bound: the array program.
+        x: (n, k) states.
+        u: (m, k) inputs.
+        rate: (n, k) rates of the states.
+        slopes: (m, k) rates of the inputs.
+    """
+
+    def __init__(self, bound: BoundArrays, x: Array, u: Array, rate: Array, slopes: Array) -> None:
+        super().__init__(bound, np.zeros(x.shape[1]), x.T)
+        self._given = u, slopes, rate
+
+    @cached_property
+    def _inputs(self) -> tuple[Array, Array, Array]:
+        return self._given
+
+
+class LinearReadings:
+    """The rows of quantities.
+
+    Args:
+        bound: the array program.
+        t: time at which sources are read, s.
+    """
+
+    def __init__(self, bound: BoundArrays, t: float) -> None:
+        self._bound = bound
+        self._size = len(bound.program.form.states)
+        self._prescribed = Stores(bound.program.form).sources(bound, t)
+
+    def rows(self, quantities: Sequence[Quantity]) -> list[Row]:
+        """How each quantity follows from the states."""
+        if not quantities:
+            return []
+        by_state = np.hstack([self._values(quantities, columns) for columns in self._by_states(moving=False)])
+        others = self._others()
+        values = self._values(quantities, others)
+        largest = {True: np.abs(others.across), False: np.abs(others.through)}
+        sizes = np.array([largest[q.is_across].max(axis=0, initial=0.0) for q in quantities])
+        moved: Any = (np.abs(values) - ROUNDING * sizes)[:, 1:].max(axis=1) > 0
+        return [Row(by_state[k], float(values[k, 0]), bool(moved[k])) for k in range(len(quantities))]
+
+    def states_behind(self, quantities: Sequence[Quantity]) -> list[int]:
+        """The states on which quantities depend, by way of rates as well."""
+        if not quantities:
+            return []
+        values = np.hstack([self._values(quantities, columns) for columns in self._by_states(moving=True)])
+        size = np.abs(values).max(axis=1, keepdims=True, initial=0.0)
+        return [int(k) for k in np.flatnonzero((np.abs(values) > ROUNDING * size).any(axis=0))]
+
+    def still(self, x: Array) -> History:
+        """All branch quantities at states (n,) where sources give nothing and nothing accelerates."""
+        zero = np.zeros((self._prescribed.size, 1))
+        return _Columns(self._bound, x[:, None], zero, np.zeros((self._size, 1)), zero)
+
+    def _values(self, quantities: Sequence[Quantity], columns: _Columns) -> Array:
+        return np.array([quantity.read(columns) for quantity in quantities])
+
+    def _by_states(self, *, moving: bool) -> list[_Columns]:
+        """One column for each state, in blocks; with the rates that the states alone cause where they move."""
+        bound, inputs = self._bound, self._prescribed.size
+        width = max(1, LARGEST_BLOCK // max(1, len(bound.program.form.graph.branches)))
+        made = []
+        for first in range(0, max(self._size, 1), width):
+            x = np.eye(self._size)[:, first : first + width]
+            zero = np.zeros((inputs, x.shape[1]))
+            made.append(_Columns(bound, x, zero, bound.part.A @ x if moving else np.zeros_like(x), zero))
+        return made
+
+    def _others(self) -> _Columns:
+        """Three columns: what sources prescribe, laws, accelerations; of the last two any numbers, no two alike."""
+        of_time, size = self._bound.program.inputs.of_time, self._size
+        any_input = 0.5 + np.arange(1, of_time.size + 1) * GOLDEN % 1
+        any_rate = 0.5 + np.arange(1, size + 1) * GOLDEN % 1
+        zero, still = np.zeros(of_time.size), np.zeros(size)
+        u = np.stack([self._prescribed, np.where(of_time, 0.0, any_input), zero], axis=1)
+        rate = np.stack([still, still, any_rate], axis=1)
+        return _Columns(self._bound, np.zeros((size, 3)), u, rate, np.stack([zero, zero, any_input], axis=1))

@@ -1,0 +1,224 @@
+"""Start states from start values: each value that is given holds at the start, and all other stores are at rest."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy import linalg
+
+from shaftwork.codegen.arrays import BoundArrays
+from shaftwork.codegen.elements import Array
+from shaftwork.codegen.linear_readings import Quantity, Row
+from shaftwork.codegen.operating import energy_weights
+from shaftwork.codegen.recovery import History
+from shaftwork.codegen.start_names import StartNames
+from shaftwork.codegen.wound_shafts import speeds_inside
+from shaftwork.core.errors import ParameterError
+from shaftwork.core.times import just_after
+
+CONSISTENT = 1e-9
+"""Two given values contradict each other when they differ by more than this fraction."""
+INDEPENDENT = 1e-9
+"""A state does not move a quantity that it changes by less than this part of what others change it by."""
+
+
+def initial_state(bound: BoundArrays, given: Mapping[str, float], t0: float) -> Array:
+    """The states at the start: every given value holds, and all other stores are at rest.
+
+    Rest is that before the sources come on: where a prescribed speed is there from the start, its impulse has been
+    given to the inertias joined to it rigidly. A speed sets speeds alone and a torque sets torques alone: that of a
+    damped spring sets its elastic torque, so that both together are what is given. What is rigidly tied to a given
+    value follows it. A value that several stores would have to share is refused, and so is what follows from laws or
+    accelerations; the message names the start values to give instead.
+
+    Inside a shaft of several elements the speeds run straight from the one end to the other, and a torque "line.tau"
+    stands all along it.
+
+    Args:
+        bound: the array program.
+        given: "part.quantity" or "node.quantity" to value in SI.
+        t0: start time, s; where something jumps there, a time after it.
+
+    Raises:
+        SignalError: there is no such quantity.
+        ParameterError: a value is not finite, contradicts another one or is none to start from.
+    """
+    rest = bound.impulse(np.zeros(len(bound.program.form.states)), None, just_after(t0))
+    if not isinstance(given, Mapping):
+        raise ParameterError(f"initial = {given!r} must map quantities to values, such as {{'J1.omega': 3.0}}.")
+    return _Start(bound, rest, just_after(t0), given).states() if given else rest
+
+
+class _Stores(NamedTuple):
+    """Stores without a value of their own.
+
+    Args:
+        names: of the stores.
+        slopes: (stores, k) by the states that are to change.
+        offsets: (stores,) how far the given states have moved them from rest.
+        is_free: (stores,) whether further states move them, for which nothing is given.
+    """
+
+    names: Sequence[str]
+    slopes: Array
+    offsets: Array
+    is_free: Any
+
+
+class _Start:
+    """The way from start values to states.
+
+    Args:
+        bound: the array program.
+        rest: (n,) states at rest.
+        t: time at which sources are read, s.
+        given: values by name.
+    """
+
+    def __init__(self, bound: BoundArrays, rest: Array, t: float, given: Mapping[str, float]) -> None:
+        self._bound, self._rest, self._t = bound, rest, t
+        self._names = StartNames(bound, t)
+        self._values = self._names.checked(given)
+        form, numbers = bound.program.form, np.arange(rest.size)
+        first, last = len(form.across_states), len(form.across_states) + len(form.through_states)
+        self._of_kind = {True: numbers < first, False: (numbers >= first) & (numbers < last)}
+        self._x, self._fixed = rest.copy(), np.zeros(rest.size, dtype=bool)
+        direct = {self._names.places[name]: v for name, v in self._values.items() if name in self._names.places}
+        self._x[list(direct)], self._fixed[list(direct)] = list(direct.values()), True
+
+    def states(self) -> Array:
+        """The states at the start."""
+        names, values = self._names, self._values
+        shafts = {name: names.shafts[name] for name in values if name in names.shafts}
+        quantities = [self._linear(name) for name in values if name not in names.places and name not in shafts]
+        pairs = [*zip(quantities, names.readings.rows(quantities), strict=True)]
+        self._meet([pair for pair in pairs if pair[0].is_across], is_across=True)
+        self._fill_shafts()
+        for name, shaft in shafts.items():
+            shaft.wind(self._bound, self._t, self._x, values[name], kept=self._fixed)
+        for shaft in shafts.values():
+            self._fixed[list(shaft.states)] = True
+        self._meet([pair for pair in pairs if not pair[0].is_across], is_across=False)
+        for name, shaft in shafts.items():
+            along = shaft.along(self._bound, self._t, self._x)
+            size = max(abs(values[name]), np.abs(self._x[list(shaft.states)]).max())
+            self._refuse_other(name, float(along[np.abs(along - values[name]).argmax()]), size)
+        return self._x
+
+    def _linear(self, name: str) -> Quantity:
+        quantity = self._names.quantity(name)
+        if quantity is None:
+            raise self._refused(name, "is no sum of speeds or of torques")
+        return quantity
+
+    def _meet(self, demands: Sequence[tuple[Quantity, Row]], *, is_across: bool) -> None:
+        """Change the speeds, or the torques, so that quantities have their values and everything else is at rest."""
+        of_kind, x = self._of_kind[is_across], self._x
+        free = of_kind & ~self._fixed
+        constants = np.array([self._constant(*demand) for demand in demands])
+        rows = np.array([row.by_state for _, row in demands]).reshape(-1, x.size)
+        values = np.array([self._values[quantity.name] for quantity, _ in demands])
+        slopes = np.abs(np.where(of_kind, rows, 0.0))
+        movable = free & (slopes > INDEPENDENT * slopes.max(axis=1, keepdims=True, initial=0.0)).any(axis=0)
+        x[movable] += self._changes(rows[:, movable], values - constants - rows @ x, movable, is_across=is_across)
+        self._fixed |= movable
+        size = np.abs(np.append(rows * np.where(of_kind, x, 0.0), values)).max(initial=0.0)
+        reached = rows @ x + constants
+        for k, (quantity, row) in enumerate(demands):
+            self._refuse_other(quantity.name, self._read(quantity) if row.moved else float(reached[k]), size)
+
+    def _constant(self, quantity: Quantity, row: Row) -> float:
+        """What the states do not add to a quantity.
+
+        Raises:
+            ParameterError: the quantity is none to start from.
+        """
+        name, form = quantity.name, self._bound.program.form
+        if row.moved and name in self._names.tied:  # beside a law, such as a spring in series
+            return self._read(quantity) - float(row.by_state @ self._x)
+        if not quantity.is_across and self._names.along(name) is not None:
+            raise self._refused(name, "is that of one end of a shaft of several elements")
+        if row.moved:
+            raise self._refused(name, "follows from laws or accelerations")
+        sizes = np.abs(row.by_state) / energy_weights(self._bound)
+        sizes = np.where(sizes > INDEPENDENT * sizes.max(initial=0.0), sizes, 0.0)
+        if quantity.is_across and sizes[len(form.across_states) :].any():
+            raise self._refused(name, "follows from torques, too")
+        if not quantity.is_across and sizes.any() and not sizes[self._of_kind[False]].any():
+            raise self._refused(name, "follows from speeds")
+        return row.prescribed
+
+    def _read(self, quantity: Quantity) -> float:
+        return float(quantity.read(History(self._bound, np.array([self._t]), self._x[None, :]))[0])
+
+    def _changes(self, rows: Array, gaps: Array, movable: Any, *, is_across: bool) -> Array:
+        """(k,) changes of the movable states with which rows close their gaps and all that can be at rest is.
+
+        A store that the rows and the fixed states determine follows them. Every other one must be at rest: where that
+        cannot be, several stores would have to share the motion, and the start is refused.
+        """
+        stores = self._stores(movable, is_across=is_across)
+        ways: Array = np.eye(rows.shape[1])
+        changes: Array = np.zeros(rows.shape[1])
+        if rows.size:
+            scaled = rows / np.abs(rows).max(axis=1, keepdims=True).clip(np.finfo(float).tiny)
+            ways = np.asarray(linalg.null_space(scaled, rcond=INDEPENDENT))
+            changes = np.asarray(np.linalg.lstsq(rows, gaps, rcond=None)[0])
+        along = stores.slopes @ ways
+        moves = np.abs(along).max(axis=1, initial=0.0) > INDEPENDENT * np.abs(stores.slopes).max(axis=1, initial=0.0)
+        rests = stores.is_free | moves
+        if ways.size:
+            moved = stores.slopes[rests] @ changes + stores.offsets[rests]
+            changes = changes - ways @ np.linalg.lstsq(along[rests], moved, rcond=None)[0]
+        size = np.abs(np.append(changes, stores.offsets)).max(initial=0.0)
+        left = rests & (np.abs(stores.slopes @ changes + stores.offsets) > CONSISTENT * size)
+        if left.any():
+            raise self._shared([name for name, moving in zip(stores.names, left, strict=True) if moving])
+        return np.asarray(changes)
+
+    def _stores(self, movable: Any, *, is_across: bool) -> _Stores:
+        """The movable states, and the tied stores of their kind that they or the given states move."""
+        of_kind = self._of_kind[is_across]
+        places, ties = np.flatnonzero(movable), abs(self._names.ties)
+        change = np.where(of_kind & self._fixed, self._x - self._rest, 0.0)
+        touched = (ties @ (movable | (change != 0)).astype(float)) > 0
+        touched &= np.array([name not in self._values for name in self._names.tied], dtype=bool)
+        beside = np.flatnonzero(touched)
+        rows = self._names.ties[beside]
+        tied = [*self._names.tied]
+        names = [state for state, moves in zip(self._names.places, movable, strict=True) if moves]
+        return _Stores(
+            [*names, *(tied[k] for k in beside)],
+            np.vstack([np.eye(places.size), rows[:, places].toarray()]),
+            np.concatenate([np.zeros(places.size), rows @ change]),
+            np.append(
+                np.zeros(places.size, dtype=bool),
+                (abs(rows) @ (of_kind & ~self._fixed & ~movable).astype(float)) > 0,
+            ),
+        )
+
+    def _fill_shafts(self) -> None:
+        """Let the speeds inside a shaft run straight between those of its ends, where nothing else is given."""
+        change = self._names.readings.still(self._x - self._rest)
+        for place, speed in speeds_inside(self._bound.program.form, change).items():
+            if not self._fixed[place]:
+                self._x[place], self._fixed[place] = self._rest[place] + speed, True
+
+    def _refuse_other(self, name: str, reached: float, size: float) -> None:
+        if abs(reached - self._values[name]) > CONSISTENT * size:
+            others = ", ".join(other for other in self._values if other != name) or "its sources"
+            raise ParameterError(
+                f"The start value {name} = {self._values[name]:g} contradicts {others}: with them it would be "
+                f"{reached:g}. {self._names.advice(name)}"
+            )
+
+    def _refused(self, name: str, why: str) -> ParameterError:
+        return ParameterError(f"'{name}' is no start value: it {why}. {self._names.advice(name)}")
+
+    def _shared(self, stores: Sequence[str]) -> ParameterError:
+        return ParameterError(
+            f"The start values ({', '.join(self._values)}) leave open how {', '.join(stores)} share the motion: they "
+            f"cannot all be at rest. {self._names.advice_for(stores)}"
+        )

@@ -1,0 +1,84 @@
+"""Shafts of several elements at the start: the torque along them, and the speeds inside them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from shaftwork.codegen.arrays import BoundArrays
+from shaftwork.codegen.elements import Array
+from shaftwork.codegen.recovery import History
+from shaftwork.components.base import Profile
+from shaftwork.network.graph import GraphPart
+from shaftwork.network.templates import Kind
+from shaftwork.reduction.form import StateForm
+
+
+@dataclass(frozen=True)
+class WoundShaft:
+    """A shaft whose torque can be given as a whole.
+
+    Args:
+        part: the shaft.
+        profile: of its torque.
+        states: numbers of its stores of torque among the states, in their order along the shaft.
+    """
+
+    part: GraphPart
+    profile: Profile
+    states: tuple[int, ...]
+
+    def wind(self, bound: BoundArrays, t: float, x: Array, torque: float, kept: Any) -> None:
+        """Give each store what the damper beside it leaves of a torque, but where (n,) states keep their values."""
+        states = list(self.states)
+        beside = self.along(bound, t, x) - x[states]
+        x[states] = np.where(kept[states], x[states], torque - beside)
+
+    def along(self, bound: BoundArrays, t: float, x: Array) -> Array:
+        """(stores,) the torque at each store with the damper beside it.
+
+        What is read at the very ends counts inertia there, so it is not read; a store there has the damper of the next.
+        """
+        columns = History(bound, np.array([t]), x[None, :]).profile(self.part, self.profile)[0]
+        inside, states = columns[1:-1], list(self.states)
+        if len(inside) == len(states):
+            return np.asarray(inside)
+        return np.asarray(x[states] + np.pad(inside - x[states][1:-1], 1, mode="edge"))
+
+
+def wound_shafts(form: StateForm) -> Mapping[str, WoundShaft]:
+    """By the name of the torque along it, "line.tau", each shaft of several elements whose torques all are states."""
+    return dict(_wound_shafts(form))
+
+
+def _wound_shafts(form: StateForm) -> Iterator[tuple[str, WoundShaft]]:
+    state = {branch: k for k, branch in enumerate(form.through_states, len(form.across_states))}
+    for part in form.graph.parts:
+        stores = [k for k in part.branches if form.graph.branches[k].template.kind is Kind.THROUGH_STORE]
+        for name, profile in part.component.profiles().items():
+            if profile.kind == "through" and len(profile.of) > 2 and stores and all(k in state for k in stores):
+                yield f"{part.name}.{name}", WoundShaft(part, profile, tuple(state[k] for k in stores))
+
+
+def speeds_inside(form: StateForm, change: History) -> dict[int, float]:
+    """For each state that is a speed inside a shaft, what lies on the straight line between those of the shaft's ends.
+
+    Args:
+        form: the state form.
+        change: branch quantities of the states less those at rest, one column.
+    """
+    owner = {form.graph.branches[branch].plus: k for k, branch in enumerate(form.across_states)}
+    found: dict[int, float] = {}
+    for part in form.graph.parts:
+        for profile in part.component.profiles().values():
+            if profile.kind != "across" or profile.lines or len(profile.of) <= 2:
+                continue
+            nodes = [part.nodes[name] for ((_, name),) in profile.of]
+            first, last = (float(change.potentials[node, 0]) for node in (nodes[0], nodes[-1]))
+            for node, share in zip(nodes[1:-1], profile.places[1:-1], strict=True):
+                if node in owner:
+                    found[owner[node]] = first + share * (last - first)
+    return found
