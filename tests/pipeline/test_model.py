@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -193,6 +194,61 @@ def test_a_start_value_of_a_geared_inertia_moves_its_group() -> None:
         net.simulate(0.1, initial={"J1.omega": 1.0, "J2.omega": 5.0})
     with pytest.raises(sw.SignalError, match=r"J1\.omega"):
         net.simulate(0.1, initial={"J1.speed": 1.0})
+
+
+def test_the_torque_of_a_damped_spring_starts_with_everything_else_at_rest() -> None:
+    sol = crane().simulate(0.1, initial={"shaft.tau": 10.0}, t_eval=3)
+    assert {name: sol[name][0] for name in sol.states} == {"J1.omega": 0.0, "J2.omega": 0.0, "shaft.tau_c": 10.0}
+    moving = crane().simulate(0.1, initial={"shaft.tau": 10.0, "J2.omega": 2.0}, t_eval=3)
+    assert moving["shaft.tau"][0] == pytest.approx(10.0, rel=1e-15)
+    assert moving["shaft.tau_c"][0] == pytest.approx(10.0 + 14.0 * 2.0, rel=1e-15)
+    assert moving["J1.omega"][0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "instead"),
+    [
+        ("shaft.omega_rel", "'J1.omega': ..., 'J2.omega': ..."),
+        ("motor.tau", "'J1.omega': ..."),
+        ("J2.tau", "'J2.omega': ..."),
+        ("shaft.energy", "'shaft.tau_c': ..."),
+        ("J1.power", "'J1.omega': ..."),
+    ],
+)
+def test_what_no_store_alone_has_is_refused_with_the_start_values_that_set_it(name: str, instead: str) -> None:
+    with pytest.raises(sw.ParameterError, match=re.escape(f"Give initial={{{instead}}}.")):
+        crane().simulate(0.1, initial={name: 1.0})
+
+
+def test_a_planetary_gear_starts_with_the_speeds_of_two_of_its_wheels() -> None:
+    """One speed leaves open how the other two share it, and so it is refused; any two of them give the third."""
+    net = sw.Network("planetary")
+    for node in ("sun", "carrier", "ring"):
+        net.add(sw.Inertia(f"{node} wheel", J=1.0), node)
+    net.add(sw.PlanetaryGear("gear", ratio=2.0), "sun", "carrier", "ring")
+    model = net.compile()
+    for name in ("sun wheel.omega", "carrier wheel.omega", "ring wheel.omega"):
+        with pytest.raises(sw.ParameterError, match="share the motion"):
+            model.simulate(0.1, initial={name: 1.0})
+    speeds = {"sun wheel.omega": 9.0, "carrier wheel.omega": 3.0, "ring wheel.omega": 0.0}  # 9 + 2 * 0 = (1 + 2) * 3
+    for name in speeds:
+        two = {other: value for other, value in speeds.items() if other != name}
+        sol = model.simulate(0.1, initial=two, t_eval=2)
+        assert {other: sol[other][0] for other in speeds} == pytest.approx(speeds, abs=1e-14)
+
+
+def test_a_start_value_of_a_prescribed_speed_is_refused_with_what_the_source_makes_it() -> None:
+    net = sw.Network("driven")
+    net.add(sw.SpeedSource("drive", omega=3.0), "a")
+    net.add(sw.Gear("gear", ratio=2.0), "a", "b")
+    net.add(sw.Inertia("J", J=1.0), "b")
+    net.add(sw.Spring("shaft", c=10.0), "b", "c")
+    net.add(sw.Inertia("end", J=1.0), "c")
+    model = net.compile()
+    assert model.simulate(0.1, initial={"J.omega": 1.5, "a.omega": 3.0}, t_eval=2)["J.omega"][0] == 1.5
+    for name in ("J.omega", "a.omega"):
+        with pytest.raises(sw.ParameterError, match=r"contradicts its sources: with them it would be (1\.5|3)\b"):
+            model.simulate(0.1, initial={name: 2.0})
 
 
 def test_steady_operation_is_where_the_start_runs_to() -> None:

@@ -159,6 +159,31 @@ def test_a_motion_goes_on_from_the_end_of_another_as_if_there_had_been_no_end() 
         assert rest.phases[-1].modes == whole.phases[-1].modes
 
 
+@pytest.mark.parametrize("end", [0.03, 2.0, 6.8, 8.5])
+def test_the_crane_goes_on_from_the_middle_of_its_motion(end: float) -> None:
+    """In the open gap, at full speed, while the brake slips, and held by it; to the digits of the two motions."""
+    crane_with_gap = sw.scenes.crane(gap=0.02).compile()
+    whole, first = (crane_with_gap.simulate(t, rtol=1e-10) for t in (10.0, end))
+    rest = crane_with_gap.simulate(
+        10.0, t_start=end, initial={name: first[name][-1] for name in first.states}, rtol=1e-10
+    )
+    times = np.linspace(end, 10.0, 201)[1:]
+    for name in ("J1.omega", "J2.omega", "shaft.tau", "shaft.phi"):
+        assert np.abs(rest.at(times)[name] - whole.at(times)[name]).max() < 1e-8 * np.abs(whole[name]).max(), name
+    assert [row.name for row in rest.phases[1:]] == [row.name for row in whole.phases if row.start > end]
+
+
+def test_a_motion_that_goes_on_without_all_that_is_stored_is_refused_with_what_is_missing() -> None:
+    """The states of one phase lack the twist of the gap: with it in the middle all else would be 6 % off."""
+    crane_with_gap = sw.scenes.crane(gap=0.02).compile()
+    first = crane_with_gap.simulate(2.0)
+    some = {name: float(first[name][-1]) for name in ("J1.omega", "J2.omega")}
+    with pytest.raises(sw.ParameterError, match=r"t_start = 2 s needs .*lacks shaft\.phi\..*sol\.states"):
+        crane_with_gap.simulate(10.0, t_start=2.0, initial=some)
+    assert crane_with_gap.simulate(3.0, t_start=2.0, initial=some | {"shaft.phi": 0.0})["shaft.phi"][0] == 0.0
+    assert crane_with_gap.simulate(3.0, t_start=2.0)["J1.omega"][0] == 0.0  # from rest
+
+
 def test_an_instant_between_two_phases_is_read_in_the_later_one() -> None:
     sol = wheel(sw.Brake("brake", tau=4.0)).simulate(3.0, initial={"J.omega": 4.0})
     ((stop, *_),) = sol.events

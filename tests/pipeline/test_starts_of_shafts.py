@@ -25,6 +25,7 @@ MESHES = (
 )
 TORQUES = st.floats(-1e3, 1e3).filter(lambda torque: abs(torque) > 1e-3)
 
+
 def pair(model: sw.ShaftModel, **shaft: float) -> sw.Network:
     """Two discs and a shaft between them."""
     net = sw.Network("pair")
@@ -55,9 +56,7 @@ def start(net: sw.Network, initial: dict[str, float]) -> sw.Solution:
 @pytest.mark.slow
 @share_of_examples(0.05)
 @given(st.sampled_from(MESHES), TORQUES, st.sampled_from([0.0, 4.0]), st.sampled_from([-5.0, 0.0, 0.3]))
-def test_a_torque_stands_all_along_the_shaft(
-    model: sw.ShaftModel, torque: float, damping: float, speed: float
-) -> None:
+def test_a_torque_stands_all_along_the_shaft(model: sw.ShaftModel, torque: float, damping: float, speed: float) -> None:
     """Inside, with the dampers' part; at the ends less the share of the mesh's inertia; to rounding."""
     sol = start(pair(model, damping=damping), {"line.tau": torque, "J1.omega": speed, "J2.omega": 0.0})
     size = abs(torque) + damping * abs(speed) / GEOMETRY["length"]

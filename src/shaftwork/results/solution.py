@@ -136,7 +136,7 @@ class Solution:
         Raises:
             SignalError: there is no such quantity; the message lists what the part has.
         """
-        if name in self.states and name in self:
+        if isinstance(name, str) and name in self.states:
             return self.x[:, self.states.index(name)].copy()
         if isinstance(name, str) and name in self.observer.profiles:
             return self.observer.profile(name, self.t, self.x, self.dense)

@@ -26,6 +26,7 @@ from shaftwork.pipeline.phases.passing import Passing, Phase
 from shaftwork.pipeline.phases.phases import FOLLOWING, Phases
 from shaftwork.pipeline.phases.rejoining import settled
 from shaftwork.pipeline.phases.settling import Settling
+from shaftwork.pipeline.phases.starts import refuse_incomplete
 
 # So many changes of mode, each within this part of the run of the one before, are chatter. Rebounds come ever faster,
 # too, before they end: a thousand of them where nearly all speed is given back.
@@ -106,6 +107,8 @@ class Run:
         if initial is not None or not begins:
             assembly = self.phases.assembly(self.phases.first)
             p = self.settling.regime(self.phases.first).p
+            if isinstance(initial, Mapping) and initial and start != 0:
+                refuse_incomplete(assembly.stores.names, initial, start)
             x, _ = assembly.model.start(assembly.prepared(p), initial, self.demand.span)
             after = self.timeline(assembly, p).sides(start)[1]
             found = self.settling.settle(start, after, self.settling.started(after, x), None)

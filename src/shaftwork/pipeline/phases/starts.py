@@ -1,9 +1,9 @@
-"""In which of its modes a part may start, by the conditions that the modes state."""
+"""How a motion through phases starts: what a restart must name, and the modes that the conditions of a part allow."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 
 from sympy import Integer, Piecewise, Symbol
@@ -13,6 +13,7 @@ from shaftwork.codegen.code import branchwise, scalar
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Modes
+from shaftwork.core.errors import ParameterError
 
 
 @lru_cache(maxsize=256)
@@ -41,3 +42,25 @@ def starts_of(modes: Modes, symbols: tuple[Symbol, ...]) -> Callable[..., list[f
             return None if any(map(math.isnan, differences(*values))) else slow(*values)
 
     return starts
+
+
+def refuse_incomplete(stored: tuple[str, ...], initial: Mapping[str, float], t_start: float) -> None:
+    """Refuse start values of a motion that goes on, t_start != 0, where they leave out what is stored.
+
+    The states of one phase are not enough: that gap or that stop would open, whose twist is a state of other phases.
+
+    Args:
+        stored: the names of all that is stored in any phase.
+        initial: the start values.
+        t_start: start of the motion, s.
+
+    Raises:
+        ParameterError: names what is missing.
+    """
+    missing = [name for name in stored if name not in initial]
+    if missing:
+        raise ParameterError(
+            f"A motion that goes on at t_start = {t_start:g} s needs all that is stored, in whatever phase it is a "
+            f"state, and initial lacks {', '.join(missing)}. Take it from the motion before, "
+            "initial={name: sol[name][-1] for name in sol.states}, or give 0.0 for what is at rest."
+        )
