@@ -15,6 +15,7 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.netlist import Netlist
+from shaftwork.reduction.form import StateForm
 
 OUTPUTS, MOST_OUTPUTS = 1001, 10_000_000
 """Output times when the user gives none, and the most that can be asked for."""
@@ -96,6 +97,20 @@ def absolute_tolerances(atol: Any, size: int) -> Array:
     if not (np.isfinite(values).all() and (values > 0).all()):
         raise ParameterError(f"atol = {atol!r} must be above 0; leave it out for a value that suits the states.")
     return values
+
+
+def refuse_unrecorded(form: StateForm, angles: tuple[str, ...]) -> None:
+    """Refuse angles that a compiled model does not record.
+
+    Raises:
+        ParameterError: says where to ask for them.
+    """
+    recorded = {state.name.rpartition(".")[0] for state in form.states if state.kind == "integral"}
+    if missing := [name for name in angles if name not in recorded]:
+        raise ParameterError(
+            f"angles = {list(angles)!r}: this model does not record the angle of {missing[0]!r}. Say so where it "
+            f"is compiled: net.compile(angles={list(angles)!r}), or net.simulate(t_end, angles={list(angles)!r})."
+        )
 
 
 def output_times(t_eval: OutputTimes, start: float, end: float) -> Array | None:

@@ -28,6 +28,7 @@ from shaftwork.pipeline.arguments import (
     branches_anew,
     checked_parameters,
     output_times,
+    refuse_unrecorded,
     relative_tolerance,
     time_span,
     watched_by,
@@ -117,7 +118,7 @@ class Model(CompiledModel):
             SimulationError: the integration failed; says when, in which state and why.
             MissingExtraError: the engine asked for is not installed.
         """
-        self._refuse_unrecorded((angles,) if isinstance(angles, str) else tuple(angles))
+        refuse_unrecorded(self.form, (angles,) if isinstance(angles, str) else tuple(angles))
         values = self._checked_all(parameters)
         if self._changes_structure(values):
             options: dict[str, Any] = {"t_start": t_start, "rtol": rtol, "atol": atol, "t_eval": t_eval}
@@ -375,14 +376,6 @@ class Model(CompiledModel):
         if any(name in decisive or value == 0 for name, value in values.items()) or branches_anew(graph, values):
             return True
         return self.arrays.assembly.degenerates(self.vector(values))
-
-    def _refuse_unrecorded(self, angles: tuple[str, ...]) -> None:
-        recorded = {state.name.rpartition(".")[0] for state in self.form.states if state.kind == "integral"}
-        if missing := [name for name in angles if name not in recorded]:
-            raise ParameterError(
-                f"angles = {list(angles)!r}: this model does not record the angle of {missing[0]!r}. Say so where it "
-                f"is compiled: net.compile(angles={list(angles)!r}), or net.simulate(t_end, angles={list(angles)!r})."
-            )
 
     def _checked_all(self, parameters: Mapping[str, float] | None) -> dict[str, float]:
         if parameters is None:
