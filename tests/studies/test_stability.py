@@ -233,9 +233,17 @@ def test_the_table_is_written_and_drawn(study: sw.studies.Stability, tmp_path: P
 @pytest.mark.parametrize("engines", [["auto"], ["auto", "exact", "scipy"]], ids=len)
 def test_every_cell_has_a_place_of_its_own_in_the_picture_and_no_label_covers_another(engines: list[str]) -> None:
     pytest.importorskip("matplotlib")
-    printed = "CentralDifference(10, closure='printed')"
-    models = ["CentralDifference(10)", printed, "CentralDifference(12, order=4)", "Lumped(10)", "Lumped(20)", "Wave()"]
-    study = stability(["clamped end", "m = 2"], models=models, engines=engines)
+    printed = "CentralDifference(m=10, closure='printed')"
+    other = "CentralDifference(m=12, order=4)"
+    models = ["CentralDifference(m=10)", printed, other, "Lumped(m=10)", "Lumped(m=20)", "Wave(places=5)"]
+    study = sw.studies.Stability(
+        tuple(
+            sw.studies.Cell(case, model, engine, engine, "coarse", error=1e-2)
+            for case in ("clamped end", "m = 2")
+            for model in models
+            for engine in engines
+        )
+    )
     figure = study.plot()
     figure.canvas.draw()
     cells = figure.axes[0]
