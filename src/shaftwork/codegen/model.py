@@ -13,7 +13,7 @@ from shaftwork.codegen.arrays import ArrayProgram, BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.scalar import ScalarProgram
 from shaftwork.components.pieces import pieces_degree
-from shaftwork.core.errors import ParameterError
+from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.blocks import BlockTooLargeError
 from shaftwork.reduction.form import StateForm
@@ -52,16 +52,20 @@ class CompiledModel:
 
     def __init__(self, form: StateForm) -> None:
         self.form = form
-        self.states: tuple[str, ...] = tuple(state.name for state in form.states)
         self.parameters: dict[str, float] = dict(form.graph.parameters)
         self.arrays = ArrayProgram(form)
         self.defaults = np.array(list(self.parameters.values()), dtype=float)
         self._bound: tuple[bytes, BoundArrays] | None = None
 
     @cached_property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states, in the order of `rhs`."""
+        return tuple(state.name for state in self.form.states)
+
+    @cached_property
     def rows(self) -> Rows | None:
         """The state equations as expressions, or None where the network is too large or too closely coupled."""
-        if self.form.waves or len(self.states) > SCALAR_STATES or len(self.form.graph.branches) > SCALAR_BRANCHES:
+        if self.form.waves or len(self.form.states) > SCALAR_STATES or len(self.form.graph.branches) > SCALAR_BRANCHES:
             return None
         try:
             return explicit_rows(self.form)
@@ -122,6 +126,20 @@ class CompiledModel:
     def jacobian(self, t: float, x: Array, p: Array | None = None) -> Any:
         """d rhs / d x as scipy.sparse.csc_array (n, n); arguments as for `rhs`."""
         return self.bind(p).jacobian(t, np.asarray(x, dtype=float))
+
+    @property
+    def code(self) -> str:
+        """The right-hand side as Python source: a function of t, the list x of states and the list p of parameters.
+
+        Raises:
+            CompileError: the network is so large that `rhs` multiplies sparse matrices, and there is no such source.
+        """
+        if self.scalar is None:
+            raise CompileError(
+                f"'{self.form.graph.name}' is too large for a right-hand side line by line: its rhs multiplies sparse "
+                "matrices. Call rhs(t, x, p), or take the matrices from linearize()."
+            )
+        return self.scalar.source
 
     @cached_property
     def linear(self) -> bool:

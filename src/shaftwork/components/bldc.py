@@ -48,8 +48,9 @@ class BLDCMotor(Component):
     -U/2 for 210 < theta < 330, whatever the current's sign; between them the current goes on through a diode to the
     other side until it is zero, and the phase is open until a diode conducts again. After `dead_time` a switch follows
     the one before it, at the speed of that instant. The inductance of a phase has its share of the mutual ones in it,
-    L = L_mu + L_sigma. Rotor inertia is a part of its own. Modes of each leg: high, low, freewheeling, open.
-    Source: Popenda 2019, figs 4-13. Analogue: three transformers whose ratios turn with the rotor.
+    L = L_mu + L_sigma. Rotor inertia is a part of its own. Modes of each leg: high, low, freewheeling high,
+    freewheeling low, open. Source: Popenda 2019, figs 4-13. Analogue: three transformers whose ratios turn
+    with the rotor.
     """
 
     U: float = parameter("V", "direct voltage of the inverter", above=0)
@@ -122,8 +123,8 @@ def _leg(p: Any, phase: str) -> Modes:
         (
             Mode("high", (Leave(EDGE - sin(angle), ANEW),), 1.0, starts=above > 0),
             Mode("low", (Leave(EDGE + sin(angle), ANEW),), -1.0, starts=below > 0),
-            Mode(opens[0], (Leave(current, OPEN), *closes), 1.0, starts=current < 0, says="freewheeling"),
-            Mode(opens[1], (Leave(-current, OPEN), *closes), -1.0, starts=current > 0, says="freewheeling"),
+            Mode(opens[0], (Leave(current, OPEN), *closes), 1.0, starts=current < 0, says="freewheeling high"),
+            Mode(opens[1], (Leave(-current, OPEN), *closes), -1.0, starts=current > 0, says="freewheeling low"),
             Mode(OPEN, (Leave(voltage - p.U / 2, opens[0]), Leave(-voltage - p.U / 2, opens[1]), *closes), form=OPEN),
         ),
         label=phase,

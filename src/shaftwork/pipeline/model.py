@@ -42,6 +42,7 @@ from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
     from shaftwork.codegen.arrays import BoundArrays
+    from shaftwork.equations.records import NamedPhase
     from shaftwork.pipeline.analysis import Given, Names, Point, Time
     from shaftwork.pipeline.waves import WaveStart
     from shaftwork.results.linear import LinearModel
@@ -225,6 +226,22 @@ class Model(CompiledModel):
     def settled(self, p: Array) -> float:
         """A time in s after which no law switches any more, for a parameter vector."""
         return max((0.0, *self.switching.known(p))) + 1.0
+
+    def phase(self, name: str | NamedPhase) -> CompiledModel:
+        """The equations of one phase of a network whose parts change their mode: `rhs`, `jacobian`, `code`, `states`.
+
+        Args:
+            name: "gap open, load stuck", or a row of `Solution.phases`; parts that it does not name are in their first
+                mode.
+
+        Raises:
+            ParameterError: there is no such phase.
+            NetworkError: its equations contradict each other.
+        """
+        raise ParameterError(
+            f"phase = {getattr(name, 'name', name)!r}: the equations of '{self.name}' are the same at all times. Take "
+            "those of the model itself, such as model.rhs."
+        )
 
     def choose_engine(self, t_end: float, *, t_start: float = 0.0, rtol: float = 1e-8) -> tuple[str, str]:
         """The engine that "auto" takes for a motion, and why."""

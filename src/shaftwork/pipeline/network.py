@@ -23,7 +23,7 @@ from shaftwork.network.wording import listed
 from shaftwork.pipeline.beside_waves import warn_of_rounding, waving, with_one_law
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.model import PhasedModel
-from shaftwork.pipeline.phases.names import in_phase, whole_name
+from shaftwork.pipeline.phases.names import in_phase, whole_name, words_of
 from shaftwork.reduction.diagnosis import diagnose
 from shaftwork.reduction.form import StateForm, state_form
 from shaftwork.results.solution import Solution

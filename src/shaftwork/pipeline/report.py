@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from shaftwork.codegen.model import CompiledModel
 from shaftwork.core.errors import SimulationError
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.network import Network
+from shaftwork.pipeline.phases.model import PhasedModel
 from shaftwork.pipeline.phases.names import whole_name
 
 LARGEST_DENSE = 1500
@@ -39,25 +41,26 @@ def _lines(net: Network, model: Model, t_end: float) -> Iterator[str]:
         yield f"  {problem.severity}: {problem}"
     if graph.zeros:
         yield f"left out, being zero: {_some(graph.zeros)}"
-    yield f"states ({len(model.states)}): {_some(model.states)}"
+    equations, when = (model.phase(whole_name(graph)), " in motion") if isinstance(model, PhasedModel) else (model, "")
+    yield f"states{when} ({len(equations.states)}): {_some(equations.states)}"
     dependent = [graph.part_of(k).name for k in (*model.form.dependent_across, *model.form.dependent_through)]
     if dependent:
         yield f"eliminated stores ({len(dependent)}): {_some(dependent)}"
-    cost = model.cost()
-    yield f"right-hand side: {cost.form} code, {cost.total} operations; {cost.entries} entries in the linear part"
-    if 0 < len(model.states) <= LARGEST_DENSE:
-        for point in _points(model):
+    cost = equations.cost()
+    yield f"right-hand side{when}: {cost.form} code, {cost.total} operations; {cost.entries} entries in the linear part"
+    if 0 < len(equations.states) <= LARGEST_DENSE:
+        for point in _points(model, equations):
             yield from _time_constants(*point)
-    if model.states:
+    if equations.states:
         name, why = model.choose_engine(t_end)
         yield f"engine for {t_end:g} s: {name}, {why}"
 
 
-def _points(model: Model) -> Iterator[tuple[str, Sequence[str], NDArray[np.float64]]]:
+def _points(model: Model, equations: CompiledModel) -> Iterator[tuple[str, Sequence[str], NDArray[np.float64]]]:
     """Words, states and slopes at rest; where parts change their mode also of the phase in which nothing holds."""
-    graph, states = model.form.graph, model.states
-    slopes = np.asarray(model.jacobian(0.0, np.zeros(len(states))).toarray())
-    if model.form.waves or not any(part.modes for part in graph.parts):
+    graph, states = model.form.graph, equations.states
+    slopes = np.asarray(equations.jacobian(0.0, np.zeros(len(states))).toarray())
+    if not isinstance(model, PhasedModel):
         yield "at rest", states, slopes
         return
     with suppress(SimulationError):  # a law has no finite slope there, as those below say of the phase in motion

@@ -41,7 +41,7 @@ def own_curve(motor: Component | None, steps: Array) -> Curve | None:
             model = net.compile()
     except ShaftworkError:
         return None
-    if model.states != ("inertia.omega",):
+    if model.states != ("inertia.omega",) or any(part.modes for part in model.form.graph.parts):
         return None
     prepared = model.prepare(model.defaults)
     observer = ModelObserver(

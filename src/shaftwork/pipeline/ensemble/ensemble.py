@@ -83,7 +83,7 @@ class Ensemble:
 
     def _refuse(self) -> None:
         form, model = self.model.form, self.model
-        if model.rows is None or form.waves or form.loop_laws or not model.states:
+        if model.rows is None or form.waves or form.loop_laws or not form.states:
             raise CompileError("The network is too large, holds waves, or has a nonlinear law at a massless node.")
         times = model.switching.timeline(model.defaults, *self.span, modes=False).times
         if form.has_impulses or form.across_sources or times:

@@ -5,21 +5,27 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 
+from shaftwork.codegen.elements import Array
 from shaftwork.codegen.linear import Linearization
+from shaftwork.codegen.model import CompiledModel, Cost
 from shaftwork.codegen.operating import steady_state
 from shaftwork.codegen.start_values import initial_state
-from shaftwork.core.errors import SimulationError
+from shaftwork.core.errors import CompileError, SimulationError
+from shaftwork.equations.records import NamedPhase
 from shaftwork.pipeline.analysis import Given, Names, Point, Time, input_names, operating_point
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.moments import Moment
+from shaftwork.pipeline.phases.names import known_modes, modes_in, whole_name, words_of
 from shaftwork.pipeline.phases.phases import Phases
 from shaftwork.pipeline.phases.run import Run
 from shaftwork.pipeline.phases.settling import Settling
 from shaftwork.pipeline.phases.solution import solution
+from shaftwork.reduction.form import StateForm
 from shaftwork.results.linear import LinearModel, linear_model
 from shaftwork.results.solution import Solution
 
@@ -27,11 +33,90 @@ MOST_CHANGES = 100
 """Changes of mode on the way to a steady operation."""
 
 
+class PhaseModel(CompiledModel):
+    """The equations of a network in one phase, as a function of time, states and parameters.
+
+    They hold while every part stays in its mode, which whoever integrates them has to watch.
+
+    Args:
+        form: the state form in this phase.
+        name: the mode of every part, "gap open, load stuck".
+        numbers: of the modes, "part.mode", which stand among the parameters where laws of equal form differ.
+    """
+
+    def __init__(self, form: StateForm, name: str, numbers: Mapping[str, float]) -> None:
+        super().__init__(form)
+        self.name = name
+        self.parameters |= {key: value for key, value in numbers.items() if key in self.parameters}
+        self.defaults = np.array(list(self.parameters.values()), dtype=float)
+
+    def __repr__(self) -> str:
+        return f"<PhaseModel of '{self.form.graph.name}', {self.name}: {', '.join(self.states) or 'no states'}>"
+
+
 class PhasedModel(Model):
     """A network with parts that change their mode, ready to be simulated again and again.
 
-    Its states, right-hand side and equations are those in the first mode of every part, in which everything moves.
+    Each phase has equations of its own, see `phase`.
     """
+
+    @cached_property
+    def states(self) -> tuple[str, ...]:
+        """All that is stored in any phase, as in a solution; which of it are states depends on the phase."""
+        return self.phases.assembly(self.phases.first).stores.names
+
+    @cached_property
+    def _phase_models(self) -> dict[str, PhaseModel]:
+        return {}
+
+    def phase(self, name: str | NamedPhase) -> PhaseModel:
+        """The equations of one phase; see `Model.phase`."""
+        graph, words = self.form.graph, words_of(name)
+        whole, modes = whole_name(graph, words), tuple(mode.name for mode in modes_in(graph, words))
+        if whole not in self._phase_models:
+            form, numbers = self.phases.assembly(modes).model.form, self.phases.numbers(modes)
+            self._phase_models[whole] = PhaseModel(form, whole, numbers)
+        return self._phase_models[whole]
+
+    def rhs(self, t: float, x: Array, p: Array | None = None) -> Array:  # noqa: ARG002
+        """There is one for each phase.
+
+        Raises:
+            CompileError: always; says how to choose the phase.
+        """
+        raise self._of_a_phase("rhs")
+
+    def jacobian(self, t: float, x: Array, p: Array | None = None) -> Any:  # noqa: ARG002
+        """There is one for each phase.
+
+        Raises:
+            CompileError: always; says how to choose the phase.
+        """
+        raise self._of_a_phase("jacobian")
+
+    def cost(self) -> Cost:
+        """There is one for each phase.
+
+        Raises:
+            CompileError: always; says how to choose the phase.
+        """
+        raise self._of_a_phase("cost()")
+
+    @property
+    def code(self) -> str:
+        """There is one for each phase.
+
+        Raises:
+            CompileError: always; says how to choose the phase.
+        """
+        raise self._of_a_phase("code")
+
+    def _of_a_phase(self, what: str) -> CompileError:
+        graph = self.form.graph
+        return CompileError(
+            f"model.{what} of '{self.name}': parts change their mode, and each phase has equations of its own. Name "
+            f"one, model.phase('{whole_name(graph)}').{what}, or a row of sol.phases. {known_modes(graph)}"
+        )
 
     @cached_property
     def phases(self) -> Phases:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 from shaftwork.components.modes import Choice, Mode, Modes
 from shaftwork.core.errors import ParameterError
@@ -10,6 +11,12 @@ from shaftwork.network.graph import CircuitGraph, GraphPart, build_graph
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.phases.resting import at_rest
 from shaftwork.reduction.form import state_form
+
+
+def words_of(phase: Any) -> str:
+    """The name of a phase that is given by it, or as a row of `Solution.phases`; whatever else is refused later."""
+    words: str = getattr(phase, "name", phase)
+    return words
 
 
 def in_phase(netlist: Netlist, graph: CircuitGraph, phase: str) -> Netlist:
@@ -39,9 +46,18 @@ def whole_name(graph: CircuitGraph, phase: str = "") -> str:
     Raises:
         ParameterError: no part or mode has this name.
     """
+    names = (name for name, _, _ in _elements(graph))
+    return ", ".join(f"{name} {mode.words}" for name, mode in zip(names, modes_in(graph, phase), strict=True))
+
+
+def modes_in(graph: CircuitGraph, phase: str) -> tuple[Mode, ...]:
+    """The mode of every element in a phase; the first one of those that are not named.
+
+    Raises:
+        ParameterError: no part or mode has this name.
+    """
     found = _modes_in(graph, phase)
-    modes_of = ((name, found.get((part.name, modes.label), modes.options[0])) for name, part, modes in _elements(graph))
-    return ", ".join(f"{name} {mode.words}" for name, mode in modes_of)
+    return tuple(found.get((part.name, modes.label), modes.options[0]) for _, part, modes in _elements(graph))
 
 
 def _choice(mode: Mode) -> Choice:
@@ -51,7 +67,7 @@ def _choice(mode: Mode) -> Choice:
 def _modes_in(graph: CircuitGraph, phase: str) -> dict[tuple[str, str], Mode]:
     """The modes that a phase names, by part and label of the element."""
     if not isinstance(phase, str):
-        raise ParameterError(f"phase = {phase!r} must be a text such as 'gap open'. {_known(graph)}")
+        raise ParameterError(f"phase = {phase!r} must be a text such as 'gap open'. {known_modes(graph)}")
     found: dict[tuple[str, str], Mode] = {}
     for words in filter(None, (part.strip() for part in phase.split(","))):
         part, modes, mode = _named(graph, words)
@@ -70,10 +86,11 @@ def _named(graph: CircuitGraph, words: str) -> tuple[GraphPart, Modes, Mode]:
         for mode in modes.options:
             if words in (f"{name} {mode.words}", f"{name} {mode.name}"):
                 return part, modes, mode
-    raise ParameterError(f"There is no phase '{words}'. {_known(graph)}")
+    raise ParameterError(f"There is no phase '{words}'. {known_modes(graph)}")
 
 
-def _known(graph: CircuitGraph) -> str:
+def known_modes(graph: CircuitGraph) -> str:
+    """The parts that change their mode with their modes, as the end of a message."""
     known = [f"{name} {_either(modes.options)}" for name, _, modes in _elements(graph)]
     return f"There are: {'; '.join(known)}." if known else "No part of this network changes its mode."
 

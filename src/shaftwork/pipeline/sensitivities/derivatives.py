@@ -123,7 +123,8 @@ def motion_sensitivities(
         SimulationError: there is no derivative; says what comes together or is only touched, and when.
     """
     span, tolerance = time_span(0.0, t_end), relative_tolerance(rtol)
-    if unknown := [name for name in initial or {} if name not in model.states]:
+    states = {state.name for state in model.form.states}
+    if unknown := [name for name in initial or {} if name not in states]:
         raise ParameterError(f"'{unknown[0]}' is no state, so it starts at another state for other parameters.")
     rows_of(model)
     smooth_parameters(model, parameters, (model,), span)  # what is wrong with them is said before the motion is made
