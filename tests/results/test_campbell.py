@@ -103,3 +103,66 @@ def test_the_picture_has_a_line_for_each_mode_and_order_and_a_dot_for_each_cross
     assert len(axis.lines) == 1 + 3 + 1
     assert len(axis.lines[-1].get_xdata()) == len(diagram.crossings)
     np.testing.assert_allclose(axis.lines[-1].get_xdata(), [made.speed * 30 / np.pi for made in diagram.crossings])
+
+
+def _pump(friction: float = 5.0) -> sw.Network:
+    """A motor, a shaft and a pump whose friction holds it at rest."""
+    net = sw.Network("pump drive")
+    net.add(sw.Inertia("J1", J=2.0), "a")
+    net.add(sw.Spring("shaft", c=1e4), "a", "b")
+    net.add(sw.Inertia("J2", J=3.0), "b")
+    net.add(sw.CoulombLoad("pump", tau=friction), "b")
+    return net
+
+
+def test_a_pump_that_sticks_at_rest_has_the_frequencies_of_a_running_one_where_it_runs() -> None:
+    """Clamped at the pump c / J1, running c (1/J1 + 1/J2)."""
+    net = _pump()
+    held, running = np.sqrt(1e4 * np.array([1 / 2, 1 / 2 + 1 / 3])) / (2 * np.pi)
+    diagram = net.campbell([10.0, 100.0], 1, at=lambda n: {"J1.omega": n, "J2.omega": n})
+    np.testing.assert_allclose(diagram.frequencies[:, 0], running, rtol=1e-12)
+    assert diagram.about == (
+        "at points from J1.omega = 10, J2.omega = 10 (pump slipping forward) to "
+        "J1.omega = 100, J2.omega = 100 (pump slipping forward)"
+    )
+    at_rest = net.campbell([10.0, 100.0], 1, at={})
+    np.testing.assert_allclose(at_rest.frequencies[:, 0], held, rtol=1e-12)
+    assert at_rest.about == "at rest (pump stuck)"
+    assert str(at_rest).startswith("pump drive at rest (pump stuck): 1 crossings from 10 to 100 rad/s")
+
+
+@pytest.mark.parametrize("build", [_pump, _stiffening, sw.scenes.crane], ids=["friction", "law", "scene"])
+def test_what_swings_otherwise_where_it_runs_must_be_given_a_point(build: Any) -> None:
+    net = build()
+    with pytest.raises(sw.ParameterError, match=r"needs a point: .* depends on how it runs") as refused:
+        net.campbell([0.0, 100.0])
+    assert "at=lambda n: {" in str(refused.value)
+    assert "at=model.steady_state()" in str(refused.value)
+
+
+def test_the_picture_says_about_what_it_is_linearised() -> None:
+    pytest.importorskip("matplotlib")
+    (axis,) = _pump().campbell([0.0, 100.0], 1, at={}).plot().axes
+    assert axis.get_title() == "linearised at rest (pump stuck)"
+    (axis,) = _two_masses().campbell([0.0, 100.0], 1).plot().axes
+    assert axis.get_title() == ""
+
+
+def test_modes_responses_and_matrices_say_about_what_they_are_linearised() -> None:
+    net = _pump()
+    model, point = net.compile(), {"J1.omega": 8.0, "J2.omega": 8.0}
+    sol = net.simulate(1.0, initial=point)
+    assert net.modes().title == "pump drive at rest (pump stuck)"
+    running = "pump drive at J1.omega = 8, J2.omega = 8 (pump slipping forward)"
+    assert net.modes(point).title == running
+    assert model.linearize(sol.at([0.5])).title == "pump drive at t = 0.5 s of a motion (pump slipping forward)"
+    net.add(sw.TorqueSource("shaker", tau=0.0), "a")
+    assert net.frequency_response("shaker.tau", "shaft.tau", [1.0], point).title == running
+    assert _two_masses().modes().title == "two masses"
+    assert _stiffening().modes({"spring.phi": 4.0}).title == "stiffening at spring.phi = 4"
+    assert _stiffening().modes().title == "stiffening at rest"
+    train = sw.scenes.shaft_chain(m=12)
+    train.add(sw.TorqueSource("fan", tau=-sw.omega * abs(sw.omega)), train.nodes[-1])
+    states = train.compile().states
+    title = train.modes(dict.fromkeys(states, 0.0)).title
+    assert title == f"{train.name} at {states[0]} = 0, {states[1]} = 0, {states[2]} = 0, ..."

@@ -87,6 +87,12 @@ class Switching:
         times = {time for switch in single for time, _ in _on_a_line(switch, switch.levels, p)}
         return tuple(sorted(times))
 
+    def clocks(self, p: Array) -> tuple[tuple[str, float], ...]:
+        """The parts whose mode ends at times in s that are known without a run, each with such a time."""
+        modes = (switch for switch in self._switches if not switch.acts and switch.line is not None)
+        times = ((one.part, time) for one in modes if not one.whole for time, _ in _on_a_line(one, one.levels, p))
+        return tuple(dict.fromkeys(times))
+
     def endless(self, p: Array) -> tuple[str, ...]:
         """The parts whose laws switch at every so many seconds without end, as held noise does."""
         whole = (switch for switch in self._switches if switch.whole and switch.acts and _straight(switch, p)[0])

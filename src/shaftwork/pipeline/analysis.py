@@ -13,6 +13,8 @@ from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.start_values import initial_state
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
+from shaftwork.network.templates import Kind
+from shaftwork.network.wording import listed
 from shaftwork.results import campbell as diagram
 from shaftwork.results.exact import ExactModel
 from shaftwork.results.linear import LinearModel, linear_model
@@ -27,6 +29,8 @@ SmallMotions = Callable[[Point, Time, Names], LinearModel | ExactModel]
 """From a point, a time and names of inputs to the network near that point."""
 BEYOND = 1.2
 """Modes without number are followed up to so many times the end of a diagram."""
+NAMED = 4
+"""Values of a point that a title names."""
 
 
 def linearized(
@@ -52,7 +56,21 @@ def linearized(
     point = None if model.form.waves else at  # a wave is refused below, whatever the names of the point
     time, x = operating_point(model, p, point, t, settled)
     slopes = Linearization(model, p, x, time, named)
-    return linear_model(model.form.graph.name, slopes, None if outputs is None else _listed(outputs), x, time)
+    title = titled(model.form.graph.name, "" if model.linear else about(at))
+    return linear_model(title, slopes, None if outputs is None else _listed(outputs), x, time)
+
+
+def about(at: Point) -> str:
+    """A point in words, for titles: "at rest", "at J1.omega = 8, J2.omega = 8"."""
+    if isinstance(at, Solution):
+        return f"at t = {at.t[0]:g} s of a motion"
+    given = [f"{name} = {value:.4g}" for name, value in (at or {}).items()]
+    return "at " + ", ".join(given if len(given) <= NAMED else [*given[: NAMED - 1], "..."]) if given else "at rest"
+
+
+def titled(name: str, point: str, phase: str = "") -> str:
+    """The title of what is linearised: the network, the point, and the phase in which it is there."""
+    return " ".join((name, *filter(None, (point, f"({phase})" if phase else ""))))
 
 
 def input_names(model: CompiledModel, inputs: Names) -> tuple[str, ...]:
@@ -75,6 +93,7 @@ def operating_point(model: CompiledModel, p: Array, at: Point, t: Time, settled:
 
 
 def campbell(
+    model: CompiledModel,
     near: SmallMotions,
     speeds: Any,
     orders: Any,
@@ -85,6 +104,7 @@ def campbell(
     """The interference diagram, linearised at one point or, where `at` is a function of speed, at each.
 
     Args:
+        model: the network.
         near: from a point to the network near it.
         speeds: (k,) rad/s, ascending.
         orders: excitations per turn.
@@ -93,14 +113,40 @@ def campbell(
         count: the modes wanted.
 
     Raises:
-        ParameterError: speeds or orders are not what they must be.
+        ParameterError: speeds or orders are not what they must be, or no point is given and it matters.
     """
+    if at is None:
+        _refuse_no_point(model)
 
     def modes(speed: float, top: float) -> Modes:
         model = near(at(speed) if callable(at) else at, None, ())
         return model.modes(count, None if isinstance(model, LinearModel) or count is not None else BEYOND * top)
 
-    return diagram.campbell(modes, speeds, orders, f_max, constant=not callable(at))
+    name = model.form.graph.name
+    return diagram.campbell(name, modes, speeds, orders, f_max, constant=not callable(at))
+
+
+def _refuse_no_point(model: CompiledModel) -> None:
+    """Refuse a diagram over speed of what swings otherwise where it runs, and is given no point.
+
+    Raises:
+        ParameterError: it is such a network; names the parts, and points that may be meant.
+    """
+    graph = model.form.graph
+    modal = [part.name for part in graph.parts if part.modes]
+    if model.linear and not modal:
+        return
+    laws = (
+        part.name for part in graph.parts if any(graph.branches[k].template.kind is Kind.LAW for k in part.branches)
+    )
+    parts = listed(tuple(dict.fromkeys((*modal, *laws))))
+    speeds = [state.name for state in model.form.states if state.kind == "across"][:2] or ["J1.omega"]
+    turning = ", ".join(f"'{name}': n" for name in speeds)
+    raise ParameterError(
+        f"campbell() of '{graph.name}' needs a point: how it swings depends on how it runs ({parts}). Give the speeds "
+        f"of all inertias where the exciting shaft turns at n rad/s, at=lambda n: {{{turning}}}; or one point for "
+        "all speeds, such as at=model.steady_state(), or at={} for rest."
+    )
 
 
 def _listed(names: str | Sequence[str]) -> tuple[str, ...]:

@@ -21,7 +21,7 @@ from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import AccuracyWarning, NetworkWarning, ParameterError
 from shaftwork.network.graph import resolve
 from shaftwork.network.netlist import Netlist, Placed
-from shaftwork.pipeline.analysis import Names, Point, SmallMotions, Time, input_names, operating_point
+from shaftwork.pipeline.analysis import Names, Point, SmallMotions, Time, about, input_names, operating_point, titled
 from shaftwork.pipeline.model import Model
 from shaftwork.results.exact import ExactModel, ExactSlopes
 from shaftwork.results.exact_lines import ExactLines
@@ -129,12 +129,16 @@ class ExactNetwork:
             SignalError: there is no such input.
             SimulationError: a law has no finite slope at the point.
         """
+        given = at
         if isinstance(at, Solution) and self._own is not self._model:
             t, at = float(at.t[-1]) if t is None else t, _values_of(at, self.lines.names)
         p = self._own.vector()
         time, x = operating_point(self._own, p, at, t, self._own.settled(p))
         values = self._read(time, x)
-        names = input_names(self._own, inputs)
+        names, title = (
+            input_names(self._own, inputs),
+            titled(self._model.name, "" if self._own.linear else about(given)),
+        )
         slopes = ExactSlopes(
             open=self._opened(values, time, names, History(self._own.bind(), np.array([time]), x[None, :])),
             lines=self.lines,
@@ -142,7 +146,7 @@ class ExactNetwork:
             profiles=ModelObserver(self._model.form, self._model.bind).profiles,
             lengths=tuple(p["length"] for p in self._values),
         )
-        return ExactModel(self._model.name, slopes, partial(self._starts, values, time))
+        return ExactModel(title, slopes, partial(self._starts, values, time))
 
     def _read(self, time: float, x: Array) -> dict[str, float]:
         """The states of the open network at the point, and speeds and torques of the ends of the shafts."""

@@ -36,6 +36,7 @@ from shaftwork.pipeline.arguments import (
 from shaftwork.pipeline.implicit import at_rest, solve_loops
 from shaftwork.pipeline.overview import model_overview
 from shaftwork.pipeline.prepared import Prepared, nominal_tolerances
+from shaftwork.pipeline.settled import warn_of_earlier_levels
 from shaftwork.pipeline.stored import Rebuild, Repetition, call_of, model_again, remember
 from shaftwork.reduction.form import StateForm
 from shaftwork.results.solution import Solution
@@ -161,7 +162,8 @@ class Model(CompiledModel):
         """The steady operation that the drive runs to, as start values for `simulate`.
 
         Args:
-            t: time at which the sources are read; by default after their last breakpoint.
+            t: time at which the sources are read; by default after their last breakpoint, with a warning where they
+                had another level before.
             initial: where the search starts; by default at rest.
             parameters: values that differ from the network's.
 
@@ -181,7 +183,10 @@ class Model(CompiledModel):
         start = initial_state(prepared.bound, initial or {}, when)
         if not math.isfinite(t):
             self.refuse_moving(prepared.bound, when)
-        return dict(zip(self.states, steady_state(prepared.bound, start, when).tolist(), strict=True))
+        x = steady_state(prepared.bound, start, when)
+        if not math.isfinite(t):
+            warn_of_earlier_levels(prepared.bound, x, when, self.switching)
+        return dict(zip(self.states, x.tolist(), strict=True))
 
     def refuse_moving(self, bound: BoundArrays, t: float) -> None:
         """Refuse laws that change with time at a time after which none switches any more, or that switch without end.

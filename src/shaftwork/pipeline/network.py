@@ -176,7 +176,7 @@ class Network(NetworkBuilder):
             exact: every shaft but a rigid one and one spring is taken as it is, without a mesh; a wave always is.
             t: time at which laws are read, s; by default as for `Model.linearize`.
         """
-        return self._small_motions(exact=exact)(at, t, ()).modes(count, f_max)
+        return self._small_motions(self.compile(), exact=exact)(at, t, ()).modes(count, f_max)
 
     def frequency_response(
         self,
@@ -198,7 +198,7 @@ class Network(NetworkBuilder):
             exact: every shaft but a rigid one and one spring is taken as it is, without a mesh; a wave always is.
             t: time at which laws are read, s; by default as for `Model.linearize`.
         """
-        return self._small_motions(exact=exact)(at, t, input).frequency_response(input, output, f)
+        return self._small_motions(self.compile(), exact=exact)(at, t, input).frequency_response(input, output, f)
 
     def campbell(
         self,
@@ -216,18 +216,21 @@ class Network(NetworkBuilder):
             speeds: (k,) rad/s, ascending.
             orders: excitations per turn.
             f_max: highest frequency of interest, Hz; by default the highest order at the highest speed.
-            at: the point, as for `Model.linearize`, or a function from the speed to the point.
+            at: the point, as for `Model.linearize`, or a function from the speed to the point; a network that swings
+                otherwise where it runs, by laws that are not linear or modes of its parts, must be given one.
             count: the modes wanted, those of smallest |rate|; by default all.
             exact: every shaft but a rigid one and one spring is taken as it is, without a mesh; a wave always is.
         """
         from shaftwork.pipeline.analysis import campbell
 
-        return campbell(self._small_motions(exact=exact), speeds, orders, f_max, at, count)
+        model = self.compile()
+        return campbell(model, self._small_motions(model, exact=exact), speeds, orders, f_max, at, count)
 
-    def _small_motions(self, *, exact: bool) -> SmallMotions:
+    @staticmethod
+    def _small_motions(model: Model, *, exact: bool) -> SmallMotions:
         from shaftwork.pipeline.exact import small_motions
 
-        return small_motions(self.compile(), Compiler((), LOOP), every=exact)
+        return small_motions(model, Compiler((), LOOP), every=exact)
 
     def save(self, path: str | Path) -> None:
         """Write the network to a text file from which `load` makes the same network.
@@ -323,7 +326,7 @@ class _InPhase:
     form: StateForm
 
     def __call__(self, phase: str | NamedPhase) -> Equations:
-        name: Any = getattr(phase, "name", phase)
+        name = words_of(phase)
         form = _sound(in_phase(self.netlist, self.form.graph, name)) if name else self.form
         return dataclasses.replace(kirchhoff(form), phase=whole_name(self.form.graph, name), in_phase=self)
 

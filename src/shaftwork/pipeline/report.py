@@ -65,7 +65,7 @@ def _points(model: Model, equations: CompiledModel) -> Iterator[tuple[str, Seque
         return
     with suppress(SimulationError):  # a law has no finite slope there, as those below say of the phase in motion
         rest = model.linearize()
-        yield f"at rest {rest.title.removeprefix(model.name).strip()}", rest.states, _dense(rest.A)
+        yield rest.title.removeprefix(model.name).strip(), rest.states, _dense(rest.A)
     yield f"in motion ({whole_name(graph)})", states, slopes
 
 

@@ -46,6 +46,7 @@ class Campbell:
 
     Args:
         title: of the network.
+        about: what it is linearised about, in words; empty where it is linear.
         speeds: (k,) rad/s, ascending.
         orders: excitations per turn.
         modes: names of the modes that swing at some speed.
@@ -55,6 +56,7 @@ class Campbell:
     """
 
     title: str
+    about: str
     speeds: Array
     orders: tuple[float, ...]
     modes: tuple[str, ...]
@@ -63,12 +65,17 @@ class Campbell:
     f_max: float
 
     def __str__(self) -> str:
-        head = f"{self.title}: {len(self.crossings)} crossings from {self.speeds[0]:g} to {self.speeds[-1]:g} rad/s"
+        head = f"{self.heading}: {len(self.crossings)} crossings from {self.speeds[0]:g} to {self.speeds[-1]:g} rad/s"
         lines = [f"{'rad/s':>12}  {'1/min':>12}  {'order':>6}  {'Hz':>12}  mode"]
         for made in self.crossings:
             turns = made.speed * 30 / np.pi
             lines.append(f"{made.speed:>12.6g}  {turns:>12.6g}  {made.order:>6g}  {made.frequency:>12.6g}  {made.mode}")
         return "\n".join([head, *lines])
+
+    @property
+    def heading(self) -> str:
+        """The network, and what it is linearised about."""
+        return f"{self.title} {self.about}".strip()
 
     def plot(self) -> Figure:
         """The diagram, speeds in 1/min (extra `plot`).
@@ -80,7 +87,13 @@ class Campbell:
 
 
 def campbell(
-    modes_at: Callable[[float, float], Modes], speeds: Any, orders: Any, f_max: float | None, *, constant: bool
+    title: str,
+    modes_at: Callable[[float, float], Modes],
+    speeds: Any,
+    orders: Any,
+    f_max: float | None,
+    *,
+    constant: bool,
 ) -> Campbell:
     """The interference diagram of a network.
 
@@ -88,6 +101,7 @@ def campbell(
     longer changes.
 
     Args:
+        title: of the network, with which those of the modes begin.
         modes_at: the modes at a speed in rad/s, those up to a frequency in Hz at least.
         speeds: (k,) rad/s, ascending.
         orders: excitations per turn, each above 0.
@@ -117,7 +131,13 @@ def campbell(
     inside = sorted(
         (made for made in crossings if made.frequency <= top), key=lambda made: (made.speed, made.order, made.frequency)
     )
-    return Campbell(found[0].title, n, lines, kept, table, tuple(inside), top)
+    return Campbell(title, _about(title, found), n, lines, kept, table, tuple(inside), top)
+
+
+def _about(title: str, found: Sequence[Modes]) -> str:
+    """The point of all modes, or those of the first and the last."""
+    first, last = (modes.title.removeprefix(title).strip() for modes in (found[0], found[-1]))
+    return first if first == last else f"at points from {first.removeprefix('at ')} to {last.removeprefix('at ')}"
 
 
 def _ascending(speeds: Any) -> Array:
@@ -229,4 +249,6 @@ def _diagram(diagram: Campbell) -> Figure:
     if diagram.modes:
         axis.legend(loc="upper left", frameon=False, fontsize=8)
     figure.suptitle(f"{diagram.title}: natural frequencies and orders")
+    if diagram.about:
+        axis.set_title(f"linearised {diagram.about}", fontsize=9)
     return figure

@@ -16,7 +16,7 @@ from shaftwork.codegen.operating import steady_state
 from shaftwork.codegen.start_values import initial_state
 from shaftwork.core.errors import CompileError, SimulationError
 from shaftwork.equations.records import NamedPhase
-from shaftwork.pipeline.analysis import Given, Names, Point, Time, input_names, operating_point
+from shaftwork.pipeline.analysis import Given, Names, Point, Time, about, input_names, operating_point, titled
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.moments import Moment
@@ -25,6 +25,7 @@ from shaftwork.pipeline.phases.phases import Phases
 from shaftwork.pipeline.phases.run import Run
 from shaftwork.pipeline.phases.settling import Settling
 from shaftwork.pipeline.phases.solution import solution
+from shaftwork.pipeline.settled import warn_of_earlier_levels
 from shaftwork.reduction.form import StateForm
 from shaftwork.results.linear import LinearModel, linear_model
 from shaftwork.results.solution import Solution
@@ -146,6 +147,9 @@ class PhasedModel(Model):
                 x = steady_state(bound, x, when, ends=partial(settling.ends, moment, when))
             moment, changes = settling.settle(when, when, moment._replace(x=x), None)
             if not changes:
+                if not math.isfinite(t):
+                    assembly = moment.regime.assembly
+                    warn_of_earlier_levels(assembly.bound(moment.regime.p), moment.x, when, assembly.model.switching)
                 return settling.held(moment, when)
         raise SimulationError(
             f"No steady operation was found: after {MOST_CHANGES} changes '{changes[-1].element.name}' still goes from "
@@ -168,7 +172,8 @@ class PhasedModel(Model):
         model = moment.regime.assembly.model
         slopes = Linearization(model, moment.regime.p, moment.x, time, input_names(model, inputs))
         named = None if outputs is None else (outputs,) if isinstance(outputs, str) else tuple(outputs)
-        return linear_model(f"{self.name} ({self._words(moment)})", slopes, named, moment.x, time)
+        title = titled(self.name, about(at), self._words(moment))
+        return linear_model(title, slopes, named, moment.x, time)
 
     def _words(self, moment: Moment) -> str:
         """The phase of a moment, "gap open, brake locked"."""

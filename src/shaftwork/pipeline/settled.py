@@ -1,0 +1,84 @@
+"""What `steady_state()` without a time may have meant: laws and modes that were others before their last change."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shaftwork.codegen.arrays import BoundArrays
+from shaftwork.codegen.elements import Array
+from shaftwork.codegen.switching import Switching
+from shaftwork.core.errors import NetworkWarning
+from shaftwork.core.notices import warn
+from shaftwork.network.templates import Kind
+
+if TYPE_CHECKING:
+    from shaftwork.network.graph import CircuitGraph, GraphBranch
+
+SAME = 1e-6
+"""Levels of a law that differ by less than this fraction are one."""
+MIDDLE = (1.0, 1.0 + SAME, 1.0)
+"""Of a level that lasts its middle is named."""
+
+
+def warn_of_earlier_levels(bound: BoundArrays, x: Array, when: float, switching: Switching) -> None:
+    """Warn where the laws had another level, or parts another mode by the clock, than at the time that was read.
+
+    A rise from nothing to the last level is no other level; a higher one on the way, or one that lasts, is.
+
+    Args:
+        bound: the equations at the steady state.
+        x: (n,) the steady state.
+        when: time after the last change, at which laws were read, s.
+        switching: of the network.
+    """
+    edges = [0.0, *(time for time in switching.known(bound.p) if 0.0 < time < when), when]
+    spans = [
+        (np.nextafter(first, last), (first + last) / 2, np.nextafter(last, first)) for first, last in pairwise(edges)
+    ]
+    times = np.array(spans)
+    found = list(_levels(bound, x, times))
+    for part, time in switching.clocks(bound.p):
+        if 0.0 < time < when:
+            before = max(edge for edge in edges if edge < time)
+            found.append((f"'{part}' changes its mode at t = {time:.6g} s", (before + time) / 2))
+    if found:
+        said, other = "; ".join(words for words, _ in found), found[0][1]
+        warn(
+            f"steady_state() of '{bound.program.form.graph.name}' reads its laws after their last change, at "
+            f"t = {when:.6g} s, and they were others before: {said}. Name the time that is meant, "
+            f"steady_state(t={when:.6g}) or steady_state(t={other:.6g}).",
+            NetworkWarning,
+        )
+
+
+def _levels(bound: BoundArrays, x: Array, times: Array) -> Iterator[tuple[str, float]]:
+    """Of each law with an earlier level what it gave and when; times are (spans, 3): both ends and the middle."""
+    inputs, graph = bound.program.assembly.inputs, bound.program.form.graph
+    values = bound.values(times.ravel(), np.tile(x[:, None], times.size))[1].reshape(len(inputs), *times.shape)
+    for branch, courses in zip(inputs.tolist(), values, strict=True):
+        final, size = courses[-1, 1], np.nanmax(np.abs(courses), initial=0.0)
+        close = SAME * size
+        lasting = np.ptp(courses, axis=1, keepdims=True) <= close
+        other = (np.abs(courses) > abs(final) + close) | (courses * final < -(close**2))
+        other |= lasting & (np.abs(courses) > close) & (np.abs(courses - final) > close)
+        if other.any():
+            sizes = np.where(other, np.abs(courses), 0.0) * np.where(lasting, MIDDLE, 1.0)
+            span, place = np.unravel_index(int(np.nanargmax(sizes)), sizes.shape)
+            time, earlier = float(times[span, place]), courses[span, place]
+            name, sign, unit = _quantity(graph, graph.branches[branch])
+            levels = f"gives {sign * final + 0.0:.6g} {unit} and gave {sign * earlier + 0.0:.6g} {unit}"
+            yield f"'{name}' {levels} at t = {time:.6g} s", time
+
+
+def _quantity(graph: CircuitGraph, branch: GraphBranch) -> tuple[str, int, str]:
+    """The part of a law, the sign with which it shows what the law gives, and the unit."""
+    part, domain = graph.part_of(branch.index), graph.domains[max(branch.plus, branch.minus)]
+    if branch.template.kind is Kind.ACROSS_SOURCE:
+        return part.name, 1, domain.across.unit
+    shown = (made for made in part.component.signals().values() if made.kind == "through")
+    sign = next((made.sign for made in shown if made.ends == branch.template.ends), 1)
+    return part.name, sign, domain.through.unit.replace("*", " ")

@@ -1,0 +1,80 @@
+"""Steady operation of laws that change: which of their levels is read, and that it is said."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import pytest
+
+import shaftwork as sw
+
+WHEEL = sw.Table([0.0, 2.0, 20.0, 30.0, 40.0], [0.0, 0.8e6, 0.8e6, 0.7e6, 0.7e6])
+
+
+def drive(load: Any) -> sw.Network:
+    """A motor that holds its speed, a shaft and a load of N m over time."""
+    net = sw.Network("bucket wheel drive")
+    net.add(sw.TorqueSource("motor", tau=1e7 * (10.0 - sw.omega)), "a")
+    net.add(sw.Inertia("J1", J=1e4), "a")
+    net.add(sw.Spring("shaft", c=1e9, d=1e6), "a", "b")
+    net.add(sw.Inertia("J2", J=1e4), "b")
+    net.add(sw.TorqueSource("load", tau=-load(sw.t) if isinstance(load, sw.Table) else -load), "b")
+    return net
+
+
+def torque(model: sw.Model, **options: float) -> float:
+    return model.steady_state(**options)["shaft.tau_c"]
+
+
+def test_a_table_with_another_level_before_its_end_warns_with_both_times() -> None:
+    """0.8 MN m last for 18 s and 0.7 MN m at the end; the shaft carries what the load takes."""
+    model = drive(WHEEL).compile()
+    said = (
+        r"'load' gives -700000 N m and gave -800000 N m at t = 11 s. "
+        r"Name the time that is meant, steady_state\(t=41\) or steady_state\(t=11\)"
+    )
+    with pytest.warns(sw.NetworkWarning, match=said):
+        assert torque(model) == pytest.approx(0.7e6, rel=1e-9)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert torque(model, t=41.0) == pytest.approx(0.7e6, rel=1e-9)
+        assert torque(model, t=11.0) == pytest.approx(0.8e6, rel=1e-9)
+
+
+OTHER_LEVELS = {
+    "a peak": sw.Table([0.0, 1.0, 2.0], [0.0, 5.0, 3.0]),
+    "a level below": sw.Table([0.0, 1.0, 2.0, 3.0], [2.0, 2.0, 5.0, 5.0]),
+    "steps": sw.Step(5.0, 1.0) + sw.Step(-2.0, 3.0),
+    "the other way": sw.Step(5.0, 1.0, before=-1.0),
+    "a load that goes": sw.Step(-5.0, 1.0, before=5.0),
+}
+
+
+@pytest.mark.parametrize("name", OTHER_LEVELS)
+def test_every_law_with_another_level_warns(name: str) -> None:
+    model = drive(OTHER_LEVELS[name]).compile()
+    with pytest.warns(sw.NetworkWarning, match=r"'load' gives .* and gave .* steady_state\(t="):
+        torque(model)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [5.0, sw.Step(5.0, 1.0), sw.Ramp(5.0, 2.0, 1.0), sw.Table([0.0, 1.0, 3.0], [0.0, 2.0, 5.0])],
+    ids=["number", "step", "ramp", "run-up"],
+)
+def test_a_rise_from_nothing_to_the_last_level_warns_of_nothing(law: Any) -> None:
+    assert torque(drive(law).compile()) == pytest.approx(5.0, rel=1e-9)
+
+
+def test_a_motor_that_is_switched_off_and_a_brake_that_comes_on_warn() -> None:
+    net = sw.Network("travel")
+    net.add(sw.KlossMotor("motor", tau_k=9.6, s_k=0.25, n_sync=3000, ratio=35.5, t_off=6.5), "a")
+    net.add(sw.Inertia("J1", J=27.0), "a")
+    net.add(sw.Brake("brake", tau=300.0, t_on=7.0), "a")
+    net.add(sw.ViscousLoad("load", d=2.0), "a")
+    model = net.compile()
+    said = r"'motor' gives 0 N m and gave .* at t = 3.25 s; 'brake' changes its mode at t = 7 s.*steady_state\(t=3.25\)"
+    with pytest.warns(sw.NetworkWarning, match=said):
+        assert model.steady_state()["J1.omega"] == 0.0
+    assert model.steady_state(t=3.25)["J1.omega"] > 5.0
