@@ -141,6 +141,22 @@ class CompiledModel:
             )
         return self.scalar.source
 
+    def phase(self, name: Any) -> CompiledModel:
+        """The equations of one phase of a network whose parts change their mode: `rhs`, `jacobian`, `code`, `states`.
+
+        Args:
+            name: "gap open, load stuck", or a row of `Solution.phases`; parts that are not named are in their first
+                mode.
+
+        Raises:
+            ParameterError: there is no such phase.
+            NetworkError: its equations contradict each other.
+        """
+        raise ParameterError(
+            f"phase = {getattr(name, 'name', name)!r}: the equations of '{self.form.graph.name}' are the same at all "
+            "times. Take those of the model itself, such as model.rhs."
+        )
+
     @cached_property
     def linear(self) -> bool:
         """Whether the right-hand side is linear in the states with constant coefficients."""

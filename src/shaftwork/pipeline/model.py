@@ -17,7 +17,7 @@ from shaftwork.codegen.operating import steady_state
 from shaftwork.codegen.start_values import initial_state
 from shaftwork.codegen.switching import Switching
 from shaftwork.codegen.valueless import rough, without_value
-from shaftwork.core.errors import CompileError, ParameterError, SimulationError
+from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import LinearInputs, Problem, Trajectory
 from shaftwork.network.netlist import Netlist
@@ -36,14 +36,12 @@ from shaftwork.pipeline.arguments import (
 from shaftwork.pipeline.implicit import at_rest, solve_loops
 from shaftwork.pipeline.overview import model_overview
 from shaftwork.pipeline.prepared import Prepared, nominal_tolerances
-from shaftwork.pipeline.settled import warn_of_earlier_levels
+from shaftwork.pipeline.settled import refuse_moving, warn_of_earlier_levels
 from shaftwork.pipeline.stored import Rebuild, Repetition, call_of, model_again, remember
 from shaftwork.reduction.form import StateForm
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
-    from shaftwork.codegen.arrays import BoundArrays
-    from shaftwork.equations.records import NamedPhase
     from shaftwork.pipeline.analysis import Given, Names, Point, Time
     from shaftwork.pipeline.waves import WaveStart
     from shaftwork.results.linear import LinearModel
@@ -182,23 +180,11 @@ class Model(CompiledModel):
         when = t if math.isfinite(t) else self.settled(prepared.p)
         start = initial_state(prepared.bound, initial or {}, when)
         if not math.isfinite(t):
-            self.refuse_moving(prepared.bound, when)
+            refuse_moving(prepared.bound, when, self.switching)
         x = steady_state(prepared.bound, start, when)
         if not math.isfinite(t):
             warn_of_earlier_levels(prepared.bound, x, when, self.switching)
         return dict(zip(self.states, x.tolist(), strict=True))
-
-    def refuse_moving(self, bound: BoundArrays, t: float) -> None:
-        """Refuse laws that change with time at a time after which none switches any more, or that switch without end.
-
-        Raises:
-            SimulationError: there is one.
-        """
-        if moving := dict.fromkeys((*bound.moving_sources(t), *self.switching.endless(bound.p))):
-            raise SimulationError(
-                f"{', '.join(moving)} never stops changing, so there is no steady operation. Name the time at which "
-                "the sources are to be read, steady_state(t=...), or take the noise out of them (std = 0 for its mean)."
-            )
 
     def linearize(
         self, at: Point = None, *, inputs: Names = None, outputs: Names = None, t: Time = None, parameters: Given = None
@@ -231,22 +217,6 @@ class Model(CompiledModel):
     def settled(self, p: Array) -> float:
         """A time in s after which no law switches any more, for a parameter vector."""
         return max((0.0, *self.switching.known(p))) + 1.0
-
-    def phase(self, name: str | NamedPhase) -> CompiledModel:
-        """The equations of one phase of a network whose parts change their mode: `rhs`, `jacobian`, `code`, `states`.
-
-        Args:
-            name: "gap open, load stuck", or a row of `Solution.phases`; parts that it does not name are in their first
-                mode.
-
-        Raises:
-            ParameterError: there is no such phase.
-            NetworkError: its equations contradict each other.
-        """
-        raise ParameterError(
-            f"phase = {getattr(name, 'name', name)!r}: the equations of '{self.name}' are the same at all times. Take "
-            "those of the model itself, such as model.rhs."
-        )
 
     def choose_engine(self, t_end: float, *, t_start: float = 0.0, rtol: float = 1e-8) -> tuple[str, str]:
         """The engine that "auto" takes for a motion, and why."""

@@ -1,4 +1,4 @@
-"""What `steady_state()` without a time may have meant: laws and modes that were others before their last change."""
+"""Laws of time in steady operation: those that never stop changing, and those that were others before they did."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.switching import Switching
-from shaftwork.core.errors import NetworkWarning
+from shaftwork.core.errors import NetworkWarning, SimulationError
 from shaftwork.core.notices import warn
 from shaftwork.network.templates import Kind
 
@@ -22,6 +22,19 @@ SAME = 1e-6
 """Levels of a law that differ by less than this fraction are one."""
 MIDDLE = (1.0, 1.0 + SAME, 1.0)
 """Of a level that lasts its middle is named."""
+
+
+def refuse_moving(bound: BoundArrays, t: float, switching: Switching) -> None:
+    """Refuse laws that change with time at a time after which none switches any more, or that switch without end.
+
+    Raises:
+        SimulationError: there is one.
+    """
+    if moving := dict.fromkeys((*bound.moving_sources(t), *switching.endless(bound.p))):
+        raise SimulationError(
+            f"{', '.join(moving)} never stops changing, so there is no steady operation. Name the time at which "
+            "the sources are to be read, steady_state(t=...), or take the noise out of them (std = 0 for its mean)."
+        )
 
 
 def warn_of_earlier_levels(bound: BoundArrays, x: Array, when: float, switching: Switching) -> None:

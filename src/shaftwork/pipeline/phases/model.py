@@ -25,7 +25,7 @@ from shaftwork.pipeline.phases.phases import Phases
 from shaftwork.pipeline.phases.run import Run
 from shaftwork.pipeline.phases.settling import Settling
 from shaftwork.pipeline.phases.solution import solution
-from shaftwork.pipeline.settled import warn_of_earlier_levels
+from shaftwork.pipeline.settled import refuse_moving, warn_of_earlier_levels
 from shaftwork.reduction.form import StateForm
 from shaftwork.results.linear import LinearModel, linear_model
 from shaftwork.results.solution import Solution
@@ -141,7 +141,7 @@ class PhasedModel(Model):
         for _ in range(MOST_CHANGES):
             bound = moment.regime.assembly.bound(moment.regime.p)
             if not math.isfinite(t):
-                moment.regime.assembly.model.refuse_moving(bound, when)
+                refuse_moving(bound, when, moment.regime.assembly.model.switching)
             x = moment.x
             if x.size:
                 x = steady_state(bound, x, when, ends=partial(settling.ends, moment, when))
