@@ -8,6 +8,7 @@ import re
 import numpy as np
 import pytest
 import sympy
+from scipy.integrate import simpson
 
 import shaftwork as sw
 from tests.reference.crane import Crane, shaft_torque
@@ -473,3 +474,27 @@ def test_options_of_the_compilation_are_taken_by_simulate_of_a_network() -> None
     short.add(sw.Inertia("J", J=1.0), "b")
     assert "line c 1.tau" in short.simulate(0.01, expand=True)
     assert "c1.tau" in net.simulate(0.001, expand=True)
+
+
+def between_springs() -> sw.Network:
+    """A torque on a massless node between two springs."""
+    net = sw.Network("series")
+    net.add(sw.Inertia("J1", J=0.1), "a")
+    net.add(sw.Spring("first", c=100.0), "a", "x")
+    net.add(sw.Spring("second", c=50.0), "x", "b")
+    net.add(sw.Inertia("J2", J=0.3), "b")
+    net.add(sw.TorqueSource("push", tau=2.0 * sw.t), "x")
+    return net
+
+
+@pytest.mark.parametrize("name", ["push", "first", "second"])
+def test_an_angle_at_a_massless_node_between_springs_is_refused(name: str) -> None:
+    with pytest.raises(sw.SignalError, match=f"angle of '{name}' is not recorded.*Give that node an inertia"):
+        between_springs().simulate(2.0, angles=name)
+
+
+@pytest.mark.parametrize("name", ["J1", "J2"])
+def test_an_angle_beside_a_massless_node_is_the_integral_of_its_speed(name: str) -> None:
+    times = np.linspace(0.0, 2.0, 20001)
+    sol = between_springs().simulate(2.0, angles=name, t_eval=times)
+    assert sol[f"{name}.phi"][-1] == pytest.approx(simpson(sol[f"{name}.omega"], x=times), rel=1e-7)

@@ -132,7 +132,8 @@ class Network(NetworkBuilder):
 
         Args:
             expand: of the network with its shafts written out part by part.
-            angles: parts whose angle (position, flux linkage) is recorded, besides those that a law reads.
+            angles: parts whose angle (position, flux linkage) is recorded, besides those that a law reads; not at a
+                node without inertia between springs, which turns at once where a torque jumps.
             algebraic_loops: a nonlinear law at a massless node is refused with its name, or solved together with the
                 motion (slower, and the solution need not be the only one).
 
@@ -308,6 +309,7 @@ class Compiler:
                 warn_of_rounding(form.graph)
             if self.angles:
                 form = state_form(form.graph, tuple(_branch_of(form.graph, name) for name in self.angles))
+                _refuse_between_springs(form)
             chosen = form.waves or any(item.choices for item in netlist.placed)
             kind = PhasedModel if any(part.modes for part in form.graph.parts) and not chosen else Model
             return kind(form, netlist, self)
@@ -350,6 +352,24 @@ def _branch_of(graph: CircuitGraph, name: str) -> int:
     part = next((part for part in graph.parts if part.name == name), None)
     branches = () if part is None else tuple(k for k in part.branches if not graph.branches[k].terms)
     if not branches:
-        known = ", ".join(part.name for part in graph.parts)
-        raise SignalError(f"There is no angle of '{name}'. The parts are: {known}.")
+        able = (part.name for part in graph.parts if any(not graph.branches[k].terms for k in part.branches))
+        raise SignalError(f"There is no angle of '{name}'. Parts with an angle are: {', '.join(able)}.")
     return branches[0]
+
+
+def _refuse_between_springs(form: StateForm) -> None:
+    """Refuse angles whose speed contains the rate of a torque, as that of a node between springs in series does.
+
+    Raises:
+        SignalError: there is one; names the part.
+    """
+    hidden = frozenset(form.dependent_through)
+    for branch in form.angles:
+        if branch in hidden or not hidden.isdisjoint(form.tree.loops.get(branch, ())):
+            name = form.graph.part_of(branch).name
+            springs = listed(tuple(dict.fromkeys(form.graph.part_of(k).name for k in form.dependent_through)))
+            raise SignalError(
+                f"The angle of '{name}' is not recorded: its speed is that of a node without inertia between springs "
+                f"({springs} among them), which turns at once where a torque jumps. Give that node an inertia, or read "
+                f"the twist of a spring, such as phi_rel."
+            )
