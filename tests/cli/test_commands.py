@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -220,3 +221,19 @@ def test_a_quantity_along_a_shaft_is_a_column_for_each_place(
     places = sol.places["line.tau"]
     assert head == ["t [s]", *(f"line.tau at {place:g} m [N*m]" for place in places)]
     assert np.array(table, dtype=float)[:, 1:] == pytest.approx(sol["line.tau"], rel=1e-9, abs=1e-9)
+
+
+def test_a_comparison_that_is_interrupted_has_told_what_was_done(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(_net: sw.Network, shaft: str, *, report: Any, **_options: Any) -> None:
+        assert shaft == "line"
+        report(sw.studies.Trial("Lumped(m=5)", "scipy", 11, 0.1, 0.01, {"tau_a": 1e-3, "tau_b": 1e-3}))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sw.studies, "work_precision", interrupted)
+    assert main(["compare", "shaft-step", "--out", str(tmp_path)]) == INTERRUPTED
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[-2] == "Lumped(m=5) on scipy: 10 ms, end torques to 0.001"
+    assert lines[-1] == "shaftwork: interrupted: 1 models are done, as told above; nothing was written"
+    assert list(tmp_path.iterdir()) == []

@@ -46,7 +46,17 @@ def run(options: Namespace, say: Say) -> Data:
     folder = Folder(options.out, FILES, options.line) if options.out else None
     begun = f"comparing over {t_end:g} s of motion (set by --t-end), after the exact solution:"
     print(begun, file=sys.stderr, flush=True)
-    study = work_precision(net, options.shaft or shafts[0], t_end=t_end, report=_done)
+    done: list[Trial] = []
+
+    def report(trial: Trial) -> None:
+        done.append(trial)
+        what = trial.why or f"{1e3 * trial.cpu:.3g} ms, end torques to {trial.error:.1g}"
+        print(f"{trial.model} on {trial.engine}: {what}", file=sys.stderr, flush=True)
+
+    try:
+        study = work_precision(net, options.shaft or shafts[0], t_end=t_end, report=report)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"{len(done)} models are done, as told above; nothing was written") from None
     say(f"{study}\n\n{study.advice}")
     if folder:
         with folder.new_files() as place:
@@ -54,11 +64,6 @@ def run(options: Namespace, say: Say) -> Data:
             write_picture(place / "work-precision.png", study.plot)
         say(f"\n{folder.written()}")
     return dataclasses.asdict(study)
-
-
-def _done(trial: Trial) -> None:
-    what = trial.why or f"{1e3 * trial.cpu:.3g} ms, end torques to {trial.error:.1g}"
-    print(f"{trial.model} on {trial.engine}: {what}", file=sys.stderr, flush=True)
 
 
 COMMAND = Command("compare", "lumped against distributed shafts: error against run time", run, arguments, machines=True)
