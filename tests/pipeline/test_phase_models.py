@@ -191,3 +191,12 @@ def test_modes_that_say_the_same_have_the_same_equations(name: str) -> None:
         laws = tuple((b.kind, b.law, b.ends, b.terms, b.through) for b in made.branches)
         groups.setdefault((label, mode.words), set()).add(laws)
     assert [words for words, laws in groups.items() if len(laws) > 1] == []
+
+
+@pytest.mark.parametrize("part", ["motor", "J1", "J2", "J3", "J4"])
+def test_an_angle_that_is_recorded_leaves_the_motion_as_it_is(part: str) -> None:
+    """A rate of the angle once stood for the acceleration in the torque that ends a mode: the clutch never slipped."""
+    net = clutches()
+    net.add(sw.Brake("brake", tau=50.0, t_on=1.0), "a")
+    plain, recorded = net.simulate(2.0), net.simulate(2.0, angles=part)
+    assert [event[1:] for event in recorded.events] == [event[1:] for event in plain.events]

@@ -42,8 +42,8 @@ class Readings:
 
     def __init__(self, form: StateForm, rows: Rows) -> None:
         self.form, self.graph, self.rows = form, form.graph, rows
-        branches = [state.branch for state in form.states]
-        self._rates = dict(zip(branches, rows.rates, strict=True)) if branches else {}
+        stores = (*form.across_states, *form.through_states)  # an angle of the same branch has another rate
+        self._rates = dict(zip(stores, rows.rates, strict=False))
         self._through: dict[int, Expr] = {}
 
     @property
