@@ -81,7 +81,7 @@ def test_the_exact_engine_refuses_what_is_not_linear_or_not_straight(oscillator)
 
 
 def test_heyoka_asks_for_a_program(oscillator):
-    with pytest.raises(SimulationError, match="needs the equations as a heyoka program"):
+    with pytest.raises(SimulationError, match="heyoka compiles small networks"):
         choice.solve(replace(oscillator.problem, symbolic=None), "heyoka")
 
 

@@ -17,6 +17,7 @@ from shaftwork.codegen.heyoka_held import HeldParameters
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.components.pieces import parts
 from shaftwork.core.errors import MissingExtraError
+from shaftwork.core.interruption import interruptible
 
 Array = NDArray[np.float64]
 
@@ -185,7 +186,8 @@ class HeyokaProgram:
                 *(self._end(number, guard) for number, guard in enumerate(self.guards)),
                 *(self._outgrows(number, value) for number, value in enumerate(self.fading)),
             ]
-        return heyoka.taylor_adaptive(
+        return interruptible(
+            heyoka.taylor_adaptive,
             list(zip(self.variables, self.rows, strict=True)),
             [0.0] * len(self.rows),
             tol=tolerance,

@@ -51,8 +51,9 @@ COMPARISONS: dict[Any, Callable[[Any, Any], Any]] = {
 
 # Far from zero these are a constant to the last bit, so that a series does not show where they change.
 FADING = (sympy.tanh, sympy.coth, sympy.sech, sympy.csch, sympy.exp)
-# A higher power rises so late from zero that a series of order 13 may not show it, and its step control not see it.
-LARGEST_PRODUCT = 5
+# A power |u|^1.5 has no series at zero. Within this distance of zero, in the unit of u, it is rounded, and changes by
+# less than this part of its value at u = 1.
+ROUNDED_NEAR_ZERO = 1e-18
 
 
 class Translator:
@@ -131,29 +132,40 @@ class Translator:
         return [self.expression(argument) for argument in self._fixed.arguments(node)]
 
     def product(self, node: sympy.Mul) -> Any:
-        """A product, with quotients as such and not as negative powers."""
+        """A product, with quotients as such and not as negative powers; its roots are smoothed where it has a slope."""
         above: list[Any] = []
         below: list[Any] = []
-        for factor in self._fixed.arguments(node):
-            fixed = factor in self._fixed.found
-            inverse = not fixed and isinstance(factor, sympy.Pow) and factor.exp.is_number and factor.exp.is_negative
-            (below if inverse else above).append(self.expression(1 / factor if inverse else factor))
+        factors = self._fixed.arguments(node)
+        for factor in factors:
+            power = isinstance(factor, sympy.Pow) and factor not in self._fixed.found and factor.exp.is_number
+            if power and factor.exp.is_negative:
+                below.append(self.expression(1 / factor))
+            elif power and isinstance(factor.base, sympy.Abs) and _rise(factors, factor.base.args[0]) > 1:
+                above.append(self._smooth_power(factor))
+            else:
+                above.append(self.expression(factor))
         upper = heyoka.prod(above) if above else heyoka.expression(1.0)
         return upper / heyoka.prod(below) if below else upper
 
     def power(self, node: sympy.Pow) -> Any:
-        """A power, with square roots and quotients as such, and low whole powers as products.
+        """A power, with square roots and quotients as such, whole powers as products, and those of a size smoothed.
 
         heyoka's own recurrence for a power divides by the base, which is zero at rest.
         """
-        base, exponent = self.expression(node.base), node.exp
-        if exponent == sympy.S.Half:
-            return heyoka.sqrt(base)
+        exponent = node.exp
         if exponent.is_number and exponent.is_negative:
             return 1.0 / self.expression(node.base**-exponent)
-        if exponent.is_number and exponent <= LARGEST_PRODUCT and float(exponent).is_integer():
-            return _whole_power(base, int(exponent))
-        return base ** self.expression(exponent)
+        if exponent.is_number and float(exponent).is_integer():
+            return _whole_power(self.expression(node.base), int(exponent))
+        if exponent.is_number and exponent > 1 and isinstance(node.base, sympy.Abs):
+            return self._smooth_power(node)
+        base = self.expression(node.base)
+        return heyoka.sqrt(base) if exponent == sympy.S.Half else base ** self.expression(exponent)
+
+    def _smooth_power(self, node: sympy.Pow) -> Any:
+        """A power |u|^a = (u^2 + e^2)^(a/2), with a tiny e, which has a series at zero as well."""
+        base = self.expression(node.base.args[0])
+        return (base * base + ROUNDED_NEAR_ZERO**2) ** heyoka.expression(float(node.exp) / 2)
 
     def sign(self, switch: sympy.Expr) -> Any:
         """The sign of an expression: -1, 0 or 1; a parameter that an event changes where the sign may change."""
@@ -251,6 +263,12 @@ class Translator:
             return heyoka.select(beyond, choose(middle + 1, last), choose(first, middle))
 
         return choose(0, len(xs))
+
+
+def _rise(factors: Sequence[sympy.Expr], base: sympy.Expr) -> float:
+    """The power with which a product goes to zero with a base: 1.5 for u |u|^0.5."""
+    powers = (factor.as_base_exp() for factor in factors)
+    return sum(float(exponent) for other, exponent in powers if exponent.is_number and abs(other) == abs(base))
 
 
 def _whole_power(base: Any, exponent: int) -> Any:

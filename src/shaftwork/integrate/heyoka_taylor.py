@@ -23,12 +23,14 @@ LOOSEST_TOLERANCE, TIGHTEST_TOLERANCE = 1e-10, 1e-15
 FIRST_DEFECT, FIRST_TRIALS, SHORTER = 1e-8, 30, 0.25
 
 # From (integrator, step callback, step limit, longest step) to (outcome, its name, steps taken); called again after an
-# interruption.
+# interruption. It returns to Python after some steps each, which changes them by rounding alone.
 Advance = Callable[[Any, Watch | None, int, float], tuple[Any, str, int]]
 # What heyoka's outcomes are called here where a guard ended the run.
 GUARD = "guard"
 # Output times that heyoka is given at once where a guard is likely to be met before the last of them.
 CHUNK = 32
+# Steps times states, some 50 ms, after which Python notices Ctrl-C and tells how far the run is.
+UNINTERRUPTED = 250_000
 # What is the least that rounding moves a guard of size 1.
 ROUNDING = 8 * float(np.finfo(float).eps)
 # heyoka's outcomes proper are below this number; those above are events that have ended a run.
@@ -52,7 +54,8 @@ def solve(problem: Problem) -> Trajectory:
         raise MissingExtraError("heyoka", "fast", "engine='heyoka'")
     if problem.program is None:
         raise SimulationError(
-            "The heyoka engine needs the equations as a heyoka program, and this problem has none. Use engine='scipy'."
+            f"heyoka compiles small networks whose laws have Taylor series. This one, of {problem.x0.size} states, is "
+            "too large or has another law. Take engine='auto', 'sundials' or 'scipy'."
         )
     if problem.t_eval is not None:
         return _on_grid(problem, np.asarray(problem.t_eval, dtype=float))
@@ -246,7 +249,7 @@ def _on_grid(problem: Problem, times: Array) -> Trajectory:
     for piece in pieces(problem):
         # An output at a breakpoint belongs to the next piece: it is the state after the jump.
         stop = times.size if piece.end == problem.t_end else int(np.searchsorted(times, piece.end, side="left"))
-        recorder = _GridRecorder(states[done:stop], times[done:stop], piece.end, chunk, stops)
+        recorder = _GridRecorder(problem, states[done:stop], times[done:stop], piece.end, chunk, stops)
         run.piece(piece, recorder)
         if run.met is not None:
             done += recorder.filled
@@ -257,10 +260,29 @@ def _on_grid(problem: Problem, times: Array) -> Trajectory:
     return Trajectory(times[:done], states[:done], _Replay(problem, stops), {"steps": run.steps}, met=run.met, end=end)
 
 
+class _Breaks:
+    """How many steps heyoka takes at once, and what happens in between: Ctrl-C is seen, and progress told."""
+
+    def __init__(self, problem: Problem) -> None:
+        self._progress = problem.progress
+        self._most = max(1, UNINTERRUPTED // max(1, problem.x0.size))
+
+    def limit(self, left: int) -> int:
+        """Steps to take at once where so many are left."""
+        return min(max(left, 1), self._most)
+
+    def goes_on(self, integrator: Any, outcome: Any, left: int) -> bool:
+        """Whether a run has stopped for a break alone."""
+        if self._progress is not None:
+            self._progress(integrator.time)
+        return left > 0 and outcome.name == "step_limit"
+
+
 class _GridRecorder:
     """Fills rows of output while the integrator passes their times; `stops` are those at which it stops in between."""
 
-    def __init__(self, rows: Array, times: Array, end: float, chunk: int, stops: list[float]) -> None:
+    def __init__(self, problem: Problem, rows: Array, times: Array, end: float, chunk: int, stops: list[float]) -> None:
+        self._breaks = _Breaks(problem)
         self._rows, self._chunk, self._stops = rows, chunk, stops
         # The grid always ends with the piece, because the next piece starts from there.
         self._grid = times if times.size and times[-1] == end else np.append(times, end)
@@ -278,7 +300,7 @@ class _GridRecorder:
             extra = int(pending[0] != now)  # heyoka's grid starts at the present time
             outcome, _, _, steps, _, found = integrator.propagate_grid(
                 np.append(now, pending) if extra else pending,
-                max_steps=max(limit - taken, 1),
+                max_steps=self._breaks.limit(limit - taken),
                 max_delta_t=longest,
                 callback=watch,
             )
@@ -287,6 +309,8 @@ class _GridRecorder:
             self._rows[self._filled : self._filled + len(kept)] = kept
             self._filled += len(found)
             arrived = self._filled == self._grid.size
+            if len(found) < len(pending) and self._breaks.goes_on(integrator, outcome, limit - taken):
+                continue
             if arrived or len(found) < len(pending) or taken >= limit:
                 return outcome, _outcome(outcome, watch, arrived=arrived), taken
             self._stops.append(integrator.time)
@@ -295,7 +319,8 @@ class _GridRecorder:
 class _SegmentRecorder:
     """Keeps heyoka's continuous output of the spans that it passes, with the stops of an earlier run in between."""
 
-    def __init__(self, end: float, stops: Sequence[float] = ()) -> None:
+    def __init__(self, problem: Problem, end: float, stops: Sequence[float] = ()) -> None:
+        self._breaks = _Breaks(problem)
         self._end, self._stops = end, stops
         self.segments: list[Any] = []
 
@@ -304,12 +329,14 @@ class _SegmentRecorder:
         while True:
             stop = min((stop for stop in self._stops if stop > integrator.time), default=self._end)
             outcome, _, _, steps, segment, _ = integrator.propagate_until(
-                stop, max_steps=max(limit - taken, 1), max_delta_t=longest, callback=watch, c_output=True
+                stop, max_steps=self._breaks.limit(limit - taken), max_delta_t=longest, callback=watch, c_output=True
             )
             taken += steps
             if segment is not None:
                 self.segments.append(segment)
             arrived = integrator.time == self._end
+            if integrator.time != stop and self._breaks.goes_on(integrator, outcome, limit - taken):
+                continue
             if arrived or integrator.time != stop or taken >= limit:
                 return outcome, _outcome(outcome, watch, arrived=arrived), taken
 
@@ -338,7 +365,7 @@ class _Replay:
         run = _Run(self._problem)
         recorders = []
         for piece in pieces(self._problem):
-            recorder = _SegmentRecorder(piece.end, [stop for stop in self._stops if stop < piece.end])
+            recorder = _SegmentRecorder(self._problem, piece.end, [stop for stop in self._stops if stop < piece.end])
             run.piece(piece, recorder)
             recorders.append(recorder)
             if run.met is not None:

@@ -202,13 +202,14 @@ def _near(problem: Timed, explain: Explain | None, t: float, x: Array) -> tuple[
 
 
 class Pace:
-    """Tells a run that goes on, in ever shorter steps, from one that has stalled.
+    """Tells a run that goes on, in ever shorter steps, from one that has stalled; and whoever asks, how far it is.
 
     Args:
         problem: what is being solved.
     """
 
     def __init__(self, problem: Timed) -> None:
+        self._progress = problem.progress
         self._span = STALL_STEPS * (problem.t_end - problem.t0)
         self._time, self._steps = problem.t0, 0
 
@@ -219,6 +220,8 @@ class Pace:
             t: end of the step, s.
             rests: whether the motion rests at a switch of a law.
         """
+        if self._progress is not None:
+            self._progress(t)
         self._steps += 1
         if self._steps < STALL_STEPS:
             return None

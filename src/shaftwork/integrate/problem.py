@@ -127,6 +127,7 @@ class Problem:
             in words; None where all have one. It is asked for messages.
         rough: the same of a law of which any part has no value or no slope, be it in a branch that does not hold.
         max_steps: an engine gives up, with a reason, after this many steps.
+        progress: told again and again the time in s that an engine has reached, or None. What it raises ends the run.
         found: what an engine has found out about the equations, for its next run with them.
     """
 
@@ -151,6 +152,7 @@ class Problem:
     explain: Explain | None = None
     rough: Explain | None = None
     max_steps: int = 10_000_000
+    progress: Callable[[float], None] | None = None
     found: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property
@@ -168,8 +170,8 @@ class DaeProblem:
         x0: (n,) start values; the algebraic ones are a first guess.
         derivative0: (n,) first guess of dx/dt at the start.
         algebraic: indices of the unknowns whose derivative does not appear.
-        t0, t_end, names, atol, rtol, breakpoints, jump, sides, switches, guards, t_eval, explain, max_steps: as in
-            `Problem`.
+        t0, t_end, names, atol, rtol, breakpoints, jump, sides, switches, guards, t_eval, explain, max_steps, progress:
+            as in `Problem`.
     """
 
     residual: Callable[[float, Array, Array], Array]
@@ -189,6 +191,7 @@ class DaeProblem:
     t_eval: Array | None = None
     explain: Explain | None = None
     max_steps: int = 10_000_000
+    progress: Callable[[float], None] | None = None
 
 
 AnyProblem = TypeVar("AnyProblem", bound=Problem | DaeProblem)
@@ -240,6 +243,11 @@ class Timed(Protocol):
     @property
     def explain(self) -> Explain | None:
         """Finds laws without a value."""
+        ...
+
+    @property
+    def progress(self) -> Callable[[float], None] | None:
+        """Told the time that is reached, s."""
         ...
 
 

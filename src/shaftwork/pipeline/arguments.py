@@ -47,16 +47,6 @@ class Demand:
     progress: Callable[[float], None] | None
 
 
-def watched_by(rhs: Callable[[float, Array], Array], progress: Callable[[float], None]) -> Callable[..., Array]:
-    """A right-hand side that tells somebody the time at which it is asked."""
-
-    def watched(t: float, x: Array) -> Array:
-        progress(t)
-        return rhs(t, x)
-
-    return watched
-
-
 def time_span(t_start: Any, t_end: Any) -> tuple[float, float]:
     """Start and end of a run in s.
 

@@ -109,6 +109,7 @@ def solve_loops(bound: BoundArrays, problem: Problem) -> tuple[Trajectory, str, 
             t_eval=problem.t_eval,
             explain=None if explain is None else lambda t, z: explain(t, z[:, :states]),
             max_steps=problem.max_steps,
+            progress=problem.progress,
         )
     )
     loops.start_from(start)

@@ -31,7 +31,6 @@ from shaftwork.pipeline.arguments import (
     refuse_unrecorded,
     relative_tolerance,
     time_span,
-    watched_by,
 )
 from shaftwork.pipeline.implicit import at_rest, solve_loops
 from shaftwork.pipeline.overview import model_overview
@@ -109,8 +108,7 @@ class Model(CompiledModel):
             parameters: values that differ from the network's, "part.parameter" to value in SI; nothing is recompiled
                 unless a value changes the structure (a damping that was exactly zero).
             max_steps: give up after this many steps.
-            progress: called again and again with the time that the engine has reached, s; not by the
-                compiled engine, the exact one and that of waves.
+            progress: called again and again with the time that the engine has reached, s; what it raises ends the run.
             angles: parts whose angle is to be read; what is recorded was chosen in `Network.compile`.
 
         Raises:
@@ -269,10 +267,10 @@ class Model(CompiledModel):
         return chosen
 
     def _problem(self, prepared: Prepared, x0: Array, demand: Demand) -> Problem:
-        span, rtol, atol, progress = demand.span, demand.rtol, demand.atol, demand.progress
+        span, rtol, atol = demand.span, demand.rtol, demand.atol
         instants = self.switching.timeline(prepared.p, *span)
         return Problem(
-            rhs=prepared.rhs if progress is None else watched_by(prepared.rhs, progress),
+            rhs=prepared.rhs,
             jacobian=prepared.jacobian,
             x0=x0,
             t0=span[0],
@@ -293,6 +291,7 @@ class Model(CompiledModel):
             explain=lambda t, x: without_value(prepared.bound, t, x),
             rough=lambda t, x: rough(prepared.bound, t, x),
             max_steps=demand.max_steps,
+            progress=demand.progress,
         )
 
     def prepare(self, p: Array) -> Prepared:

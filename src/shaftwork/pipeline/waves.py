@@ -186,6 +186,7 @@ def solve_waves(
             t_eval=problem.t_eval,
             explain=problem.explain,
             max_steps=problem.max_steps,
+            progress=problem.progress,
             linear=linear,
             steady=steady,
             speeds0=None if start is None else start.speeds,

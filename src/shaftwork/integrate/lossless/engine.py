@@ -160,6 +160,8 @@ class _March:
         self._follow(-1)
         self._states.append(np.column_stack([self._x, x]))
         self._x = end
+        if self._problem.progress is not None:
+            self._problem.progress(start + length)
 
     def _follow(self, number: int) -> None:
         """Note when the kinks at the start of a panel arrive."""

@@ -18,7 +18,7 @@ from shaftwork.codegen.timeline import Timeline
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import Problem, SeriesError, Trajectory
-from shaftwork.pipeline.arguments import Demand, absolute_tolerances, watched_by
+from shaftwork.pipeline.arguments import Demand, absolute_tolerances
 from shaftwork.pipeline.implicit import at_rest
 from shaftwork.pipeline.phases.assemblies import Assembly
 from shaftwork.pipeline.phases.moments import Change, Moment
@@ -188,7 +188,7 @@ class Run:
             t_eval=self._outputs(t, end),
             max_steps=demand.max_steps - self.steps,
             react=passing,
-            rhs=problem.rhs if demand.progress is None else watched_by(problem.rhs, demand.progress),
+            progress=demand.progress,
         )
 
     def _span(self, t: float, moment: Moment) -> tuple[float, Moment]:
