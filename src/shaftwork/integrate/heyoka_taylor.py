@@ -271,11 +271,11 @@ class _Breaks:
         """Steps to take at once where so many are left."""
         return min(max(left, 1), self._most)
 
-    def goes_on(self, integrator: Any, outcome: Any, left: int) -> bool:
-        """Whether a run has stopped for a break alone."""
+    def goes_on(self, integrator: Any, outcome: Any, steps: int, left: int) -> bool:
+        """Whether a run has stopped for a break alone: it stands still where an event has no value."""
         if self._progress is not None:
             self._progress(integrator.time)
-        return left > 0 and outcome.name == "step_limit"
+        return steps > 0 and left > 0 and outcome.name == "step_limit"
 
 
 class _GridRecorder:
@@ -309,7 +309,7 @@ class _GridRecorder:
             self._rows[self._filled : self._filled + len(kept)] = kept
             self._filled += len(found)
             arrived = self._filled == self._grid.size
-            if len(found) < len(pending) and self._breaks.goes_on(integrator, outcome, limit - taken):
+            if len(found) < len(pending) and self._breaks.goes_on(integrator, outcome, steps, limit - taken):
                 continue
             if arrived or len(found) < len(pending) or taken >= limit:
                 return outcome, _outcome(outcome, watch, arrived=arrived), taken
@@ -335,7 +335,7 @@ class _SegmentRecorder:
             if segment is not None:
                 self.segments.append(segment)
             arrived = integrator.time == self._end
-            if integrator.time != stop and self._breaks.goes_on(integrator, outcome, limit - taken):
+            if integrator.time != stop and self._breaks.goes_on(integrator, outcome, steps, limit - taken):
                 continue
             if arrived or integrator.time != stop or taken >= limit:
                 return outcome, _outcome(outcome, watch, arrived=arrived), taken
