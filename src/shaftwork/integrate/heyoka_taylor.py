@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from shaftwork.core.errors import MissingExtraError, SimulationError
+from shaftwork.integrate.breaks import Breaks
 from shaftwork.integrate.pieces import Piece, PiecewiseDense, both_sides, failure, pieces, start_of_piece
 from shaftwork.integrate.problem import Array, Problem, SeriesError, Trajectory
 from shaftwork.integrate.switches import Watch, keeps_sides, settle
@@ -29,8 +30,6 @@ Advance = Callable[[Any, Watch | None, int, float], tuple[Any, str, int]]
 GUARD = "guard"
 # Output times that heyoka is given at once where a guard is likely to be met before the last of them.
 CHUNK = 32
-# Steps times states, some 50 ms, after which Python notices Ctrl-C and tells how far the run is.
-UNINTERRUPTED = 250_000
 # What is the least that rounding moves a guard of size 1.
 ROUNDING = 8 * float(np.finfo(float).eps)
 # heyoka's outcomes proper are below this number; those above are events that have ended a run.
@@ -260,29 +259,11 @@ def _on_grid(problem: Problem, times: Array) -> Trajectory:
     return Trajectory(times[:done], states[:done], _Replay(problem, stops), {"steps": run.steps}, met=run.met, end=end)
 
 
-class _Breaks:
-    """How many steps heyoka takes at once, and what happens in between: Ctrl-C is seen, and progress told."""
-
-    def __init__(self, problem: Problem) -> None:
-        self._progress = problem.progress
-        self._most = max(1, UNINTERRUPTED // max(1, problem.x0.size))
-
-    def limit(self, left: int) -> int:
-        """Steps to take at once where so many are left."""
-        return min(max(left, 1), self._most)
-
-    def goes_on(self, integrator: Any, outcome: Any, steps: int, left: int) -> bool:
-        """Whether a run has stopped for a break alone: it stands still where an event has no value."""
-        if self._progress is not None:
-            self._progress(integrator.time)
-        return steps > 0 and left > 0 and outcome.name == "step_limit"
-
-
 class _GridRecorder:
     """Fills rows of output while the integrator passes their times; `stops` are those at which it stops in between."""
 
     def __init__(self, problem: Problem, rows: Array, times: Array, end: float, chunk: int, stops: list[float]) -> None:
-        self._breaks = _Breaks(problem)
+        self._breaks = Breaks(problem)
         self._rows, self._chunk, self._stops = rows, chunk, stops
         # The grid always ends with the piece, because the next piece starts from there.
         self._grid = times if times.size and times[-1] == end else np.append(times, end)
@@ -320,7 +301,7 @@ class _SegmentRecorder:
     """Keeps heyoka's continuous output of the spans that it passes, with the stops of an earlier run in between."""
 
     def __init__(self, problem: Problem, end: float, stops: Sequence[float] = ()) -> None:
-        self._breaks = _Breaks(problem)
+        self._breaks = Breaks(problem)
         self._end, self._stops = end, stops
         self.segments: list[Any] = []
 
