@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 from functools import cache
+from itertools import pairwise
+from pathlib import Path
 
 import pytest
 import sympy
 
 import shaftwork as sw
+from shaftwork.cli import main
 
 
 @cache
@@ -117,3 +122,85 @@ def test_a_curve_of_several_pieces_that_is_switched_is_one_list_of_cases() -> No
     assert sol["motor.tau"].tolist()[::3] == [0.0, 0.0]
     assert sol["motor.tau"][1] == pytest.approx(7.0, rel=1e-14)
     assert sol["motor.tau"][2] > 0
+
+
+def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """What `shaftwork latex` prints."""
+    assert main(["latex", *arguments]) == 0
+    return capsys.readouterr().out
+
+
+def test_a_document_of_a_scene_has_each_of_its_phases_and_compiles(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    text = printed(capsys, "six-phases", "--document")
+    said = [line for before, line in pairwise(text.splitlines()) if before == r"\section{Phase}"]
+    assert [sorted(each.split(", ")) for each in said] == [
+        sorted(each.split(", ")) for each in sw.scenes.SCENES["six-phases"].phases
+    ]
+    assert text.count(r"\begin{document}") == text.count(r"\end{document}") == 1
+    if shutil.which("pdflatex"):
+        (tmp_path / "report.tex").write_text(text, encoding="utf-8")
+        command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "report.tex"]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, encoding="latin-1", check=False)
+        assert done.returncode == 0, done.stdout[-2000:]
+
+
+def test_without_a_phase_the_command_prints_the_one_in_which_the_motion_begins(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    begins = sw.scenes.bldc_shaft().simulate(1e-6).phases[0].name
+    assert sw.scenes.bldc_shaft().start_phase() == begins
+    for options in ((), ("--document",)):
+        assert begins in printed(capsys, "bldc-shaft", *options)
+    assert sw.scenes.shaft_chain(3).start_phase() == ""
+
+
+@pytest.mark.parametrize(
+    ("form", "title"),
+    [("kirchhoff", "Kirchhoff's equations"), ("state", "State form"), ("second-order", "Second-order form")],
+)
+def test_a_document_is_of_the_form_that_is_asked_for(form: str, title: str, capsys: pytest.CaptureFixture[str]) -> None:
+    text = printed(capsys, "crane-start", "--document", "--form", form)
+    titles = [line for line in text.splitlines() if line.startswith(r"\section{")]
+    assert titles == [r"\section{Phase}", rf"\section{{{title}}}", r"\section{Nomenclature}", *titles[3:]]
+    assert titles[3:] in ([], [r"\section{Remarks}"])
+    with pytest.raises(sw.ShaftworkError, match="no form 'newton'"):
+        gapped().equations().document("newton")  # type: ignore[arg-type]
+
+
+def test_the_kirchhoff_form_says_whose_integral_the_twist_of_a_gap_is() -> None:
+    net = sw.Network("gapped")
+    net.add(sw.Inertia("J1", J=2.0, symbol="1"), "a")
+    net.add(sw.Backlash("gap", gap=0.02, c=100.0, symbol="g"), "a", "b")
+    net.add(sw.Inertia("J2", J=5.0, symbol="2"), "b")
+    equations = net.equations(phase="gap in contact")
+    rate = r"\frac{d \varphi_{g}}{d t} &= \omega_{1} - \omega_{2}"
+    assert rate in equations.latex("kirchhoff")
+    assert equations.latex().count(rate) == 1  # below, among the states
+    assert rate in equations.document("kirchhoff")
+
+
+def switched(**motor: float) -> sw.Network:
+    """A motor that is off from 6.5 s on, beside a brake that is on from then on."""
+    net = sw.Network("switched")
+    net.add(sw.motors["KBF-90 LA 2"].cage("motor", symbol="M", t_off=6.5, **motor), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.Brake("brake", tau=20.0, t_on=6.5), "a")
+    return net
+
+
+def test_a_motor_that_is_off_in_a_phase_is_printed_without_torque() -> None:
+    off = switched().equations(phase="brake slipping forward").latex()
+    assert r"\tau_{M} &= 0" in off
+    assert r"\begin{cases}" not in off
+    assert r"t_{\mathrm{off},M}" not in off
+    on = switched().equations(phase="brake released").latex()
+    assert on.count(r"\text{for}") == 2  # the pieces of the curve
+    assert r"t_{\mathrm{off},M}" not in on
+
+
+def test_a_motor_that_is_switched_within_a_phase_keeps_its_cases_of_the_time() -> None:
+    net = switched(t_on=1.0)
+    assert r"t_{\mathrm{on},M}" in net.equations(phase="brake released").latex()
+    assert r"t_{\mathrm{off},M}" not in net.equations(phase="brake released").latex()

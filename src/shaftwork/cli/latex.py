@@ -23,16 +23,19 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace, say: Say) -> Data:
-    """The equations, or those of one phase, or of each phase that the source of a scene has equations for."""
+    """The equations of a phase: of those that the source of a scene has, or of the one in which the motion begins."""
+    from shaftwork.equations.report import joined
+
     net, scene = load(options)
-    if options.phase:
-        say(_typeset(net.equations(phase=options.phase), options))
-    elif options.document or not (scene and scene.phases):
-        say(_typeset(net.equations(), options))
-    else:
-        for phase in scene.phases:
+    phases = (options.phase,) if options.phase else (scene.phases if scene else ()) or (net.start_phase(),)
+    texts = [_typeset(net.equations(phase=phase or None), options) for phase in phases]
+    if options.document:
+        say(joined(texts))
+        return {}
+    for phase, text in zip(phases, texts, strict=True):
+        if len(phases) > 1:
             say(rf"\section*{{{phase}}}")
-            say(_typeset(net.equations(phase=phase), options))
+        say(text)
     return {}
 
 
@@ -42,9 +45,8 @@ def _typeset(equations: Equations, options: Namespace) -> str:
 
         made = lagrangian(equations)
         return made.document(values=options.values) if options.document else made.latex(values=options.values)
-    if options.document:
-        return equations.document(values=options.values)
-    return equations.latex(form=options.form, values=options.values)
+    typeset = equations.document if options.document else equations.latex
+    return typeset(options.form, values=options.values)
 
 
 COMMAND = Command("latex", "print the equations as LaTeX", run, arguments)

@@ -56,8 +56,12 @@ class Blocks:
     equations: Equations
     values: bool
 
-    def kirchhoff(self) -> Iterator[Block]:
-        """Balances, loops, couplings and laws."""
+    def kirchhoff(self, *, twists: bool = True) -> Iterator[Block]:
+        """Balances, loops, couplings and laws.
+
+        Args:
+            twists: print whose integrals the angles in laws are; not needed above the state form, which says it.
+        """
         equations = self.equations
         domains = dict.fromkeys(equations.form.graph.domains)
         balanced = " and ".join(", ".join(BALANCES[domain] for domain in domains).rsplit(", ", 1))
@@ -65,14 +69,19 @@ class Blocks:
         balances = (summed.balance() for summed in self.sums)
         yield Block(f"Balance of {balanced} at the nodes", (*self._lines(nodes), *balances))
         loops = [row for row in equations.loops if equations.assembly.ends(row.link)[0] not in self.twists]
-        twists = (line for summed in self.sums for line in summed.loops())
-        yield Block("Speeds around the loops", (*self._lines(loops), *twists))
+        rates = (line for summed in self.sums for line in summed.loops())
+        yield Block("Speeds around the loops", (*self._lines(loops), *rates))
         around = {_to_rounding(row.expression) for row in equations.loops}  # only asked for membership
         said = [(_to_rounding(row.expression), _to_rounding(-row.expression)) for row in equations.couplings]
         couplings = [row for row, both in zip(equations.couplings, said, strict=True) if around.isdisjoint(both)]
         lossy = any(branch.template.through for branch in equations.form.graph.branches)
         yield Block("Couplings" if lossy else "Ideal couplings", tuple(self._lines(couplings)))
-        yield Block("Laws of the parts", tuple(self._laws()))
+        integrals = [row for row in equations.states if row.name in self._integrals] if twists else []
+        yield Block("Laws of the parts", (*self._laws(), *self._lines(integrals)))
+
+    @cached_property
+    def _integrals(self) -> frozenset[str]:
+        return frozenset(state.name for state in self.equations.form.states if state.kind == "integral")
 
     def derived(self) -> Block:
         """The definitions of the letters that stand for several parameters; nothing where numbers are printed."""

@@ -298,11 +298,16 @@ class Equations:
 
     __repr__ = __str__
 
-    def document(self, *, values: bool = False) -> str:
-        """A complete LaTeX document: all forms, the states with their units, and the nomenclature with the values."""
+    def document(self, form: Form | None = None, *, values: bool = False) -> str:
+        """A complete LaTeX document: the forms, the states with their units, and the nomenclature with the values.
+
+        Args:
+            form: as in `latex`; by default all.
+            values: print the parameters' values instead of their symbols.
+        """
         from shaftwork.equations.report import document
 
-        return document(self, values=values)
+        return document(self, form, values=values)
 
     def _repr_latex_(self) -> str:
         from shaftwork.equations.report import notebook

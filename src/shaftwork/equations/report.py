@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from shaftwork.core.errors import CompileError, ShaftworkError
@@ -25,6 +25,7 @@ PREAMBLE = r"""\documentclass[11pt,a4paper]{article}
 \usepackage{booktabs}
 \usepackage{longtable}
 \allowdisplaybreaks"""
+FORMS = "'kirchhoff', 'state' or 'second-order'"
 BEGIN = r"""\date{}
 \begin{document}
 \sloppy
@@ -77,9 +78,9 @@ def blocks_of(equations: Equations, form: Form | None, *, values: bool) -> tuple
         case "second-order":
             made = tuple(blocks.second_order())
         case None:
-            made = (*blocks.kirchhoff(), *blocks.state(laws=False))
+            made = (*blocks.kirchhoff(twists=False), *blocks.state(laws=False))
         case _:
-            raise ShaftworkError(f"There is no form {form!r}; take 'kirchhoff', 'state' or 'second-order'.")
+            raise ShaftworkError(f"There is no form {form!r}; take {FORMS}.")
     return tuple(block for block in (*made, blocks.derived()) if block.lines)
 
 
@@ -89,18 +90,36 @@ def _content(block: Block) -> str:
     return f"{remark}\\begin{{align*}}\n{rows}\n\\end{{align*}}"
 
 
-def document(equations: Equations, *, values: bool = False) -> str:
-    """A LaTeX document that compiles as it is."""
+def document(equations: Equations, form: Form | None = None, *, values: bool = False) -> str:
+    """A LaTeX document that compiles as it is, of one form or of all."""
     blocks = Blocks(equations, values)
     states = {state.name: "state" for state in equations.form.states}
     found = {symbol.name for row in equations.rows for symbol in row.left.free_symbols | row.right.free_symbols}
-    sections = {
-        "Kirchhoff's equations": section((*blocks.kirchhoff(), blocks.derived())),
-        "State form": section(blocks.state(laws=False)),
-        "Second-order form": _second_order(blocks),
-        "Nomenclature": nomenclature(equations, found | states.keys(), states),
+    forms: dict[str, tuple[str, Callable[[], str]]] = {
+        "kirchhoff": (
+            "Kirchhoff's equations",
+            lambda: section((*blocks.kirchhoff(twists=form is not None), blocks.derived())),
+        ),
+        "state": ("State form", lambda: section(blocks.state(laws=form is not None))),
+        "second-order": ("Second-order form", lambda: _second_order(blocks)),
     }
+    if form not in (None, *forms):
+        raise ShaftworkError(f"There is no form {form!r}; take {FORMS}.")
+    sections = {title: text() for name, (title, text) in forms.items() if form in (None, name)}
+    sections["Nomenclature"] = nomenclature(equations, found | states.keys(), states)
     return in_sections(equations, sections)
+
+
+def joined(documents: Sequence[str]) -> str:
+    """One document of several, such as of all phases of a motion, each from a new page on.
+
+    Args:
+        documents: complete ones of the same network, at least one.
+    """
+    end = "\\end{document}\n"
+    head, begin, _ = documents[0].partition(BEGIN)
+    bodies = "\\clearpage".join(text.partition(BEGIN)[2].removesuffix(end) for text in documents)
+    return f"{head}{begin}{bodies}{end}"
 
 
 def in_sections(equations: Equations, sections: Mapping[str, str]) -> str:

@@ -23,7 +23,8 @@ from shaftwork.network.wording import listed
 from shaftwork.pipeline.beside_waves import warn_of_rounding, waving, with_one_law
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.model import PhasedModel
-from shaftwork.pipeline.phases.names import in_phase, whole_name, words_of
+from shaftwork.pipeline.phases.names import in_phase, meant, whole_name, words_of
+from shaftwork.pipeline.phases.spans import during, span_of
 from shaftwork.reduction.diagnosis import diagnose
 from shaftwork.reduction.form import StateForm, state_form
 from shaftwork.results.solution import Solution
@@ -105,6 +106,16 @@ class Network(NetworkBuilder):
             )
 
         return _InPhase(netlist, form)("" if phase is None else phase)
+
+    def start_phase(self) -> str:
+        """The phase in which a motion from rest begins, "gap open, load stuck"; empty where no part changes its mode.
+
+        Raises:
+            NetworkError: the network cannot be assembled; lists every reason.
+            SimulationError: no modes go together at the start.
+        """
+        model = self.compile()
+        return model.start_phase() if isinstance(model, PhasedModel) else ""
 
     def lagrangian(self, *, expand: bool = False, phase: str | NamedPhase | None = None) -> Lagrangian:
         """Energies, generalised coordinates and forces, and Lagrange's equations, with their proof by Kirchhoff's.
@@ -329,8 +340,15 @@ class _InPhase:
 
     def __call__(self, phase: str | NamedPhase) -> Equations:
         name = words_of(phase)
-        form = _sound(in_phase(self.netlist, self.form.graph, name)) if name else self.form
+        form = _in_phase(self.netlist, self.form.graph, name) if name else self.form
         return dataclasses.replace(kirchhoff(form), phase=whole_name(self.form.graph, name), in_phase=self)
+
+
+def _in_phase(netlist: Netlist, graph: CircuitGraph, phase: str) -> StateForm:
+    """The state form in a phase, with the laws that hold at its times."""
+    form = _sound(in_phase(netlist, graph, phase))
+    then = during(form.graph, span_of(graph, meant(graph, phase)))
+    return form if then is form.graph else state_form(then)
 
 
 @contextmanager

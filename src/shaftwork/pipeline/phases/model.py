@@ -129,6 +129,15 @@ class PhasedModel(Model):
         run.march(initial)
         return solution(run, self.name)
 
+    def start_phase(self) -> str:
+        """The phase in which a motion from rest begins, "gap open, brake locked".
+
+        Raises:
+            SimulationError: no modes go together there.
+        """
+        demand = Demand((0.0, 1.0), 1e-8, None, None, "auto", 1, None)
+        return self._words(Run(self.phases, {}, demand).begin(None))
+
     def _choice(self, demand: Demand) -> tuple[str, str]:
         return Run(self.phases, {}, demand).choose()
 

@@ -60,6 +60,18 @@ def modes_in(graph: CircuitGraph, phase: str) -> tuple[Mode, ...]:
     return tuple(found.get((part.name, modes.label), modes.options[0]) for _, part, modes in _elements(graph))
 
 
+def meant(graph: CircuitGraph, phase: str) -> Iterator[tuple[GraphPart, tuple[Mode, ...]]]:
+    """Of each element its part, and the modes that say what the phase says of it.
+
+    Raises:
+        ParameterError: no part or mode has this name.
+    """
+    found = _modes_in(graph, phase)
+    for _, part, modes in _elements(graph):
+        words = found.get((part.name, modes.label), modes.options[0]).words
+        yield part, tuple(mode for mode in modes.options if mode.words == words)
+
+
 def _choice(mode: Mode) -> Choice:
     return Choice(mode.form, mode.value)
 

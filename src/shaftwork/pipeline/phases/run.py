@@ -97,11 +97,11 @@ class Run:
     def march(self, initial: Mapping[str, float] | None) -> None:
         """Go through all phases from the start values."""
         t, end = self.demand.span
-        moment = self._begin(initial)
+        moment = self.begin(initial)
         while t < end:
             t, moment = self._span(t, moment)
 
-    def _begin(self, initial: Mapping[str, float] | None) -> Moment:
+    def begin(self, initial: Mapping[str, float] | None) -> Moment:
         """The states and modes at the start."""
         start, begins = self.demand.span[0], self._known.begins
         if initial is not None or not begins:
@@ -122,7 +122,7 @@ class Run:
 
     def choose(self) -> tuple[str, str]:
         """The engine for the first phase, and why."""
-        moment = self._begin(None)
+        moment = self.begin(None)
         problem = self._problem(self.demand.span[0], moment)
         return self._engine(moment, lambda: problem) if problem.x0.size else ("exact", STILL)
 
