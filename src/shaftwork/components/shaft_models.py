@@ -19,7 +19,7 @@ from shaftwork.components.shaft_meshes import (
     spectral,
 )
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.parameters import whole
+from shaftwork.core.parameters import numbers_in_si, whole
 
 MOST_ELEMENTS = 100_000
 """Elements of a model; more is a typing error."""
@@ -242,7 +242,8 @@ class Auto(ShaftModel):
 
     def __post_init__(self) -> None:
         for name, least, most in (("f_max", 0.0, 1e12), ("tolerance", 1e-12, 0.1)):
-            value = getattr(self, name)
+            value = numbers_in_si(f"Auto: {name}", getattr(self, name), "Hz" if name == "f_max" else "1")
+            object.__setattr__(self, name, value)
             if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value <= most:
                 raise ParameterError(f"Auto: {name} = {value!r} must be a number from {least:g} to {most:g}.")
 

@@ -106,7 +106,7 @@ class Parameter:
             return None, None
         if self.record is not None:
             return self._from_text(value)
-        if hasattr(value, "dimensionality") and hasattr(value, "to"):
+        if is_quantity(value):
             return self._from_quantity(value)
         if value is None or isinstance(value, (bool, str, bytes, complex)):
             return value, f"must be a number{' or a law' if self.law else ''}, not {type(value).__name__} {value!r}"
@@ -129,16 +129,57 @@ class Parameter:
             return value, f"is none: {str(error).rstrip('.')}"
 
     def _from_quantity(self, value: Any) -> tuple[Any, str | None]:
-        """Units with angles need care: to a library of units a revolution is 2 pi and a radian is 1, pure numbers."""
-        counts_angle = any(word in str(value.units) for word in ANGLES)
-        if self.unit == "rad/s" and not counts_angle and value.check("1/[time]"):
-            return value, f"is given in '{value.units}', which may count revolutions or radians; give rpm or rad/s"
-        target = {"1": "dimensionless", "1/min": "revolution / minute" if counts_angle else "1 / minute"}
-        try:
-            number = float(value.to(target.get(self.unit, self.unit)).magnitude)
-        except Exception as error:  # noqa: BLE001 (pint has its own classes, which must not be imported here)
-            return value, f"is given in '{value.units}', but needs {self.unit} ({error})"
-        return number, self.objection(number)
+        magnitude, objection = converted(value, self.unit)
+        if objection is not None:
+            return value, objection
+        if getattr(magnitude, "ndim", 0):
+            return value, "must be one number, not several"
+        return float(magnitude), self.objection(float(magnitude))
+
+
+def is_quantity(value: Any) -> bool:
+    """Whether a value has units."""
+    return hasattr(value, "dimensionality") and hasattr(value, "to")
+
+
+def converted(value: Any, unit: str) -> tuple[Any, str | None]:
+    """The number, or array of numbers, of a quantity in a unit; and the objection to its units, or None.
+
+    Units with angles need care: to a library of units a revolution is 2 pi and a radian is 1, pure numbers. So a
+    speed needs a unit that says which it counts, and a frequency counts revolutions, whatever it is given in.
+    """
+    counts_angle = any(word in str(value.units) for word in ANGLES)
+    if "rad/s" in unit and not counts_angle and (value.check("1/[time]") or "hertz" in str(value.units)):
+        return value, f"is given in '{value.units}', which may count revolutions or radians; give rpm or rad/s"
+    turns = {"1/min": "revolution / minute", "Hz": "revolution / second", "1/s": "revolution / second"}
+    plain = {"1": "dimensionless", "1/min": "1 / minute", "Hz": "1 / second"}
+    target = turns.get(unit) if counts_angle else None
+    try:
+        return value.to(target or plain.get(unit, unit)).magnitude, None
+    except Exception as error:  # noqa: BLE001 (pint has its own classes, which must not be imported here)
+        return value, f"is given in '{value.units}', but needs {'a pure number' if unit == '1' else unit} ({error})"
+
+
+def numbers_in_si(name: str, values: Any, unit: str = "1") -> Any:
+    """Numbers that a user gave, in SI: of a quantity, of an array of one, or of a list of quantities; else as they are.
+
+    Args:
+        name: of the argument, for the message.
+        values: the numbers or quantities.
+        unit: SI unit.
+
+    Raises:
+        ParameterError: the units are wrong.
+    """
+    if is_quantity(values):
+        numbers, objection = converted(values, unit)
+        if objection is not None:
+            raise ParameterError(f"{name} {objection}.")
+        return numbers
+    mixed = isinstance(values, list | tuple) or str(getattr(values, "dtype", "")) == "object"
+    if mixed and any(map(is_quantity, values)):
+        return [numbers_in_si(f"{name}[{place}]", value, unit) for place, value in enumerate(values)]
+    return values
 
 
 def in_si(name: str, value: Any, unit: str = "1", **bounds: Any) -> float:

@@ -12,7 +12,7 @@ from shaftwork.codegen.elements import Array
 from shaftwork.components.base import Component
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.parameters import in_si
+from shaftwork.core.parameters import in_si, numbers_in_si
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.netlist import Netlist
 from shaftwork.reduction.form import StateForm
@@ -80,8 +80,9 @@ def absolute_tolerances(atol: Any, size: int) -> Array:
     Raises:
         ParameterError: it cannot be; says what would be right.
     """
+    plain = numbers_in_si("atol", atol)
     try:
-        values = np.broadcast_to(np.asarray(atol, dtype=float), (size,))
+        values = np.broadcast_to(np.asarray(plain, dtype=float), (size,))
     except (TypeError, ValueError):
         raise ParameterError(f"atol = {atol!r} must be one number, or {size} numbers, one for each state.") from None
     if not (np.isfinite(values).all() and (values > 0).all()):
@@ -118,8 +119,9 @@ def output_times(t_eval: OutputTimes, start: float, end: float) -> Array | None:
         if not 2 <= count <= MOST_OUTPUTS:
             raise ParameterError(f"t_eval = {count} output times: give at least 2 and at most {MOST_OUTPUTS}.")
         return np.linspace(start, end, count)
+    plain = numbers_in_si("t_eval", t_eval, "s")
     try:
-        times = np.asarray(t_eval, dtype=float)
+        times = np.asarray(plain, dtype=float)
     except (TypeError, ValueError):
         raise ParameterError(f"t_eval = {t_eval!r} must be a list of times, their number, or 'steps'.") from None
     good = times.ndim == 1 and times.size > 0 and bool(np.isfinite(times).all())

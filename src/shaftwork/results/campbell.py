@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from shaftwork.core.errors import MissingExtraError, ParameterError
-from shaftwork.core.parameters import in_si
+from shaftwork.core.parameters import in_si, numbers_in_si
 from shaftwork.results.modes import Modes
 from shaftwork.results.observer import Array
 
@@ -141,8 +141,9 @@ def _about(title: str, found: Sequence[Modes]) -> str:
 
 
 def _ascending(speeds: Any) -> Array:
+    plain = numbers_in_si("speeds", speeds, "rad/s")
     try:
-        given = np.atleast_1d(np.asarray(speeds, dtype=float))
+        given = np.atleast_1d(np.asarray(plain, dtype=float))
     except (TypeError, ValueError):
         given = np.empty(0)
     if (

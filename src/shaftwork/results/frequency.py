@@ -13,6 +13,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from shaftwork.core.errors import MissingExtraError, ParameterError, SignalError
+from shaftwork.core.parameters import numbers_in_si
 from shaftwork.results.observer import Array
 from shaftwork.results.slopes import Complex, Motions, Slopes
 
@@ -107,8 +108,9 @@ def frequencies(f: Any) -> Array:
     Raises:
         ParameterError: they are no positive, finite numbers.
     """
+    plain = numbers_in_si("f", f, "Hz")
     try:
-        given = np.atleast_1d(np.asarray(f, dtype=float))
+        given = np.atleast_1d(np.asarray(plain, dtype=float))
     except (TypeError, ValueError):
         given = np.empty(0)
     if given.ndim != 1 or not given.size:

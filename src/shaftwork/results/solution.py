@@ -12,6 +12,7 @@ import numpy as np
 
 from shaftwork.core.errors import AccuracyWarning, MissingExtraError, SignalError, no_quantity
 from shaftwork.core.notices import warn
+from shaftwork.core.parameters import numbers_in_si
 from shaftwork.core.screen import counted, named, on_one_screen
 from shaftwork.results.energy import EnergyBalance, energy_balance
 from shaftwork.results.extremes import Extreme, Extremes
@@ -158,10 +159,12 @@ class Solution:
 
         Raises:
             SignalError: these are no times, or one lies outside the run.
+            ParameterError: they have the unit of something else.
         """
         first, last = self.steps[0], self.steps[-1]
+        plain = numbers_in_si("t", t, "s")
         try:
-            times = np.atleast_1d(np.asarray(t, dtype=float))
+            times = np.atleast_1d(np.asarray(plain, dtype=float))
         except (TypeError, ValueError):
             times = np.empty(0)
         if times.ndim != 1 or not times.size:

@@ -14,7 +14,7 @@ import numpy as np
 
 from shaftwork.components.motor_catalogue import Nameplate
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.parameters import in_si
+from shaftwork.core.parameters import in_si, numbers_in_si
 from shaftwork.results.observer import Array
 
 OWN = Path(__file__).with_name("motors.csv")
@@ -108,7 +108,7 @@ class CatalogueMotor:
         Args:
             n: (k,) speeds without sign, 1/min.
         """
-        speeds = np.asarray(n, dtype=float)
+        speeds = np.asarray(numbers_in_si("n", n, "1/min"), dtype=float)
         n_k = self.n_sync * (1 - self.nameplate.s_k)
         weakened = self.tau_k * (n_k / np.maximum(speeds, n_k)) ** 2
         return np.where(speeds <= self.fastest * (1 + ROUNDING), weakened, 0.0)
