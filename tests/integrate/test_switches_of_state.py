@@ -193,6 +193,7 @@ RESTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("rest", RESTS)
 def test_a_motion_that_comes_to_rest_on_a_switch_goes_on(rest: str, engine: str) -> None:

@@ -40,6 +40,7 @@ def test_a_stiff_chain_is_solved_by_sundials_below_and_above_a_hundred_states(si
     assert sol[f"J{size - 1}.omega"][-1] == pytest.approx(1000 * 2 * np.pi / 60, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_stop_that_a_large_chain_meets_on_its_way_is_part_of_the_jacobian() -> None:
     """At the start the stop has no slope, so its entries join the sparse pattern only when it is hit."""
     net = chain(101, sw.TorqueSource("m", tau=5.0))
@@ -90,6 +91,7 @@ def test_a_cubic_torque_against_a_cubic_spring_starts_from_rest(engine: str) -> 
 ROUGH = [1 - sympy.sqrt(sw.omega), 1 - sympy.Abs(sw.omega) ** 1.7, sympy.sqrt(sw.t)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tau", ROUGH, ids=str)
 def test_auto_goes_on_with_scipy_where_a_law_has_no_taylor_series(tau: object) -> None:
     sol, reference = body(tau).simulate(1.0), body(tau).simulate(1.0, engine="scipy")
@@ -114,6 +116,7 @@ def test_an_infinite_slope_at_rest_does_not_hold_an_implicit_engine_at_rest(engi
     assert -2 * root - 2 * np.log(1 - root) == pytest.approx(1.0, abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["scipy", "sundials"])
 def test_a_run_that_chatters_ends_with_the_time_and_what_to_do(engine: str) -> None:
     with pytest.raises(sw.SimulationError, match=r"failed at t = 0\.5\d* s.*2000 steps.*smooth transition.*J\.omega"):
@@ -132,6 +135,7 @@ def test_sundials_says_once_why_it_failed(capfd: pytest.CaptureFixture[str]) -> 
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 def test_the_exact_engine_says_that_an_input_is_too_rough() -> None:
     """A root has no slope at zero, so no polynomials resolve it."""
     with pytest.raises(sw.ParameterError, match="polynomials resolve the input"):

@@ -112,6 +112,7 @@ def test_the_reference_shaft_has_its_printed_frequencies_whatever_its_model(
     assert modes.names[0] == "rigid body of Je, line, Jm"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("length", [1e-3, 1e4])
 @pytest.mark.parametrize("J", [(1e-9, 1e3), (1e-4, 1e-9), (1e6, 1e-2), (1e6, 1e3)])
 def test_no_mode_is_lost_at_extreme_ratios(length: float, J: tuple[float, float]) -> None:
@@ -120,6 +121,7 @@ def test_no_mode_is_lost_at_extreme_ratios(length: float, J: tuple[float, float]
     np.testing.assert_allclose(modes.frequencies, wanted, rtol=1e-13)
 
 
+@pytest.mark.slow
 def test_a_stepped_shaft_with_discs_has_the_shapes_of_its_line() -> None:
     sections = ((0.4, 0.03), (1.1, 0.05), (0.7, 0.04))
     discs = (0.02, 0.0, 0.3, 0.08)
@@ -153,6 +155,7 @@ def test_the_damped_shaft_responds_as_its_transfer_matrix() -> None:
         np.testing.assert_allclose(found.values, values[:, 0], rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_bare_free_shaft_is_a_cotangent() -> None:
     """omega_a / tau_a = cot(w T) / (i Z) without anything at its ends, also at 0 and beyond 1000 half waves."""
     net = sw.Network("bare")
@@ -166,6 +169,7 @@ def test_a_bare_free_shaft_is_a_cotangent() -> None:
     np.testing.assert_allclose(net.modes().frequencies * T, np.arange(10) / 2, rtol=1e-14)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("values", [{}, LOSSY])
 def test_meshes_converge_to_the_exact_branches_with_their_equal_frequencies(values: dict[str, float]) -> None:
     exact, mesh = (net.modes(exact=isinstance(model, sw.Lumped), f_max=2500.0) for model, net in (
@@ -181,6 +185,7 @@ def test_meshes_converge_to_the_exact_branches_with_their_equal_frequencies(valu
     assert np.linalg.matrix_rank(amplitudes) <= 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("output", ["c2.tau_b", "c1.3.omega"])
 def test_meshes_converge_to_the_exact_response(output: str) -> None:
     f = np.geomspace(0.5, 2500.0, 100)
@@ -189,6 +194,7 @@ def test_meshes_converge_to_the_exact_response(output: str) -> None:
     np.testing.assert_allclose(exact.values, mesh.frequency_response("motor.tau", output, f).values, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_torques_that_hold_without_motion_are_modes_of_rate_zero() -> None:
     exact, mesh = _held(sw.Wave()).modes(f_max=6000.0), _held(sw.Spectral(28)).modes(f_max=6000.0)
     _assert_equal_rates(exact, mesh)
@@ -202,6 +208,7 @@ def test_torques_that_hold_without_motion_are_modes_of_rate_zero() -> None:
     np.testing.assert_allclose(next(found), next(found), rtol=1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rotor", [True, False])
 def test_laws_enter_by_their_slopes_at_the_operating_point(rotor: bool) -> None:  # noqa: FBT001
     """Without its rotor the motor is at a massless node, where speed and torque of its curve depend on each other."""
@@ -220,6 +227,7 @@ def test_laws_enter_by_their_slopes_at_the_operating_point(rotor: bool) -> None:
         np.testing.assert_allclose(next(responses), next(responses), rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_motion_with_waves_is_a_point() -> None:
     net = _crane(sw.Wave())
     sol = net.simulate(0.4, t_eval=401)
@@ -230,6 +238,7 @@ def test_a_motion_with_waves_is_a_point() -> None:
         net.compile().linearize()
 
 
+@pytest.mark.slow
 def test_an_electrical_supply_and_a_soft_coupling_stand_beside_an_exact_shaft() -> None:
     exact, mesh = _supplied(sw.Lumped(3)), _supplied(sw.Spectral(32))
     _assert_equal_rates(exact.modes(exact=True, f_max=2500.0), mesh.modes(f_max=2500.0))
@@ -254,6 +263,7 @@ def _exact_rate(damping: float, friction: float, start: complex) -> complex:
         return complex(mpmath.findroot(gap, mpmath.mpc(start)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("damping", "friction"), [(1.0, 1e-3), (1e-2, 1.0), (1e-6, 1e3), (100.0, 1.0)])
 def test_rates_of_slight_and_of_overwhelming_losses_agree_with_40_digits(damping: float, friction: float) -> None:
     modes = _train(sw.Lumped(4), (0.1, 0.1), damping=damping, friction=friction).modes(exact=True)
@@ -273,6 +283,7 @@ def test_modes_that_crowd_are_named_with_the_frequency_up_to_which_all_are_known
         _train(sw.Wave()).modes(f_max=1e6)
 
 
+@pytest.mark.slow
 def test_what_the_meshes_lose_is_no_result(monkeypatch: pytest.MonkeyPatch) -> None:
     """The count of the exact modes knows no mesh: with one mode of the mesh left out nothing is returned."""
     net = _train(sw.Wave())
@@ -295,6 +306,7 @@ def _open_ended(d: float, J: float = 0.0, side: float = 0.0) -> sw.Network:
     return net
 
 
+@pytest.mark.slow
 def test_at_a_matched_end_everything_leaves_and_no_mode_is_made_up() -> None:
     """Behind an inertia J the shaft is a damper Z: the one mode is -Z / J. A side branch keeps its own."""
     impedance = SECTION.impedance
@@ -317,6 +329,7 @@ def test_an_end_that_throws_back_a_little_has_the_modes_of_its_echo() -> None:
     np.testing.assert_allclose(modes.rates, (np.log(0.2) + 2j * np.pi * np.arange(4)) / (2 * delay), rtol=1e-11)
 
 
+@pytest.mark.slow
 def test_an_undamped_resonance_that_is_hit_is_infinite() -> None:
     net = _train(sw.Wave())
     response = net.frequency_response("motor.tau", "line.tau_b", [30.0, float(net.modes().frequencies[2])])
@@ -324,6 +337,7 @@ def test_an_undamped_resonance_that_is_hit_is_infinite() -> None:
     assert np.isinf(response.values[1])
 
 
+@pytest.mark.slow
 def test_the_mirrored_train_has_the_same_modes_and_mirrored_shapes() -> None:
     values = {"length": 1.0, "diameter": 0.02, **STEEL, **LOSSY, "model": sw.Lumped(6)}
     modes = []
@@ -338,6 +352,7 @@ def test_the_mirrored_train_has_the_same_modes_and_mirrored_shapes() -> None:
         np.testing.assert_allclose(here, sign * there[:, ::-1], atol=1e-11 * np.abs(here).max())
 
 
+@pytest.mark.slow
 def test_an_interference_diagram_of_waves_meets_the_orders_of_a_fine_mesh() -> None:
     speeds, orders = np.linspace(50.0, 250.0, 5), (1, 2, 12)
 
@@ -371,6 +386,7 @@ _SHAFT = st.tuples(
 )
 
 
+@pytest.mark.slow
 @settings(share_of_examples(0.01), phases=(Phase.generate,))
 @given(st.lists(_SHAFT, min_size=1, max_size=3), st.sampled_from([0.2, 1.0, 3.7]), st.booleans())
 def test_random_trains_are_those_of_a_converged_mesh(shafts: list[Any], ratio: float, branched: bool) -> None:  # noqa: FBT001

@@ -80,6 +80,7 @@ def test_a_simulated_sinusoidal_drive_settles_to_the_amplitude_and_phase(f: floa
     assert fitted / 3.0 == pytest.approx(response.values[0], rel=1e-7)
 
 
+@pytest.mark.slow
 def test_a_small_swing_of_a_nonlinear_drive_is_that_of_its_linearisation() -> None:
     """A motor under load, its load swinging by 0.001 of its size: second order terms are of that size squared."""
 
@@ -160,6 +161,7 @@ def test_a_chain_responds_as_its_transfer_matrices_say(n: int) -> None:
     np.testing.assert_allclose(response.values, wanted, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_chain_of_ten_thousand_states_responds_as_its_transfer_matrices_say() -> None:
     """Both round: the product of 5000 transfer matrices loses some ten digits of sixteen near a resonance."""
     n, f = 5001, np.array([0.05, 3.0, 40.0])

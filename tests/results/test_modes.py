@@ -95,6 +95,7 @@ def test_a_mode_shape_of_the_chain_is_a_cosine() -> None:
     assert shape[np.abs(shape).argmax()] == pytest.approx(1.0, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_the_lowest_modes_of_a_long_chain_are_the_lowest_of_all() -> None:
     """Shift and invert: 1e-10 of the exact frequencies and damping, at 5999 states and losses of a millionth."""
     n, d = 3000, 1e-3
@@ -238,6 +239,7 @@ def test_stiffness_over_twelve_orders_keeps_the_slow_frequency() -> None:
     np.testing.assert_allclose(net.modes().frequencies[:2], [0.0, slow], rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_table_is_the_same_in_every_process() -> None:
     code = (
         "import shaftwork as sw\n"
@@ -284,6 +286,7 @@ def test_the_spectral_shaft_has_the_frequencies_of_the_wave_equation() -> None:
     np.testing.assert_allclose(along[:, [0, -1]].T, [modes.shapes["a.omega"], modes.shapes["b.omega"]], atol=1e-14)
 
 
+@pytest.mark.slow
 def test_at_rest_laws_are_read_at_the_start_and_parts_are_in_the_mode_they_have_there() -> None:
     """The load sticks and the brake, which comes on after 6.5 s, does not yet; the motor's curve drives at standstill.
 

@@ -10,6 +10,7 @@ from shaftwork.results.quadrature import MOST, Panels, integrate
 STEPS = np.array([0.0, 1.0, 3.0])
 
 
+@pytest.mark.slow
 @given(st.floats(0.0, 3.0))
 def test_a_jump_and_a_kink_within_a_step_are_integrated_to_1e_10(place: float) -> None:
     def integrand(panels: Panels) -> np.ndarray:

@@ -79,6 +79,7 @@ def test_a_history_is_counted_as_by_hand(values: tuple[float, ...], cycles: list
     assert sorted(zip(found.range, found.count, strict=True)) == sorted(cycles)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials"])
 def test_the_cycles_of_a_sine_are_those_of_the_closed_form(engine: str) -> None:
     """10 s of 100 + 50 sin at 5 Hz: up from the mean, 99 half cycles from peak to valley, back to the mean."""
@@ -123,6 +124,7 @@ def test_both_sides_of_a_jump_are_turning_points() -> None:
     np.testing.assert_allclose(turning.values, [0.0, 10.0, -15.0, -5.0], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_twenty_seconds_of_noise_are_counted_as_their_values() -> None:
     from rainflow import extract_cycles  # type: ignore[import-untyped]
 
@@ -144,6 +146,7 @@ def test_noise_of_a_solver_is_no_load() -> None:
     assert len(counted(values, smallest=0.0)) > 50
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["scipy", "sundials"])
 def test_contacts_that_let_go_at_zero_make_the_same_cycles_in_every_engine(engine: str) -> None:
     """A gap lets go at a torque of zero, but for rounding: which cycle closes there must not hang on its sign."""
@@ -164,6 +167,7 @@ def test_contacts_that_let_go_at_zero_make_the_same_cycles_in_every_engine(engin
 histories = st.lists(st.integers(-50, 50), min_size=2, max_size=40)
 
 
+@pytest.mark.slow
 @given(histories, st.sampled_from([-3.0, -1.0, 0.5, 2.0]))
 def test_damage_scales_with_the_power_of_the_load(values: list[int], factor: float) -> None:
     one, other = damage(counted(values), LINE), damage(counted([factor * value for value in values]), LINE)
@@ -171,6 +175,7 @@ def test_damage_scales_with_the_power_of_the_load(values: list[int], factor: flo
     assert other.cycles.count.sum() == one.cycles.count.sum()
 
 
+@pytest.mark.slow
 @given(histories)
 def test_a_history_from_peak_to_peak_does_twice_the_damage_when_it_is_repeated(values: list[int]) -> None:
     top = int(np.argmax(values))
@@ -188,6 +193,7 @@ def test_damage_lies_between_that_of_the_largest_swing_and_of_so_many(values: li
     assert done <= largest * 2.0 * max(found.count.sum(), 0.5) * (1 + 1e-12)
 
 
+@pytest.mark.slow
 @given(histories, st.floats(0.1, 10.0))
 def test_only_the_order_of_values_counts_not_their_times(values: list[int], pace: float) -> None:
     slow = counted(values, t=[pace * k for k in range(len(values))])
@@ -248,6 +254,7 @@ def line() -> sw.Solution:
     return net.simulate(t_end=0.5)
 
 
+@pytest.mark.slow
 def test_every_shaft_and_spring_is_judged_a_long_one_at_its_worst_place(line: sw.Solution) -> None:
     found = line.damage(sn=LINE)
     assert list(found) == ["coupling.tau", "line.tau"]

@@ -56,6 +56,7 @@ def test_twist_is_torque_over_stiffness_and_node_speeds_are_part_speeds(sol: sw.
     assert sol["shaft.tau"] == pytest.approx(sol["shaft.tau_c"] + 14.0 * sol["shaft.omega_rel"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_a_state_is_the_quantity_of_its_name_as_it_follows_from_the_equations(name: str) -> None:
     found = SCENES[name].build().compile().simulate(t_end=0.2, t_eval=21)

@@ -29,6 +29,7 @@ def apart(one: sw.Solution, other: sw.Solution, name: str) -> float:
     return float(np.abs(one[name] - other[name]).max() / np.abs(other[name]).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("J_m", INERTIAS)
 def test_lumped_and_distributed_shafts_move_alike(J_m: float) -> None:
     """Twenty elements err by 1e-3 at 1567 Hz, which hardly moves here; one spring lacks this frequency altogether."""
@@ -38,6 +39,7 @@ def test_lumped_and_distributed_shafts_move_alike(J_m: float) -> None:
         assert apart(motion(J_m, sw.OneSpring()), truth, name) < 5e-2, name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shaft", [DISTRIBUTED, sw.Lumped(20), sw.OneSpring()], ids=str)
 @pytest.mark.parametrize("J_m", INERTIAS)
 def test_energy_is_kept_and_the_currents_sum_to_zero(J_m: float, shaft: sw.ShaftModel) -> None:
@@ -87,6 +89,7 @@ def test_the_small_mass_is_at_its_steady_speed_within_the_run_and_the_large_one_
     assert motion(0.11)["Jm.omega"][-1] < 0.85 * steady
 
 
+@pytest.mark.slow
 def test_a_finer_output_grid_changes_no_commutation() -> None:
     """Its times cut steps to lengths at which the fast engine sees no event, right beside those of the motor."""
     found = (compiled(sw.OneSpring()).simulate(T_END, t_eval=5001), motion(0.11, sw.OneSpring()))

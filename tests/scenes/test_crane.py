@@ -43,6 +43,7 @@ def turns(sol: sw.Solution) -> np.ndarray[Any, Any]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("variant", VARIANTS, ids=str)
 def test_the_driving_mass_rests_between_8_6_and_8_9_s(variant: dict[str, Any]) -> None:
     """Printed: about 8.8 s. Locked means that it stands still to the last bit."""
@@ -86,6 +87,7 @@ def test_with_a_gap_the_ringing_is_slower_and_the_slower_the_smaller_it_gets(gap
     assert (np.diff(swings) > 0).all()
 
 
+@pytest.mark.slow
 def test_the_six_phases_come_in_the_order_of_the_source() -> None:
     """Closing the gap, winding up, both moving (also steadily), braking, ringing down: (12) to (16)."""
     scene = sw.scenes.SCENES["six-phases"]
@@ -105,6 +107,7 @@ def test_the_six_phases_come_in_the_order_of_the_source() -> None:
     assert [row.start for row in sol.phases] == [0.0, *ends[:-1]]  # the end of one is the start of the next
 
 
+@pytest.mark.slow
 def test_the_equations_of_the_six_phases_have_the_masses_of_the_source() -> None:
     """J1 alone in (12), (13), both in (14), (15), J2 alone in (16)."""
     scene = sw.scenes.SCENES["six-phases"]
@@ -116,6 +119,7 @@ def test_the_equations_of_the_six_phases_have_the_masses_of_the_source() -> None
     assert moving == [["J1"], ["J1"], ["J1", "J2"], ["J1", "J2"], ["J2"]]
 
 
+@pytest.mark.slow
 def test_a_random_resistance_is_seen_most_in_steady_travel_and_follows_its_seed() -> None:
     def steady(**variant: Any) -> np.ndarray[Any, Any]:
         sol = motion(**variant)

@@ -24,6 +24,7 @@ def torques(soil: str) -> np.ndarray[Any, Any]:
     return np.stack([run["shaft.tau"] for run in runs])
 
 
+@pytest.mark.slow
 def test_twenty_seeds_lie_around_the_three_printed_numbers() -> None:
     """Both extremes are those of the start, which no seed changes, but for a few seeds that dig beyond them."""
     tau = torques("grey clay")
@@ -35,11 +36,13 @@ def test_twenty_seeds_lie_around_the_three_printed_numbers() -> None:
     assert means.mean() == pytest.approx(1337.0, abs=3 * means.std() / np.sqrt(SEEDS))
 
 
+@pytest.mark.slow
 def test_the_harder_the_soil_the_higher_the_mean_torque() -> None:
     means = [torques(soil).mean() for soil in SOILS]
     assert means[0] < means[1] < means[2]
 
 
+@pytest.mark.slow
 def test_the_wheel_turns_in_the_air_until_5_s_and_then_digs() -> None:
     sol = sw.scenes.excavator().simulate(T_END, t_eval=3001)
     air, dug = sol["digging.tau"][sol.t < T_DIG], sol["digging.tau"][sol.t > T_DIG + 1.0]

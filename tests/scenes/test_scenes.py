@@ -13,6 +13,7 @@ from shaftwork.scenes.shaft_chain import PRINTED_SHEAR_MODULUS
 from tests.reference.mna import Piece, spectrum
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(sw.scenes.SCENES))
 def test_every_scene_runs_to_its_end_with_its_signals(name: str) -> None:
     scene = sw.scenes.SCENES[name]

@@ -200,6 +200,7 @@ def test_the_energy_is_the_work_of_the_torque_and_stays_when_it_ends(line: Line)
     assert later == pytest.approx(np.full(later.size, work), rel=ROUNDING)
 
 
+@pytest.mark.slow
 def test_energy_does_not_drift_in_ten_thousand_delays() -> None:
     of = motion(POPENDA, [Torque(0, pulse, (PULSE,))], 1e4 * SHAFT.delay)
     energy = wave_energy(of)
@@ -355,6 +356,7 @@ def test_a_linear_law_of_the_speed_is_a_damper(disc: float) -> None:
     assert largest_difference(with_damper, with_law, np.linspace(0.0, 0.02, 333)) < ROUNDING
 
 
+@pytest.mark.slow
 def test_a_law_that_jumps_with_the_speed_is_refused() -> None:
     friction = Torque(0, lambda _, speed: -0.3 * np.sign(speed), of_speed=True)
     drive = Torque(1, lambda t: np.sin(2000 * t))

@@ -32,6 +32,7 @@ def motion(top: float, J: float, load: float, lengths: tuple[float, float, float
     return net.simulate(float(t[3]))
 
 
+@pytest.mark.slow
 @share_of_examples(0.1)
 @given(
     share=st.floats(0.3, 1.4),
@@ -119,6 +120,7 @@ def test_each_reason_is_named_and_none_that_fits_is_an_error() -> None:
             sw.sizing.choose(made, **bounds)
 
 
+@pytest.mark.slow
 def test_a_motor_that_is_switched_off_is_not_asked_to_accelerate_its_rotor() -> None:
     made = sw.sizing.duty(sw.scenes.crane().simulate(10.0), "motor", cycle=40.0)
     heavy = replace(MOTOR, J=1.0)
@@ -151,6 +153,7 @@ def test_the_impulse_of_a_speed_that_jumps_is_in_no_figure_and_the_choice_says_s
     assert "not checked: the impulse on the motor's own rotor where the speed jumps" in str(choice)
 
 
+@pytest.mark.slow
 def test_a_motor_that_runs_or_that_a_store_starts_gives_no_impulse() -> None:
     crane = sw.scenes.crane_start()
     running = crane.simulate(1.0, initial=crane.compile().steady_state())
@@ -169,6 +172,7 @@ def test_a_motor_that_runs_or_that_a_store_starts_gives_no_impulse() -> None:
         assert "impulse" not in str(sw.sizing.choose(made))
 
 
+@pytest.mark.slow
 def test_the_packages_motors_are_marked_as_chosen_and_make_parts_of_a_network() -> None:
     assert OWN.read_text(encoding="utf-8").startswith("#")
     assert "CHOSEN" in OWN.read_text(encoding="utf-8")

@@ -103,6 +103,7 @@ def assert_as_by_hand(made: sw.sizing.Duty, hand: Hand, end: float) -> None:
 POSITIVE = st.floats(0.2, 20.0)
 
 
+@pytest.mark.slow
 @settings(share_of_examples(0.1), phases=(Phase.explicit, Phase.reuse, Phase.generate))
 @example(lengths=(1.00001, 3.1327969124830384, 17.0, 1.0), top=2.0, J=1.0, d=1.0, load=0.0)  # a peak before a jump
 @given(
@@ -221,6 +222,7 @@ def test_a_soft_start_counts_from_its_begin_to_the_begin_of_the_plateau(shape: s
     assert close(made.loaded, 3.0, 3.0)
 
 
+@pytest.mark.slow
 def test_a_motion_from_rest_to_rest_of_ninth_degree_is_under_load_all_the_time() -> None:
     net = sw.Network("rest to rest")
     way = SOFT["ninth degree"].subs(sw.t, sw.t + 1.0)
@@ -277,6 +279,7 @@ def start() -> sw.Solution:
     return sw.scenes.crane_start().simulate(6.5)
 
 
+@pytest.mark.slow
 def test_the_cranes_motor_is_seen_at_its_own_shaft(start: sw.Solution) -> None:
     made = sw.sizing.duty(start, "motor")
     node = sw.sizing.duty(start, torque="motor.tau", speed="rotor.omega")
@@ -288,6 +291,7 @@ def test_the_cranes_motor_is_seen_at_its_own_shaft(start: sw.Solution) -> None:
     assert "ratio 35.5, efficiency 0.95" in str(made)
 
 
+@pytest.mark.slow
 def test_a_start_on_the_mains_has_no_reserve_and_steady_travel_that_of_pull_out_over_load(start: sw.Solution) -> None:
     at = sw.sizing.duty(start, "motor").reserve()
     assert at.ratio == pytest.approx(1.0, rel=1e-9)
@@ -305,6 +309,7 @@ def test_parameters_of_the_run_are_those_of_the_curve() -> None:
     assert made.reserve().limit == pytest.approx(9.0, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_frequency_drive_has_its_pull_out_torque_in_reserve_and_less_of_it_in_a_weak_field() -> None:
     def drive(f: Any) -> sw.sizing.Duty:
         net = sw.Network("drive")
@@ -387,6 +392,7 @@ def test_questions_that_make_no_sense_are_refused(start: sw.Solution) -> None:
         rest.reserve()
 
 
+@pytest.mark.slow
 def test_figures_are_a_table_and_the_plane_of_speed_and_torque_a_picture(start: sw.Solution) -> None:
     made = sw.sizing.duty(start, "motor", cycle=700.0, cooling=0.5)
     frame = made.to_pandas()

@@ -62,6 +62,7 @@ def test_a_torque_and_the_speed_of_another_shaft_are_refused(torque: str, speed:
         sw.sizing.duty(geared(), torque=torque, speed=speed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("torque", "speed"),
     [

@@ -48,17 +48,20 @@ def assert_differences(
     return made
 
 
+@pytest.mark.slow
 def test_the_start_of_the_crane_equals_central_differences() -> None:
     """The load breaks loose; the first peak is 1.0 percent higher for a pull-out torque that is 1 percent higher."""
     names = ("motor.tau_k", "motor.s_k", "J2.J", "shaft.c", "load.tau")
     assert_differences(sw.scenes.crane_start(), (*CRANE, "end J2.omega"), 2.0, names)
 
 
+@pytest.mark.slow
 def test_all_phases_of_the_crane_equal_central_differences() -> None:
     """Gap, contact, breaking loose, braking, ringing down: ten seconds with all parts that change their mode."""
     assert_differences(sw.scenes.six_phases(), CRANE, 10.0, ("shaft.gap",), step=5e-6)
 
 
+@pytest.mark.slow
 def test_switches_that_come_together_count_one_by_one() -> None:
     """The motor goes off as the brake comes on: a parameter that parts them is smooth to the first order alone."""
     assert_differences(sw.scenes.crane(), CRANE[1:], 10.0, ("motor.t_off",), step=1e-6, order=1)
@@ -92,6 +95,7 @@ def test_an_oscillator_with_dry_friction_is_the_closed_form() -> None:
             assert made[measure][name] == pytest.approx(expected, rel=1e-8, abs=1e-8), (measure, name)
 
 
+@pytest.mark.slow
 def test_stribeck_friction_equals_central_differences() -> None:
     net = oscillator(tau_s=6.0, omega_s=0.5)
     names = ("f.tau_c", "f.tau_s", "f.omega_s", "s.c")
@@ -149,6 +153,7 @@ def test_impacts_of_flanks_that_hardly_move_pass_on_the_derivative_of_their_mome
         assert_momentum_is_kept(1e-7, 0.45)
 
 
+@pytest.mark.slow
 def test_a_spring_behind_flanks_that_come_to_rest_equals_central_differences() -> None:
     net = flanks(0.1, 0.65)
     net.add(sw.Spring("S", c=90.0, d=1.2), "b", "c")
@@ -156,6 +161,7 @@ def test_a_spring_behind_flanks_that_come_to_rest_equals_central_differences() -
     assert_differences(net, ["max S.tau", "rms S.tau"], 1.5, ("J1.J", "J2.J", "g.gap"), close=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 def test_impacts_of_geared_inertias_equal_central_differences(restitution: float) -> None:
     """Behind the gear is an inertia that is no state, and a load that breaks loose."""
@@ -173,6 +179,7 @@ def test_impacts_of_geared_inertias_equal_central_differences(restitution: float
     assert_differences(net, ["max s.tau", "end B.omega", "end C.omega", "rms s.tau"], 0.45, names)
 
 
+@pytest.mark.slow
 def test_impacts_through_a_gear_that_rubs_equal_central_differences() -> None:
     """Torques pass it otherwise than speeds do, so an impact is no longer the least change."""
     net = sw.Network("lossy")
@@ -186,6 +193,7 @@ def test_impacts_through_a_gear_that_rubs_equal_central_differences() -> None:
     assert_differences(net, ["end C.omega", "rms C.omega"], 0.6, ("gap.restitution", "g.ratio", "g.efficiency"))
 
 
+@pytest.mark.slow
 def test_laws_that_switch_with_the_motion_equal_central_differences() -> None:
     """A torque that falls at a speed, once through a jump and once through a kink."""
     for law in (
@@ -201,6 +209,7 @@ def test_laws_that_switch_with_the_motion_equal_central_differences() -> None:
         assert_differences(net, ["max s.tau", "end B.omega", "rms T.tau"], 1.5, ("A.J", "s.c", "d.d"))
 
 
+@pytest.mark.slow
 def test_a_commutated_motor_equals_central_differences() -> None:
     """A phase opens, and what its current was goes over."""
     net = sw.Network("bldc")
@@ -211,6 +220,7 @@ def test_a_commutated_motor_equals_central_differences() -> None:
         motion_sensitivities(net, list(made.measures), t_end=0.015, parameters=["motor.pole_pairs"])
 
 
+@pytest.mark.slow
 def test_held_noise_moves_with_its_interval_and_not_with_its_seed() -> None:
     net = sw.scenes.crane(load="random")
     assert_differences(net, ["end J2.omega", "mean shaft.tau"], 0.51, ("load.mean", "load.interval"))
@@ -218,6 +228,7 @@ def test_held_noise_moves_with_its_interval_and_not_with_its_seed() -> None:
         motion_sensitivities(net, ["end J2.omega"], t_end=0.5, parameters=["load.seed"])
 
 
+@pytest.mark.slow
 def test_two_extremes_of_one_height_have_no_derivative() -> None:
     """Two motors alike give two pulls alike, one after the other: which of them is larger is up to either."""
     net = sw.Network("twice")
@@ -231,6 +242,7 @@ def test_two_extremes_of_one_height_have_no_derivative() -> None:
         motion_sensitivities(net, ["max J.omega"], t_end=7.0)
 
 
+@pytest.mark.slow
 def test_what_is_only_touched_or_comes_first_by_chance_is_refused() -> None:
     net = sw.Network("release")
     net.add(sw.KlossMotor("motor", tau_k=5.0, s_k=0.3, n_sync=1500.0, t_on=0.2), "a")

@@ -43,6 +43,7 @@ def differences(values: object, parameter: float) -> np.ndarray:
     return (4 * central(step / 2) - central(step)) / 3
 
 
+@pytest.mark.slow
 def test_frequencies_and_damping_equal_central_differences() -> None:
     net, model = train()
     made = frequency_sensitivities(net)
@@ -145,6 +146,7 @@ def test_what_is_no_name_of_a_measure_is_refused(measures: object, message: str)
         motion_sensitivities(train()[0], measures, t_end=0.1)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_measures_of_a_motion_equal_central_differences() -> None:
     net, model = train()
     made = motion_sensitivities(net, MEASURES, t_end=0.8, rtol=1e-10)

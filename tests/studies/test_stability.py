@@ -42,6 +42,7 @@ def study() -> sw.studies.Stability:
     return stability(SAMPLE, engines=("auto", "scipy", "banded", "wave"))
 
 
+@pytest.mark.slow
 def test_nothing_is_wrong_without_a_word(study: sw.studies.Stability) -> None:
     assert study.wrong == ()
     assert study.counts["right"] > 40
@@ -205,6 +206,7 @@ def test_steps_that_are_not_enough_are_too_long() -> None:
     assert {cell.verdict for cell in cells} == {"too long"}
 
 
+@pytest.mark.slow
 def test_an_explicit_engine_shortens_its_steps_and_never_becomes_unstable() -> None:
     """A finer chain of the same drive: the steps grow in proportion to its highest frequency, 2 m / delay."""
     case = dataclasses.replace(NAMED["free end"], delays=2.0)

@@ -80,6 +80,7 @@ def test_measures_equal_closed_forms(count: int) -> None:
         np.testing.assert_allclose(made.measures[f"{kind} shaft.tau"], values, atol=2e-6, err_msg=kind)
 
 
+@pytest.mark.slow
 def test_16_variants_of_the_crane_agree_with_scipy() -> None:
     pytest.importorskip("heyoka")
     samples = {name: values[:16] for name, values in crane_samples().items()}
@@ -104,6 +105,7 @@ def test_variants_side_by_side_are_those_of_any_order_and_grouping() -> None:
     np.testing.assert_array_equal(Worker(other).run(np.arange(24)).values, whole.values)
 
 
+@pytest.mark.slow
 def test_variants_with_a_gap_and_a_brake_change_their_modes_each_at_its_own_time() -> None:
     pytest.importorskip("heyoka")
     net = sw.Network("gap and brake")
@@ -253,6 +255,7 @@ def stopped(path: Path, monkeypatch: pytest.MonkeyPatch, after: int, **call: obj
             sweep(swing(), store=path, **call)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_a_sweep_that_was_stopped_goes_on_to_identical_results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "swing.jsonl"
     call = {"samples": {"shaft.c": np.linspace(500.0, 900.0, 20)}, "t_end": 0.2, "engine": "scipy"}
@@ -330,6 +333,7 @@ def test_results_are_a_table_a_file_and_a_picture(tmp_path: Path) -> None:
         made.plot("J")
 
 
+@pytest.mark.slow
 def test_processes_give_the_same() -> None:
     """The one test that starts a process: it costs seconds."""
     call = {"samples": {"shaft.c": np.linspace(500.0, 900.0, 9)}, "t_end": 0.2, "measures": ["max shaft.tau"]}
@@ -337,6 +341,7 @@ def test_processes_give_the_same() -> None:
     np.testing.assert_array_equal(one.measures["max shaft.tau"], two.measures["max shaft.tau"])
 
 
+@pytest.mark.slow
 def test_the_largest_torque_of_a_motor_is_its_pull_out_torque_to_1e_8() -> None:
     """Shafts of many kinds make the slip pass that of the pull-out torque once or, swinging, several times."""
     pytest.importorskip("heyoka")
@@ -351,6 +356,7 @@ def test_the_largest_torque_of_a_motor_is_its_pull_out_torque_to_1e_8() -> None:
     np.testing.assert_allclose(made.measures["max motor.tau"], samples["motor.tau_k"] * 35.5 * 0.95, rtol=1e-8)
 
 
+@pytest.mark.slow
 def test_a_guard_that_is_met_just_after_a_sample_leaves_extremes_right() -> None:
     """A clutch closes at 1 s, within rounding of a sample: from there to the guard it is 1e-14 s."""
     pytest.importorskip("heyoka")

@@ -37,6 +37,7 @@ def test_integrals_of_what_the_states_do_not_feel(omega: float, mean: float) -> 
     assert made.measures["mean"] == pytest.approx(10.0 * (1 - np.cos(turned)) / turned, abs=1e-7)
 
 
+@pytest.mark.slow
 def test_extremes_of_what_the_states_do_not_feel() -> None:
     """A ripple whose amplitude swings slowly, against many samples of it."""
     omega, slow = 1000.0, 0.7

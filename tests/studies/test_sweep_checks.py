@@ -116,6 +116,7 @@ def test_why_is_the_cause_in_the_equations_at_the_start(torque: sympy.Expr, load
     assert made.why.startswith(why)
 
 
+@pytest.mark.slow
 def test_what_hardly_moves_is_known_with_a_smaller_tolerance() -> None:
     """A linear motion is proportional to its load; the absolute tolerance, that of 0.001 rad/s, is not."""
     pytest.importorskip("heyoka")

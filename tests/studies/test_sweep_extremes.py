@@ -24,6 +24,7 @@ def both(net: sw.Network, samples: dict[str, np.ndarray], **options: object) -> 
     return [(fast.measures[name][:ALONE], slow.measures[name]) for name in fast.measures]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rtol", [1e-8, 1e-14])
 def test_extremes_of_widely_different_shafts_are_right_to_1e_9(rtol: float) -> None:
     """Steps of a damped shaft are half a period long, and the torque of a motor near its pull-out has two tops in one.
@@ -43,6 +44,7 @@ def test_extremes_of_widely_different_shafts_are_right_to_1e_9(rtol: float) -> N
         np.testing.assert_allclose(fast, slow, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_extremes_of_what_depends_on_the_time_itself_are_right() -> None:
     """The torque of the motor is a function of the time alone, and its largest value is known."""
     net = sw.Network("driven")

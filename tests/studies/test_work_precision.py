@@ -16,6 +16,7 @@ from shaftwork.studies.work_precision import work_precision
 SMALL = (sw.OneSpring(), sw.Lumped(10), sw.Lumped(20), sw.CentralDifference(10), sw.Spectral(8), sw.Wave(3))
 
 
+@pytest.mark.slow
 def test_the_truth_of_a_train_is_that_of_characteristics_and_waves_agree() -> None:
     net, t = sw.scenes.shaft_step(), np.linspace(0.001, 0.05, 50)
     known = truth(net, "line", 0.05, t)
@@ -26,6 +27,7 @@ def test_the_truth_of_a_train_is_that_of_characteristics_and_waves_agree() -> No
     assert np.abs(waves["line.tau"][:, 1] - known.values["tau_mid"]).max() < 1e-8
 
 
+@pytest.mark.slow
 def test_the_truth_knows_a_shaft_that_is_wired_backwards() -> None:
     def wired(*nodes: str) -> sw.Network:
         net = sw.Network("train")
@@ -42,6 +44,7 @@ def test_the_truth_knows_a_shaft_that_is_wired_backwards() -> None:
     np.testing.assert_allclose(back["tau_mid"], -there["tau_mid"], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_other_networks_have_other_truths() -> None:
     t = np.linspace(0.001, 0.01, 10)
     damped = sw.scenes.shaft_step(damping=1.0)
@@ -54,6 +57,7 @@ def test_other_networks_have_other_truths() -> None:
     assert truth(net, "line", 0.01, t).source == "travelling waves"
 
 
+@pytest.mark.slow
 def test_the_study_ranks_the_models_as_their_orders_say() -> None:
     study = work_precision(sw.scenes.shaft_step(), "line", t_end=0.05, models=SMALL, points=101)
     trial = {found.model: found for found in study.trials}
@@ -83,6 +87,7 @@ def test_the_study_ranks_the_models_as_their_orders_say() -> None:
     }
 
 
+@pytest.mark.slow
 def test_a_model_that_fails_is_a_row_with_its_reason(tmp_path: Path) -> None:
     models = (sw.Wave(), sw.Spectral(4))
     study = work_precision(
@@ -104,6 +109,7 @@ def test_an_unknown_shaft_is_answered_with_those_there_are() -> None:
         work_precision(sw.scenes.shaft_step(), "axle", t_end=0.1)
 
 
+@pytest.mark.slow
 def test_the_ship_line_is_solved_alike_by_waves_and_by_polynomials() -> None:
     """Smooth torque: the spectral model of degree 8 is good to 1e-6 of the speeds."""
     waves, smooth = (sw.scenes.ship_line(model).simulate(2.0, t_eval=201) for model in (sw.Wave(), sw.Spectral(12)))
@@ -112,6 +118,7 @@ def test_the_ship_line_is_solved_alike_by_waves_and_by_polynomials() -> None:
     assert np.abs(waves["shaft2.tau_a"] - smooth["shaft2.tau_a"]).max() < 2e-3 * np.abs(smooth["shaft2.tau_a"]).max()
 
 
+@pytest.mark.slow
 def test_frequencies_are_judged_with_the_damping_at_the_ends() -> None:
     net = sw.scenes.shaft_step()
     net.add(sw.Damper("brake", d=200.0), "load end")
