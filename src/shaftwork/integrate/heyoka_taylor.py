@@ -70,7 +70,7 @@ class _Run:
         self.problem = problem
         self.program = problem.program.program
         tolerance = min(max(problem.rtol, TIGHTEST_TOLERANCE), LOOSEST_TOLERANCE)
-        self.integrator = self.program.integrator(tolerance)
+        self.integrator = self.program.integrator(tolerance * problem.overall)
         self.parameters = problem.program.parameters
         self.state: Array = np.array(problem.x0, dtype=float)
         self.start = self.state

@@ -128,6 +128,7 @@ class Problem:
         rough: the same of a law of which any part has no value or no slope, be it in a branch that does not hold.
         max_steps: an engine gives up, with a reason, after this many steps.
         progress: told again and again the time in s that an engine has reached, or None. What it raises ends the run.
+        overall: the size of the largest state where it stays below one: so much smaller is a tolerance for all states.
         found: what an engine has found out about the equations, for its next run with them.
     """
 
@@ -153,6 +154,7 @@ class Problem:
     rough: Explain | None = None
     max_steps: int = 10_000_000
     progress: Callable[[float], None] | None = None
+    overall: float = 1.0
     found: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property

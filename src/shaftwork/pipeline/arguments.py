@@ -15,6 +15,7 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si, numbers_in_si
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.netlist import Netlist
+from shaftwork.pipeline.prepared import NOMINAL
 from shaftwork.reduction.form import StateForm
 
 OUTPUTS, MOST_OUTPUTS = 1001, 10_000_000
@@ -22,6 +23,23 @@ OUTPUTS, MOST_OUTPUTS = 1001, 10_000_000
 FINEST_RTOL = float(np.finfo(float).eps)
 """What doubles can keep; a smaller tolerance would promise what no engine holds."""
 OutputTimes = int | Sequence[float] | Array | Literal["steps"] | None
+
+
+@dataclasses.dataclass(frozen=True)
+class Sizes:
+    """How small a motion is.
+
+    Args:
+        of: the size of each state by name, where it is below that at ordinary speeds.
+        overall: a power of ten up to the largest of all states, where that is below one.
+    """
+
+    of: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    overall: float = 1.0
+
+    def tolerances(self, ordinary: Array, names: Sequence[str]) -> Array:
+        """(n,) absolute tolerances of states by name, as fractions of the relative one, from those at usual speeds."""
+        return np.minimum(ordinary, [NOMINAL * self.of.get(name, np.inf) for name in names])
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,6 +54,7 @@ class Demand:
         engine: its name, or "auto".
         max_steps: steps before the engine gives up.
         progress: told the time that is reached, or None.
+        sizes: of a motion that is tiny.
     """
 
     span: tuple[float, float]
@@ -45,6 +64,17 @@ class Demand:
     engine: str
     max_steps: int
     progress: Callable[[float], None] | None
+    sizes: Sizes = Sizes()
+
+    def tolerances(self, ordinary: Array, names: Sequence[str]) -> Array:
+        """(n,) absolute tolerances of states by name, from those at ordinary speeds as fractions of the relative one.
+
+        Raises:
+            ParameterError: those that are given cannot be; says what would be right.
+        """
+        if self.atol is None:
+            return self.rtol * self.sizes.tolerances(ordinary, names)
+        return absolute_tolerances(self.atol, len(names))
 
 
 def time_span(t_start: Any, t_end: Any) -> tuple[float, float]:

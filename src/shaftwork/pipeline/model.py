@@ -24,7 +24,6 @@ from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import (
     Demand,
     OutputTimes,
-    absolute_tolerances,
     branches_anew,
     checked_parameters,
     output_times,
@@ -36,6 +35,7 @@ from shaftwork.pipeline.implicit import at_rest, solve_loops
 from shaftwork.pipeline.overview import model_overview
 from shaftwork.pipeline.prepared import Prepared, nominal_tolerances
 from shaftwork.pipeline.settled import refuse_moving, warn_of_earlier_levels
+from shaftwork.pipeline.sizes import in_its_size
 from shaftwork.pipeline.stored import Rebuild, Repetition, call_of, model_again, remember
 from shaftwork.reduction.form import StateForm
 from shaftwork.results.solution import Solution
@@ -132,6 +132,9 @@ class Model(CompiledModel):
 
     def _motion(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
         prepared = self.prepare(self.vector(values) if values else self.defaults)
+        return in_its_size(self.form, prepared, demand, lambda made: self._run(prepared, initial, made))
+
+    def _run(self, prepared: Prepared, initial: Given, demand: Demand) -> Solution:
         x0, waves = self.start(prepared, initial, demand.span)
         problem = self._problem(prepared, x0, demand)
         trajectory, name, why = self._solve(prepared, problem, waves, demand.engine)
@@ -267,7 +270,7 @@ class Model(CompiledModel):
         return chosen
 
     def _problem(self, prepared: Prepared, x0: Array, demand: Demand) -> Problem:
-        span, rtol, atol = demand.span, demand.rtol, demand.atol
+        span, rtol = demand.span, demand.rtol
         instants = self.switching.timeline(prepared.p, *span)
         return Problem(
             rhs=prepared.rhs,
@@ -276,8 +279,9 @@ class Model(CompiledModel):
             t0=span[0],
             t_end=span[1],
             names=self.states,
-            atol=rtol * prepared.atol if atol is None else absolute_tolerances(atol, len(x0)),
+            atol=demand.tolerances(prepared.atol, self.states),
             rtol=rtol,
+            overall=demand.sizes.overall,
             breakpoints=tuple(time for time in instants.times if span[0] < time < span[1]),
             jump=(lambda t, x: prepared.bound.impulse(x, *instants.sides(t))) if self.form.has_impulses else None,
             sides=instants.sides,

@@ -26,6 +26,7 @@ from shaftwork.pipeline.phases.run import Run
 from shaftwork.pipeline.phases.settling import Settling
 from shaftwork.pipeline.phases.solution import solution
 from shaftwork.pipeline.settled import refuse_moving, warn_of_earlier_levels
+from shaftwork.pipeline.sizes import in_its_size
 from shaftwork.reduction.form import StateForm
 from shaftwork.results.linear import LinearModel, linear_model
 from shaftwork.results.solution import Solution
@@ -125,6 +126,11 @@ class PhasedModel(Model):
         return Phases(self, self._rebuild)
 
     def _motion(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
+        first = self.phases.assembly(self.phases.first)
+        prepared = first.prepared(first.vector(values, {}))
+        return in_its_size(first.model.form, prepared, demand, lambda made: self._run_through(values, initial, made))
+
+    def _run_through(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
         run = Run(self.phases, values, demand)
         run.march(initial)
         return solution(run, self.name)

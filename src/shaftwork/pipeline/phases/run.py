@@ -18,7 +18,7 @@ from shaftwork.codegen.timeline import Timeline
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import Problem, SeriesError, Trajectory
-from shaftwork.pipeline.arguments import Demand, absolute_tolerances
+from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.implicit import at_rest
 from shaftwork.pipeline.phases.assemblies import Assembly
 from shaftwork.pipeline.phases.moments import Change, Moment
@@ -178,13 +178,14 @@ class Run:
         following = bisect_right(times.times, t)
         end = min([*times.times[following : following + 1], demand.span[1]])
         problem = regime.assembly.problem(moment, (t, end), times)
+        states = regime.assembly.model.states
         atol = demand.rtol * problem.atol
-        if demand.atol is not None:
-            atol[: moment.x.size] = absolute_tolerances(demand.atol, moment.x.size)
+        atol[: len(states)] = demand.tolerances(problem.atol[: len(states)], states)
         return replace(
             problem,
             rtol=demand.rtol,
             atol=atol,
+            overall=demand.sizes.overall,
             t_eval=self._outputs(t, end),
             max_steps=demand.max_steps - self.steps,
             react=passing,
