@@ -6,6 +6,7 @@ Each test starts it as a shell does.
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -67,7 +68,7 @@ def test_ctrl_c_ends_a_run_with_130_and_one_line_that_says_how_far_it_came(tmp_p
     assert process.stdout.readline() == b"swing: 1e+06 s of motion\n"  # before anything is computed
     process.send_signal(signal.SIGINT)
     (line,) = all_of(errors).splitlines()
-    assert line.startswith("shaftwork: interrupted: the motion had come to t = ")
+    assert re.match(r"shaftwork: interrupted(: the motion had come to t = |$)", line)  # it may not have begun yet
     assert process.wait() == INTERRUPTED
     assert process.stdout.read() == b""
     process.stdout.close()
