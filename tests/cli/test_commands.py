@@ -58,6 +58,7 @@ def test_modes_about_a_point(capsys: pytest.CaptureFixture[str]) -> None:
     assert "'fast' must be a number in SI" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_diagram_has_its_crossings_in_turns(model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
     arguments = ["campbell", model, "--n-max", "2000", "--orders", "1,2"]
@@ -74,6 +75,7 @@ def test_the_diagram_has_its_crossings_in_turns(model: str, tmp_path: Path, caps
     assert "'one' must be numbers with commas between them" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_sweep_is_that_of_the_library(model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
     arguments = ["sweep", model, "--t-end", "0.2", "--vary", "shaft.c=5e3:2e4:4", "--vary", "J2.J=1, 3"]
@@ -179,6 +181,7 @@ def test_a_signal_that_does_not_exist_is_refused_before_the_run(
     assert words in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_model_without_a_steady_operation_ends_with_1(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     net = sw.Network("free")
     net.add(sw.TorqueSource("pull", tau=1.0), "a")
@@ -209,6 +212,7 @@ def test_phases_and_events_are_told_to_machines(capsys: pytest.CaptureFixture[st
     assert [tuple(event.values()) for event in said["events"]] == list(sol.events)
 
 
+@pytest.mark.slow
 def test_a_quantity_along_a_shaft_is_a_column_for_each_place(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

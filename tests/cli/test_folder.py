@@ -26,6 +26,7 @@ def names(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()}
 
 
+@pytest.mark.slow
 def test_a_folder_holds_the_files_of_the_last_run_and_what_the_user_put_there(tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert main(["run", model(tmp_path, "rubbing", rubs=True), "--t-end", "1", "--out", str(out)]) == DONE
@@ -69,6 +70,7 @@ def test_a_list_of_files_that_no_run_wrote_is_not_followed(
     assert (tmp_path / "notes.txt").exists()
 
 
+@pytest.mark.slow
 def test_a_run_that_fails_leaves_the_older_one_as_it_was(tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert main(["run", model(tmp_path, "rubbing", rubs=True), "--t-end", "1", "--out", str(out)]) == DONE
@@ -81,6 +83,7 @@ def test_a_run_that_fails_leaves_the_older_one_as_it_was(tmp_path: Path) -> None
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
 
 
+@pytest.mark.slow
 def test_a_run_that_cannot_write_leaves_the_older_one_as_it_was(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

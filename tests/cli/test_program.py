@@ -25,6 +25,7 @@ def test_scenes_are_listed_with_their_source(capsys: pytest.CaptureFixture[str])
         assert line.endswith(f"({scene.source})")
 
 
+@pytest.mark.slow
 def test_run_prints_a_table_and_writes_curves_and_csv(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "crane-start", "--out", str(tmp_path / "crane")]) == DONE
     printed = capsys.readouterr().out
@@ -43,6 +44,7 @@ def test_a_saved_network_runs_like_the_scene(tmp_path: Path, capsys: pytest.Capt
     assert "J1.omega" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_run_tells_phases_and_writes_them_with_the_events(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "six-phases", "--out", str(tmp_path)]) == DONE
     printed = capsys.readouterr().out
@@ -64,6 +66,7 @@ def test_run_tells_phases_and_writes_them_with_the_events(tmp_path: Path, capsys
     assert [row[1:] for row in events[1:]] == [list(event[1:]) for event in sol.events]
 
 
+@pytest.mark.slow
 def test_latex_prints_the_phases_of_a_scene_or_the_one_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
     scene = sw.scenes.SCENES["six-phases"]
     assert main(["latex", "six-phases", "--form", "state"]) == DONE
@@ -133,6 +136,7 @@ def test_a_bad_folder_is_found_before_the_run(
         assert "Give another folder." in said.err
 
 
+@pytest.mark.slow
 def test_a_linear_model_whose_inputs_are_too_rough_is_no_model_for_the_exact_engine(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -169,6 +173,7 @@ def test_an_unforeseen_error_ends_with_1_and_one_line(
     assert "'run crane-start' failed with LinAlgError: Singular matrix." in line
 
 
+@pytest.mark.slow
 def test_a_reader_that_closes_the_pipe_ends_the_command_quietly() -> None:
     """The reader is gone before the first word, so that every write fails."""
     command = [sys.executable, "-m", "shaftwork.cli", "latex", "shaft-chain"]
@@ -192,6 +197,7 @@ def test_every_problem_of_a_wrong_network_is_printed(tmp_path: Path, capsys: pyt
     assert "'s'" in said
 
 
+@pytest.mark.slow
 def test_a_failed_computation_ends_with_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     net = sw.Network("pole")
     net.add(sw.Inertia("J", J=1.0), "a")

@@ -75,6 +75,7 @@ def test_ctrl_c_ends_a_run_with_130_and_one_line_that_says_how_far_it_came(tmp_p
     assert [path.name for path in tmp_path.iterdir()] == ["swing.toml"]  # no half of a result
 
 
+@pytest.mark.slow
 def test_a_terminal_shows_how_far_a_run_has_come_and_is_left_clean(tmp_path: Path) -> None:
     pytest.importorskip("tqdm")
     process, terminal = started("run", swinging(tmp_path), "--engine", "scipy", "--t-end", "30", terminal=True)
@@ -86,6 +87,7 @@ def test_a_terminal_shows_how_far_a_run_has_come_and_is_left_clean(tmp_path: Pat
     assert not shown.rpartition("\r")[0].rpartition("\r")[2].strip()  # the last line is blank again
 
 
+@pytest.mark.slow
 def test_without_a_terminal_no_progress_is_written(tmp_path: Path) -> None:
     process, errors = started("run", swinging(tmp_path), "--engine", "scipy", "--t-end", "1")
     assert all_of(errors) == ""
@@ -93,6 +95,7 @@ def test_without_a_terminal_no_progress_is_written(tmp_path: Path) -> None:
     assert process.returncode == DONE
 
 
+@pytest.mark.slow
 def test_without_tqdm_a_terminal_shows_nothing_and_the_run_is_done(tmp_path: Path) -> None:
     (tmp_path / "tqdm.py").write_text("raise ImportError('not installed')\n", encoding="utf-8")
     path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
@@ -104,6 +107,7 @@ def test_without_tqdm_a_terminal_shows_nothing_and_the_run_is_done(tmp_path: Pat
     assert process.returncode == DONE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("terminal", [False, True])
 def test_a_terminal_of_ascii_shows_other_letters_as_escapes(tmp_path: Path, terminal: bool) -> None:  # noqa: FBT001
     environment = {"PYTHONIOENCODING": "ascii", "LANG": "C", "LC_ALL": "C", "PYTHONUTF8": "0"}

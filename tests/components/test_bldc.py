@@ -58,6 +58,7 @@ def test_every_engine_follows_the_motor_written_by_hand(engine: str, changed: di
     assert np.abs(total).max() <= 8 * np.finfo(float).eps * np.abs(x[:, :3]).max()
 
 
+@pytest.mark.slow
 def test_switches_turn_at_their_angles_exactly() -> None:
     """Every 60 degrees from 30 on, to the rounding of the angle and of the time."""
     model = _model()

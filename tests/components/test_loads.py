@@ -196,6 +196,7 @@ def test_a_wrong_kind_is_answered_with_the_kinds() -> None:
     assert any("held, band-limited" in str(problem) for problem in net.check())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["held", "band-limited"])
 def test_under_a_random_load_there_is_no_steady_operation_but_at_a_named_time(kind: str) -> None:
     """Held noise has no slope in time, and yet never stops changing."""

@@ -154,6 +154,7 @@ def test_a_gear_with_losses_is_a_constraint_whose_reaction_does_work(mode: str) 
     assert len(made.constraints) == (mode != "stuck")
 
 
+@pytest.mark.slow
 @share_of_examples(0.5)
 @given(pieces=networks(max_inertias=6))
 def test_they_are_kirchhoffs_for_random_networks(pieces: Network) -> None:

@@ -210,6 +210,7 @@ def energy(trajectory, times, parts=64):
     return trajectory.dense(times) ** 2 @ [JA / 2, JB / 2] + waves.sum(axis=1) / (4 * Z)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "delays"), [("steady", 3000), ("driven", 3000), ("marched", 1000), ("steady", 8e6)])
 def test_energy_is_kept(kind, delays):
     # 8e6 delays are 1e5 periods of the first mode.

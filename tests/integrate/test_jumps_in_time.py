@@ -154,6 +154,7 @@ def sides(terms: list[Term], x: Array) -> tuple[Array, Array]:
 RUN = share_of_examples(0.2)
 
 
+@pytest.mark.slow
 @given(st.lists(TERMS, min_size=1, max_size=4), st.sampled_from(ENGINES))
 @RUN
 def test_a_free_body_has_the_integral_of_any_law(terms: list[Term], engine: str) -> None:

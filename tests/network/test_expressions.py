@@ -60,6 +60,7 @@ EXPRESSIONS = st.recursive(
 )
 
 
+@pytest.mark.slow
 @given(st.data())
 def test_every_expression_in_the_grammar_reads_back_as_itself(data: st.DataObject) -> None:
     try:

@@ -98,6 +98,7 @@ def by_hand(model: sw.Model, sol: sw.Solution) -> Iterator[float]:
             yield float(np.abs((found.y[:, -1] - end) / largest[columns]).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NETWORKS)
 def test_scipy_through_all_phases_by_hand_reproduces_the_motion(name: str) -> None:
     """Tolerance 1e-7 of the largest value: both integrate to 1e-11, and a phase begins some 1e-14 s late."""
@@ -107,6 +108,7 @@ def test_scipy_through_all_phases_by_hand_reproduces_the_motion(name: str) -> No
     assert max(errors) < 1e-7
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::shaftwork.core.errors.NetworkWarning")
 @share_of_examples(0.02)
 @given(train=trains(most=4))
@@ -193,6 +195,7 @@ def test_modes_that_say_the_same_have_the_same_equations(name: str) -> None:
     assert [words for words, laws in groups.items() if len(laws) > 1] == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", ["motor", "J1", "J2", "J3", "J4"])
 def test_an_angle_that_is_recorded_leaves_the_motion_as_it_is(part: str) -> None:
     """A rate of the angle once stood for the acceleration in the torque that ends a mode: the clutch never slipped."""

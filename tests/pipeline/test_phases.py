@@ -75,6 +75,7 @@ def test_every_phase_is_what_the_equations_can_be_printed_for() -> None:
     assert net.equations(phase=last).latex(form="state") == printed[last]
 
 
+@pytest.mark.slow
 def test_values_change_without_other_equations() -> None:
     sol = model().simulate(3.0, parameters={"brake.tau": 15.0, "gap.gap": 0.03})
     assert sol.events == crane(15.0, 0.03).simulate(3.0).events
@@ -159,6 +160,7 @@ def test_a_motion_goes_on_from_the_end_of_another_as_if_there_had_been_no_end() 
         assert rest.phases[-1].modes == whole.phases[-1].modes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("end", [0.03, 2.0, 6.8, 8.5])
 def test_the_crane_goes_on_from_the_middle_of_its_motion(end: float) -> None:
     """In the open gap, at full speed, while the brake slips, and held by it; to the digits of the two motions."""

@@ -93,6 +93,7 @@ def test_a_brake_that_is_too_weak_slips_as_often_as_it_must(engine: str) -> None
     assert sum(event[3] == "locked" for event in sol.events) == 5
 
 
+@pytest.mark.slow
 def test_the_phases_of_the_crane_lie_between_its_events_and_say_their_modes() -> None:
     sol = crane("coulomb").simulate(t_end=10.0, rtol=1e-9)
     instants = list(dict.fromkeys(event[0] for event in sol.events))

@@ -119,6 +119,7 @@ def test_a_motion_at_other_times_with_other_values_is_stored_with_its_call(t_eva
     assert same(read(WAYS["pickled"](sol)), read(sol))
 
 
+@pytest.mark.slow
 def test_a_motion_with_a_loop_reads_the_same_when_stored() -> None:
     sol = looped().simulate(0.1, algebraic_loops="solve", t_eval=11)
     assert same(WAYS["pickled"](sol)["film.tau"], sol["film.tau"])
@@ -217,6 +218,7 @@ def hybrid_phase(net: sw.Network) -> str:
     return net.simulate(0.5).phases[0].name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS)
 def test_every_result_reads_the_same_when_stored(way: str) -> None:
     differ = [name for name, (made, facts) in results().items() if not _alike(facts(WAYS[way](made)), facts(made))]

@@ -86,6 +86,7 @@ def _rising(pieces: Network, signals: Mapping[str, mna.Signal]) -> Network:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("fewest", "most"), [(2, 2), (25, 30)])
 def test_the_random_networks_are_small_and_large(fewest: int, most: int) -> None:
     def fits(pieces: Network) -> bool:

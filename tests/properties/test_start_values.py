@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -144,6 +145,7 @@ def test_start_values_beside_a_shaft_are_met_or_refused_with_names_that_work(
     assert_met_or_told(model, some_values([*observables(model), *along], data), data)
 
 
+@pytest.mark.slow
 @given(trains(6), st.data())
 @share_of_examples(0.06)
 def test_start_values_of_networks_with_modes_are_met_or_refused_with_names_that_work(

@@ -118,6 +118,7 @@ def test_the_excavator_loses_little_to_two_masses() -> None:
     assert abs(lost.peak_error) < 0.05
 
 
+@pytest.mark.slow
 def test_a_known_motion_must_end_where_it_is_compared() -> None:
     net, train = crane()
     with pytest.raises(sw.ParameterError, match=r"ends at 0\.5 s, and t_end is 2 s"):

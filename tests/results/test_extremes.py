@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -69,6 +70,7 @@ def largest_error(seed: int, most: int, engine: str) -> float:
     return float(max(errors))
 
 
+@pytest.mark.slow
 @share_of_examples(0.04)
 @given(st.integers(0, 2**32 - 1))
 def test_extremes_of_linear_trains_are_those_of_their_modes(seed: int) -> None:

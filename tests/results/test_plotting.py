@@ -82,6 +82,7 @@ def test_phases_and_changes_of_mode_are_marked() -> None:
     assert ends == [(row.start, pytest.approx(row.end)) for row in sol.phases]
 
 
+@pytest.mark.slow
 def test_more_changes_than_can_be_told_apart_are_marked_by_their_phases_alone() -> None:
     sol = sw.scenes.bldc_shaft().simulate(0.3)
     assert len(sol.events) > 60

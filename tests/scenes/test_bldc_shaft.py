@@ -59,6 +59,7 @@ def settled_ripple(sol: sw.Solution, name: str) -> tuple[float, float]:
     return float(frequencies[spectrum.argmax()]), float(6 * 2 * sol["Je.omega"][last].mean() / (2 * np.pi))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("J_m", INERTIAS)
 def test_torque_and_currents_ripple_at_six_times_the_electrical_frequency(J_m: float) -> None:
     """As the source says of figures 4, 6, 9 and 11: typical of a motor that is controlled by its voltage alone."""

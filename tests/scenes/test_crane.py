@@ -54,6 +54,7 @@ def test_the_driving_mass_rests_between_8_6_and_8_9_s(variant: dict[str, Any]) -
     assert sol.energy_residual < 1e-8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("variant", [variant for variant in VARIANTS if "start" not in variant], ids=str)
 def test_the_crane_travels_steadily_at_about_1_08_m_s_from_about_5_s_on(variant: dict[str, Any]) -> None:
     sol = motion(**variant)
@@ -62,6 +63,7 @@ def test_the_crane_travels_steadily_at_about_1_08_m_s_from_about_5_s_on(variant:
     assert at_5 > 0.975 * at_brake
 
 
+@pytest.mark.slow
 def test_the_driven_mass_rings_down_as_against_a_locked_one_at_3_13_hz() -> None:
     """Each half swing lasts pi / RATE, and loses twice the resistance beside what the damping takes.
 
@@ -132,6 +134,7 @@ def test_a_random_resistance_is_seen_most_in_steady_travel_and_follows_its_seed(
     assert not np.allclose(steady(load="random", seed=2.0), rough)
 
 
+@pytest.mark.slow
 def test_a_start_by_frequency_spares_the_shaft() -> None:
     direct, soft = (sol["shaft.tau"][sol.t < T_BRAKE].max() for sol in (motion(), motion(start="frequency")))
     assert soft < 0.6 * direct

@@ -70,6 +70,7 @@ def test_the_rotor_is_accelerated_too_and_flux_above_the_rated_speed_is_weak(
     assert found.reserve == pytest.approx(float(limits[0]) / found.tau_peak, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_the_best_motor_is_the_smallest_that_nothing_speaks_against() -> None:
     made = sw.sizing.duty(motion(150.0, 0.05, 12.0, (0.5, 3.0, 0.5, 1.0)), "drive")
     choice = sw.sizing.choose(made)

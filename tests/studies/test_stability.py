@@ -49,6 +49,7 @@ def test_nothing_is_wrong_without_a_word(study: sw.studies.Stability) -> None:
     assert "wrong without a warning: 0" in str(study)
 
 
+@pytest.mark.slow
 def test_what_does_not_run_names_its_reason(study: sw.studies.Stability) -> None:
     for cell in study.cells:
         assert bool(cell.why) or cell.verdict in ("right", "coarse")
@@ -222,6 +223,7 @@ def test_an_explicit_engine_shortens_its_steps_and_never_becomes_unstable() -> N
     assert max(errors) < 1e-2
 
 
+@pytest.mark.slow
 def test_the_table_is_written_and_drawn(study: sw.studies.Stability, tmp_path: Path) -> None:
     study.to_csv(tmp_path / "table.csv")
     rows = list(csv.DictReader((tmp_path / "table.csv").read_text(encoding="utf-8").splitlines()))

@@ -93,6 +93,7 @@ def test_16_variants_of_the_crane_agree_with_scipy() -> None:
         np.testing.assert_allclose(fast.measures[name], slow.measures[name], atol=1e-6 * size or 1e-9, err_msg=name)
 
 
+@pytest.mark.slow
 def test_variants_side_by_side_are_those_of_any_order_and_grouping() -> None:
     pytest.importorskip("heyoka")
     worker = crane_worker()
