@@ -20,7 +20,7 @@ if importlib.util.find_spec("heyoka") is not None:
     heyoka.llvm_state.set_diskcache_enabled(False)
     heyoka.llvm_state.set_memcache_limit(2**28)
 
-# A property is tried on 20 examples, in CI on 500, an expensive one on its share of them (`share_of_examples`).
+# A property is tried on 20 examples or on SHAFTWORK_EXAMPLES, an expensive one on its share (`share_of_examples`).
 # They are the same in every run: a red test must mean a change of the code, not of the dice.
 settings.register_profile(
     "random networks",
