@@ -63,7 +63,7 @@ def _hidden(motion: Solution, form: StateForm, demand: Demand, tolerances: Array
         )
     reached = np.array([largest.get(state.name, 0.0) for state in form.states])
     usual = demand.sizes.tolerances(tolerances, [state.name for state in form.states]) / NOMINAL
-    is_angle = np.array([state.kind == "integral" for state in form.states])
+    is_angle = np.array([state.kind == "integral" for state in form.states], dtype=bool)
     ordinary = tolerances / NOMINAL
     speed = (reached / ordinary)[~is_angle].max(initial=0.0) or (reached / ordinary).max(initial=0.0)
     step = (demand.span[1] - demand.span[0]) / max(1, motion.statistics.get("steps", 1))
