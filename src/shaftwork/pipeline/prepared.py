@@ -11,7 +11,8 @@ import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
-from shaftwork.integrate.problem import LinearInputs
+from shaftwork.codegen.recovery import History
+from shaftwork.integrate.problem import LinearInputs, Observed
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
 
@@ -29,6 +30,7 @@ class Prepared:
     symbolic: Callable[[], Any]
     linear: LinearInputs | None
     atol: Array
+    form: StateForm
 
     @cached_property
     def bound(self) -> BoundArrays:
@@ -38,6 +40,30 @@ class Prepared:
     def jacobian(self, t: float, x: Array) -> Any:
         """Of the right-hand side, sparse."""
         return self.bound.jacobian(t, x)
+
+
+def observed(prepared: Prepared) -> Observed:
+    """What the branches of a linear network show to the engines.
+
+    The through variable of a conductance in the tree comes from the balance of a node, so its law tells what rounding
+    has left of it.
+    """
+    form, graph = prepared.form, prepared.form.graph
+    branches = len(graph.branches)
+    tree = list(form.tree_conductances)
+
+    def values(times: Array, states: Array) -> Array:
+        history = History(prepared.bound, times, states)
+        left = np.zeros_like(history.through)
+        left[tree] = history.through[tree] - prepared.bound.part.coefficients[tree][:, None] * history.across[tree]
+        return np.concatenate([history.across, history.through, left]).T
+
+    domains = [graph.domains[max(branch.plus, branch.minus)] for branch in graph.branches]
+    across, through = tuple(domain.across.unit for domain in domains), tuple(domain.through.unit for domain in domains)
+    names = tuple(graph.part_of(branch.index).name for branch in graph.branches)
+    direct = np.arange(3 * branches) < branches
+    direct[[branches + branch for branch in form.through_states]] = True
+    return Observed(values, (*across, *through, *through), (*names, *names, *names), direct)
 
 
 def nominal_tolerances(form: StateForm, coefficients: Array) -> Array:
