@@ -159,4 +159,6 @@ def largest_error(values: Mapping[str, Array], wanted: Mapping[str, Array]) -> f
 
 
 def _kind(name: str) -> str:
-    return name.rpartition(".")[2].partition("_")[0]
+    """The quantity of a signal; grounds of the generator hold shafts."""
+    quantity = name.rpartition(".")[2].partition("_")[0]
+    return "tau" if quantity == "reaction" else quantity

@@ -17,11 +17,11 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.integrate.driven import driven, polynomials
 from shaftwork.integrate.modal import Modes, find_modes
 from shaftwork.integrate.pieces import Piece, both_sides, failure, pieces, start_of_piece
-from shaftwork.integrate.precise import PrecisePiece, PreciseSystem, precise_piece, precise_system, seconds
+from shaftwork.integrate.precise import Nearby, PrecisePiece, PreciseSystem, precise_piece, precise_system, seconds
 from shaftwork.integrate.problem import Array, LinearInputs, Problem, Trajectory
 from shaftwork.integrate.stiffness import balance, norm, scale_by
 from shaftwork.integrate.straight import straight_line
-from shaftwork.integrate.verification import doubt
+from shaftwork.integrate.verification import difference, doubt
 
 # Intervals of the engine's own output grid, which no accuracy depends on.
 OWN_INTERVALS = 500
@@ -71,14 +71,46 @@ def solve(problem: Problem) -> Trajectory:
     trajectory = _propagated(problem, system, lambda piece, x: _span(problem, system, piece, x, dense_form=dense_form))
     part = doubt(problem, trajectory, _lost(problem, system, trajectory))
     if part <= DOUBTED or (precise := _precise(problem, system)) is None:
-        return replace(trajectory, doubt=part)
+        return trajectory if part <= DOUBTED else replace(trajectory, doubt=_spread(problem, linear, trajectory))
     try:
-        made = _propagated(problem, system, lambda piece, x: precise_piece(problem, precise, piece, x))
+        made = _propagated(
+            problem, system, lambda piece, x: precise_piece(problem, precise, piece, x, _nearby(problem, system, piece))
+        )
     except OverflowError as error:
         raise failure(problem, "exact", problem.t_end, trajectory.x[-1], str(error)) from error
     bits = precise.power.bits
     remark = f"Floats may lose a part of {part:.1g} of it, so it is computed in whole numbers of {bits} bits."
     return replace(made, remark=remark, statistics={"bits": bits})
+
+
+def _spread(problem: Problem, linear: LinearInputs, trajectory: Trajectory) -> float:
+    """How far a run moves where each entry of A is rounded once more, as a part of the largest value of its kind."""
+    rounded = linear.A.copy()
+    rounded.data = rounded.data * (1 + np.finfo(float).eps * np.random.default_rng(0).choice((-1.0, 1.0), rounded.nnz))
+    system = _System(replace(linear, A=rounded))
+    dense_form = problem.linear is None or prefers_dense(problem, linear)
+    if problem.linear is None and system.modes is None:
+        return 1.0
+    other = _propagated(problem, system, lambda piece, x: _span(problem, system, piece, x, dense_form=dense_form))
+    return difference(problem, trajectory, other)
+
+
+def _nearby(problem: Problem, system: _System, piece: Piece) -> Nearby:
+    """The motion in floats from the node before each time: over so short a time they lose little."""
+    level, slope = straight_line(problem, system.forcing, piece)
+    modes, scale = system.modes, system.scale
+    if modes is None:
+        return _propagator(system, level, slope, dense_form=True).between
+
+    def between(nodes: Array, states: Array, times: Array) -> Array:
+        index = np.clip(np.searchsorted(nodes, times, side="right") - 1, 0, nodes.size - 1)
+        found = np.empty((times.size, states.shape[1]))
+        for k in np.unique(index):
+            line = (level + slope * (nodes[k] - nodes[0])) / scale, slope / scale
+            found[index == k] = modes.response(states[k] / scale, *line, times[index == k] - nodes[k]) * scale
+        return found
+
+    return between
 
 
 def _lost(problem: Problem, system: _System, trajectory: Trajectory) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -23,10 +24,11 @@ PRODUCT = 3e-7
 SERIES = 10
 # Between outputs the motion is polynomials of this degree, which leave out this part of the largest value of a state.
 DEGREE, LEFT_OUT = 20, 2e-14
-# A motion that rings in more panels than these, and all motions at few times, are computed anew at each of the times.
+# A motion that rings in more panels than these goes on in floats from exact nodes; at few times it is computed anew.
 MOST_PANELS, FEW = 200, 64
 INTERVALS = 500
 """Steps of a motion that rings."""
+Nearby = Callable[[Array, Array, Array], Array]
 _COEFFICIENTS = np.linalg.inv(chebyshev.chebvander(2 * points(DEGREE) - 1, DEGREE))
 
 
@@ -74,12 +76,14 @@ class PrecisePiece:
         piece: its span of time.
         start: (size, 1) of it, as whole numbers.
         exponent: the power of two by which they are smaller than the states.
+        nearby: the motion in floats, from nodes (k,), the states (k, n) there and times (m,) to states (m, n).
     """
 
     system: PreciseSystem
     piece: Piece
     start: Integers
     exponent: int
+    nearby: Nearby
 
     def exactly(self, times: Array) -> Array:
         """States (k, n) at times (k,), each rounded once."""
@@ -134,6 +138,12 @@ class PrecisePiece:
         steps = np.array([*(each.start for each in found), self.piece.end])
         return PiecewiseDense(steps[:-1], tuple(found), steps, largest.size)
 
+    @cached_property
+    def _nodes(self) -> tuple[Array, Array]:
+        """Times (k,) and states (k, n) between which a motion that rings is computed in floats."""
+        times = np.linspace(self.piece.start, self.piece.end, INTERVALS + 1)
+        return times, self.exactly(times)
+
     @property
     def end(self) -> Array:
         """(n,) state at its end."""
@@ -143,13 +153,15 @@ class PrecisePiece:
     def times(self) -> Array:
         """(s,) between these the motion is smooth."""
         if self.panels is None:
-            return np.linspace(self.piece.start, self.piece.end, INTERVALS + 1)
+            return self._nodes[0]
         return self.panels.steps
 
     def at(self, times: Array) -> Array:
         """States (k, n) at times (k,)."""
-        if times.size <= FEW or _are_even(times) or self.panels is None:
+        if times.size <= FEW or _are_even(times):
             return self.exactly(times)
+        if self.panels is None:
+            return self.nearby(*self._nodes, times)
         return np.asarray(self.panels(times))
 
 
@@ -177,7 +189,7 @@ def precise_system(problem: Problem, linear: LinearInputs) -> PreciseSystem | No
     return found
 
 
-def precise_piece(problem: Problem, system: PreciseSystem, piece: Piece, x: Array) -> PrecisePiece:
+def precise_piece(problem: Problem, system: PreciseSystem, piece: Piece, x: Array, nearby: Nearby) -> PrecisePiece:
     """The motion in a piece from a state x (n,)."""
     level, slope = straight_line(problem, system.fractions.inputs, piece)
     values = np.concatenate([x, level[system.active], slope[system.active]])
@@ -187,4 +199,4 @@ def precise_piece(problem: Problem, system: PreciseSystem, piece: Piece, x: Arra
     largest = max(map(abs, shares), default=Fraction(0))
     exponent = largest.numerator.bit_length() - largest.denominator.bit_length() if largest else 0
     start = system.power.whole([share / Fraction(2) ** exponent for share in shares])[:, None]
-    return PrecisePiece(system, piece, start, exponent)
+    return PrecisePiece(system, piece, start, exponent, nearby)

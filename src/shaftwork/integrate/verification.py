@@ -16,7 +16,7 @@ WORTH_SAYING = 2e-7
 # A motion each of whose states is known to this part is not looked at any further.
 CERTAIN = 1e-10
 # An engine with a tolerance may be off by this many times of it; an error of so much is said.
-TOLERATED = 50.0
+TOLERATED = 10.0
 
 
 def objection(problem: Problem, trajectory: Trajectory, engine: str) -> str | None:
@@ -62,6 +62,15 @@ def doubt(problem: Problem, trajectory: Trajectory, lost: Array) -> float:
     moved = states[-1] + lost * _patterns(states.shape[1])
     changed = observed.values(np.repeat(ends, len(moved)), moved) - values[-1]
     return _largest(observed, np.where(observed.direct, np.abs(changed).max(axis=0), 0.0), values)[0]
+
+
+def difference(problem: Problem, trajectory: Trajectory, other: Trajectory) -> float:
+    """The largest difference of two runs in the states and in what is across the branches, as a part of the largest."""
+    if problem.observed is None or not trajectory.t.size:
+        return 0.0
+    chosen, observed = _samples(trajectory.t.size), problem.observed
+    first, second = (observed.values(run.t[chosen], run.x[chosen]) for run in (trajectory, other))
+    return _largest(observed, np.where(observed.direct, np.abs(first - second).max(axis=0), 0.0), first)[0]
 
 
 def _samples(count: int) -> Array:
