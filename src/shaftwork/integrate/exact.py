@@ -71,7 +71,7 @@ def solve(problem: Problem) -> Trajectory:
     trajectory = _propagated(problem, system, lambda piece, x: _span(problem, system, piece, x, dense_form=dense_form))
     part = doubt(problem, trajectory, _lost(problem, system, trajectory))
     if part <= DOUBTED or (precise := _precise(problem, system)) is None:
-        return trajectory if part <= DOUBTED else replace(trajectory, doubt=_spread(problem, linear, trajectory))
+        return replace(trajectory, doubt=part if part <= DOUBTED else _spread(problem, linear, trajectory))
     try:
         made = _propagated(
             problem, system, lambda piece, x: precise_piece(problem, precise, piece, x, _nearby(problem, system, piece))

@@ -32,19 +32,21 @@ class Fractions(NamedTuple):
 
 
 class Observed(NamedTuple):
-    """What is across the branches of a linear network, what passes through them, and what their laws leave of it.
+    """The speeds of a linear network, what passes through its branches, and what laws leave of that.
 
     Args:
-        values: from times (k,) and states (k, n) to (k, 3 b): across, through, and what should be zero, of b branches.
-        kinds: (3 b,) their units.
-        names: (3 b,) their parts.
-        direct: (3 b,) whether a value is across a branch or a state; what dampers give is a difference times their d.
+        values: from times (k,) and states (k, n) to (k, m): across, through, and what should be zero.
+        kinds: (m,) their units.
+        names: (m,) their parts.
+        direct: (m,) whether a value is a speed or a state; what dampers give is a difference times their d.
+        first_left: number of the first value that should be zero.
     """
 
     values: Callable[[Array, Array], Array]
     kinds: tuple[str, ...]
     names: tuple[str, ...]
     direct: Any
+    first_left: int
 
 
 @dataclass(frozen=True)

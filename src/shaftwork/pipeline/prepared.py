@@ -13,6 +13,7 @@ from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.recovery import History
 from shaftwork.integrate.problem import LinearInputs, Observed
+from shaftwork.network.graph import GROUND
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
 
@@ -49,21 +50,26 @@ def observed(prepared: Prepared) -> Observed:
     has left of it.
     """
     form, graph = prepared.form, prepared.form.graph
-    branches = len(graph.branches)
-    tree = list(form.tree_conductances)
+    parts = [(part, part.nodes[port.name]) for part in graph.parts for port in part.component.ports]
+    nodes = {node: part.name for part, node in parts if node != GROUND}
+    places, tree = list(nodes), list(form.tree_conductances)
 
     def values(times: Array, states: Array) -> Array:
         history = History(prepared.bound, times, states)
-        left = np.zeros_like(history.through)
-        left[tree] = history.through[tree] - prepared.bound.part.coefficients[tree][:, None] * history.across[tree]
-        return np.concatenate([history.across, history.through, left]).T
+        left = history.through[tree] - prepared.bound.part.coefficients[tree][:, None] * history.across[tree]
+        return np.concatenate([history.potentials[places], history.through, left]).T
 
     domains = [graph.domains[max(branch.plus, branch.minus)] for branch in graph.branches]
-    across, through = tuple(domain.across.unit for domain in domains), tuple(domain.through.unit for domain in domains)
-    names = tuple(graph.part_of(branch.index).name for branch in graph.branches)
-    direct = np.arange(3 * branches) < branches
-    direct[[branches + branch for branch in form.through_states]] = True
-    return Observed(values, (*across, *through, *through), (*names, *names, *names), direct)
+    through = [  # that of a coupling is a multiplier, whatever its ratios make of it
+        "" if branch.template.kind is Kind.COUPLING else domain.through.unit
+        for branch, domain in zip(graph.branches, domains, strict=True)
+    ]
+    kinds = (*(graph.domains[node].across.unit for node in nodes), *through, *(through[branch] for branch in tree))
+    owners = [graph.part_of(branch.index).name for branch in graph.branches]
+    names = (*nodes.values(), *owners, *(owners[branch] for branch in tree))
+    direct = np.arange(len(kinds)) < len(nodes)
+    direct[[len(nodes) + branch for branch in form.through_states]] = True
+    return Observed(values, kinds, names, direct, len(nodes) + len(owners))
 
 
 def nominal_tolerances(form: StateForm, coefficients: Array) -> Array:
