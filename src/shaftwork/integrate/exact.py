@@ -16,12 +16,12 @@ from scipy.sparse.linalg import expm_multiply
 from shaftwork.core.errors import ParameterError
 from shaftwork.integrate.driven import driven, polynomials
 from shaftwork.integrate.modal import Modes, find_modes
+from shaftwork.integrate.observation import difference, doubt
 from shaftwork.integrate.pieces import Piece, both_sides, failure, pieces, start_of_piece
 from shaftwork.integrate.precise import Nearby, PrecisePiece, PreciseSystem, precise_piece, precise_system, seconds
 from shaftwork.integrate.problem import Array, LinearInputs, Problem, Trajectory
 from shaftwork.integrate.stiffness import balance, norm, scale_by
 from shaftwork.integrate.straight import straight_line
-from shaftwork.integrate.verification import difference, doubt
 
 # Intervals of the engine's own output grid, which no accuracy depends on.
 OWN_INTERVALS = 500
