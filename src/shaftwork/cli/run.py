@@ -118,6 +118,9 @@ def _say_phases(solution: Solution, say: Say) -> None:
 def _write(solution: Solution, signals: Sequence[str], place: Path) -> None:
     import numpy as np
 
+    from shaftwork.results.samples import warn_of_coarse_samples
+
+    warn_of_coarse_samples(solution, signals)
     units, profiles = solution.observer.units, solution.observer.profiles
     head, columns = ["t [s]"], [solution.t]
     for name in signals:

@@ -21,6 +21,7 @@ from shaftwork.results.life import damage_of, damages, load_cycles
 from shaftwork.results.observer import Array, Dense, Observer
 from shaftwork.results.rainflow import SMALLEST, Rainflow
 from shaftwork.results.reader import Reader
+from shaftwork.results.samples import warn_of_coarse_samples
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -217,17 +218,26 @@ class Solution:
         return self.energy.residual
 
     def to_pandas(self, *names: str) -> pd.DataFrame:
-        """A table over time of the named quantities, by default of all (extra `data`)."""
+        """A table over time of the named quantities, by default of all (extra `data`).
+
+        An `AccuracyWarning` says where output times are too far apart to show how the named quantities, or else the
+        states, swing.
+        """
         frame = _require("pandas", "data", "Solution.to_pandas()")
         columns = {name: self[name] for name in names or self.names}
+        warn_of_coarse_samples(self, names)
         return frame.DataFrame(columns, index=frame.Index(self.t, name="t"))
 
     def to_xarray(self, *names: str) -> xarray.Dataset:
-        """A data set over time of the named quantities, by default of all, with units (extra `data`)."""
+        """A data set over time of the named quantities, by default of all, with units (extra `data`).
+
+        Warns as `to_pandas` does.
+        """
         library = _require("xarray", "data", "Solution.to_xarray()")
         units = self.observer.units
         data = {name: ("t", self[name], {"units": units[name]}) for name in names or self.names}
         time = ("t", self.t, {"units": "s"})
+        warn_of_coarse_samples(self, names)
         return library.Dataset(  # type: ignore[no-any-return]
             data, coords={"t": time}, attrs={"title": self.name, "engine": self.engine, "why": self.why}
         )
