@@ -20,8 +20,8 @@ _NODES = (1 - np.cos(np.pi * np.arange(DEGREE + 1) / DEGREE)) / 2
 _POWERS = np.linalg.inv(np.vander(_NODES, increasing=True))
 _CHEBYSHEV = np.linalg.inv(chebyshev.chebvander(2 * _NODES - 1, DEGREE))
 _FACTORIALS = np.cumprod([1.0, *range(1, DEGREE + 1)])
-# Values at a time in one evaluation of the motion.
-BLOCK = 200_000
+# Values at a time in one evaluation of the motion: the functions phi of so many stay in a cache.
+BLOCK = 10_000
 
 
 @dataclass(frozen=True)
@@ -58,9 +58,12 @@ def _moved(rates: Complex, length: float, inside: Array, start: Complex, inputs:
     Law: e^z w + t sum_j (t / length)^j j! phi_{j+1}(z) c_j with z = lambda t.
     """
     z = np.multiply.outer(inside, rates)
-    weights = phi(z, DEGREE + 1) * _FACTORIALS[:, None, None]
-    shares = (inside / length) ** np.arange(DEGREE + 1)[:, None]
-    return np.asarray(np.exp(z) * start + inside[:, None] * np.einsum("jkm,jk,kmj->km", weights, shares, inputs))
+    exponential = np.exp(z)
+    motion = exponential * start
+    powers = _FACTORIALS[:, None] * inside * (inside / length) ** np.arange(DEGREE + 1)[:, None]
+    for j, function in enumerate(phi(z, exponential, DEGREE + 1)):
+        motion += function * (powers[j][:, None] * inputs[..., j])
+    return np.asarray(motion)
 
 
 def polynomials(forcing: Callable[[Array], Array], length: float) -> Array | None:

@@ -16,7 +16,7 @@ Complex = NDArray[np.complex128]
 # The modes may multiply rounding errors by this much; a defective matrix is far beyond.
 LARGEST_CONDITION = 1e4
 # Up to this size of their argument the phi functions are summed as series of so many terms.
-NEAR, SERIES_TERMS = 2.0, 32
+NEAR, SERIES_TERMS = 2.0, 24
 # In the scale of energy a lossless matrix is skew up to this part of its entries: each state on the way there rounds.
 SKEW = 1e-12
 
@@ -44,9 +44,10 @@ class Modes:
         """
         z = np.multiply.outer(elapsed, self.values)
         t = elapsed[:, None]
-        motion = np.exp(z) * (self.inverse @ start)
+        exponential = np.exp(z)
+        motion = exponential * (self.inverse @ start)
         if level.any() or slope.any():
-            once, twice = phi(z, 2)
+            once, twice = phi(z, exponential, 2)
             motion += t * once * (self.inverse @ level) + t**2 * twice * (self.inverse @ slope)
         return np.ascontiguousarray((motion @ self.vectors.T).real)
 
@@ -112,21 +113,28 @@ def _lossless_modes(matrix: Array, scale: Array, speeds: NDArray[np.bool_]) -> M
     return Modes(values, vectors.astype(complex), (rows / scale).astype(complex))
 
 
-def phi(z: Complex, count: int) -> Complex:
+def phi(z: Complex, exponential: Complex, count: int) -> Complex:
     """phi_1 ... phi_count, (count, ...): phi_k = (phi_{k-1} - 1 / (k-1)!) / z, phi_0 = e^z.
 
     Near zero, where these differences would cancel, the last one is summed as a series and the others follow from it.
+
+    Args:
+        z: where.
+        exponential: e^z, which a caller has already.
+        count: how many.
     """
     small = np.abs(z) < NEAR
-    safe = np.where(small, NEAR, z)
+    inverse = 1.0 / np.where(small, NEAR, z)  # one division for all: a complex one costs as much as five products
     found = np.empty((count, *z.shape), dtype=complex)
-    found[0] = np.expm1(safe) / safe
+    np.multiply(exponential - 1.0, inverse, out=found[0])
     for k in range(1, count):
-        found[k] = (found[k - 1] - 1 / math.factorial(k)) / safe
+        np.subtract(found[k - 1], 1 / math.factorial(k), out=found[k])
+        found[k] *= inverse
     near = z[small]
     series = np.ones_like(near)
-    for term in range(SERIES_TERMS, count, -1):
-        series = 1.0 + series * near / term
+    for term in range(count + SERIES_TERMS, count, -1):
+        series *= near / term
+        series += 1.0
     series /= math.factorial(count)
     for k in range(count, 0, -1):
         found[k - 1][small] = series
