@@ -99,6 +99,9 @@ def test_a_sweep_is_that_of_the_library(model: str, tmp_path: Path, capsys: pyte
     [
         (("--vary", "shaft.c=1:2"), "write first:last:count"),
         (("--vary", "shaft.c=1:2:one"), "write first:last:count"),
+        (("--vary", "shaft.c=1:2:\N{SUPERSCRIPT TWO}"), "write first:last:count"),
+        (("--vary", "shaft.c=1:2:99999999999"), "a count from 2 to 1000000"),
+        (("--vary", "shaft.c=1:2:9999", "--vary", "J1.J=1:2:9999"), "has 99980001 variants, more than 10000000"),
         (("--vary", "shaft.c=-1:2:3"), "shaft.c must be"),
         (("--vary", "shaft.k=1,2"), "There is no parameter 'shaft.k'"),
         (("--vary", "shaft.c"), "such as --vary shaft.c=2e4,3e4"),

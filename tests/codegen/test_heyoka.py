@@ -196,5 +196,9 @@ def test_new_parameters_and_start_states_compile_nothing(monkeypatch):
 def test_a_large_system_is_compiled_compactly():
     states = sympy.symbols("y:102")
     rows = tuple(states[i - 1] - 2 * states[i] for i in range(len(states)))
-    assert build(states, t, (), rows).integrator(1e-10).compact_mode
-    assert not build(states[:2], t, (), (states[1], -states[0])).integrator(1e-10).compact_mode
+    for program, compact in (
+        (build(states, t, (), rows), True),
+        (build(states[:2], t, (), (states[1], -states[0])), False),
+    ):
+        with program.lent(1e-10) as lent:
+            assert lent.integrator.compact_mode == compact

@@ -13,8 +13,15 @@ if TYPE_CHECKING:
     from shaftwork.core.parameters import Parameter
     from shaftwork.pipeline.network import Network
 
-_QUANTITY = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*[^\W\d].*")
+_QUANTITY = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\W\d].*)")
 """A number and a unit behind it; no law reads so."""
+_UNIT = re.compile(r"(?:[^\W\d]\w*+|[*/() ·]|(?:\*\*|\^) *[-+]?\d(?:\.\d+)?(?! *(?:\*\*|\^)))*+")
+"""Names of units, their products and quotients, and powers of one digit: the reader behind computes any other number,
+of any size."""
+MOST_CHARACTERS = 100
+"""Of a number with its unit."""
+MOST_VALUES = 1_000_000
+"""Of one parameter that is varied; more is a typing error."""
 
 
 def with_settings(net: Network, settings: Iterable[str]) -> Network:
@@ -67,12 +74,15 @@ def numbers(net: Network, text: str) -> tuple[str, list[Any]]:
     ends = written.split(":")
     if len(ends) == 1:
         return name, [_value(name, declared, item) for item in written.split(",")]
-    if len(ends) != 3 or not ends[2].strip().isdigit() or int(ends[2]) < 2:
-        raise ParameterError(f"{text}: write first:last:count with a count of 2 or more, such as {name}=1:2:11.")
+    count = int(ends[2]) if len(ends) == 3 and re.fullmatch(r" *[0-9]{1,9} *", ends[2]) else 0
+    if not 2 <= count <= MOST_VALUES:
+        raise ParameterError(
+            f"{text}: write first:last:count with a count from 2 to {MOST_VALUES}, such as {name}=1:2:11."
+        )
     first, last = (declared.magnitude(_value(name, declared, end)) for end in ends[:2])
     if objection := first[1] or last[1]:
         raise ParameterError(f"{text}: {name} {objection}.")
-    return name, np.linspace(first[0], last[0], int(ends[2])).tolist()
+    return name, np.linspace(first[0], last[0], count).tolist()
 
 
 def point(texts: Iterable[str]) -> dict[str, float]:
@@ -145,6 +155,12 @@ def _quantity(name: str, text: str) -> Any:
         from pint import application_registry
     except ImportError:
         raise MissingExtraError("pint", "units", f"{name}={text} with a unit") from None
+    number = _QUANTITY.fullmatch(text.strip())
+    if number is None or len(text) > MOST_CHARACTERS or not _UNIT.fullmatch(number[2]):
+        raise ParameterError(
+            f"{name}={text[:MOST_CHARACTERS]} is no number with a unit. Write the number, then units with * / and "
+            "powers of one digit, such as '3 kg*m**2'."
+        )
     try:
         return application_registry.Quantity(text)
     except Exception as error:  # noqa: BLE001 (pint raises what its tokeniser does, too)

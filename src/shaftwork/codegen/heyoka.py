@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -31,6 +32,19 @@ WEIGHT = 1e-3
 COOLDOWN = 1e-9
 
 
+@dataclass(eq=False)
+class Compiled:
+    """A compiled integrator.
+
+    Args:
+        integrator: the `heyoka.taylor_adaptive`.
+        listener: asked at a guard, with its number, whether the run goes on.
+    """
+
+    integrator: Any = None
+    listener: Callable[[int], bool] | None = None
+
+
 @dataclass(frozen=True)
 class HeyokaProgram:
     """A system x' = f(t, x, p) in heyoka's expressions; its integrators are compiled when first needed and kept.
@@ -52,7 +66,6 @@ class HeyokaProgram:
         guards: heyoka expressions at whose change of sign a run ends; behind the signs of the switches there is a
             parameter for each: 1 where its rise through zero ends the run, -1 where its fall does, 0 where neither; and
             behind these another for each, how far beyond zero it has to go; last of all one for each of `fading`.
-        listeners: the last one is asked at a guard, with its number, whether the run goes on.
         held: functions that are constant between switches; they are the last of the parameters.
         stepping: which of the switches depend on them.
     """
@@ -68,8 +81,7 @@ class HeyokaProgram:
     guards: tuple[Any, ...] = ()
     held: HeldParameters | None = None
     stepping: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
-    listeners: list[Callable[[int], bool]] = field(default_factory=list, repr=False, compare=False)
-    _compiled: dict[float, Any] = field(default_factory=dict, repr=False, compare=False)
+    _idle: dict[float, list[Compiled]] = field(default_factory=dict, repr=False, compare=False)
     _functions: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property
@@ -97,11 +109,22 @@ class HeyokaProgram:
         """The place of the first weight among the parameters."""
         return self.parameter_count + len(self.switches) + 2 * len(self.guards)
 
-    def integrator(self, tolerance: float) -> Any:
-        """The `heyoka.taylor_adaptive` for a relative tolerance; one compilation for each tolerance."""
-        if tolerance not in self._compiled:
-            self._compiled[tolerance] = self._compile(tolerance)
-        return self._compiled[tolerance]
+    @contextmanager
+    def lent(self, tolerance: float) -> Iterator[Compiled]:
+        """An integrator for a relative tolerance, which no other run has meanwhile, of this thread or of others.
+
+        It is compiled once for each tolerance, and of runs at once for each: heyoka then finds its code again.
+        """
+        idle = self._idle.setdefault(tolerance, [])
+        try:
+            compiled = idle.pop()
+        except IndexError:
+            compiled = self._compile(tolerance)
+        try:
+            yield compiled
+        finally:
+            compiled.listener = None
+            idle.append(compiled)
 
     def switch_values(self, t: float | Array, x: Array, parameters: Array) -> Array:
         """Values of the switches (k,) at time t in s, state x (n,) and all parameters, the signs included.
@@ -170,9 +193,10 @@ class HeyokaProgram:
         kept[own] = signs[own]
         signs[:] = self.switch_signs(*at, parameters, kept)
 
-    def _compile(self, tolerance: float) -> Any:
+    def _compile(self, tolerance: float) -> Compiled:
         import heyoka
 
+        made = Compiled()
         heyoka.set_logger_level_error()  # a failed run says so itself
         options: dict[str, Any] = {}
         if self.guards:
@@ -183,10 +207,10 @@ class HeyokaProgram:
             options["t_events"] = [
                 *(self._leaves_its_side(number, switch) for number, switch in enumerate(self.switches)),
                 *(self._comes_near(number, value) for number, value in enumerate(self.fading)),
-                *(self._end(number, guard) for number, guard in enumerate(self.guards)),
+                *(self._end(number, guard, made) for number, guard in enumerate(self.guards)),
                 *(self._outgrows(number, value) for number, value in enumerate(self.fading)),
             ]
-        return interruptible(
+        made.integrator = interruptible(
             heyoka.taylor_adaptive,
             list(zip(self.variables, self.rows, strict=True)),
             [0.0] * len(self.rows),
@@ -194,6 +218,7 @@ class HeyokaProgram:
             compact_mode=len(self.rows) > LARGEST_UNROLLED,
             **options,
         )
+        return made
 
     def _comes_near(self, number: int, value: Any) -> Any:
         """The event that what is fading comes near."""
@@ -215,7 +240,7 @@ class HeyokaProgram:
             (size - WEIGHT**2) * (1.0 - size), direction=heyoka.event_direction.negative, callback=weigh
         )
 
-    def _end(self, number: int, guard: Any) -> Any:
+    def _end(self, number: int, guard: Any, compiled: Compiled) -> Any:
         """The event that a guard rises through an offset on its side; the run goes on if whoever listens says so."""
         import heyoka
 
@@ -224,7 +249,7 @@ class HeyokaProgram:
         met = heyoka.select(side, side * guard - offset, heyoka.expression(-1.0))
 
         def ask(_integrator: Any, _direction: int) -> bool:
-            return bool(self.listeners) and self.listeners[-1](number)
+            return compiled.listener is not None and compiled.listener(number)
 
         # heyoka's own cooldown grows with the tolerance, and hides what follows soon
         return heyoka.t_event(met, direction=heyoka.event_direction.positive, callback=ask, cooldown=COOLDOWN)

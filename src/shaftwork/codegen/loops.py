@@ -73,13 +73,14 @@ class LoopSolver:
 
     def _followed(self, t: Array, x: Array) -> Array:
         """The unknowns (loops, k), those of each instant by Newton's method from those of the one before."""
-        starts = np.tile(self._last[:, None], len(t))
+        last = self._last
+        starts = np.tile(last[:, None], len(t))
         a = self._newton(t, x, starts)
         if len(t) == 1:
-            self._last = a[:, 0] if np.isfinite(a).all() else self._last
+            self._last = a[:, 0] if np.isfinite(a).all() else last
             return a
         while True:
-            known = np.column_stack([self._last, a])
+            known = np.column_stack([last, a])
             found = np.where(np.isfinite(known).all(axis=0), np.arange(known.shape[1]), 0)
             ends = known[:, np.maximum.accumulate(found)]  # where there is no solution, the last one that there was
             least = SAME * np.abs(ends).max(axis=1, keepdims=True)

@@ -14,6 +14,7 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.scalar import ScalarProgram
 from shaftwork.components.pieces import pieces_degree
 from shaftwork.core.errors import CompileError, ParameterError
+from shaftwork.core.kept import Kept
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.blocks import BlockTooLargeError
 from shaftwork.reduction.form import StateForm
@@ -55,7 +56,7 @@ class CompiledModel:
         self.parameters: dict[str, float] = dict(form.graph.parameters)
         self.arrays = ArrayProgram(form)
         self.defaults = np.array(list(self.parameters.values()), dtype=float)
-        self._bound: tuple[bytes, BoundArrays] | None = None
+        self._bound = Kept[bytes, BoundArrays](1)
 
     @cached_property
     def states(self) -> tuple[str, ...]:
@@ -105,10 +106,7 @@ class CompiledModel:
     def bind(self, p: Array | None = None) -> BoundArrays:
         """The array program for a parameter vector; the last one is kept."""
         vector = self.defaults if p is None else np.asarray(p, dtype=float)
-        key = vector.tobytes()
-        if self._bound is None or self._bound[0] != key:
-            self._bound = (key, self.arrays.bind(vector))
-        return self._bound[1]
+        return self._bound(vector.tobytes(), lambda: self.arrays.bind(vector))
 
     def rhs(self, t: float, x: Array, p: Array | None = None) -> Array:
         """Rates of the states.

@@ -17,6 +17,7 @@ from shaftwork.codegen.timeline import CLEARANCE, NOTHING, Timeline, timeline
 from shaftwork.components.laws import line, switches
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ParameterError
+from shaftwork.core.kept import Kept
 from shaftwork.network.graph import GraphPart
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
@@ -76,7 +77,7 @@ class Switching:
     def __init__(self, form: StateForm) -> None:
         self._switches = tuple(_switches(form))
         self._places = sorted({place for switch in self._switches for place in switch.places})
-        self._found: dict[tuple[bytes, float, float, bool], Timeline] = {}
+        self._found = Kept[tuple[bytes, float, float, bool], Timeline](KEPT)
 
     def known(self, p: Array) -> tuple[float, ...]:
         """Times in s of switches that are linear in time, increasing: they are known without a run.
@@ -123,18 +124,17 @@ class Switching:
         if not self._switches:
             return NOTHING
         key = (p[self._places].tobytes(), t0, t_end, modes)
-        if key not in self._found:
-            found: list[tuple[float, float]] = []
-            for switch in (one for one in self._switches if one.acts or modes):
-                if switch.line is None:
-                    found += _searched(switch, p, t0, t_end)
-                else:
-                    levels = _whole_numbers(switch, p, t0, t_end) if switch.whole else switch.levels
-                    found += _on_a_line(switch, levels, p)
-            while len(self._found) >= KEPT:
-                del self._found[next(iter(self._found))]
-            self._found[key] = timeline(found, t0, t_end)
-        return self._found[key]
+        return self._found(key, lambda: self._searched(p, t0, t_end, modes=modes))
+
+    def _searched(self, p: Array, t0: float, t_end: float, *, modes: bool) -> Timeline:
+        found: list[tuple[float, float]] = []
+        for switch in (one for one in self._switches if one.acts or modes):
+            if switch.line is None:
+                found += _searched(switch, p, t0, t_end)
+            else:
+                levels = _whole_numbers(switch, p, t0, t_end) if switch.whole else switch.levels
+                found += _on_a_line(switch, levels, p)
+        return timeline(found, t0, t_end)
 
 
 def _switches(form: StateForm) -> Iterator[_Switch]:

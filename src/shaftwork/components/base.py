@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -18,6 +17,7 @@ from shaftwork.components.modes import Modes
 from shaftwork.core.declarations import is_label, is_pair, refuse_fields
 from shaftwork.core.domains import DOMAIN_NAMES, DOMAINS, ELECTRICAL, ROTATION, Domain
 from shaftwork.core.errors import NetworkWarning, ParameterError, ShaftworkError
+from shaftwork.core.notices import muted
 from shaftwork.core.parameters import Parameter, parameter
 
 Role = Literal["store", "loss", "source", "coupling"]
@@ -211,8 +211,7 @@ class Component:
 
     def changed(self, **values: Any) -> Self:
         """The same part with other values, of which its author has been warned already."""
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", NetworkWarning)
+        with muted(NetworkWarning):
             return dataclasses.replace(self, **values)
 
     @property

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
@@ -16,6 +15,7 @@ from shaftwork.components.laws import Interpolation, Table
 from shaftwork.components.switching import number_of, off_time, on_time, refuse_no_time_on, while_on
 from shaftwork.components.torque_curves import bend, kloss, pull_out_slip, pull_up_share, refuse_rated_point
 from shaftwork.core.errors import NetworkWarning, ParameterError
+from shaftwork.core.notices import warn
 from shaftwork.core.parameters import parameter
 
 
@@ -196,9 +196,8 @@ def _warn_of_turns(title: str, torques: tuple[float, float, float], n_k: float, 
     speed = n_k * (share + turn * (1 - share))
     if 0 < speed < n_k:
         other = f"a speed n_s nearer to {free * n_k:.4g} 1/min, or none" if n_s else "n_s"
-        warnings.warn(
+        warn(
             f"{title}: the quartic through its three torques turns once more at {speed:.4g} 1/min, so that the torque "
             f"does not fall to tau_s and rise to tau_k as it should. Give {other}.",
             NetworkWarning,
-            stacklevel=6,
         )

@@ -3,9 +3,17 @@
 from __future__ import annotations
 
 import sys
+import threading
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 
 PACKAGE = __name__.partition(".")[0]
+FILTERS = threading.RLock()
+"""To be held around `warnings.catch_warnings`, whose filters are of all threads: if two overlap, one stays for good."""
+
+_muted: ContextVar[tuple[type[Warning], ...]] = ContextVar("muted", default=())
 
 
 def warn(message: str, category: type[Warning]) -> None:
@@ -15,7 +23,23 @@ def warn(message: str, category: type[Warning]) -> None:
         message: what is worth knowing.
         category: kind of warning.
     """
+    if issubclass(category, _muted.get()):
+        return
     level, frame = 1, sys._getframe()  # noqa: SLF001 (what `warnings` itself counts by)
     while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == PACKAGE:
         level, frame = level + 1, frame.f_back
     warnings.warn(message, category, stacklevel=level)
+
+
+@contextmanager
+def muted(*categories: type[Warning]) -> Iterator[None]:
+    """This thread's `warn` of these kinds says nothing meanwhile: its author has been warned before.
+
+    Args:
+        categories: kinds of warnings.
+    """
+    before = _muted.set((*_muted.get(), *categories))
+    try:
+        yield
+    finally:
+        _muted.reset(before)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
-import warnings
 from dataclasses import dataclass, replace
 
 from shaftwork.core.errors import AccuracyWarning, MissingExtraError, ParameterError
+from shaftwork.core.notices import warn
 from shaftwork.integrate.problem import Engine, Problem, Trajectory
 
 # Why scipy goes on where heyoka stopped.
@@ -152,7 +152,7 @@ def solve(
             and trajectory.t.size
             and (lost := rounding(problem, trajectory.t, trajectory.x)) is not None
         ):
-            warnings.warn(lost, AccuracyWarning, stacklevel=4)
+            warn(lost, AccuracyWarning)
         return trajectory, name, why or reason
     run = load(name)
     from shaftwork.integrate.problem import SeriesError

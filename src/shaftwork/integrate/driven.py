@@ -80,8 +80,10 @@ def polynomials(forcing: Callable[[Array], Array], length: float) -> Array | Non
     while panels <= most:
         times = length / panels * (np.arange(panels)[:, None] + _NODES)
         values = forcing(times.ravel()).reshape(-1, panels, DEGREE + 1)
-        last = np.abs(values @ _CHEBYSHEV.T)[..., -2:].max(axis=(1, 2))
         largest = np.maximum(np.abs(values).max(axis=(1, 2)), np.finfo(float).tiny)
+        if not np.isfinite(largest).all():  # an input without a value somewhere has no polynomial there
+            return None
+        last = np.abs(values @ _CHEBYSHEV.T)[..., -2:].max(axis=(1, 2))
         rough = float((last / largest).max(initial=0.0))
         if rough <= LEFT_OUT or before / 4 < rough <= ROUNDED:
             return values

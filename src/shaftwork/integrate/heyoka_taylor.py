@@ -40,7 +40,7 @@ def solve(problem: Problem) -> Trajectory:
     """Integrate the heyoka program of a problem.
 
     With `t_eval` the run only fills the output grid; dense output and step ends are made by a second, identical run
-    when they are first asked for. The integrator belongs to the program: two threads must not run one program at once.
+    when they are first asked for.
 
     Raises:
         MissingExtraError: heyoka is not installed.
@@ -63,14 +63,17 @@ def solve(problem: Problem) -> Trajectory:
     return Trajectory(t, x, dense, {"steps": dense.steps.size - 1}, met=dense.met, end=(float(t[-1]), x[-1]))
 
 
-class _Run:
-    """One run of the shared integrator over a problem."""
+def _tolerance(problem: Problem) -> float:
+    return min(max(problem.rtol, TIGHTEST_TOLERANCE), LOOSEST_TOLERANCE) * problem.overall
 
-    def __init__(self, problem: Problem) -> None:
+
+class _Run:
+    """One run over a problem, by an integrator that is lent for it."""
+
+    def __init__(self, problem: Problem, lent: Any) -> None:
         self.problem = problem
         self.program = problem.program.program
-        tolerance = min(max(problem.rtol, TIGHTEST_TOLERANCE), LOOSEST_TOLERANCE)
-        self.integrator = self.program.integrator(tolerance * problem.overall)
+        self.lent, self.integrator = lent, lent.integrator
         self.parameters = problem.program.parameters
         self.state: Array = np.array(problem.x0, dtype=float)
         self.start = self.state
@@ -98,9 +101,9 @@ class _Run:
             self._guard(self.problem.guards.sides, self.problem.guards.offsets)
         self.program.weigh(integrator)
         watch = self._watch(piece)
-        self.program.listeners.clear()
+        self.lent.listener = None
         longest = self._first_step(piece)
-        self.program.listeners[:] = [self._reacts] if watch is None else []
+        self.lent.listener = self._reacts if watch is None else None
         while True:
             left = self.problem.max_steps - self.steps
             raw, outcome, steps = advance(integrator, watch, left if longest == math.inf else 1, longest)
@@ -242,7 +245,12 @@ class _Run:
 
 
 def _on_grid(problem: Problem, times: Array) -> Trajectory:
-    run, stops = _Run(problem), list[float]()
+    with problem.program.program.lent(_tolerance(problem)) as lent:
+        return _filled(_Run(problem, lent), times)
+
+
+def _filled(run: _Run, times: Array) -> Trajectory:
+    problem, stops = run.problem, list[float]()
     states = np.empty((times.size, run.state.size))
     done, chunk = 0, times.size + 1 if problem.guards is None else CHUNK
     for piece in pieces(problem):
@@ -343,14 +351,14 @@ class _Replay:
 
     @cached_property
     def _made(self) -> tuple[tuple[tuple[Any, ...], ...], int | None]:
-        run = _Run(self._problem)
-        recorders = []
-        for piece in pieces(self._problem):
-            recorder = _SegmentRecorder(self._problem, piece.end, [stop for stop in self._stops if stop < piece.end])
-            run.piece(piece, recorder)
-            recorders.append(recorder)
-            if run.met is not None:
-                break
+        problem, recorders = self._problem, list[_SegmentRecorder]()
+        with problem.program.program.lent(_tolerance(problem)) as lent:
+            run = _Run(problem, lent)
+            for piece in pieces(problem):
+                recorders.append(_SegmentRecorder(problem, piece.end, [s for s in self._stops if s < piece.end]))
+                run.piece(piece, recorders[-1])
+                if run.met is not None:
+                    break
         return tuple(tuple(recorder.segments) for recorder in recorders), run.met
 
     @property

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.integrate import BDF, DOP853, LSODA, OdeSolution, Radau
 
 from shaftwork.core.errors import SimulationError
+from shaftwork.core.notices import FILTERS
 from shaftwork.integrate.cancellation import cancellation
 from shaftwork.integrate.crossings import Crossings
 from shaftwork.integrate.guards import LEAST, SHORTER, GuardWatch
@@ -212,7 +213,7 @@ def _step(solver: Any, method: Method) -> str:
     """Take one step; the solver's message, which LSODA gives as a warning."""
     if method != "LSODA":
         return str(solver.step() or "")
-    with warnings.catch_warnings(record=True) as caught:
+    with FILTERS, warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         message = solver.step()
     return "; ".join([*(str(warning.message) for warning in caught), str(message or "")])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.util
 import warnings
 from collections.abc import Callable
-from contextlib import redirect_stdout
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -13,6 +12,8 @@ from typing import Any, Literal
 import numpy as np
 
 from shaftwork.core.errors import MissingExtraError
+from shaftwork.core.notices import FILTERS
+from shaftwork.core.quiet import unprinted
 from shaftwork.integrate.chebyshev import Polynomial, points
 from shaftwork.integrate.crossings import Crossings
 from shaftwork.integrate.guards import CLEARANCE, LEAST, SHORTER, GuardWatch, share_of_tolerance
@@ -156,7 +157,7 @@ def _open_cvode(problem: Problem, piece: Piece, x: Array, method: Method, patter
     least = CLEARANCE * float(np.spacing(abs(piece.start)))
     if _first_change(problem, x, guard.rhs(piece.start, x)) < least:
         options["first_step"] = least
-    with warnings.catch_warnings():
+    with FILTERS, warnings.catch_warnings():
         # It says that the pattern is only used as a pattern, since the Jacobian is given.
         warnings.filterwarnings("ignore", message="Custom sparse Jacobian")
         solver = CVODE(rhs, **options)
@@ -204,7 +205,7 @@ def _open_ida(problem: DaeProblem, piece: Piece, x: Array) -> _Opened:
         calc_init_dt=1e-3 * (piece.end - piece.start),
     )
     try:
-        with redirect_stdout(None):
+        with unprinted():
             start = solver.init_step(piece.start, x, problem.derivative0)
     except RuntimeError as error:
         reason = f"IDA found no consistent initial values ({error})"
@@ -299,7 +300,7 @@ def _step(
     """End in s and state (n,) there of the next step from a time and state, which is `longest` s long at most."""
     stop = min(piece.end, t + longest)
     # SUNDIALS prints what its result says as well.
-    with np.errstate(all="ignore"), redirect_stdout(None):
+    with np.errstate(all="ignore"), unprinted():
         result = opened.solver.step(stop, method="onestep", tstop=stop)
     if not result.success:
         raise failure(problem, "sundials", t, x, str(result.message), opened.guard)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import warnings
 from collections.abc import Callable, Mapping
 from functools import cached_property, partial
 from typing import Any
@@ -19,6 +18,7 @@ from shaftwork.components.modes import ALL_IN_ONE
 from shaftwork.components.shaft_models import MOST_SPECTRAL, OneSpring, Rigid, Spectral, Wave
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import AccuracyWarning, NetworkWarning, ParameterError
+from shaftwork.core.notices import muted
 from shaftwork.network.graph import resolve
 from shaftwork.network.netlist import Netlist, Placed
 from shaftwork.pipeline.analysis import Names, Point, SmallMotions, Time, about, input_names, operating_point, titled
@@ -100,10 +100,7 @@ class ExactNetwork:
             dataclasses.replace(item, part=shafts.get(item.part.name, item.part), choices=choices)
             for item in self._model.netlist.placed
         )
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", NetworkWarning)
-            if self._model.form.waves:
-                warnings.simplefilter("ignore", AccuracyWarning)
+        with muted(NetworkWarning, *((AccuracyWarning,) if self._model.form.waves else ())):
             return self._compiled(Netlist(self._model.name, placed))
 
     @cached_property

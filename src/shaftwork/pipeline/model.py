@@ -18,6 +18,7 @@ from shaftwork.codegen.start_values import initial_state
 from shaftwork.codegen.switching import Switching
 from shaftwork.codegen.valueless import rough, without_value
 from shaftwork.core.errors import CompileError, ParameterError
+from shaftwork.core.kept import Kept
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import LinearInputs, Problem, Trajectory
 from shaftwork.network.netlist import Netlist
@@ -64,8 +65,8 @@ class Model(CompiledModel):
     def __init__(self, form: StateForm, netlist: Netlist, rebuild: Rebuild) -> None:
         super().__init__(form)
         self.netlist, self._rebuild = netlist, rebuild
-        self._prepared: tuple[bytes, Prepared] | None = None
-        self._variants: dict[tuple[tuple[str, float], ...], Model] = {}
+        self._prepared = Kept[bytes, Prepared](1)
+        self._variants = Kept[tuple[tuple[str, float], ...], Model](VARIANTS)
         self._choices: list[tuple[tuple[float, float, float], Array, tuple[str, str]]] = []
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -300,19 +301,18 @@ class Model(CompiledModel):
 
     def prepare(self, p: Array) -> Prepared:
         """Everything that depends on a parameter vector alone; the last one is kept."""
-        key = p.tobytes()
-        if self._prepared is None or self._prepared[0] != key:
-            scalar = self.scalar
-            made = Prepared(
-                p=p,
-                bind=self.bind,
-                rhs=self.bind(p).rhs if scalar is None else scalar.bind(p),
-                symbolic=cache(lambda: None if self._program is None else self._program.bind(p)),
-                linear=self._linear_inputs(p),
-                atol=nominal_tolerances(self.form, self.arrays.assembly.coefficients(p)),
-            )
-            self._prepared = (key, made)
-        return self._prepared[1]
+        return self._prepared(p.tobytes(), lambda: self._prepare(p))
+
+    def _prepare(self, p: Array) -> Prepared:
+        scalar = self.scalar
+        return Prepared(
+            p=p,
+            bind=self.bind,
+            rhs=self.bind(p).rhs if scalar is None else scalar.bind(p),
+            symbolic=cache(lambda: None if self._program is None else self._program.bind(p)),
+            linear=self._linear_inputs(p),
+            atol=nominal_tolerances(self.form, self.arrays.assembly.coefficients(p)),
+        )
 
     @cached_property
     def _program(self) -> Any:
@@ -381,9 +381,4 @@ class Model(CompiledModel):
 
     def _variant(self, values: Mapping[str, float]) -> Model:
         """The model of the same network with other values where these change its structure; the last few are kept."""
-        key = tuple(sorted(values.items()))
-        if key not in self._variants:
-            self._variants[key] = self._rebuild(self.netlist.with_values(values))
-        while len(self._variants) > VARIANTS:
-            del self._variants[next(iter(self._variants))]
-        return self._variants[key]
+        return self._variants(tuple(sorted(values.items())), lambda: self._rebuild(self.netlist.with_values(values)))

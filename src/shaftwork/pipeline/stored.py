@@ -6,12 +6,12 @@ output times, and the call that led to them.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 from weakref import WeakValueDictionary
 
-from shaftwork.core.errors import NetworkWarning
+from shaftwork.core.errors import AccuracyWarning, NetworkWarning
+from shaftwork.core.notices import muted
 from shaftwork.network.netlist import Netlist
 
 if TYPE_CHECKING:
@@ -35,8 +35,7 @@ def model_again(rebuild: Rebuild, netlist: Netlist) -> Model:
     """The model of a network; its author has been warned when it was first made."""
     model = _LIVING.get((rebuild, netlist))
     if model is None:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", NetworkWarning)
+        with muted(NetworkWarning):
             model = _LIVING[rebuild, netlist] = rebuild(netlist)
     return model
 
@@ -79,8 +78,7 @@ class Repetition:
     def __call__(self) -> Solution:
         """The motion, made again."""
         model = self._model or model_again(self._rebuild, self._netlist)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # its author has seen them
+        with muted(NetworkWarning, AccuracyWarning):  # its author has seen them
             return model.simulate(**self._options)
 
     def __reduce__(self) -> tuple[Any, ...]:

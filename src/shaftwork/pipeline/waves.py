@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -20,6 +19,7 @@ from shaftwork.components.modes import ALL_IN_ONE
 from shaftwork.components.shaft_models import Lumped, Wave
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import AccuracyWarning, NetworkWarning, ParameterError
+from shaftwork.core.notices import warn
 from shaftwork.core.times import just_after
 from shaftwork.integrate.lossless.engine import solve
 from shaftwork.integrate.lossless.lines import DelayProblem, DelayTrajectory
@@ -33,8 +33,6 @@ LIGHT = 0.1
 """Lumped bearing friction is light up to this fraction of the impedance: the torques are right to about 0.5 %."""
 MANY_PANELS = 2e5
 """A march of so many panels takes minutes."""
-CALLER = 6
-"""Frames from a warning to who called `simulate`."""
 
 
 @dataclass(frozen=True)
@@ -204,12 +202,11 @@ def _warn_of_friction(bound: BoundArrays, impedances: Array) -> None:
         value = {name: float(bound.p[place]) for name, place in part.parameters.items()}
         share = value.get("friction", 0.0) * value["length"] / float(impedance)
         if share > LIGHT:
-            warnings.warn(
+            warn(
                 f"Shaft '{part.name}': its bearing friction d' L is {share:.2g} of its wave impedance, and Wave() "
                 f"lumps it at the ends and the middle, which is right far below one only: torques along it are off by "
                 f"{'more than ten' if share > 5 else 'some'} per cent. Take model=Spectral(16), which spreads it out.",
                 AccuracyWarning,
-                stacklevel=CALLER,
             )
 
 
@@ -218,10 +215,9 @@ def _warn_of_short_lines(bound: BoundArrays, delays: Array, span: float) -> None
     panels = span / float(delays[shortest])
     if panels > MANY_PANELS:
         name = bound.program.form.graph.part_of(bound.program.form.waves[2 * shortest]).name
-        warnings.warn(
+        warn(
             f"A wave crosses shaft '{name}' in {delays[shortest]:.2g} s, and beside nonlinear laws no panel is longer: "
             f"the run takes at least {panels:.2g} panels. Take model=OneSpring() or Spectral(2) for a shaft so short, "
             "or a shorter run.",
             NetworkWarning,
-            stacklevel=CALLER,
         )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -18,6 +17,7 @@ from shaftwork.components.sources import ForceSource, TorqueSource
 from shaftwork.components.translation import Mass, TranslationalDamper, TranslationalSpring
 from shaftwork.core.domains import ROTATION, TRANSLATION, Domain
 from shaftwork.core.errors import NetworkWarning, ShaftworkError
+from shaftwork.core.notices import muted
 from shaftwork.core.parameters import Parameter
 from shaftwork.network.netlist import REFERENCE, Placed
 from shaftwork.reduce.covariance import does_the_same
@@ -185,8 +185,7 @@ def _scaled(part: Component, scale: Scale, here: Domain, domain: Domain) -> tupl
                     *(made[0], target.unit, signsimp(made[1])),
                 )
             )
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", NetworkWarning)  # what is odd about the part was said when it was made
+    with muted(NetworkWarning):  # what is odd about the part was said when it was made
         return kind(part.name, **values), tuple(entries)
 
 

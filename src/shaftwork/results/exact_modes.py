@@ -8,7 +8,6 @@ has none, and what the mesh leads to is taken as far as it is what has been coun
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.core.errors import NetworkWarning, ParameterError, SimulationError
+from shaftwork.core.notices import warn
 from shaftwork.results.exact_problem import ExactProblem
 from shaftwork.results.modes import Modes, checked_count, largest_rate, modes_of
 from shaftwork.results.observer import Array
@@ -104,12 +104,11 @@ def _lowest(modes: Modes, count: int | None) -> Modes:
 def _stop(slopes: ExactSlopes, limit: float, asked: str) -> None:
     """Say why modes are named up to a limit alone; where they crowd there, by an error."""
     if np.isinf(slopes.lines.crowding):
-        warnings.warn(
+        warn(
             f"{asked}: an end of a shaft takes all that arrives at it (a damper of the impedance of the shaft), and "
             f"what does not come back makes no mode. Modes are named up to f_max = {limit / (2 * np.pi):.4g} Hz, "
             f"beyond which rounding alone would make some; for amplitudes take frequency_response.",
             NetworkWarning,
-            stacklevel=5,
         )
         return
     shaft = slopes.lines.names[int(slopes.lines.damping.argmax())]

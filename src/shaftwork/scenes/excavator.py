@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
-
 from shaftwork.components.bucket_wheel import BucketWheelLoad, Soil
 from shaftwork.components.motor_catalogue import motors
 from shaftwork.components.motors import CageMotor
 from shaftwork.components.rotation import Gear, Inertia, Spring
 from shaftwork.core.errors import NetworkWarning
+from shaftwork.core.notices import muted
 from shaftwork.pipeline.network import Network
 from shaftwork.scenes.catalog import Scene
 
@@ -61,9 +60,8 @@ def digging(
 
 def cage_motor(pull_up_speed: float) -> CageMotor:
     """The motor with a speed at pull-up, 1/min, without a warning of its curve."""
-    with warnings.catch_warnings():
+    with muted(NetworkWarning):
         # the quartic first rises to 5.8 kN m at 110 1/min: the price of the extremes of figure 13
-        warnings.simplefilter("ignore", NetworkWarning)
         return motors["excavator 250 kW"].cage("motor", n_s=pull_up_speed, symbol="M")
 
 

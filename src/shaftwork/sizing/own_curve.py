@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable
 
 import numpy as np
@@ -12,6 +11,7 @@ from shaftwork.codegen.observer import ModelObserver
 from shaftwork.components.base import Component
 from shaftwork.components.rotation import Inertia
 from shaftwork.core.errors import NetworkWarning, ShaftworkError
+from shaftwork.core.notices import muted
 from shaftwork.pipeline.network import Network
 from shaftwork.results.observer import Array
 
@@ -34,8 +34,7 @@ def own_curve(motor: Component | None, steps: Array) -> Curve | None:
         return None
     net = Network("bench")
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", NetworkWarning)  # of its curve the motor has been warned about when made
+        with muted(NetworkWarning):  # of its curve the motor has been warned about when made
             net.add(motor, "shaft")
             net.add(Inertia("inertia", J=1.0), "shaft")
             model = net.compile()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from itertools import compress, product
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,9 @@ from shaftwork.studies.sweep_task import Chunk, Reader, Task, Worker
 
 LEFT = "a zero, an impact, a stiff motion or a change of mode that is not beyond doubt is left to `simulate`"
 """Why variants have left those beside them."""
+
+MOST_VARIANTS = 10_000_000
+"""Of a grid: so many take hours, and more are a typing error."""
 
 Measures = Mapping[str, "str | Callable[[Solution], float]"] | Iterable[str]
 
@@ -155,8 +158,24 @@ def _columns(netlist: Netlist, parameters: Any, samples: Any) -> dict[str, Array
             lengths = ", ".join(f"{name} {len(values)}" for name, values in checked.items())
             raise ParameterError(f"The columns of samples differ in length: {lengths}.")
         return checked
-    rows = np.array(list(product(*checked.values())))
-    return {name: rows[:, k].copy() for k, name in enumerate(checked)}
+    return _grid(checked)
+
+
+def _grid(values: Mapping[str, Array]) -> dict[str, Array]:
+    """Every combination of values, the last name fastest."""
+    count = math.prod(map(len, values.values()))
+    if count > MOST_VARIANTS:
+        sizes = " x ".join(f"{len(own)}" for own in values.values())
+        raise ParameterError(
+            f"A grid of {sizes} values has {count} variants, more than {MOST_VARIANTS}. Give fewer values, or draw "
+            "samples={...} of them."
+        )
+    columns: dict[str, Array] = {}
+    before = 1
+    for name, own in values.items():
+        columns[name] = np.tile(np.repeat(own, count // before // len(own)), before)
+        before *= len(own)
+    return columns
 
 
 def _checked(netlist: Netlist, name: str, values: Any) -> Array:

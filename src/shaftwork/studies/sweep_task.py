@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,7 +12,16 @@ from numpy.typing import NDArray
 
 from shaftwork.codegen.observer import ModelObserver
 from shaftwork.components.base import Component
-from shaftwork.core.errors import CompileError, NetworkError, ParameterError, ShaftworkError, no_quantity
+from shaftwork.core.errors import (
+    AccuracyWarning,
+    CompileError,
+    NetworkError,
+    NetworkWarning,
+    ParameterError,
+    ShaftworkError,
+    no_quantity,
+)
+from shaftwork.core.notices import muted
 from shaftwork.integrate.choice import available
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.network import Network
@@ -208,8 +216,7 @@ def _checked(part: Component) -> set[str]:
 
     told: Any = object.__new__(Told)
     object.__getattribute__(told, "__dict__").update(vars(part))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # what is odd about it was said when it was made
+    with muted(NetworkWarning, AccuracyWarning):  # what is odd about it was said when it was made
         told.__post_init__()
     return read - {"__post_init__"}
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import warnings
 from functools import cache
 from itertools import pairwise
 
 import numpy as np
 
 from shaftwork.core.errors import AccuracyWarning
+from shaftwork.core.notices import warn
 from shaftwork.integrate.lossless.collocation import STAGES
 from shaftwork.integrate.lossless.lattice import ROUNDING, Lattice
 from shaftwork.integrate.lossless.leaps import Far, Leaps
@@ -92,13 +92,12 @@ def _far(lattice: Lattice, rtol: float) -> tuple[DelayTrajectory | None, list[bo
     if any(bad):
         if 2 * lattice.size <= MOST_PANELS_FAR:
             return None, bad
-        warnings.warn(
+        warn(
             f"After {lattice.count // lattice.size:g} delays the modes have run out of step and the waves have "
             f"wrinkles finer than {lattice.size} panels in a delay: about {lattice.wrinkles(late):.1g} of the largest "
             f"wave is not resolved (asked: {rtol:.1g}). The energy is kept all the same. An input without jumps, or a "
             "little damping with model=Spectral(16), leaves fewer wrinkles.",
             AccuracyWarning,
-            stacklevel=2,
         )
         bad = [False] * lattice.size
     far = Far(lattice.trajectory(run, np.empty(0)), leaps, lattice)

@@ -26,6 +26,7 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Leave, Mode, Modes
 from shaftwork.components.pieces import pieces_degree
 from shaftwork.core.errors import CompileError, no_value
+from shaftwork.core.kept import Kept
 from shaftwork.integrate.choice import available
 from shaftwork.integrate.problem import Guards, Problem
 from shaftwork.network.graph import GraphPart
@@ -117,8 +118,8 @@ class Assembly:
                     self._watched[number, mode.name] = tuple(self._leaves(number, readings, part, mode))
         if rows is None:
             _ = self._shown  # so that all quantities are known before any function of them is made
-        self._prepared: dict[bytes, Prepared] = {}
-        self._rates_made: dict[bytes, tuple[Callable[[float, Array], Array], dict[str, Any]]] = {}
+        self._prepared = Kept[bytes, Prepared](KEPT)
+        self._rates_made = Kept[bytes, tuple[Callable[[float, Array], Array], dict[str, Any]]](KEPT)
         self._sides: dict[ModeNames, Array] = {}
         self._ends: dict[ModeNames, tuple[tuple[int, Watched], ...]] = {}
         self._numbers = [self._places[element.number] for element in elements if element.number in self._places]
@@ -173,12 +174,7 @@ class Assembly:
         """What the numbers of modes do not enter, for the other parameters."""
         plain = p.copy()
         plain[self._numbers] = 0.0
-        key = plain.tobytes()
-        if key not in self._prepared:
-            while len(self._prepared) >= KEPT:
-                del self._prepared[next(iter(self._prepared))]
-            self._prepared[key] = self.model.prepare(plain)
-        return self._prepared[key]
+        return self._prepared(plain.tobytes(), lambda: self.model.prepare(plain))
 
     def bound(self, p: Array) -> BoundArrays:
         """The equations with their parameters; matrices hold no number of a mode."""
@@ -334,12 +330,7 @@ class Assembly:
 
     def _rates(self, p: Array) -> tuple[Callable[[float, Array], Array], dict[str, Any]]:
         """The right-hand side and what engines find out about it, for all phases with these parameters."""
-        key = p.tobytes()
-        if key not in self._rates_made:
-            while len(self._rates_made) >= KEPT:
-                del self._rates_made[next(iter(self._rates_made))]
-            self._rates_made[key] = rates_of(self.model, self.bound(p), self.motion(p)[0], p), {}
-        return self._rates_made[key]
+        return self._rates_made(p.tobytes(), lambda: (rates_of(self.model, self.bound(p), self.motion(p)[0], p), {}))
 
     def _sizes(self, guards: Callable[[Array, Array], Array], x: Array, span: tuple[float, float]) -> Array:
         """The size of each clock over a phase, as far as the time alone tells."""

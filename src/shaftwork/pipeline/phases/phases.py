@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from shaftwork.components.modes import Choice
 from shaftwork.core.errors import NetworkError, NetworkWarning, ParameterError
+from shaftwork.core.kept import Kept
+from shaftwork.core.notices import muted
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.netlist import Netlist
@@ -44,8 +45,8 @@ class Phases:
         self._assemblies: dict[tuple[str, ...], Assembly | NetworkError] = {}
         self._engines: dict[tuple[Assembly, ModeNames, str], tuple[str, str]] = {}
         self._easy: dict[Assembly, dict[tuple[int, str], tuple[str, str]]] = {}
-        self.found: tuple[Any, Any] | None = None
-        """Of which values and times the last run was, and what it has found out: the next like it goes on with that."""
+        self.found = Kept[Any, Any](1)
+        """What the last run has found out, by its values and times: the next like it goes on with that."""
 
     def assembly(self, modes: ModeNames) -> Assembly:
         """The equations for a combination of modes.
@@ -56,15 +57,15 @@ class Phases:
         forms = tuple(element.modes[name].form for element, name in zip(self.elements, modes, strict=True))
         if forms not in self._assemblies:
             try:
-                with warnings.catch_warnings():  # of the network as it is wired compilation has warned
-                    warnings.simplefilter("ignore", NetworkWarning)
+                with muted(NetworkWarning):  # of the network as it is wired compilation has warned
                     netlist = self._netlist(forms)
                     model = self._rebuild(netlist)
                     if (resting := at_rest(netlist, model.form)) is not netlist:
                         model = self._rebuild(resting)
-                self._assemblies[forms] = Assembly(model, self.elements, forms)
+                made: Assembly | NetworkError = Assembly(model, self.elements, forms)
             except NetworkError as error:
-                self._assemblies[forms] = error
+                made = error
+            self._assemblies.setdefault(forms, made)  # another thread may have been first
         made = self._assemblies[forms]
         if isinstance(made, NetworkError):
             raise made.with_traceback(None)  # else it would keep the frames of every time that it was raised

@@ -54,7 +54,7 @@ class Regimes:
                 assembly.sizes(p),
                 assembly.watched(modes),
             )
-            self._made[modes] = made
+            self._made.setdefault(modes, made)  # another thread may have been first
         return self._made[modes]
 
     def possible(self, modes: ModeNames) -> bool:

@@ -68,10 +68,7 @@ class Known:
 
 def _known(phases: Phases, values: Mapping[str, float], span: tuple[float, float]) -> Known:
     """What the last run with these values over the same time has found out, or nothing yet."""
-    key = tuple(sorted(values.items())), span
-    if phases.found is None or phases.found[0] != key:
-        phases.found = key, Known(Settling(phases, values, span))
-    made: Known = phases.found[1]
+    made: Known = phases.found((tuple(sorted(values.items())), span), lambda: Known(Settling(phases, values, span)))
     return made
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 
@@ -14,6 +13,7 @@ from shaftwork.codegen.differentiated import Differentiated, Shown
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.expressed import Expressed
 from shaftwork.core.errors import AccuracyWarning, ParameterError, SimulationError
+from shaftwork.core.notices import warn
 from shaftwork.integrate.variation import Coefficients, Variation, variation
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.moments import Change
@@ -227,11 +227,10 @@ class MotionSlopes:
 
 def _warn(doubt: float, t: float) -> None:
     if doubt > DOUBTFUL:
-        warnings.warn(
+        warn(
             f"Sensitivities are right to some {doubt:.0e} only: at t = {t:.9g} s something changes that is hardly "
             "moving any more. Of rigid contacts a larger omega_rest helps.",
             AccuracyWarning,
-            stacklevel=6,
         )
 
 
