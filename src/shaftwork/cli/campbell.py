@@ -8,6 +8,7 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from shaftwork.cli.command import Command, Data, Say, folder_option, point_options
 from shaftwork.cli.folder import Folder, write_picture, write_rows
 from shaftwork.cli.models import load, point_of
+from shaftwork.core.errors import ParameterError
 
 SPEEDS = 61
 
@@ -28,6 +29,11 @@ def run(options: Namespace, say: Say) -> Data:
     import numpy as np
 
     net, _ = load(options)
+    if not 0 <= options.n_min < options.n_max < math.inf:
+        raise ParameterError(
+            f"--n-min {options.n_min:g} --n-max {options.n_max:g}: give two speeds in 1/min, the lower one 0 or more, "
+            "such as --n-min 0 --n-max 3000."
+        )
     folder = Folder(options.out, ("campbell.csv", "campbell.png"), options.line) if options.out else None
     speeds = np.linspace(options.n_min, options.n_max, SPEEDS) * math.pi / 30
     diagram = net.campbell(

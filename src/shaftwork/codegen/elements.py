@@ -12,6 +12,7 @@ from scipy import sparse
 from sympy import Expr
 
 from shaftwork.codegen.code import scalar, vectorised
+from shaftwork.core.errors import ParameterError
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.templates import BranchTemplate, Kind
 from shaftwork.reduction.form import StateForm
@@ -22,6 +23,9 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 LINEAR = (Kind.ACROSS_STORE, Kind.THROUGH_STORE, Kind.CONDUCTANCE)
+FARTHEST = 1e100
+"""Sizes of coefficients in SI up to it, and down to its reciprocal: products of a few leave the range of floating-point
+numbers, as that of a shaft of 1e60 m, whose diameter counts to the fourth power."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,16 +59,29 @@ class Coefficients:
 
     def __init__(self, graph: CircuitGraph) -> None:
         linear = [branch.index for branch in graph.branches if branch.template.kind in LINEAR]
-        self._size = len(graph.branches)
+        self._graph, self._size = graph, len(graph.branches)
         self._groups = tuple(
             (group, vectorised(group.template.symbols, group.template.law)) for group in groups_of(graph, linear)
         )
 
     def __call__(self, p: Array) -> Array:
-        """(branches,) coefficients; 0 for branches that have none."""
+        """(branches,) coefficients; 0 for branches that have none.
+
+        Raises:
+            ParameterError: one is too large or too small to compute with; names its part.
+        """
         values = np.zeros(self._size)
-        for group, function in self._groups:
-            values[group.branches] = function(*p[group.places])
+        with np.errstate(all="ignore"):
+            for group, function in self._groups:
+                values[group.branches] = function(*p[group.places])
+        sizes = np.abs(values)
+        if (beyond := np.flatnonzero(~((values == 0) | ((sizes >= 1 / FARTHEST) & (sizes <= FARTHEST))))).size:
+            part = self._graph.part_of(int(beyond[0]))
+            raise ParameterError(
+                f"{type(part.component).__name__} '{part.name}': its values make an inertia, a stiffness or a damping "
+                f"of {values[beyond[0]]:.3g} in SI, and the equations take sizes from {1 / FARTHEST:g} to {FARTHEST:g}. "
+                "Look for a value in a wrong unit."
+            )
         return values
 
 

@@ -72,7 +72,8 @@ def _within_rounding(program: Any, integrator: Any) -> NDArray[np.bool_]:
     values = program.switch_values(time, state, parameters)
     moved = state * (1.0 + ROUNDINGS * np.where(np.arange(state.size) % 2, 1.0, -1.0))
     others = program.switch_values(time + ROUNDINGS * abs(time), moved, parameters)
-    return np.asarray((values != 0.0) & (np.abs(values) <= np.abs(others - values)))
+    with np.errstate(invalid="ignore"):  # one that is infinite is not near zero
+        return np.asarray((values != 0.0) & (np.abs(values) <= np.abs(others - values)))
 
 
 def _early_signs(program: Any, integrator: Any, horizon: float) -> Array:

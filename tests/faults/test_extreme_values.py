@@ -1,0 +1,43 @@
+"""Values that nobody means: each is admissible by itself, but what the equations make of it is not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+import shaftwork as sw
+
+USES: dict[str, Callable[[sw.Network], Any]] = {
+    "auto": lambda net: net.simulate(0.01),
+    "scipy": lambda net: net.simulate(0.01, engine="scipy"),
+    "exact": lambda net: net.simulate(0.01, engine="exact"),
+    "modes": lambda net: net.modes(count=3),
+    "steady state": lambda net: net.compile().steady_state(t=0.0),
+}
+
+
+def line(diameter: float) -> sw.Network:
+    net = sw.Network("line")
+    net.add(sw.TorqueSource("motor", tau=1.0), "a")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.Shaft("shaft", length=1.0, diameter=diameter, model=sw.Spectral(4)), "a", "b")
+    net.add(sw.Damper("water", d=9.0), "b", "ground")
+    return net
+
+
+@pytest.mark.parametrize("use", USES)
+@pytest.mark.parametrize("diameter", [1e-60, 1e30, 1e60])
+def test_a_shaft_whose_stiffness_leaves_the_range_of_numbers_is_named(use: str, diameter: float) -> None:
+    with pytest.raises(sw.ParameterError, match=r"Shaft 'shaft': .* Look for a value in a wrong unit"):
+        USES[use](line(diameter))
+
+
+def test_an_input_that_is_infinite_at_the_start_is_left_to_engines_that_step() -> None:
+    """It is not searched for ever finer panels, in which polynomials would follow it."""
+    net = sw.Network("pushed")
+    net.add(sw.TorqueSource("motor", tau=1 / sw.t), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    with pytest.raises(sw.SimulationError, match="engine failed at t = 0 s"):
+        net.simulate(1.0)
