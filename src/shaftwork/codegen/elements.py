@@ -79,7 +79,7 @@ class Coefficients:
             part = self._graph.part_of(int(beyond[0]))
             raise ParameterError(
                 f"{type(part.component).__name__} '{part.name}': its values make an inertia, a stiffness or a damping "
-                f"of {values[beyond[0]]:.3g} in SI, and the equations take sizes from {1 / FARTHEST:g} to {FARTHEST:g}. "
+                f"of {values[beyond[0]]:.3g} in SI, the equations take sizes from {1 / FARTHEST:g} to {FARTHEST:g}. "
                 "Look for a value in a wrong unit."
             )
         return values
