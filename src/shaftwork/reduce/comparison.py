@@ -65,7 +65,7 @@ class Comparison:
         lines = ["model       peak N m     error  rms error", f"train     {self.extremes[0]:10.6g}"]
         models = {"groups": self.after, **({} if self.by_modes is None else {"modes": self.by_modes})}
         for place, (name, torque) in enumerate(models.items(), 1):
-            errors = f"{self._peak_error(place):+10.2%}{self._rms_error(torque):11.2%}"
+            errors = f"{self._peak_error(place):+z10.2%}{self._rms_error(torque):11.2%}"
             lines.append(f"{name:10}{self.extremes[place]:10.6g}{errors}")
         return "\n".join(lines)
 

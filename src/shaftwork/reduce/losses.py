@@ -86,7 +86,7 @@ class FrequencyTable:
 
 def _cells(row: FrequencyLoss) -> tuple[str, str, str, str, str]:
     after, by_modes = ("lost" if f is None else f"{f:.6g}" for f in (row.after, row.by_modes))
-    error = "" if row.error is None else f"{row.error:+.2%}"
+    error = "" if row.error is None else f"{row.error:+z.2%}"
     return str(row.mode), f"{row.before:.6g}", after, error, by_modes
 
 

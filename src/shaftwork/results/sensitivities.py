@@ -132,6 +132,6 @@ def _text(title: str, header: Sequence[str], rows: Mapping[str, Array]) -> str:
     widths = [max(len(text), 9) for text in header]
     lines = [f"{'':{width}}  " + "  ".join(text.rjust(w) for text, w in zip(header, widths, strict=True))]
     for name in order:
-        cells = (f"{round(value, 4) + 0.0:.4f}".rjust(w) for value, w in zip(rows[name].tolist(), widths, strict=True))
+        cells = (f"{value:z.4f}".rjust(w) for value, w in zip(rows[name].tolist(), widths, strict=True))
         lines.append(f"{name:{width}}  " + "  ".join(cells))
     return "\n".join([title, *lines])
