@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import shaftwork as sw
+from shaftwork.studies.sweep_store import check_of
 
 STIFFNESSES = np.linspace(500.0, 900.0, 20)
 """More than two chunks of variants that run one by one."""
@@ -44,7 +45,8 @@ def lines(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
 
 def chunk(**changes: Any) -> str:
     whole = {"variants": [0, 1], "values": [[1.0, 2.0], [3.0, 4.0]], "reasons": ["", ""], "left": 0} | changes
-    return json.dumps({key: value for key, value in whole.items() if value != "no"})
+    made = {key: value for key, value in whole.items() if value != "no"}
+    return json.dumps(made | {"check": check_of(made)})
 
 
 @pytest.mark.parametrize(
@@ -74,6 +76,7 @@ def chunk(**changes: Any) -> str:
         (chunk(reasons=[""]), "not a text for each of its 2 variants"),
         (chunk(reasons=["", None]), "not a text for each of its 2 variants"),
         (chunk(left=3), "'left' is not a whole number from 0 to 2"),
+        (chunk().replace("4.0", "5.0"), "its digits are not those that were written"),
     ],
 )
 def test_a_damaged_line_is_named_and_without_it_the_sweep_goes_on(

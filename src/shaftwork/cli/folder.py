@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shaftwork.core.errors import MissingExtraError, ParameterError
+from shaftwork.core.files import replaced
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -52,19 +53,38 @@ class Folder:
 
     @contextmanager
     def new_files(self) -> Iterator[Path]:
-        """A folder to write into; all in it takes the place of the older run's files once everything is written."""
-        draft = Path(tempfile.mkdtemp(prefix=".shaftwork-", dir=self.path))
+        """A folder to write into; all in it takes the place of the older run's files once everything is written.
+
+        Raises:
+            ParameterError: something cannot be written, as on a full disk.
+        """
         try:
-            yield draft
-            names = sorted(path.name for path in draft.iterdir())
-            manifest = {"command": ["shaftwork", *self._line], "files": names}
-            (draft / MANIFEST).write_text(json.dumps(manifest, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-            for name in self._files():
-                (self.path / name).unlink(missing_ok=True)
-            for name in [MANIFEST, *names]:  # the list first: whatever happens next, the next run knows these files
-                (draft / name).replace(self.path / name)
-        finally:
-            shutil.rmtree(draft, ignore_errors=True)
+            draft = Path(tempfile.mkdtemp(prefix=".shaftwork-", dir=self.path))
+            try:
+                yield draft
+                self._take(draft)
+            finally:
+                shutil.rmtree(draft, ignore_errors=True)
+        except OSError as error:
+            raise ParameterError(
+                f"--out {self.path} cannot be written: {error}. Make room, or give another folder."
+            ) from None
+
+    def _take(self, draft: Path) -> None:
+        """Put the files of a draft in the place of the older run's; wherever it ends, the next run knows them all."""
+        new, older = sorted(path.name for path in draft.iterdir()), self._files()
+        stale = [name for name in older if name not in new]
+        self._list([*new, *stale])
+        for name in new:
+            (draft / name).replace(self.path / name)
+        for name in stale:
+            (self.path / name).unlink(missing_ok=True)
+        self._list(new)
+
+    def _list(self, names: Sequence[str]) -> None:
+        manifest = {"command": ["shaftwork", *self._line], "files": names}
+        with replaced(self.path / MANIFEST) as file:
+            file.write(json.dumps(manifest, indent=2, ensure_ascii=False) + "\n")
 
     def written(self) -> str:
         """What is there, in words."""

@@ -11,6 +11,7 @@ from sympy import Expr
 
 from shaftwork.components import REGISTRY, Component, Table
 from shaftwork.core.errors import ModelFileError, ParameterError
+from shaftwork.core.files import replaced
 from shaftwork.network import expressions, textfile
 from shaftwork.network.expression_reader import parse
 from shaftwork.network.grammar import fault_of, tokens_of
@@ -43,7 +44,8 @@ def write_netlist(netlist: Netlist, path: str | Path) -> None:
     """
     place, text = _path_of(path), netlist_text(netlist)
     try:
-        place.write_text(text, encoding="utf-8", newline="\n")
+        with replaced(place) as file:
+            file.write(text)
     except (OSError, ValueError) as error:
         raise ModelFileError(
             f"{place} cannot be written: {error}. Give the path of a file in a folder that exists."

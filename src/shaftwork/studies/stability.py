@@ -15,6 +15,7 @@ import numpy as np
 
 from shaftwork.components.shaft_models import ShaftModel, Wave
 from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError
+from shaftwork.core.files import replaced
 from shaftwork.integrate.choice import ENGINES, available
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.prepared import NOMINAL
@@ -127,7 +128,7 @@ class Stability:
     def to_csv(self, path: str | Path) -> None:
         """Write every cell with all that is known about it."""
         names = tuple(Cell.__dataclass_fields__)
-        with Path(path).open("w", newline="", encoding="utf-8") as file:
+        with replaced(path) as file:
             writer = csv.writer(file)
             writer.writerow(names)
             writer.writerows([getattr(cell, name) for name in names] for cell in self.cells)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import nullcontext
 from itertools import compress
 from pathlib import Path
 from typing import Any
@@ -77,11 +78,11 @@ def sweep(
         processes: how many; by default as many as there are cores, where the sweep takes long enough. Variants side by
             side are divided only then: in the seconds that a process needs to start, 50 000 are done.
         store: a file to which all that is done is appended. The same call with the same file goes on where it stopped.
-            It is for one call at a time.
+            It is for one call at a time: a second one is refused.
 
     Raises:
         ParameterError: an argument is out of its range, there is no such parameter or measure, or the store is that of
-            another sweep or is damaged in a line that is not the last.
+            another sweep, in use by one, damaged in a line that is not the last, or cannot be written any more.
         NetworkError: the network cannot be assembled.
         SignalError: a measure is of a quantity that does not exist.
     """
@@ -96,7 +97,8 @@ def sweep(
         options["t_eval"] = 2  # they read the motion between these
     task = Task(net, columns, readers, _lines(sn, readers), end, options)
     worker = Worker(task)
-    values, reasons, left = _run(task, worker, count, None if store is None else Store(store, task))
+    with nullcontext() if store is None else Store(store, task) as kept:
+        values, reasons, left = _run(task, worker, count, kept)
     why = worker.why or (f"{left} of {len(task)} variants ran one by one: {LEFT}" if left else "")
     measured = dict(zip(readers, values.T, strict=True))
     return Sweep(net.name, columns, measured, limits, reasons, why)

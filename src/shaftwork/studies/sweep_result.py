@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.core.errors import MissingExtraError, ParameterError
+from shaftwork.core.files import replaced
 from shaftwork.core.parameters import whole
 from shaftwork.results.observer import Array
 
@@ -118,7 +119,7 @@ class Sweep:
         """
         columns = self.columns
         try:
-            with Path(path).open("w", newline="", encoding="utf-8") as file:
+            with replaced(path) as file:
                 writer = csv.writer(file)
                 writer.writerow(columns)
                 writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))

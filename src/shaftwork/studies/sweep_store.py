@@ -1,7 +1,7 @@
 """A file to which a sweep appends every chunk that is done, so that stopping loses nothing.
 
-One JSON text a line: first what the sweep is, then chunks. A line that was cut off when the sweep was killed is written
-anew.
+One JSON text a line: first what the sweep is, then chunks, each with a sum over what it says. A line that was cut off
+when the sweep was killed is written anew.
 """
 
 from __future__ import annotations
@@ -9,10 +9,14 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import os
+import zlib
 from collections.abc import Callable, Mapping
+from contextlib import suppress
+from io import FileIO
 from pathlib import Path
 from sys import float_info
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -21,39 +25,97 @@ from shaftwork.network.wording import listed
 from shaftwork.results.measures import Measure
 from shaftwork.studies.sweep_task import Chunk, Reader, Task
 
-FORMAT = 1
+try:
+    import fcntl
+except ImportError:  # a system without such locks
+    fcntl = None  # type: ignore[assignment]
+
+FORMAT = 2
 
 
 class Store:
-    """The file of a sweep.
+    """The file of a sweep, which is for one sweep at a time, until it is closed.
 
     Args:
         path: of the file; it is made where there is none.
         task: the sweep.
 
     Raises:
-        ParameterError: the file is that of another sweep, is damaged in a line that is not the last, or cannot be
-            written.
+        ParameterError: the file is that of another sweep, is in use, is damaged in a line that is not the last, or
+            cannot be written.
     """
 
     def __init__(self, path: str | Path, task: Task) -> None:
         self._path, self._title = Path(path), _title(task)
         title = (json.dumps(self._title) + "\n").encode()
+        self._file = self._opened()
         try:
-            raw = self._path.read_bytes() if self._path.exists() else b""
+            raw = self._file.read()
             *whole, torn = raw.split(b"\n")
             if whole or not title.startswith(torn):
                 self._refuse_other(raw.split(b"\n", 1)[0])
+            self.chunks = [self._read(line, number, task) for number, line in enumerate(whole[1:], 2)]
+            """What is there."""
+            if torn:
+                self._file.truncate(len(raw) - len(torn))
             if not whole:
-                self._path.write_bytes(title)
-            elif torn:
-                self._path.write_bytes(raw[: -len(torn)])
-        except OSError as error:
+                self._write(title)
+        except BaseException:
+            self.close()
+            raise
+
+    def _opened(self) -> FileIO:
+        """The file, locked against other sweeps where the system has locks; the system lets go of them at any end."""
+        try:
+            if self._path.exists() and not self._path.is_file():
+                why = "it is no file"
+            else:
+                return self._locked(FileIO(self._path, "a+"))
+        except (OSError, ValueError) as error:
+            why = str(error)
+        raise ParameterError(f"store = '{self._path}' cannot be used: {why}. Give a file in a folder that exists.")
+
+    def _locked(self, file: FileIO) -> FileIO:
+        file.seek(0)
+        try:
+            if fcntl is not None:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            file.close()
             raise ParameterError(
-                f"store = '{path}' cannot be used: {error}. Give a file in a folder that exists."
+                f"store = '{self._path}' is in use by another sweep. Wait until it has ended, or give another name."
             ) from None
-        self.chunks = [self._read(line, number, task) for number, line in enumerate(whole[1:], 2)]
-        """What is there."""
+        except OSError:
+            pass  # a file system without locks
+        return file
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Leave the file to others."""
+        self._file.close()
+
+    def _write(self, line: bytes) -> None:
+        """Append a line, whole or not at all.
+
+        Raises:
+            ParameterError: it cannot be written, as on a full disk.
+        """
+        before, left = self._file.seek(0, os.SEEK_END), memoryview(line)
+        try:
+            while left:
+                left = left[self._file.write(left) :]
+        except OSError as error:
+            with suppress(OSError):
+                self._file.truncate(before)
+            raise ParameterError(
+                f"store = '{self._path}' cannot be written any more: {error}. What it has is kept: make room, and the "
+                "same call goes on from there."
+            ) from None
 
     def _refuse_other(self, line: bytes) -> None:
         found = _parsed(line)
@@ -85,7 +147,11 @@ class Store:
         )
 
     def append(self, chunk: Chunk) -> None:
-        """Write what has been done."""
+        """Write what has been done.
+
+        Raises:
+            ParameterError: it cannot be written.
+        """
         values = [[value if math.isfinite(value) else None for value in row] for row in chunk.values.tolist()]
         made = {
             "variants": chunk.variants.tolist(),
@@ -93,8 +159,12 @@ class Store:
             "reasons": list(chunk.reasons),
             "left": chunk.left,
         }
-        with self._path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(made) + "\n")
+        self._write((json.dumps(made | {"check": check_of(made)}) + "\n").encode())
+
+
+def check_of(made: Mapping[str, Any]) -> int:
+    """A sum over all that a line says but itself: a digit that was changed changes it."""
+    return zlib.crc32(json.dumps({key: value for key, value in made.items() if key != "check"}).encode())
 
 
 def _parsed(line: bytes) -> Any:
@@ -120,7 +190,7 @@ def _objection(made: Any, task: Task) -> str:
         return f"its reasons are not a text for each of its {len(variants)} variants"
     if not _counts(made.get("left", 0), len(variants)):
         return f"'left' is not a whole number from 0 to {len(variants)}"
-    return ""
+    return "" if made.get("check") == check_of(made) else "its digits are not those that were written"
 
 
 def _are(made: Any, holds: Callable[[Any], bool], count: int | None = None) -> bool:

@@ -17,6 +17,7 @@ import numpy as np
 from shaftwork.components.shaft_models import CentralDifference, Lumped, OneSpring, ShaftModel, Spectral, Wave
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError
+from shaftwork.core.files import replaced
 from shaftwork.core.parameters import in_si, whole
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.network import Network
@@ -160,7 +161,7 @@ class WorkPrecision:
 
     def to_csv(self, path: str | Path) -> None:
         """Write every trial with all its errors."""
-        with Path(path).open("w", newline="", encoding="utf-8") as file:
+        with replaced(path) as file:
             writer = csv.writer(file)
             writer.writerow(["model", "engine", "states", "setup_s", "cpu_s", *self.columns, "extra_modes", "why"])
             for trial in self.trials:

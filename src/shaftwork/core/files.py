@@ -1,0 +1,35 @@
+"""Files that are whole at every moment: whoever stops the program, and however full the disk is."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO
+
+
+@contextlib.contextmanager
+def replaced(path: str | Path) -> Iterator[IO[str]]:
+    """A file for text that takes the place of one at a path once it is written; till then that one stays.
+
+    What is no file, as a terminal, is written to as it is.
+
+    Raises:
+        OSError: it cannot be written; what was there is as it was.
+    """
+    place = Path(os.path.realpath(path))  # a link stays one
+    if place.exists() and not place.is_file():
+        with place.open("w", encoding="utf-8", newline="") as file:
+            yield file
+        return
+    draft = place.with_name(f".{place.name[:100]}.{os.getpid()}.part")
+    try:
+        with draft.open("w", encoding="utf-8", newline="") as file:
+            yield file
+        with contextlib.suppress(FileNotFoundError):
+            shutil.copymode(place, draft)
+        draft.replace(place)
+    finally:
+        draft.unlink(missing_ok=True)
