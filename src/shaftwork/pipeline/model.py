@@ -17,6 +17,7 @@ from shaftwork.codegen.operating import steady_state
 from shaftwork.codegen.start_values import initial_state
 from shaftwork.codegen.switching import Switching
 from shaftwork.codegen.valueless import rough, without_value
+from shaftwork.core.callbacks import Told
 from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.core.kept import Kept
 from shaftwork.integrate import choice
@@ -109,7 +110,8 @@ class Model(CompiledModel):
             parameters: values that differ from the network's, "part.parameter" to value in SI; nothing is recompiled
                 unless a value changes the structure (a damping that was exactly zero).
             max_steps: give up after this many steps.
-            progress: called again and again with the time that the engine has reached, s; what it raises ends the run.
+            progress: called again and again with the time that the engine has reached, s; what it raises ends the run
+                and comes out as it is.
             angles: parts whose angle is to be read; what is recorded was chosen in `Network.compile`.
 
         Raises:
@@ -125,9 +127,10 @@ class Model(CompiledModel):
             return self._variant(values).simulate(t_end, **options)
         span = time_span(t_start, t_end)
         times = output_times(t_eval, *span)
-        demand = Demand(span, relative_tolerance(rtol), atol, times, engine, max_steps, progress)
+        told = Told(progress)
+        demand = Demand(span, relative_tolerance(rtol), atol, times, engine, max_steps, told if progress else None)
         made = dict(zip(self.parameters, self.defaults.tolist(), strict=True)) | values
-        motion = self._motion(values, initial, demand)
+        motion = told.of(lambda: self._motion(values, initial, demand))
         again = Repetition(self._rebuild, self.netlist, call_of(motion, demand, values, initial), self)
         return replace(motion, parameters=made, initial=dict(initial or {}), again=again)
 
