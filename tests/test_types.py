@@ -27,6 +27,12 @@ CHECKERS = {
 }
 
 
+@pytest.mark.parametrize("name", ["_private", "NoSuchPart"])
+def test_a_name_that_the_package_does_not_have_is_an_attribute_error(name: str) -> None:
+    with pytest.raises(AttributeError, match=f"has no attribute '{name}'"):
+        getattr(sw, name)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("checker", CHECKERS)
 def test_a_client_under_strict_types_may_use_every_public_name_and_the_examples(checker: str, tmp_path: Path) -> None:

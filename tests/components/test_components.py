@@ -62,6 +62,13 @@ def test_every_component_is_a_frozen_value(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", OWN)
+def test_a_ratio_is_never_zero_and_an_efficiency_never_zero_or_above_one(name: str) -> None:
+    wrong = [("ratio", 0.0), ("efficiency", 0.0), ("efficiency", 1.01), ("efficiency_back", 1.01)]
+    declared = REGISTRY[name].declared
+    assert all("must be" in (declared[key].objection(value) or "") for key, value in wrong if key in declared)
+
+
+@pytest.mark.parametrize("name", OWN)
 def test_every_component_refuses_what_it_does_not_know_with_what_it_takes(name: str) -> None:
     with pytest.raises(sw.ParameterError, match="It takes a name and"):
         _made(name, wrong=1.0)

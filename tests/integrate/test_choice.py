@@ -105,3 +105,13 @@ def test_a_run_that_another_engine_makes_does_not_load_heyoka(engine: str) -> No
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "False"
+
+
+def test_what_is_stiff_is_told_by_the_time_that_passes_not_by_the_clock(oscillator):
+    matrix = sparse.csc_array(np.diag([-100.0, -1.0]))
+    slow = replace(
+        oscillator.problem, linear=None, symbolic=None, rhs=lambda _t, x: matrix @ x, jacobian=lambda _t, _x: matrix,
+        breakpoints=(), jump=None,
+    )  # fmt: skip
+    late = replace(slow, t0=1e6, t_end=1e6 + slow.t_end, t_eval=None)
+    assert choice.choose(late)[0] == choice.choose(slow)[0] == "scipy"

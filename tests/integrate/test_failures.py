@@ -57,6 +57,24 @@ def test_a_run_ends_when_its_steps_are_used_up(oscillator, engine):
         choice.solve(replace(oscillator.problem, max_steps=3, rtol=1e-10), engine)
 
 
+@pytest.mark.parametrize("engine", ["scipy", "sundials", "heyoka"])
+def test_the_limit_of_steps_is_that_of_the_whole_run_not_of_each_piece(oscillator, engine):
+    steps = choice.solve(oscillator.problem, engine)[0].statistics["steps"]
+    choice.solve(replace(oscillator.problem, max_steps=steps), engine)
+    with pytest.raises(SimulationError, match=f"{steps - 1} steps were not enough"):
+        choice.solve(replace(oscillator.problem, max_steps=steps - 1), engine)
+
+
+def test_what_explains_a_failure_is_asked_at_finite_states_alone():
+    """The stages after one without a value have none either: what they say of a law would be made up."""
+    asked = []
+    failing = problem(lambda _t, x: np.sqrt(1.0 - x) + 1.0, explain=lambda _t, x: asked.append(x))
+    with pytest.raises(SimulationError, match="failed"):
+        choice.solve(failing, "scipy")
+    assert asked
+    assert np.isfinite(np.concatenate(asked)).all()
+
+
 def test_an_unbounded_linear_motion_is_named():
     growing = replace(
         problem(lambda _t, x: 1e4 * x, 1.0),

@@ -238,6 +238,20 @@ def test_a_motion_with_waves_is_a_point() -> None:
         net.compile().linearize()
 
 
+def test_the_point_of_a_motion_is_its_end_in_time_too() -> None:
+    """A brake that grips harder by the second: modes about a motion read it where the motion ends, or when told."""
+    net = sw.Network("gripping")
+    net.add(sw.TorqueSource("brake", tau=-(0.1 + 50 * sw.t) * sw.omega - 0.02 * sw.omega**3), "m")
+    net.add(sw.Inertia("rotor", J=0.02), "m")
+    net.add(sw.Shaft("shaft", length=1.0, diameter=0.02, model=sw.Wave(), **STEEL), "m", "l")
+    net.add(sw.Inertia("load", J=0.05), "l")
+    sol = net.simulate(0.01, initial={"rotor.omega": 5.0})
+    end = {name: float(sol[name][-1]) for name in ("rotor.omega", "load.omega")}
+    for t, time in ((None, 0.01), (0.002, 0.002)):
+        found, wanted = net.modes(sol, 3, t=t), net.modes(end, 3, t=time)
+        np.testing.assert_allclose(found.rates, wanted.rates, rtol=1e-9)
+
+
 @pytest.mark.slow
 def test_an_electrical_supply_and_a_soft_coupling_stand_beside_an_exact_shaft() -> None:
     exact, mesh = _supplied(sw.Lumped(3)), _supplied(sw.Spectral(32))

@@ -91,6 +91,13 @@ def test_a_matched_end_returns_less_than_a_millionth_of_the_pulse() -> None:
     assert np.abs(run["line.omega_a"][back]).max() * case.section.impedance < 1e-6 * TORQUE
 
 
+def test_a_matched_end_returns_nothing_of_a_step() -> None:
+    """The drive end sees the impedance alone, as if the shaft had no other end."""
+    case = NAMED["matched end, step"]
+    run = case.network(sw.Wave(3)).simulate(case.t_end, t_eval=case.times)
+    np.testing.assert_allclose(run["line.omega_a"] * case.section.impedance, TORQUE, rtol=1e-9)
+
+
 @pytest.mark.parametrize("name", ["m = 2", "inertia ratio 10000", "free end", "clamped end"])
 @pytest.mark.parametrize("model", MESHES, ids=repr)
 def test_what_a_model_must_do_tends_to_what_the_shaft_does(name: str, model: sw.Lumped) -> None:
@@ -253,6 +260,8 @@ def test_every_cell_has_a_place_of_its_own_in_the_picture_and_no_label_covers_an
     cells = figure.axes[0]
     places = [text.get_position() for text in cells.texts]
     assert len(places) == len(set(places)) == sum(np.isfinite(cell.error) for cell in study.cells)
+    walls = [line.get_xdata()[0] for line in cells.lines if line.get_color() == "black"]
+    assert walls == [k * len(engines) - 0.5 for k in range(1, len(models))]  # between kinds
     above = cells.child_axes[0].get_xticklabels()
     assert [label.get_text().replace("\n", "") for label in above] == [
         "CentralDifference", "CentralDifference(closure='printed')", "CentralDifference(order=4)",
