@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from sympy import cancel
 
+import shaftwork as sw
 from shaftwork.core.errors import CompileError
 from shaftwork.equations.second_order import second_order
 from tests.equations.networks import MECHANICAL, dc_drive, graph_of
@@ -28,6 +29,22 @@ def test_referred_inertias_are_divided_by_the_square_of_the_ratio() -> None:
     form = second_order(graph_of(MECHANICAL["geared inertias"]()))
     first, second, ratio = (quantity(name) for name in ("J1.J", "J2.J", "g.ratio"))
     assert form.mass == {(0, 0): first + second / ratio**2}
+
+
+def test_a_row_of_a_large_network_names_every_torque_at_its_node() -> None:
+    """Where no matrix fits on the page: each source once, on the right side, which goes over two lines."""
+    net = sw.Network("row")
+    for k in range(14):
+        net.add(sw.Inertia(f"J{k}", J=1.0), f"n{k}")
+        if k:
+            net.add(sw.Spring(f"c{k}", c=1.0 + k), f"n{k - 1}", f"n{k}")
+    for k in range(8):
+        net.add(sw.TorqueSource(f"source{k}", tau=1.0 + k * sw.t), "n3")
+    text = net.equations().latex(form="second-order")
+    (row,) = (row for row in text.partition("where")[0].split(r" \\[1ex]") if "source" in row)
+    right = row.rpartition(" = ")[2]
+    assert [right.count(rf"+ \tau_{{\mathrm{{source}},{k}}}") for k in range(1, 8)] == [1] * 7
+    assert right.startswith(r"\tau_{\mathrm{source},0}")
 
 
 def test_an_electrical_network_has_no_second_order_form() -> None:

@@ -14,6 +14,7 @@ import sympy
 import shaftwork as sw
 from shaftwork.components.shaft_models import ShaftModel
 from shaftwork.core.domains import ROTATION
+from shaftwork.network.sharing import Shared
 
 
 def hoist(**shaft: float) -> sw.Network:
@@ -100,6 +101,17 @@ def test_parts_that_look_at_their_own_numbers_have_branches_of_their_own() -> No
         together = stacked(*numbers)
         for k, number in enumerate(numbers):
             assert described(together, f"stack{k}") == described(stacked(number), "stack0")
+
+
+def test_parts_that_are_alike_are_worked_out_once() -> None:
+    """What makes a chain of a thousand springs quick; a number that becomes zero may change the branches."""
+    worked: list[int] = []
+    shared = Shared(lambda *_: worked.append(1))
+    numbers = []
+    for name, c, d in (("first", 100.0, 1.0), ("equal", 100.0, 1.0), ("softer", 50.0, 2.0), ("undamped", 50.0, 0.0)):
+        shared.of(sw.Spring(name, c=c, d=d), {"c": c, "d": d})
+        numbers.append(len(worked))
+    assert numbers == [1, 1, 1, 2]
 
 
 @pytest.mark.parametrize("first", [0.4, 1.0, 3.0])

@@ -120,3 +120,11 @@ def test_a_mode_that_the_kept_shaft_does_not_feel_behind_a_clamp_of_stiffness_sw
     found = small.by_modes.simulate(2.0, engine="exact", t_eval=101)
     true = net.simulate(2.0, engine="exact", t_eval=101)
     assert found["c0.tau"] == pytest.approx(true["c0.tau"], abs=1e-5 * np.abs(true["c0.tau"]).max())
+
+
+def test_a_support_between_two_boundaries_has_its_own_damping_alone() -> None:
+    """The damping of the springs on the way stays between the boundaries; all modes, so the motion is the train's."""
+    net = chain([2.0, 0.2, 0.5, 1.0], [900.0, 3000.0, 500.0], damping=1e-3)
+    net.add(sw.Spring("bearing", c=400.0, d=0.4), "2", "ground")
+    net.add(sw.SpeedSource("servo", omega=sw.Table([0, 1, 2], [0, 3, 3])), "3")
+    assert sw.reduce.simplify(net, 4, "c0").compare(2.0, engine="exact").rms_error_by_modes < 1e-10
