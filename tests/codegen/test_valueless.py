@@ -43,6 +43,7 @@ OF_TIME: dict[str, tuple[Callable[[], sw.Network], str]] = {
         r"tau = Max\(0, sqrt\(1 - t\) - 5\) \+ 1 of TorqueSource 'pull'",
     ),
     "a brake that slips": (lambda: braked(20.0, tau=3 * ENDS), r"tau = 3\*sqrt\(1 - t\) of Brake 'brake'"),
+    "one law of two": (lambda: braked(20.0, tau=3 * ENDS, on=1 + sw.t), r"tau = 3\*sqrt\(1 - t\) of Brake 'brake'"),
     "a brake that holds": (lambda: braked(0.5, tau=3 + 3 * ENDS), r"tau = 3\*sqrt\(1 - t\) \+ 3 of Brake 'brake'"),
     "what is held": (lambda: braked(0.1 * ENDS, tau=1.0), r"tau = 0.1\*sqrt\(1 - t\) of TorqueSource 'pull'"),
     "a condition": (lambda: braked(2.0, tau=1.0, on=ENDS - 5), r"on = sqrt\(1 - t\) - 5 of Brake 'brake'"),

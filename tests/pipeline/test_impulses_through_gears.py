@@ -302,3 +302,15 @@ def test_what_would_slip_where_a_gear_jams_is_not_stopped_with_it(
     initial = {name: speeds[name] for name in model.states if name in speeds}
     with pytest.raises(sw.SimulationError, match=r"stopped at .* by a gear that jams at once, and 'joint' would slip"):
         model.simulate(0.5, engine=engine, initial=initial)
+
+
+def test_a_source_that_jumps_through_zero_gives_in_each_direction_of_power_its_impulse_times_its_mean_speed() -> None:
+    """A lossy gear is driven by the inertia down to rest and drives it from there: two stages, one balance."""
+    net = sw.Network("reversal")
+    net.add(sw.SpeedSource("drive", omega=10 - sw.Step(16.0, 1.0)), "a")
+    net.add(sw.LossyGear("gear", ratio=2.0, efficiency=0.8), "a", "b")
+    net.add(sw.Inertia("J", J=3.0), "b")
+    with pytest.warns(sw.NetworkWarning, match="'drive' jumps"):
+        sol = net.simulate(2.0)
+    assert sol["J.omega"][-1] == -3.0
+    assert sol.energy_residual < 1e-12

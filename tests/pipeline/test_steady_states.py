@@ -78,3 +78,15 @@ def test_a_motor_that_is_switched_off_and_a_brake_that_comes_on_warn() -> None:
     with pytest.warns(sw.NetworkWarning, match=said):
         assert model.steady_state()["J1.omega"] == 0.0
     assert model.steady_state(t=3.25)["J1.omega"] > 5.0
+
+
+def test_a_warning_of_a_brake_that_comes_on_names_a_time_before_it() -> None:
+    net = sw.Network("travel")
+    net.add(sw.TorqueSource("motor", tau=4.0), "a")
+    net.add(sw.Inertia("J1", J=27.0), "a")
+    net.add(sw.Brake("brake", tau=300.0, t_on=7.0), "a")
+    net.add(sw.ViscousLoad("load", d=2.0), "a")
+    model = net.compile()
+    with pytest.warns(sw.NetworkWarning, match=r"'brake' changes its mode at t = 7 s.*steady_state\(t=3.5\)"):
+        assert model.steady_state()["J1.omega"] == 0.0
+    assert model.steady_state(t=3.5)["J1.omega"] == pytest.approx(2.0, rel=1e-9)
