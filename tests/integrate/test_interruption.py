@@ -65,7 +65,7 @@ def test_breaks_leave_a_compiled_run_as_it_is(monkeypatch: pytest.MonkeyPatch) -
     compiled = drive("pump").compile()
     whole = compiled.simulate(0.5, engine="heyoka")
     monkeypatch.setattr("shaftwork.integrate.breaks.UNINTERRUPTED", 1)
-    parts = compiled.simulate(0.5, engine="heyoka")
+    parts = compiled.simulate(0.5, engine="heyoka", max_steps=whole.statistics["steps"])  # to the very last
     np.testing.assert_allclose(whole.x, parts.x, rtol=1e-12, atol=1e-12 * np.abs(whole.x).max())
     assert whole.statistics == parts.statistics
     assert (whole.steps == parts.steps).all()

@@ -238,6 +238,15 @@ def test_a_motion_with_waves_is_a_point() -> None:
         net.compile().linearize()
 
 
+def test_an_angle_that_no_slope_reads_is_the_integral_of_its_speed_in_each_mode() -> None:
+    """A spring by the square of its angle is none at rest, and only records the angle."""
+    net = _train(sw.Wave())
+    net.add(sw.TorqueSource("spring", tau=-3 * sw.phi**2), "l")
+    modes = net.modes({}, 4)
+    angle, speed = (modes.shapes[name][1:] for name in ("spring.phi", "Jm.omega"))
+    np.testing.assert_allclose(angle * modes.rates[1:], speed, rtol=1e-9)
+
+
 def test_the_point_of_a_motion_is_its_end_in_time_too() -> None:
     """A brake that grips harder by the second: modes about a motion read it where the motion ends, or when told."""
     net = sw.Network("gripping")

@@ -129,6 +129,25 @@ def test_variants_with_a_gap_and_a_brake_change_their_modes_each_at_its_own_time
             assert fast.measures[name][row] == pytest.approx(expected, rel=1e-6, abs=1e-8), name
 
 
+def test_variants_of_a_gear_before_a_gap_run_side_by_side() -> None:
+    """The speed behind the gear, which goes on over each contact, is read by the ratio of its variant."""
+    pytest.importorskip("heyoka")
+    net = sw.Network("geared gap")
+    net.add(sw.TorqueSource("motor", tau=100.0), "m")
+    net.add(sw.Inertia("J0", J=2.0), "m")
+    net.add(sw.Gear("gear", ratio=2.0), "m", "rotor")
+    net.add(sw.Inertia("J1", J=27.35), "rotor")
+    net.add(sw.Backlash("shaft", gap=0.003, c=24206.0, d=14.0), "rotor", "wheel")
+    net.add(sw.Inertia("J2", J=62.5), "wheel")
+    ratios = np.linspace(1.5, 3.0, 16)
+    measures = ("max shaft.tau", "end J0.omega")
+    fast = sweep(net, samples={"gear.ratio": ratios}, t_end=0.2, measures=measures)
+    assert fast.why == ""
+    solution = net.compile().simulate(0.2, parameters={"gear.ratio": 3.0}, rtol=1e-10)
+    for name in measures:
+        assert fast.measures[name][-1] == pytest.approx(Measure.read(name).of(solution), rel=1e-9), name
+
+
 def test_what_runs_side_by_side_runs_one_by_one_where_it_must() -> None:
     pytest.importorskip("heyoka")
     stiffness, damping = np.linspace(500.0, 900.0, 16), np.full(16, 2.0)
