@@ -193,6 +193,21 @@ def test_impacts_through_a_gear_that_rubs_equal_central_differences() -> None:
     assert_differences(net, ["end C.omega", "rms C.omega"], 0.6, ("gap.restitution", "g.ratio", "g.efficiency"))
 
 
+def test_a_brake_that_comes_on_by_the_speed_and_the_time_is_the_closed_form() -> None:
+    """It is on from omega + t / 1 s = 6 on: at t* = 6 / (1 + tau / J) the motion goes on with the torque that is left."""
+    tau, brake, inertia, t_end = 10.0, 4.0, 2.0, 3.0
+    net = sw.Network("ramped")
+    net.add(sw.TorqueSource("motor", tau=tau), "a")
+    net.add(sw.Inertia("J", J=inertia), "a")
+    net.add(sw.Brake("brake", tau=brake, on=sw.omega + sw.t - 6), "a")
+    made = motion_sensitivities(net, ["end J.omega"], t_end=t_end, parameters=("motor.tau", "brake.tau"))
+    t_on = 6 / (1 + tau / inertia)
+    assert made.measures["end J.omega"] == pytest.approx((tau * t_end - brake * (t_end - t_on)) / inertia, rel=1e-9)
+    earlier = -t_on / (1 + tau / inertia) / inertia
+    assert made["end J.omega"]["motor.tau"] == pytest.approx((t_end + brake * earlier) / inertia, rel=1e-7)
+    assert made["end J.omega"]["brake.tau"] == pytest.approx(-(t_end - t_on) / inertia, rel=1e-7)
+
+
 @pytest.mark.slow
 def test_laws_that_switch_with_the_motion_equal_central_differences() -> None:
     """A torque that falls at a speed, once through a jump and once through a kink."""
