@@ -105,13 +105,18 @@ def test_parts_that_look_at_their_own_numbers_have_branches_of_their_own() -> No
 
 def test_parts_that_are_alike_are_worked_out_once() -> None:
     """What makes a chain of a thousand springs quick; a number that becomes zero may change the branches."""
-    worked: list[int] = []
-    shared = Shared(lambda *_: worked.append(1))
+    worked: list[Any] = []
+    shared = Shared(lambda part, *_: worked.append(part.ports))
     numbers = []
     for name, c, d in (("first", 100.0, 1.0), ("equal", 100.0, 1.0), ("softer", 50.0, 2.0), ("undamped", 50.0, 0.0)):
         shared.of(sw.Spring(name, c=c, d=d), {"c": c, "d": d})
         numbers.append(len(worked))
     assert numbers == [1, 1, 1, 2]
+
+
+def test_work_that_looks_at_all_of_a_part_is_done_for_each() -> None:
+    shared = Shared(lambda part, *_: vars(part)["name"])
+    assert [shared.of(sw.Spring(name, c=1.0), {"c": 1.0, "d": 0.0})[0] for name in "ab"] == ["a", "b"]
 
 
 @pytest.mark.parametrize("first", [0.4, 1.0, 3.0])

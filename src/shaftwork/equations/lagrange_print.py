@@ -23,7 +23,7 @@ KINETIC, POTENTIAL, LOSS = "E_k", "E_p", r"\mathcal{R}"
 """Letters of the energies, after Abdelkader 2016, (19), and of Rayleigh's function."""
 
 
-def body(lagrangian: Lagrangian, *, values: bool = False) -> str:
+def body(lagrangian: Lagrangian, *, values: bool) -> str:
     """The body of a LaTeX document, each block under a paragraph heading."""
     return typeset(lagrangian.kirchhoff, _blocks(lagrangian, values=values))
 
@@ -33,7 +33,7 @@ def notebook(lagrangian: Lagrangian) -> str:
     return rendered(lagrangian.kirchhoff, _blocks(lagrangian, values=False))
 
 
-def document(lagrangian: Lagrangian, *, values: bool = False) -> str:
+def document(lagrangian: Lagrangian, *, values: bool) -> str:
     """A LaTeX document that compiles as it is."""
     made, coordinates = lagrangian, {symbol.name: "coordinate" for symbol in lagrangian.coordinates}
     energies = {

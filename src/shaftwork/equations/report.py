@@ -32,7 +32,7 @@ BEGIN = r"""\date{}
 \maketitle"""
 
 
-def body(equations: Equations, form: Form | None = None, *, values: bool = False) -> str:
+def body(equations: Equations, form: Form | None, *, values: bool) -> str:
     """The blocks of one form, or of Kirchhoff's equations and the state form, each under a paragraph heading."""
     return typeset(equations, blocks_of(equations, form, values=values))
 
@@ -90,7 +90,7 @@ def _content(block: Block) -> str:
     return f"{remark}\\begin{{align*}}\n{rows}\n\\end{{align*}}"
 
 
-def document(equations: Equations, form: Form | None = None, *, values: bool = False) -> str:
+def document(equations: Equations, form: Form | None, *, values: bool) -> str:
     """A LaTeX document that compiles as it is, of one form or of all."""
     blocks = Blocks(equations, values)
     states = {state.name: "state" for state in equations.form.states}
