@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -90,3 +91,13 @@ def test_a_wrong_value_is_answered_with_what_would_be_right(
 ) -> None:
     assert main(["check", model(tmp_path), "--set", setting]) == WRONG_INPUT
     assert words in capsys.readouterr().err
+
+
+def test_a_unit_without_the_library_of_units_is_answered_with_the_extra(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pint", None)  # what an import then says is ImportError
+    assert main(["modes", model(tmp_path), "--set", "J1.J=200 kg*cm^2"]) == WRONG_INPUT
+    said = capsys.readouterr().err
+    assert "J1.J=200 kg*cm^2 with a unit" in said
+    assert "shaftwork[units]" in said

@@ -155,3 +155,18 @@ def test_a_drive_without_load_coasts_to_standstill(model: sw.ShaftModel) -> None
     net.add(sw.ViscousLoad("load", d=0.5), "b")
     found = net.compile().steady_state(initial={"J1.omega": 10.0, "J2.omega": 10.0, "line.tau": 3.0})
     assert max(map(abs, found.values())) < 1e-12
+
+
+@pytest.mark.parametrize("jolt", [0.0, 10.0])
+def test_what_a_source_jolts_at_the_start_has_not_yet_run_along_a_shaft(jolt: float) -> None:
+    """The sun takes ring and carrier along at once; inside the shaft behind the carrier speeds are as without it."""
+    net = sw.Network("planets")
+    net.add(sw.SpeedSource("drive", omega=jolt), "sun")
+    net.add(sw.PlanetaryGear("planets", ratio=2.0), "sun", "ring", "carrier")
+    net.add(sw.Inertia("J1", J=1.0), "ring")
+    net.add(sw.Inertia("J2", J=2.0), "carrier")
+    net.add(sw.Shaft("line", **GEOMETRY, model=sw.Lumped(4)), "carrier", "end")
+    net.add(sw.Inertia("J3", J=0.2), "end")
+    sol = start(net, {"J3.omega": 3.0})
+    assert [sol[f"line.omega_{k}"][0] for k in (1, 2, 3)] == pytest.approx([0.75, 1.5, 2.25], rel=1e-12)
+    assert (sol["J2.omega"][0] != 0.0) == (jolt != 0.0)

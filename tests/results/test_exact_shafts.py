@@ -245,6 +245,7 @@ def test_an_angle_that_no_slope_reads_is_the_integral_of_its_speed_in_each_mode(
     modes = net.modes({}, 4)
     angle, speed = (modes.shapes[name][1:] for name in ("spring.phi", "Jm.omega"))
     np.testing.assert_allclose(angle * modes.rates[1:], speed, rtol=1e-9)
+    assert (modes.rates.real == 0).all()  # exactly: nothing is lost
 
 
 def test_the_point_of_a_motion_is_its_end_in_time_too() -> None:

@@ -225,6 +225,8 @@ def test_requirements_filter_and_a_measure_ranks() -> None:
         ({"samples": {"shaft.c": [1.0], "J.J": [1.0, 2.0]}}, r"differ in length: shaft.c 1, J.J 2"),
         ({}, r"Give a grid"),
         ({"parameters": {"J.J": [1.0]}, "measures": ["shaft.tau"]}, r"'shaft.tau' is no measure"),
+        ({"parameters": {"J.J": [1.0]}, "measures": ["largest shaft.tau"]}, r"'largest shaft.tau' is no measure"),
+        ({"parameters": {"J.J": [1.0]}, "measures": ["max"]}, r"'max' is no measure"),
         ({"parameters": {"J.J": [1.0]}, "measures": ["max shaft.torque"]}, r"'shaft' has: .*shaft.tau"),
         ({"parameters": {"J.J": [1.0]}, "measures": ["damage shaft.tau"]}, r"needs an S-N line"),
         ({"parameters": {"J.J": [1.0]}, "require": {"max": (0, 1)}}, r"there is no measure 'max'"),
