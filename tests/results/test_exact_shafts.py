@@ -238,6 +238,14 @@ def test_a_motion_with_waves_is_a_point() -> None:
         net.compile().linearize()
 
 
+def test_the_first_modes_of_a_shaft_with_much_friction_are_those_up_to_a_frequency() -> None:
+    """Friction makes more half waves than the delay alone tells."""
+    net = _train(sw.Wave(), friction=1.0)
+    first, many = net.modes({}, 3), net.modes({}, f_max=4000.0)
+    assert len(many) > len(first) == 3
+    np.testing.assert_allclose(first.rates, many.rates[:3], rtol=1e-9)
+
+
 def test_an_angle_that_no_slope_reads_is_the_integral_of_its_speed_in_each_mode() -> None:
     """A spring by the square of its angle is none at rest, and only records the angle."""
     net = _train(sw.Wave())

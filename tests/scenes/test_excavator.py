@@ -71,6 +71,15 @@ def test_a_soil_is_found_by_its_name_from_python_and_from_a_file(soil: str, tmp_
     assert loaded.parts[-1].mean_torque == net.parts[-1].mean_torque
 
 
+def test_the_excavator_as_a_train_digs_with_the_same_wheel() -> None:
+    """Eleven masses, and the buckets of the scene of two."""
+    train, scene = (made("fault zone", seed=3.0) for made in (sw.scenes.excavator_train, sw.scenes.excavator))
+    assert sum(isinstance(part, sw.Inertia) for part in train.parts) == 11
+    wheels = [[part for part in net.parts if isinstance(part, sw.BucketWheelLoad)] for net in (train, scene)]
+    assert len(wheels[0]) == 1
+    assert wheels[0] == wheels[1]
+
+
 def test_an_unknown_soil_is_one_problem_that_names_those_there_are() -> None:
     with pytest.raises(sw.NetworkError, match=r"'sand' is no soil\. The soils are: fault zone,.* grey clay") as said:
         sw.scenes.excavator("sand").compile()

@@ -193,6 +193,21 @@ def test_impacts_through_a_gear_that_rubs_equal_central_differences() -> None:
     assert_differences(net, ["end C.omega", "rms C.omega"], 0.6, ("gap.restitution", "g.ratio", "g.efficiency"))
 
 
+def test_derivatives_of_a_tiny_motion_are_those_of_a_large_one() -> None:
+    """The motion goes with the torque, and so do its derivatives by all that is no torque."""
+
+    def by_inertia(tau: float) -> float:
+        net = sw.Network("swing")
+        net.add(sw.TorqueSource("pull", tau=tau), "a")
+        net.add(sw.Inertia("J", J=2.0), "a")
+        net.add(sw.Spring("s", c=200.0, d=1.0), "a", "ground")
+        net.add(sw.FanLoad("fan", tau_n=1e-3 / tau, n_n=100.0), "a")
+        made = motion_sensitivities(net, ["end J.omega"], t_end=3.0, parameters=("J.J",))
+        return made["end J.omega"]["J.J"] / tau
+
+    assert by_inertia(1e-9) == pytest.approx(by_inertia(1e3), rel=1e-6)
+
+
 def test_a_brake_that_comes_on_by_the_speed_and_the_time_is_the_closed_form() -> None:
     """It is on from omega + t / 1 s = 6 on: at t* = 6 / (1 + tau / J) the motion goes on with the torque that is left."""
     tau, brake, inertia, t_end = 10.0, 4.0, 2.0, 3.0
