@@ -238,6 +238,20 @@ def test_a_motion_with_waves_is_a_point() -> None:
         net.compile().linearize()
 
 
+@pytest.mark.parametrize(("roots", "kept"), [((10j, 10.0001j), False), ((9j, 11j), True)])
+def test_two_starts_that_lead_to_one_root_are_no_two_modes(roots: tuple[complex, complex], kept: bool) -> None:  # noqa: FBT001
+    """The mesh is then too coarse to tell them apart, and a finer one is made."""
+
+    class Found:
+        unknowns = 2
+
+        def roots(self, starts: Any) -> Any:
+            return np.array([roots[0] if abs(starts[0]) < 10 else roots[1]]), np.zeros((2, 1))
+
+    found = exact_modes._refined(Found(), np.array([8j, 12j]))
+    assert (found is not None) is kept
+
+
 def test_the_first_modes_of_a_shaft_with_much_friction_are_those_up_to_a_frequency() -> None:
     """Friction makes more half waves than the delay alone tells."""
     net = _train(sw.Wave(), friction=1.0)

@@ -139,6 +139,7 @@ def test_a_cycle_of_many_phases_with_reversal_and_rest_is_that_of_hand_calculati
     assert close(made.rest, 4.1, 9.0)
     assert made.held < 1e-9
     assert close(made.acceleration_time(), 0.7, 1.0)
+    assert made.figures["cyclic duration factor"] == (pytest.approx(100 * 4.9 / 9.0), "%")
     assert "array(" not in repr(made)  # the figures, and not the course of the motion
 
 

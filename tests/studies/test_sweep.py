@@ -129,6 +129,23 @@ def test_variants_with_a_gap_and_a_brake_change_their_modes_each_at_its_own_time
             assert fast.measures[name][row] == pytest.approx(expected, rel=1e-6, abs=1e-8), name
 
 
+def test_torques_at_both_ends_of_a_mesh_are_those_of_single_runs() -> None:
+    """At the second end the last spring gives what the node takes: the same sign as at the first."""
+    pytest.importorskip("heyoka")
+    net = sw.Network("meshed")
+    net.add(sw.TorqueSource("motor", tau=5 * sw.t), "a")
+    net.add(sw.Inertia("J1", J=0.5), "a")
+    net.add(sw.Shaft("line", length=1.0, diameter=0.02, model=sw.Lumped(3)), "a", "b")
+    net.add(sw.Inertia("J2", J=0.5), "b")
+    net.add(sw.ViscousLoad("load", d=0.2), "b")
+    measures = ("end line.tau_a", "end line.tau_b")
+    fast = sweep(net, samples={"J2.J": np.linspace(0.4, 0.6, 16)}, t_end=0.3, measures=measures)
+    assert fast.why == ""
+    solution = net.compile().simulate(0.3, parameters={"J2.J": 0.6}, rtol=1e-10)
+    for name in measures:
+        assert fast.measures[name][-1] == pytest.approx(Measure.read(name).of(solution), rel=1e-6), name
+
+
 def test_variants_of_a_gear_before_a_gap_run_side_by_side() -> None:
     """The speed behind the gear, which goes on over each contact, is read by the ratio of its variant."""
     pytest.importorskip("heyoka")
