@@ -209,7 +209,7 @@ def test_derivatives_of_a_tiny_motion_are_those_of_a_large_one() -> None:
 
 
 def test_a_brake_that_comes_on_by_the_speed_and_the_time_is_the_closed_form() -> None:
-    """It is on from omega + t / 1 s = 6 on: at t* = 6 / (1 + tau / J) the motion goes on with the torque that is left."""
+    """On from omega + t / 1 s = 6 on: after t* = 6 / (1 + tau / J) the motion goes on with the torque that is left."""
     tau, brake, inertia, t_end = 10.0, 4.0, 2.0, 3.0
     net = sw.Network("ramped")
     net.add(sw.TorqueSource("motor", tau=tau), "a")
