@@ -62,6 +62,18 @@ def test_as_printed_the_pull_out_slip_is_kept_and_the_pull_out_torque_falls_with
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("f", [2.5, 15.0, 50.0])
+def test_below_s_k_f_n_standstill_has_a_share_of_the_pull_out_torque_that_a_boost_makes_up_for(f: float) -> None:
+    """Pull-out lies where the motor lags by s_k n_sync behind its field, below 15 Hz at a negative speed."""
+    x = f / (MOTOR["s_k"] * 50.0)
+    share = 2 * x / (1 + x**2)
+    (plain,) = torque(sw.FrequencyDrive("m", **MOTOR, f=f), [0.0])
+    assert plain == pytest.approx(share * MOTOR["tau_k"], rel=1e-12)
+    boost = (share**-0.5 - 1) / (1 - f / 100.0)
+    (boosted,) = torque(sw.FrequencyDrive("m", **MOTOR, f=f, boost=boost, f_boost=100.0), [0.0])
+    assert boosted == pytest.approx(MOTOR["tau_k"], rel=1e-12)
+
+
 def test_a_boost_raises_the_flux_at_low_frequency_alone() -> None:
     """Torque goes with the square of the flux: 1.2^2 at standstill, 1.1^2 in the middle, 1 from f_boost on."""
     for f, flux in ((0.0, 1.2), (5.0, 1.1), (10.0, 1.0), (30.0, 1.0)):

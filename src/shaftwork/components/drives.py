@@ -29,10 +29,12 @@ class FrequencyDrive(Component):
     by default f_n. A frequency that falls makes the motor brake; one below zero turns it backwards.
 
     The lag D_k at which the motor pulls out is the same at every frequency (slip_exponent = 0): without stator
-    resistance it is the rotor's resistance over its leakage inductance, so that the pull-out slip is s_k f_n / f. In
-    (3b) Marinkovic prints (n_k / n)^2 for (f_n / f)^2, which is slip_exponent = 1: the slip s_k at every frequency,
-    where f > 0. The boost is chosen, as the source has none: a share of flux at standstill, since Kloss' formula knows
-    no stator resistance for which a voltage would make up. Analogue: a controlled current source. Source: Marinkovic
+    resistance it is the rotor's resistance over its leakage inductance, so that the pull-out slip is s_k f_n / f. Below
+    f = s_k f_n pull-out then lies at a negative speed, and at standstill the motor has 2 x / (1 + x^2) of
+    tau_k flux^2, with x = f / (s_k f_n): a start from rest under load needs f_0 near s_k f_n, or a boost. In (3b)
+    Marinkovic prints (n_k / n)^2 for (f_n / f)^2, which is slip_exponent = 1: the slip s_k at every frequency, where
+    f > 0. The boost is chosen, as the source has none: a share of flux at standstill, since Kloss' formula knows no
+    stator resistance for which a voltage would make up. Analogue: a controlled current source. Source: Marinkovic
     2012, (2), (3a), (3b), (18).
     """
 
