@@ -209,3 +209,23 @@ def test_under_a_random_load_there_is_no_steady_operation_but_at_a_named_time(ki
         model.steady_state()
     assert 290 < model.steady_state(t=1.0)["J.omega"] < 314
     assert 290 < model.steady_state(parameters={"load.std": 0.0})["J.omega"] < 314
+
+
+def test_a_coulomb_load_of_no_size_has_no_modes_until_it_is_given_one() -> None:
+    """Without it 10 N m on 1 kg m^2 are 10 rad/s after a second, and a load of 4 N m takes 4 rad/s of that."""
+
+    def pushed(tau: float) -> sw.Model:
+        net = sw.Network("pushed")
+        net.add(sw.TorqueSource("push", tau=10.0), "a")
+        net.add(sw.Inertia("J", J=1.0), "a")
+        net.add(sw.CoulombLoad("load", tau=tau), "a")
+        return net.compile()
+
+    free, loaded = pushed(0.0), pushed(4.0)
+    assert free.cost().operations == {"div": 1}
+    for model in (free, loaded):
+        for tau in (0.0, 4.0):
+            sol = model.simulate(1.0, parameters={"load.tau": tau})
+            assert sol["J.omega"][-1] == pytest.approx(10.0 - tau, rel=1e-9)
+            assert -sol["load.tau"][-1] == tau
+            assert len(sol.phases) == (tau > 0)

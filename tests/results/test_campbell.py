@@ -166,3 +166,31 @@ def test_modes_responses_and_matrices_say_about_what_they_are_linearised() -> No
     states = train.compile().states
     title = train.modes(dict.fromkeys(states, 0.0)).title
     assert title == f"{train.name} at {states[0]} = 0, {states[1]} = 0, {states[2]} = 0, ..."
+
+
+def test_titles_name_the_time_at_which_laws_that_depend_on_it_are_read() -> None:
+    net = sw.Network("ramp")
+    net.add(sw.FrequencyDrive("m", tau_k=8.0, s_k=0.3, n_sync=3000), "a")  # rises until 5 s
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.Spring("s", c=100.0), "a", "b")
+    net.add(sw.Inertia("K", J=1.0), "b")
+    point = {"J.omega": 3.0, "K.omega": 3.0}
+    assert net.modes(point).title == "ramp at J.omega = 3, K.omega = 3, laws at t = 6 s"
+    assert net.modes(t=2.0).title == "ramp at rest, laws at t = 2 s"
+    assert net.modes(t=2.0, exact=True).title == "ramp at rest, laws at t = 2 s"
+    assert net.frequency_response("m.tau", "s.tau", [1.0], t=3.0).title == "ramp at rest, laws at t = 3 s"
+    moment = net.simulate(5.0).at([4.0])
+    assert net.modes(moment).title == "ramp at t = 4 s of a motion"
+    assert net.modes(moment, t=1.0).title == "ramp at t = 4 s of a motion, laws at t = 1 s"
+    diagram = net.campbell(np.linspace(1.0, 300.0, 3), at=lambda n: {"J.omega": n, "K.omega": n})
+    assert (
+        diagram.heading
+        == "ramp at points from J.omega = 1, K.omega = 1 to J.omega = 300, K.omega = 300, laws at t = 6 s"
+    )
+    net.add(sw.Brake("brake", tau=1.0, t_on=7.0), "b")
+    assert net.modes(t=2.0).title == "ramp at rest, laws at t = 2 s (brake released)"
+
+
+def test_titles_name_no_time_where_no_law_depends_on_it() -> None:
+    assert sw.scenes.crane_start().modes().title == "crane start at rest (load stuck)"
+    assert sw.scenes.ship_line().modes().title == "ship line"

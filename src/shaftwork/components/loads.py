@@ -97,11 +97,13 @@ class CoulombLoad(Component):
     ports: ClassVar = (Port("a"),)
 
     def modes(self, p: Any) -> Iterator[Modes]:
-        if p.omega_s == 0:
+        if p.omega_s == 0 and p.tau != 0:
             yield rubbing(p.tau)
 
     def branches(self, p: Any) -> Iterator[Branch]:
-        if p.omega_s == 0:
+        if p.tau == 0:
+            yield ThroughLaw(Integer(0))  # a load left out by its value: nothing sticks
+        elif p.omega_s == 0:
             yield from rubs(p.tau, p, None)
         else:
             yield ThroughLaw(p.tau * tanh(ACROSS / p.omega_s))

@@ -11,6 +11,7 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.linear import Linearization, source_inputs
 from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.start_values import initial_state
+from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
 from shaftwork.network.templates import Kind
@@ -56,16 +57,27 @@ def linearized(
     point = None if model.form.waves else at  # a wave is refused below, whatever the names of the point
     time, x = operating_point(model, p, point, t, settled)
     slopes = Linearization(model, p, x, time, named)
-    title = titled(model.form.graph.name, "" if model.linear else about(at))
+    title = titled(model.form.graph.name, near(model, at, time))
     return linear_model(title, slopes, None if outputs is None else _listed(outputs), x, time)
 
 
-def about(at: Point) -> str:
-    """A point in words, for titles: "at rest", "at J1.omega = 8, J2.omega = 8"."""
+def near(model: CompiledModel, at: Point, t: float) -> str:
+    """What is linearised, in words, for titles: the point, and the time where laws depend on it; else nothing."""
+    return "" if model.linear else about(model, at, t)
+
+
+def about(model: CompiledModel, at: Point, t: float) -> str:
+    """A point in words, and the time in s where laws depend on it: "at J1.omega = 8, laws at t = 2 s"."""
+    graph = model.form.graph
+    laws = (
+        graph.in_network_symbols(made.template.law, made) for made in graph.branches if made.template.kind is Kind.LAW
+    )
+    when = f"{diagram.LAWS}{t:g} s" if any(TIME in law.free_symbols for law in laws) else ""
     if isinstance(at, Solution):
-        return f"at t = {at.t[0]:g} s of a motion"
+        return f"at t = {at.t[0]:g} s of a motion" + ("" if t == at.t[0] else when)
     given = [f"{name} = {value:.4g}" for name, value in (at or {}).items()]
-    return "at " + ", ".join(given if len(given) <= NAMED else [*given[: NAMED - 1], "..."]) if given else "at rest"
+    shown = ", ".join(given if len(given) <= NAMED else [*given[: NAMED - 1], "..."])
+    return (f"at {shown}" if given else "at rest") + when
 
 
 def titled(name: str, point: str, phase: str = "") -> str:
@@ -94,7 +106,7 @@ def operating_point(model: CompiledModel, p: Array, at: Point, t: Time, settled:
 
 def campbell(
     model: CompiledModel,
-    near: SmallMotions,
+    small_motions: SmallMotions,
     speeds: Any,
     orders: Any,
     f_max: float | None,
@@ -105,7 +117,7 @@ def campbell(
 
     Args:
         model: the network.
-        near: from a point to the network near it.
+        small_motions: from a point to the network near it.
         speeds: (k,) rad/s, ascending.
         orders: excitations per turn.
         f_max: highest frequency of interest, Hz.
@@ -119,7 +131,7 @@ def campbell(
         _refuse_no_point(model)
 
     def modes(speed: float, top: float) -> Modes:
-        model = near(at(speed) if callable(at) else at, None, ())
+        model = small_motions(at(speed) if callable(at) else at, None, ())
         return model.modes(count, None if isinstance(model, LinearModel) or count is not None else BEYOND * top)
 
     name = model.form.graph.name

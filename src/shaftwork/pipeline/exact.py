@@ -21,7 +21,7 @@ from shaftwork.core.errors import AccuracyWarning, NetworkWarning, ParameterErro
 from shaftwork.core.notices import muted
 from shaftwork.network.graph import resolve
 from shaftwork.network.netlist import Netlist, Placed
-from shaftwork.pipeline.analysis import Names, Point, SmallMotions, Time, about, input_names, operating_point, titled
+from shaftwork.pipeline.analysis import Names, Point, SmallMotions, Time, input_names, near, operating_point, titled
 from shaftwork.pipeline.model import Model
 from shaftwork.results.exact import ExactModel, ExactSlopes
 from shaftwork.results.exact_lines import ExactLines
@@ -134,7 +134,7 @@ class ExactNetwork:
         values = self._read(time, x)
         names, title = (
             input_names(self._own, inputs),
-            titled(self._model.name, "" if self._own.linear else about(given)),
+            titled(self._model.name, near(self._own, given, time)),
         )
         slopes = ExactSlopes(
             open=self._opened(values, time, names, History(self._own.bind(), np.array([time]), x[None, :])),

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 REFINED = 1e-12
 ITERATIONS = 50
+LAWS = ", laws at t = "
+"""Before the time at which laws are read, in what a title says of the point."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +139,11 @@ def campbell(
 def _about(title: str, found: Sequence[Modes]) -> str:
     """The point of all modes, or those of the first and the last."""
     first, last = (modes.title.removeprefix(title).strip() for modes in (found[0], found[-1]))
-    return first if first == last else f"at points from {first.removeprefix('at ')} to {last.removeprefix('at ')}"
+    if first == last:
+        return first
+    point, _, time = first.partition(LAWS)
+    first = point if time and last.endswith(LAWS + time) else first
+    return f"at points from {first.removeprefix('at ')} to {last.removeprefix('at ')}"
 
 
 def _ascending(speeds: Any) -> Array:

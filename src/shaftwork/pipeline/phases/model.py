@@ -187,7 +187,7 @@ class PhasedModel(Model):
         model = moment.regime.assembly.model
         slopes = Linearization(model, moment.regime.p, moment.x, time, input_names(model, inputs))
         named = None if outputs is None else (outputs,) if isinstance(outputs, str) else tuple(outputs)
-        title = titled(self.name, about(at), self._words(moment))
+        title = titled(self.name, about(model, at, time), self._words(moment))
         return linear_model(title, slopes, named, moment.x, time)
 
     def _words(self, moment: Moment) -> str:
