@@ -83,6 +83,7 @@ def test_the_torque_of_a_coupling_is_right_however_strong_its_damping_is(
     assert np.abs(found - expected).max() < BOUND[engine] * np.abs(expected).max()
 
 
+@pytest.mark.filterwarnings("ignore:the engine .* is off by:shaftwork.AccuracyWarning")
 @pytest.mark.parametrize("engine", INSTALLED)
 @pytest.mark.parametrize("ratio", [1e-3, 1e4])
 def test_the_ends_of_the_range_are_right_with_every_engine(engine: str, ratio: float) -> None:

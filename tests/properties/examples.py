@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 
 from shaftwork import AccuracyWarning, Model, Network, NetworkWarning
 from shaftwork.components import REGISTRY
-from tests.reference.mna import GROUND, Piece
+from tests.reference.mna import GROUND, TERMINALS, Piece, Response
 from tests.strategies import Network as Pieces
 
 Array = NDArray[np.float64]
+QUANTITIES = {"rotation": ("omega", "tau"), "translation": ("v", "f"), "electrical": ("u", "i")}
 
 
 def share_of_examples(share: float = 1.0) -> settings:
@@ -69,6 +70,45 @@ def quantity_of(name: str) -> str:
     """
     quantity = name.rpartition(".")[2].partition("_")[0]
     return "tau" if quantity == "f" else quantity
+
+
+def _domain(piece: Piece, place: int) -> str:
+    """The domain of a piece at one of its nodes, as the declaration of its ports says."""
+    return REGISTRY[piece.type].ports[place].domain.name
+
+
+def across_signals(pieces: Pieces, response: Response) -> dict[str, Array]:
+    """Speeds and voltages of all nodes that the referee determines, by the library's names."""
+    domains = {
+        node: _domain(piece, place)
+        for piece in pieces
+        if piece.type != "Ground"
+        for place, node in enumerate(piece.nodes)
+    }
+    return {
+        f"{node}.{QUANTITIES[domains[node]][0]}": values for node, values in response.across.items() if node != GROUND
+    }
+
+
+def through_signals(pieces: Pieces, response: Response) -> Iterator[tuple[str, Array]]:
+    """Torques, forces and currents of all parts that the referee determines, by the library's names and signs."""
+    for piece in pieces:
+        if piece.type == "Ground":
+            signals = {"through": ("reaction", 1.0)}
+        elif piece.type == "DCMachine":
+            signals = {"through_p": ("i", 1.0), "through_rotor": ("tau", -1.0)}
+        elif len(REGISTRY[piece.type].ports) > 1 and REGISTRY[piece.type].role == "coupling":
+            pairs = zip(TERMINALS[piece.type], REGISTRY[piece.type].ports, strict=True)
+            signals = {
+                f"through_{terminal}": (f"{QUANTITIES[port.domain.name][1]}_{port.name}", 1.0)
+                for terminal, port in pairs
+            }
+        else:
+            sign = -1.0 if REGISTRY[piece.type].role == "source" else 1.0
+            signals = {"through": (QUANTITIES[_domain(piece, 0)][1], sign)}
+        for unknown, (name, sign) in signals.items():
+            if (values := response.through.get(f"{piece.name}.{unknown}")) is not None:
+                yield f"{piece.name}.{name}", sign * values
 
 
 def assert_equal_signals(found: Mapping[str, Array], wanted: Mapping[str, Array], tolerance: float) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 import pytest
@@ -11,60 +11,20 @@ from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
 from shaftwork import t
-from shaftwork.components import REGISTRY
 from tests.properties.examples import (
-    Array,
+    across_signals,
     assert_equal_signals,
     compiled,
     inner_drives,
     processor_time_limit,
     share_of_examples,
+    through_signals,
 )
 from tests.reference import mna
-from tests.reference.mna import GROUND, SOURCE_VALUE, TERMINALS, Piece
+from tests.reference.mna import SOURCE_VALUE, Piece
 from tests.strategies import Network, networks
 
 TIMES = np.linspace(0.0, 0.5, 6)
-QUANTITIES = {"rotation": ("omega", "tau"), "translation": ("v", "f"), "electrical": ("u", "i")}
-
-
-def _domain(piece: Piece, place: int) -> str:
-    """The domain of a piece at one of its nodes, as the declaration of its ports says."""
-    return REGISTRY[piece.type].ports[place].domain.name
-
-
-def _across(pieces: Network, response: mna.Response) -> dict[str, Array]:
-    """Speeds and voltages of all nodes that the referee determines, by the library's names."""
-    domains = {
-        node: _domain(piece, place)
-        for piece in pieces
-        if piece.type != "Ground"
-        for place, node in enumerate(piece.nodes)
-    }
-    return {
-        f"{node}.{QUANTITIES[domains[node]][0]}": values for node, values in response.across.items() if node != GROUND
-    }
-
-
-def _through(pieces: Network, response: mna.Response) -> Iterator[tuple[str, Array]]:
-    """Torques, forces and currents of all parts that the referee determines, by the library's names and signs."""
-    for piece in pieces:
-        if piece.type == "Ground":
-            signals = {"through": ("reaction", 1.0)}
-        elif piece.type == "DCMachine":
-            signals = {"through_p": ("i", 1.0), "through_rotor": ("tau", -1.0)}
-        elif len(REGISTRY[piece.type].ports) > 1 and REGISTRY[piece.type].role == "coupling":
-            pairs = zip(TERMINALS[piece.type], REGISTRY[piece.type].ports, strict=True)
-            signals = {
-                f"through_{terminal}": (f"{QUANTITIES[port.domain.name][1]}_{port.name}", 1.0)
-                for terminal, port in pairs
-            }
-        else:
-            sign = -1.0 if REGISTRY[piece.type].role == "source" else 1.0
-            signals = {"through": (QUANTITIES[_domain(piece, 0)][1], sign)}
-        for unknown, (signal, sign) in signals.items():
-            if (values := response.through.get(f"{piece.name}.{unknown}")) is not None:
-                yield f"{piece.name}.{signal}", sign * values
 
 
 @st.composite
@@ -109,7 +69,7 @@ def test_every_speed_and_every_torque_equals_that_of_the_referee(
     with processor_time_limit(30.0):
         solution = compiled(_rising(pieces, signals)).simulate(TIMES[-1], t_eval=TIMES, engine="exact")
     response = mna.simulate(pieces, signals, TIMES)
-    wanted = _across(pieces, response) | dict(_through(pieces, response))
+    wanted = across_signals(pieces, response) | dict(through_signals(pieces, response))
     assert_equal_signals({name: solution[name] for name in wanted}, wanted, 1e-7)
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy import sparse
 
-from shaftwork.codegen.elements import Array, GainMatrix, potential_matrix
+from shaftwork.codegen.elements import Array, GainMatrix, potential_matrix, rationals
 from shaftwork.codegen.inputs import Inputs
 from shaftwork.codegen.loops import LoopSolver
 from shaftwork.codegen.matrices import LinearPart, MatrixAssembly
@@ -109,6 +110,27 @@ class BoundArrays:
         if self._controls.size:
             slope = slope + by_y @ (part.D[:, self._controls] @ slope[self._controls])
         return sparse.csc_array(part.A + part.B @ slope)
+
+    def rational(self) -> tuple[Array, Array, Callable[[float], Array]] | None:
+        """The equations x' = A x + G v(t) of a linear network without any rounding, v(t) in floats.
+
+        Returns:
+            A (n, n) and G (n, m) as fractions, and v; None where laws and nodes make an algebraic loop.
+        """
+        if self.loops is not None:
+            return None
+        inputs, part = self.program.inputs, self.program.assembly.rational(self.p)
+        x0, y0 = np.zeros(inputs.states), np.zeros(inputs.outputs)
+        by_y, by_x = (rationals(made.toarray()) for made in inputs.slopes(0.0, y0, x0, self.p))
+        slope = by_y @ part.C + by_x
+        slope = slope + by_y @ (part.D[:, self._controls] @ slope[self._controls])
+
+        def given(t: float) -> Array:
+            """u and u' where nothing moves."""
+            y, u = self.values(t, x0)
+            return np.concatenate([u, _where(inputs.of_time, inputs.time_slopes(t, y, x0, self.p))])
+
+        return part.A + part.B @ slope, np.hstack([part.B, part.B1]), given
 
     def moving_sources(self, t: float) -> tuple[str, ...]:
         """The parts whose laws change with time at a time."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -54,6 +55,27 @@ def groups_of(graph: CircuitGraph, branches: Sequence[int]) -> tuple[TemplateGro
     return tuple(made)
 
 
+def rationals(values: Any) -> Array:
+    """An array of floats or fractions as an array of fractions, which are these very numbers."""
+    found = np.empty(np.shape(values), dtype=object)
+    found.ravel()[:] = [Fraction(value) if value else 0 for value in np.ravel(values).tolist()]
+    return found
+
+
+def inverse_of_fractions(matrix: Array) -> Array:
+    """The inverse of a regular matrix of fractions, by Gauss and Jordan."""
+    size = len(matrix)
+    rows = np.hstack([matrix, np.eye(size, dtype=object)])
+    for k in range(size):
+        pivot = k + int(np.flatnonzero(rows[k:, k])[0])
+        rows[[k, pivot]] = rows[[pivot, k]]
+        rows[k] = rows[k] / Fraction(rows[k, k])
+        for other in np.flatnonzero(rows[:, k]):
+            if other != k:
+                rows[other] = rows[other] - rows[other, k] * rows[k]
+    return rows[:, size:]
+
+
 class Coefficients:
     """Capacity, stiffness or conductance of every linear branch as a function of the parameter vector."""
 
@@ -84,6 +106,18 @@ class Coefficients:
             )
         return values
 
+    def rational(self, p: Array) -> Array:
+        """The same as fractions, without any rounding where the law is rational."""
+        values = rationals(np.zeros(self._size))
+        exact = rationals(p)
+        for group, function in self._groups:
+            try:
+                found = function(*exact[group.places])
+            except (AttributeError, TypeError):  # a root or a logarithm of a parameter
+                found = function(*p[group.places])
+            values[group.branches] = rationals(np.broadcast_to(found, group.branches.shape))
+        return values
+
 
 class GainMatrix:
     """A sparse matrix whose entries are whole numbers or gear ratios, as a function of the parameter vector.
@@ -112,6 +146,18 @@ class GainMatrix:
     def _values(self, p: Array) -> dict[Expr, float]:
         assert self._function is not None  # noqa: S101 (there are coefficients)
         return dict(zip(self._coefficients, self._function(p[self._places].tolist()), strict=True))
+
+    def rational(self, p: Array) -> Array:
+        """The matrix as a full array of fractions, with the products and sums of ratios not rounded."""
+        data = rationals(self._data)
+        if self._gains:
+            assert self._function is not None  # noqa: S101 (there are coefficients)
+            exact = rationals(self._function(rationals(p[self._places]).tolist()))
+            values = dict(zip(self._coefficients, exact.tolist(), strict=True))
+            data[self._variable] = rationals(fold(self._gains, values.__getitem__))
+        matrix = rationals(np.zeros(self._shape))
+        np.add.at(matrix, (self._rows, self._columns), data)
+        return matrix
 
     def degenerates(self, p: Array) -> bool:
         """Whether ratios meet at p that differ in the network, so that other equations hold there."""

@@ -9,6 +9,7 @@ variables that the laws and the integrals read, and after them what controlled s
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from shaftwork.codegen.elements import Coefficients, cutset_matrix, loop_matrix, potential_matrix
+from shaftwork.codegen.elements import Coefficients, cutset_matrix, inverse_of_fractions, loop_matrix, potential_matrix
 from shaftwork.core.errors import CompileError
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
@@ -87,8 +88,24 @@ class MatrixAssembly:
         Raises:
             CompileError: a block of the algebraic equations is singular for these values; names its branches.
         """
-        form, F, k = self.form, self.loops(p), self.coefficients(p)
-        Q = F if self.cutsets is self.loops else self.cutsets(p)
+        loops = self.loops(p)
+        cutsets = loops if self.cutsets is self.loops else self.cutsets(p)
+        potentials = None if self.potentials is None else self.potentials(p)
+        part = self._assembled(loops, cutsets, self.coefficients(p), potentials)
+        fields = {field.name: getattr(part, field.name) for field in dataclasses.fields(part)}
+        return LinearPart(
+            **{name: made if name == "coefficients" else sparse.csr_array(made) for name, made in fields.items()}
+        )
+
+    def rational(self, p: Array) -> LinearPart:
+        """The same as full arrays of fractions: nothing is rounded, so nothing cancels."""
+        loops = self.loops.rational(p)
+        cutsets = loops if self.cutsets is self.loops else self.cutsets.rational(p)
+        potentials = None if self.potentials is None else self.potentials.rational(p)
+        return self._assembled(loops, cutsets, self.coefficients.rational(p), potentials)
+
+    def _assembled(self, F: Any, Q: Any, k: Array, potentials: Any) -> LinearPart:
+        form = self.form
         blocks = _Blocks(form, F, Q, len(self.inputs))
         solve_conductances = self._inverse_of_conductances(blocks, k)
         link_g = blocks.diagonal(k[blocks.R])
@@ -117,18 +134,18 @@ class MatrixAssembly:
         t_u = -(blocks.Q("T", "R") @ r_u + blocks.Q("T", "W") @ blocks.input("W"))
         C, D = blocks.output_rows(self.outputs, g_x, g_u)
         z_x, z_u = blocks.integral_rows(self.outputs, C, D)
-        if self.potentials is not None:
-            C, D = blocks.with_readings(C, D, self.potentials(p), g_x, g_u)
+        if potentials is not None:
+            C, D = blocks.with_readings(C, D, potentials, g_x, g_u)
         return LinearPart(
-            A=sparse.csr_array(blocks.stack([c_x, l_x, z_x])),
-            B=sparse.csr_array(blocks.stack([c_u, l_u, z_u])),
-            B1=sparse.csr_array(blocks.stack([c_du, l_du, blocks.nothing(*z_u.shape)])),
-            C=sparse.csr_array(C),
-            D=sparse.csr_array(D),
-            conductance_x=sparse.csr_array(g_x),
-            conductance_u=sparse.csr_array(g_u),
-            tree_law_x=sparse.csr_array(t_x),
-            tree_law_u=sparse.csr_array(t_u),
+            A=blocks.stack([c_x, l_x, z_x]),
+            B=blocks.stack([c_u, l_u, z_u]),
+            B1=blocks.stack([c_du, l_du, blocks.nothing(*z_u.shape)]),
+            C=C,
+            D=D,
+            conductance_x=g_x,
+            conductance_u=g_u,
+            tree_law_x=t_x,
+            tree_law_u=t_u,
             loops=F,
             cutsets=Q,
             coefficients=k,
@@ -141,6 +158,8 @@ class MatrixAssembly:
 
     def _inverse(self, blocks: _Blocks, matrix: Any, branches: NDArray[np.intp], what: str) -> Any:
         """The inverse, block by block of connected unknowns; diagonal where nothing is coupled."""
+        if blocks.rational:
+            return inverse_of_fractions(matrix)
         matrix = sparse.csr_array(matrix)
         size = matrix.shape[0]
         count, label = connected_components(matrix, directed=False)
@@ -190,7 +209,9 @@ class _Blocks:
             "W": form.laws,
         }
         self._groups = {name: np.array(members, dtype=np.intp) for name, members in groups.items()}
-        self._small = loops.shape[0] <= SMALL
+        self.rational = isinstance(loops, np.ndarray)
+        self._small = self.rational or loops.shape[0] <= SMALL
+        self._number: type = object if self.rational else float
         self._loops = self.own(loops)
         self._cutsets = self._loops if cutsets is loops else self.own(cutsets)
         self._cache: dict[tuple[bool, str, str], Any] = {}
@@ -202,7 +223,7 @@ class _Blocks:
 
     def own(self, matrix: Any) -> Any:
         """A sparse matrix as an array, where the network is small."""
-        return matrix.toarray() if self._small else matrix
+        return matrix.toarray() if self._small and sparse.issparse(matrix) else matrix
 
     def diagonal(self, values: Array) -> Any:
         """A diagonal matrix."""
@@ -210,7 +231,7 @@ class _Blocks:
 
     def nothing(self, *shape: int) -> Any:
         """A matrix of zeros."""
-        return np.zeros(shape) if self._small else sparse.csr_array(shape)
+        return np.zeros(shape, dtype=self._number) if self._small else sparse.csr_array(shape)
 
     def stack(self, matrices: Sequence[Any]) -> Any:
         """Matrices one below the other."""
@@ -284,6 +305,6 @@ class _Blocks:
 
     def _selection(self, columns: NDArray[np.intp], width: int) -> Any:
         if self._small:
-            return np.eye(width)[columns]
+            return np.eye(width, dtype=self._number)[columns]
         size = len(columns)
         return sparse.csr_array((np.ones(size), (np.arange(size), columns)), shape=(size, width))

@@ -142,25 +142,30 @@ def solve(
     Warns:
         AccuracyWarning: dampers are so strong that the rounding of speeds spoils their torques.
     """
-    from shaftwork.integrate.cancellation import rounding
-
     name, reason = choose(problem) if engine == "auto" else (engine, f"The engine {engine!r} was asked for.")
     if name != "heyoka" or not (fallback or engine == "auto"):
-        trajectory = load(name)(problem)
-        if (
-            name not in EXPLICIT
-            and trajectory.t.size
-            and (lost := rounding(problem, trajectory.t, trajectory.x)) is not None
-        ):
-            warn(lost, AccuracyWarning)
-        return trajectory, name, why or reason
+        trajectory = _guarded(problem, load(name)(problem), name)
+        return trajectory, name, f"{why or reason} {trajectory.remark}".rstrip()
     run = load(name)
     from shaftwork.integrate.problem import SeriesError
 
     try:
-        return run(problem), name, why or reason
+        return _guarded(problem, run(problem), name), name, why or reason
     except SeriesError:
         return load("scipy")(problem), "scipy", NOT_ANALYTIC
+
+
+def _guarded(problem: Problem, trajectory: Trajectory, name: str) -> Trajectory:
+    """The run, after a warning where it is worth less than it should be."""
+    from shaftwork.integrate.cancellation import rounding
+    from shaftwork.integrate.verification import objection
+
+    said = objection(problem, trajectory, name)
+    if said is None and problem.observed is None and name not in EXPLICIT and trajectory.t.size:
+        said = rounding(problem, trajectory.t, trajectory.x)
+    if said is not None:
+        warn(said, AccuracyWarning)
+    return trajectory
 
 
 def check(name: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -16,9 +16,12 @@ from scipy.sparse.linalg import expm_multiply
 from shaftwork.core.errors import ParameterError
 from shaftwork.integrate.driven import driven, polynomials
 from shaftwork.integrate.modal import Modes, find_modes
+from shaftwork.integrate.observation import difference, doubt
 from shaftwork.integrate.pieces import Piece, both_sides, failure, pieces, start_of_piece
+from shaftwork.integrate.precise import Nearby, PrecisePiece, PreciseSystem, precise_piece, precise_system, seconds
 from shaftwork.integrate.problem import Array, LinearInputs, Problem, Trajectory
 from shaftwork.integrate.stiffness import balance, norm, scale_by
+from shaftwork.integrate.straight import straight_line
 
 # Intervals of the engine's own output grid, which no accuracy depends on.
 OWN_INTERVALS = 500
@@ -30,8 +33,10 @@ TAYLOR_PRODUCTS = 6.0
 MOST_HALVINGS = 40
 # States up to which inputs that are no straight lines are followed mode by mode.
 LARGEST_DRIVEN = 600
-# A forcing may differ from a straight line by this part of its size before it is refused.
-STRAIGHT = 1e-7
+# What rounding may change before a run is made in whole numbers, and the estimate of its time up to which it is, s.
+DOUBTED, LONGEST_PRECISE = 1e-7, 10.0
+# States up to which other engines are measured against this one.
+LARGEST_REFERENCE = 200
 
 
 def solve(problem: Problem) -> Trajectory:
@@ -63,23 +68,99 @@ def solve(problem: Problem) -> Trajectory:
         )
     system = _system(linear)
     dense_form = problem.linear is None or prefers_dense(problem, linear)
+    trajectory = _propagated(problem, system, lambda piece, x: _span(problem, system, piece, x, dense_form=dense_form))
+    part = doubt(problem, trajectory, _lost(problem, system, trajectory))
+    if part <= DOUBTED or (precise := _precise(problem, system)) is None:
+        return replace(trajectory, doubt=part if part <= DOUBTED else _spread(problem, linear, trajectory))
+    try:
+        made = _propagated(
+            problem, system, lambda piece, x: precise_piece(problem, precise, piece, x, _nearby(problem, system, piece))
+        )
+    except OverflowError as error:
+        raise failure(problem, "exact", problem.t_end, trajectory.x[-1], str(error)) from error
+    bits = precise.power.bits
+    remark = f"Floats may lose a part of {part:.1g} of it, so it is computed in whole numbers of {bits} bits."
+    return replace(made, remark=remark, statistics={"bits": bits})
+
+
+def _spread(problem: Problem, linear: LinearInputs, trajectory: Trajectory) -> float:
+    """How far a run moves where each entry of A is rounded once more, as a part of the largest value of its kind."""
+    rounded = linear.A.copy()
+    rounded.data = rounded.data * (1 + np.finfo(float).eps * np.random.default_rng(0).choice((-1.0, 1.0), rounded.nnz))
+    system = _System(replace(linear, A=rounded))
+    dense_form = problem.linear is None or prefers_dense(problem, linear)
+    if problem.linear is None and system.modes is None:
+        return 1.0
+    other = _propagated(problem, system, lambda piece, x: _span(problem, system, piece, x, dense_form=dense_form))
+    return difference(problem, trajectory, other)
+
+
+def _nearby(problem: Problem, system: _System, piece: Piece) -> Nearby:
+    """The motion in floats from the node before each time: over so short a time they lose little."""
+    level, slope = straight_line(problem, system.forcing, piece)
+    modes, scale = system.modes, system.scale
+    if modes is None:
+        return _propagator(system, level, slope, dense_form=True).between
+
+    def between(nodes: Array, states: Array, times: Array) -> Array:
+        index = np.clip(np.searchsorted(nodes, times, side="right") - 1, 0, nodes.size - 1)
+        found = np.empty((times.size, states.shape[1]))
+        for k in np.unique(index):
+            line = (level + slope * (nodes[k] - nodes[0])) / scale, slope / scale
+            found[index == k] = modes.response(states[k] / scale, *line, times[index == k] - nodes[k]) * scale
+        return found
+
+    return between
+
+
+def _lost(problem: Problem, system: _System, trajectory: Trajectory) -> Array:
+    """(n,) what rounding may change in each state.
+
+    Law: A is known to eps |A|, so in the scale of `balance` x is known to c eps |A| t |x|, c the condition of modes.
+    """
+    turns = max(1.0, system.norm * (problem.t_end - problem.t0))
+    size = float(np.linalg.norm(np.abs(trajectory.x / system.scale).max(axis=0, initial=0.0)))
+    return np.asarray(np.finfo(float).eps * system.condition * turns * size * system.scale)
+
+
+def _propagated(problem: Problem, system: _System, span_of: Callable[[Piece, Array], _Motion]) -> Trajectory:
+    """The motion from piece to piece."""
     x = np.asarray(problem.x0, dtype=float)
-    spans: list[_Span] = []
+    spans: list[_Motion] = []
     for piece in pieces(problem):
         start = start_of_piece(problem, piece, x)
         with np.errstate(over="ignore", invalid="ignore"):
-            span = _span(problem, system, piece, start, dense_form=dense_form)
+            span = span_of(piece, start)
         spans.append(span)
         x = span.end
         if not np.isfinite(x).all():
             raise failure(problem, "exact", piece.end, x, "the motion is unbounded")
-    dense = _ExactDense(tuple(spans), system.norm)
+    starts = np.array([piece.start for piece in pieces(problem)])
+    dense = _ExactDense(tuple(spans), starts, system.norm)
     if problem.t_eval is None:
         t, states = both_sides(problem, [span.times for span in spans], [span.at(span.times) for span in spans])
     else:
         t = np.asarray(problem.t_eval, dtype=float)
         states = dense(t)
-    return Trajectory(t, states, dense, {"steps": sum(span.times.size - 1 for span in spans)})
+    steps = sum(span.times.size - 1 for span in spans if isinstance(span, _Span))
+    return Trajectory(t, states, dense, {"steps": steps})
+
+
+def _precise(problem: Problem, system: _System) -> PreciseSystem | None:
+    """The system in whole numbers; None where a run would take too long, or inputs are no straight lines."""
+    turns = system.norm * (problem.t_end - problem.t0)
+    outputs = OWN_INTERVALS if problem.t_eval is None else problem.t_eval.size
+    slow = seconds(problem.x0.size, turns, outputs) > LONGEST_PRECISE
+    return None if slow or problem.linear is None else precise_system(problem, problem.linear)
+
+
+def reference(problem: Problem) -> Trajectory | None:
+    """The motion against which another engine is measured; None where it would take too long or is in doubt itself."""
+    linear = problem.linear or problem.driven
+    if linear is None or problem.x0.size > LARGEST_REFERENCE or (problem.linear is None and not drivable(problem)):
+        return None
+    trajectory = solve(problem)
+    return trajectory if trajectory.doubt <= DOUBTED else None
 
 
 def drivable(problem: Problem) -> bool:
@@ -137,6 +218,11 @@ class _System:
         self.scale = balance(matrix)
         self.matrix = scale_by(matrix, self.scale)
         self.norm = norm(self.matrix)
+
+    @cached_property
+    def condition(self) -> float:
+        """How much the modes multiply rounding."""
+        return 1.0 if self.modes is None else self.modes.condition
 
     @cached_property
     def modes(self) -> Modes | None:
@@ -210,17 +296,20 @@ class _Span:
     at: Callable[[Array], Array]
 
 
+_Motion = _Span | PrecisePiece
+
+
 class _ExactDense:
     """The motion at any time of the run.
 
     Args:
         spans: the pieces.
+        starts: of them, s.
         rate: no mode is faster, 1/s.
     """
 
-    def __init__(self, spans: tuple[_Span, ...], rate: float) -> None:
-        self._spans, self._rate = spans, rate
-        self._starts = np.array([span.times[0] for span in spans])
+    def __init__(self, spans: tuple[_Motion, ...], starts: Array, rate: float) -> None:
+        self._spans, self._starts, self._rate = spans, starts, rate
 
     @property
     def steps(self) -> Array:
@@ -245,7 +334,7 @@ def _span(problem: Problem, system: _System, piece: Piece, x: Array, *, dense_fo
     times = _nodes(problem, piece)
     if problem.linear is None:
         return _driven_span(problem, system, piece, x, times)
-    level, slope = _straight_line(problem, system.forcing, piece)
+    level, slope = straight_line(problem, system.forcing, piece)
     modes = system.modes if dense_form else None
     if modes is not None:
         scale = system.scale
@@ -308,20 +397,3 @@ def _propagator(system: _System, level: Array, slope: Array, *, dense_form: bool
     clock = sparse.csr_array(np.array([[0.0, 1.0], [0.0, 0.0]]))
     augmented = sparse.block_array([[matrix, sparse.csr_array(forcing)], [None, clock]], format="csr")
     return _Propagator(augmented.toarray() if dense_form else augmented, scale, dense_form)
-
-
-def _straight_line(problem: Problem, forcing: Callable[[float], Array], piece: Piece) -> tuple[Array, Array]:
-    """Level at the start of a piece and slope of u, from values strictly inside the piece."""
-    length = piece.high - piece.low
-    times = [piece.low + part * length for part in (0.25, 0.5, 0.75)]
-    early, middle, late = (np.asarray(forcing(time), dtype=float) for time in times)
-    slope = (late - early) / (times[2] - times[0])
-    bend = np.abs(middle - (early + late) / 2) - np.abs(slope) * np.spacing(piece.high)  # a short piece's times round
-    if (bend > STRAIGHT * (np.abs(early) + np.abs(late)).max(initial=0.0)).any():
-        name = problem.names[int(np.argmax(bend))]
-        raise ParameterError(
-            f"The exact engine needs an input that is a straight line between breakpoints; the one of {name!r} bends "
-            f"between t = {piece.start:.6g} s and {piece.end:.6g} s. Take the engine 'auto'."
-        )
-    slope[np.abs(slope) * length <= 8 * np.finfo(float).eps * np.abs(early)] = 0.0
-    return early - (times[0] - piece.start) * slope, slope

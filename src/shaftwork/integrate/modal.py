@@ -31,11 +31,13 @@ class Modes:
         values: (k,) eigenvalues, 1/s.
         vectors: (n, k), a column for each mode.
         inverse: (k, n) rows of the inverse of all vectors.
+        condition: of all vectors, by which they may multiply rounding.
     """
 
     values: Complex
     vectors: Complex
     inverse: Complex
+    condition: float = 1.0
 
     def response(self, start: Array, level: Array, slope: Array, elapsed: Array) -> Array:
         """States (k, n) at times `elapsed` (k,) after a start state, for the input level + slope * elapsed.
@@ -58,12 +60,13 @@ def find_modes(matrix: Any) -> Modes | None:
     if lossless is not None:
         return _lossless_modes(matrix, *lossless)
     values, vectors = np.linalg.eig(matrix)
-    if np.linalg.cond(vectors) > LARGEST_CONDITION:
+    condition = float(np.linalg.cond(vectors))
+    if condition > LARGEST_CONDITION:
         return None
     inverse = np.linalg.inv(vectors).astype(complex)
     kept = values.imag >= 0
     weights = np.where(values.imag > 0, 2.0, 1.0)[kept]
-    return Modes(values[kept].astype(complex), vectors[:, kept] * weights, inverse[kept])
+    return Modes(values[kept].astype(complex), vectors[:, kept] * weights, inverse[kept], condition)
 
 
 def _lossless_halves(matrix: Array) -> tuple[Array, NDArray[np.bool_]] | None:

@@ -17,6 +17,38 @@ Array = NDArray[np.float64]
 Explain = Callable[[Array, Array], tuple[float, str] | None]
 
 
+class Fractions(NamedTuple):
+    """The system x' = A x + G v(t) without any rounding but that of its parameters and inputs.
+
+    Args:
+        A: (n, n) full array of `fractions.Fraction`.
+        G: (n, m) the same.
+        inputs: v(t), (m,) floats.
+    """
+
+    A: Any
+    G: Any
+    inputs: Callable[[float], Array]
+
+
+class Observed(NamedTuple):
+    """The speeds of a linear network, what passes through its branches, and what laws leave of that.
+
+    Args:
+        values: from times (k,) and states (k, n) to (k, m): across, through, and what should be zero.
+        kinds: (m,) their units.
+        names: (m,) their parts.
+        direct: (m,) whether a value is a speed or a state; what dampers give is a difference times their d.
+        first_left: number of the first value that should be zero.
+    """
+
+    values: Callable[[Array, Array], Array]
+    kinds: tuple[str, ...]
+    names: tuple[str, ...]
+    direct: Any
+    first_left: int
+
+
 @dataclass(frozen=True)
 class LinearInputs:
     """A linear system x' = A x + u(t) whose input is smooth between its breakpoints.
@@ -24,11 +56,13 @@ class LinearInputs:
     Args:
         A: (n, n) scipy.sparse.csr_array, 1/s times the units of the states.
         forcing: u(t), shape (n,), or (n, k) at times (k,); evaluated strictly inside a piece it is that piece's own.
+        fractions: makes the same system without rounding, or None where there is no such form.
         found: what an engine has found out about A, for the next run with the same parameters.
     """
 
     A: Any
     forcing: Callable[[Any], Array]
+    fractions: Callable[[], Fractions | None] = lambda: None
     found: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
 
@@ -121,6 +155,7 @@ class Problem:
         linear: the same system in linear form, where it is one and its input is, between breakpoints, a polynomial of
             degree at most 1 in t; else None.
         driven: the same system in linear form, where it is one and its input is another smooth function; else None.
+        observed: all quantities of a linear network, or None.
         symbolic: the same system as a heyoka program with its parameters (`codegen.heyoka.BoundProgram`), a function
             that makes this where an engine asks for it, or None where there is none.
         explain: from times (k,) and states (k, n) to the first of these times at which a law has no value, and that law
@@ -149,6 +184,7 @@ class Problem:
     t_eval: Array | None = None
     linear: LinearInputs | None = None
     driven: LinearInputs | None = None
+    observed: Observed | None = None
     symbolic: Any = None
     explain: Explain | None = None
     rough: Explain | None = None
@@ -273,6 +309,8 @@ class Trajectory:
         x: (k, n) states.
         dense: the solution at any time; at a breakpoint the state after the jump.
         statistics: counts by name: "steps", "rhs", "jacobians", "switches" as far as the engine knows them.
+        doubt: what rounding may have changed, as a part of the largest state of its unit, where the engine can tell.
+        remark: a sentence on how the engine has gone about it, where that is out of the ordinary.
         met: the guard that ended the run, or None where it went on to `Problem.t_end`.
         end: time in s and state (n,) where the run ended; known of a run with guards.
     """
@@ -281,6 +319,8 @@ class Trajectory:
     x: Array
     dense: DenseOutput
     statistics: Mapping[str, int] = field(default_factory=dict)
+    doubt: float = field(default=0.0, kw_only=True)
+    remark: str = field(default="", kw_only=True)
     met: int | None = field(default=None, kw_only=True)
     end: tuple[float, Array] | None = field(default=None, kw_only=True)
 

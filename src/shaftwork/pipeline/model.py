@@ -21,7 +21,7 @@ from shaftwork.core.callbacks import Told
 from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.core.kept import Kept
 from shaftwork.integrate import choice
-from shaftwork.integrate.problem import LinearInputs, Problem, Trajectory
+from shaftwork.integrate.problem import Fractions, LinearInputs, Problem, Trajectory
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import (
     Demand,
@@ -35,7 +35,7 @@ from shaftwork.pipeline.arguments import (
 )
 from shaftwork.pipeline.implicit import at_rest, solve_loops
 from shaftwork.pipeline.overview import model_overview
-from shaftwork.pipeline.prepared import Prepared, nominal_tolerances
+from shaftwork.pipeline.prepared import Prepared, nominal_tolerances, observed
 from shaftwork.pipeline.settled import refuse_moving, warn_of_earlier_levels
 from shaftwork.pipeline.sizes import in_its_size
 from shaftwork.pipeline.stored import Rebuild, Repetition, call_of, model_again, remember
@@ -295,6 +295,7 @@ class Model(CompiledModel):
             t_eval=demand.t_eval,
             linear=None if self.degree is None else prepared.linear,
             driven=prepared.linear if self.degree is None else None,
+            observed=observed(prepared) if self.linear else None,
             symbolic=prepared.symbolic,
             explain=lambda t, x: without_value(prepared.bound, t, x),
             rough=lambda t, x: rough(prepared.bound, t, x),
@@ -315,6 +316,7 @@ class Model(CompiledModel):
             symbolic=cache(lambda: None if self._program is None else self._program.bind(p)),
             linear=self._linear_inputs(p),
             atol=nominal_tolerances(self.form, self.arrays.assembly.coefficients(p)),
+            form=self.form,
         )
 
     @cached_property
@@ -361,9 +363,13 @@ class Model(CompiledModel):
         if self.form.waves or not self.linear:
             return None
         n, bound = len(self.states), self.bind(p)
-        return LinearInputs(
-            bound.jacobian(0.0, np.zeros(n)).tocsr(), lambda t: bound.rhs(t, np.zeros((n, *np.shape(t))))
-        )
+
+        def fractions() -> Fractions | None:
+            found = bound.rational()
+            return None if found is None else Fractions(*found)
+
+        matrix = bound.jacobian(0.0, np.zeros(n)).tocsr()
+        return LinearInputs(matrix, lambda t: bound.rhs(t, np.zeros((n, *np.shape(t)))), fractions)
 
     def _changes_structure(self, values: Mapping[str, float]) -> bool:
         """Whether other equations hold for new values: a value becomes zero or ceases to, ratios meet, `Auto`."""

@@ -11,7 +11,9 @@ import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
-from shaftwork.integrate.problem import LinearInputs
+from shaftwork.codegen.recovery import History
+from shaftwork.integrate.problem import LinearInputs, Observed
+from shaftwork.network.graph import GROUND
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
 
@@ -29,6 +31,7 @@ class Prepared:
     symbolic: Callable[[], Any]
     linear: LinearInputs | None
     atol: Array
+    form: StateForm
 
     @cached_property
     def bound(self) -> BoundArrays:
@@ -38,6 +41,35 @@ class Prepared:
     def jacobian(self, t: float, x: Array) -> Any:
         """Of the right-hand side, sparse."""
         return self.bound.jacobian(t, x)
+
+
+def observed(prepared: Prepared) -> Observed:
+    """What the branches of a linear network show to the engines.
+
+    The through variable of a conductance in the tree comes from the balance of a node, so its law tells what rounding
+    has left of it.
+    """
+    form, graph = prepared.form, prepared.form.graph
+    parts = [(part, part.nodes[port.name]) for part in graph.parts for port in part.component.ports]
+    nodes = {node: part.name for part, node in parts if node != GROUND}
+    places, tree = list(nodes), list(form.tree_conductances)
+
+    def values(times: Array, states: Array) -> Array:
+        history = History(prepared.bound, times, states)
+        left = history.through[tree] - prepared.bound.part.coefficients[tree][:, None] * history.across[tree]
+        return np.concatenate([history.potentials[places], history.through, left]).T
+
+    domains = [graph.domains[max(branch.plus, branch.minus)] for branch in graph.branches]
+    through = [  # that of a coupling is a multiplier, whatever its ratios make of it
+        "" if branch.template.kind is Kind.COUPLING else domain.through.unit
+        for branch, domain in zip(graph.branches, domains, strict=True)
+    ]
+    kinds = (*(graph.domains[node].across.unit for node in nodes), *through, *(through[branch] for branch in tree))
+    owners = [graph.part_of(branch.index).name for branch in graph.branches]
+    names = (*nodes.values(), *owners, *(owners[branch] for branch in tree))
+    direct = np.arange(len(kinds)) < len(nodes)
+    direct[[len(nodes) + branch for branch in form.through_states]] = True
+    return Observed(values, kinds, names, direct, len(nodes) + len(owners))
 
 
 def nominal_tolerances(form: StateForm, coefficients: Array) -> Array:

@@ -1,0 +1,202 @@
+"""Linear motions in as many digits as they need: where rates lie so far apart that floats lose the slow ones."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from shaftwork.integrate.chebyshev import Polynomial, points
+from shaftwork.integrate.fixed_point import FixedPoint, Integers
+from shaftwork.integrate.pieces import Piece, PiecewiseDense, pieces
+from shaftwork.integrate.problem import Array, Fractions, LinearInputs, Problem
+from shaftwork.integrate.stiffness import balance, scale_by
+from shaftwork.integrate.straight import straight_line
+
+# A product of two such numbers takes about this long on one core, s.
+PRODUCT = 3e-7
+# Of an output the evenly spaced run takes so many products of the matrix with a state.
+SERIES = 10
+# Between outputs the motion is polynomials of this degree, which leave out this part of the largest value of a state.
+DEGREE, LEFT_OUT = 20, 2e-14
+# A motion that rings in more panels than these goes on in floats from exact nodes; at few times it is computed anew.
+MOST_PANELS, FEW = 200, 64
+INTERVALS = 500
+"""Steps of a motion that rings."""
+Nearby = Callable[[Array, Array, Array], Array]
+_COEFFICIENTS = np.linalg.inv(chebyshev.chebvander(2 * points(DEGREE) - 1, DEGREE))
+
+
+class PreciseSystem:
+    """z' = M z with z = (x, v, v'): the states, the inputs that are not zero, and their slopes.
+
+    Args:
+        linear: the system.
+        fractions: the same without rounding.
+        length: of the longest piece, s.
+        active: which inputs are not always zero.
+    """
+
+    def __init__(self, linear: LinearInputs, fractions: Fractions, length: float, active: list[int]) -> None:
+        self.fractions, self.active = fractions, active
+        n, m = len(fractions.A), len(active)
+        matrix = np.full((n + 2 * m, n + 2 * m), 0, dtype=object)
+        matrix[:n, :n], matrix[:n, n : n + m] = fractions.A, fractions.G[:, active]
+        matrix[n : n + m, n + m :] = np.eye(m, dtype=object)
+        rough = np.array([[float(entry) for entry in row] for row in matrix])
+        scale = balance(linear.A)
+        size = np.abs(scale_by(linear.A.toarray(), scale)).max(initial=0.0) or 1 / length
+        columns = (np.abs(rough[:n, n : n + m]) / scale[:, None]).max(axis=0, initial=0.0)
+        shares = size / np.where(columns > 0, columns, size)
+        self.scale = 2.0 ** np.round(np.log2(np.concatenate([scale, shares, shares * size])))
+        exact = [Fraction(each) for each in self.scale.tolist()]
+        balanced = [
+            [entry * exact[j] / exact[i] if entry else 0 for j, entry in enumerate(row)] for i, row in enumerate(matrix)
+        ]
+        self.power = FixedPoint(np.array(balanced, dtype=object), length)
+
+
+def seconds(states: int, turns: float, outputs: int) -> float:
+    """About how long a run takes, from the product of its fastest rate and its length."""
+    size, squares = states + 2, 25 + math.log2(max(turns, 1.0))
+    return PRODUCT * (squares * size**3 + outputs * size**2 * SERIES)
+
+
+@dataclass(frozen=True)
+class PrecisePiece:
+    """The motion in one piece.
+
+    Args:
+        system: its equations.
+        piece: its span of time.
+        start: (size, 1) of it, as whole numbers.
+        exponent: the power of two by which they are smaller than the states.
+        nearby: the motion in floats, from nodes (k,), the states (k, n) there and times (m,) to states (m, n).
+    """
+
+    system: PreciseSystem
+    piece: Piece
+    start: Integers
+    exponent: int
+    nearby: Nearby
+
+    def exactly(self, times: Array) -> Array:
+        """States (k, n) at times (k,), each rounded once."""
+        system, power = self.system, self.system.power
+        first = Fraction(self.piece.start)
+        elapsed = [Fraction(time) - first for time in times.tolist()]
+        block = self._evenly(elapsed)
+        if block is None:
+            block = power.advance(np.repeat(self.start, len(elapsed), axis=1), elapsed)
+        n = len(system.scale) - 2 * len(system.active)
+        return np.asarray(np.ldexp(power.floats(block[:n]).T, self.exponent) * system.scale[:n])
+
+    def _evenly(self, elapsed: list[Fraction]) -> Integers | None:
+        """The motion at times with equal steps, whose exponential is shared; None where they have none."""
+        power, count = self.system.power, len(elapsed) - 1
+        if count < len(self.start):
+            return None
+        step = (elapsed[-1] - elapsed[0]) / count
+        nudges = [time - elapsed[0] - k * step for k, time in enumerate(elapsed)]
+        if not power.is_short(max(map(abs, nudges))):
+            return None
+        columns = power.advance(self.start, [elapsed[0]])
+        matrix = power.advance(power.whole(np.eye(len(self.start))), [step] * len(self.start))
+        while columns.shape[1] <= count:
+            columns = np.hstack([columns, matrix @ columns[:, : count + 1 - columns.shape[1]] >> power.bits])
+            matrix = matrix @ matrix >> power.bits
+        return power.nudge(columns, nudges)
+
+    @cached_property
+    def panels(self) -> PiecewiseDense | None:
+        """The motion as polynomials, in panels that are the shorter the faster it moves; None where it only rings.
+
+        The last panel comes first: what still moves fast there does so all the time.
+        """
+        starts, found = [self.piece.start], list[Polynomial]()
+        end, largest = self.piece.end, np.zeros(len(self.system.scale) - 2 * len(self.system.active))
+        while starts:
+            start = starts[-1]
+            shares = (self.piece.end - self.piece.start) / (end - start)
+            if len(found) > MOST_PANELS or (not found and shares > MOST_PANELS):
+                return None
+            states = self.exactly(start + (end - start) * points(DEGREE))
+            largest = np.maximum(largest, np.abs(states).max(axis=0))
+            missing = np.abs(_COEFFICIENTS @ states)[-2:].max(axis=0)
+            middle = (start + end) / 2
+            if (missing > LEFT_OUT * largest).any() and start < middle < end:
+                starts.append(middle)
+                continue
+            found.append(Polynomial(start, end, states))
+            end = starts.pop()
+        found.reverse()
+        steps = np.array([*(each.start for each in found), self.piece.end])
+        return PiecewiseDense(steps[:-1], tuple(found), steps, largest.size)
+
+    @cached_property
+    def _nodes(self) -> tuple[Array, Array]:
+        """Times (k,) and states (k, n) between which a motion that rings is computed in floats."""
+        times = np.linspace(self.piece.start, self.piece.end, INTERVALS + 1)
+        return times, self.exactly(times)
+
+    @property
+    def end(self) -> Array:
+        """(n,) state at its end."""
+        return np.asarray(self.exactly(np.array([self.piece.end]))[0])
+
+    @property
+    def times(self) -> Array:
+        """(s,) between these the motion is smooth."""
+        if self.panels is None:
+            return self._nodes[0]
+        return self.panels.steps
+
+    def at(self, times: Array) -> Array:
+        """States (k, n) at times (k,)."""
+        if times.size <= FEW or _are_even(times):
+            return self.exactly(times)
+        if self.panels is None:
+            return self.nearby(*self._nodes, times)
+        return np.asarray(self.panels(times))
+
+
+def _are_even(times: Array) -> bool:
+    """Whether times have equal steps, up to rounding."""
+    evenly = np.linspace(times[0], times[-1], times.size)
+    return bool((np.abs(times - evenly) <= 4 * np.spacing(np.abs(times).max())).all())
+
+
+def precise_system(problem: Problem, linear: LinearInputs) -> PreciseSystem | None:
+    """The system of a problem, which is kept for its next run; None where it has no exact form."""
+    if "fractions" not in linear.found:
+        linear.found["fractions"] = linear.fractions()
+    fractions: Fractions | None = linear.found["fractions"]
+    if fractions is None:
+        return None
+    spans = pieces(problem)
+    lines = [straight_line(problem, fractions.inputs, piece) for piece in spans]
+    active = np.flatnonzero(np.any([(level != 0) | (slope != 0) for level, slope in lines], axis=0)).tolist()
+    length = max(piece.end - piece.start for piece in spans)
+    key = f"precise to {length!r} with {active}"
+    if key not in linear.found:
+        linear.found[key] = PreciseSystem(linear, fractions, length, active)
+    found: PreciseSystem = linear.found[key]
+    return found
+
+
+def precise_piece(problem: Problem, system: PreciseSystem, piece: Piece, x: Array, nearby: Nearby) -> PrecisePiece:
+    """The motion in a piece from a state x (n,)."""
+    level, slope = straight_line(problem, system.fractions.inputs, piece)
+    values = np.concatenate([x, level[system.active], slope[system.active]])
+    shares = [
+        Fraction(value) / Fraction(each) for value, each in zip(values.tolist(), system.scale.tolist(), strict=True)
+    ]
+    largest = max(map(abs, shares), default=Fraction(0))
+    exponent = largest.numerator.bit_length() - largest.denominator.bit_length() if largest else 0
+    start = system.power.whole([share / Fraction(2) ** exponent for share in shares])[:, None]
+    return PrecisePiece(system, piece, start, exponent, nearby)
