@@ -40,6 +40,8 @@ def test_a_brake_that_fades_slowly_slips_on_time_and_as_often_as_with_another_en
     assert [event[1:] for event in sol.events] == [event[1:] for event in other.events]
 
 
+# The speeds of 500 rad/s are right to 1e-8; what they leave open in the spring's 0.7 N m is 1e-6, and the run says so.
+@pytest.mark.filterwarnings("ignore:the engine 'heyoka' is off by 1e-06:shaftwork.AccuracyWarning")
 def test_the_end_of_a_ramp_costs_no_digits_of_a_long_motion() -> None:
     net = sw.Network("long ramp")
     net.add(sw.Inertia("J", J=1.0), "a")

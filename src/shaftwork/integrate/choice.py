@@ -6,8 +6,7 @@ import importlib
 import importlib.util
 from dataclasses import dataclass, replace
 
-from shaftwork.core.errors import AccuracyWarning, MissingExtraError, ParameterError
-from shaftwork.core.notices import warn
+from shaftwork.core.errors import MissingExtraError, ParameterError
 from shaftwork.integrate.problem import Engine, Problem, Trajectory
 
 # Why scipy goes on where heyoka stopped.
@@ -132,15 +131,12 @@ def solve(
         fallback: whether another engine may go on where a Taylor series cannot; always so with "auto".
 
     Returns:
-        The trajectory, the name of the engine and why it was taken.
+        The trajectory with its caveat, the name of the engine and why it was taken.
 
     Raises:
         ParameterError: no engine has this name.
         MissingExtraError: the engine's library is not installed.
         SimulationError: the engine failed.
-
-    Warns:
-        AccuracyWarning: dampers are so strong that the rounding of speeds spoils their torques.
     """
     name, reason = choose(problem) if engine == "auto" else (engine, f"The engine {engine!r} was asked for.")
     if name != "heyoka" or not (fallback or engine == "auto"):
@@ -152,20 +148,18 @@ def solve(
     try:
         return _guarded(problem, run(problem), name), name, why or reason
     except SeriesError:
-        return load("scipy")(problem), "scipy", NOT_ANALYTIC
+        return _guarded(problem, load("scipy")(problem), "scipy"), "scipy", NOT_ANALYTIC
 
 
 def _guarded(problem: Problem, trajectory: Trajectory, name: str) -> Trajectory:
-    """The run, after a warning where it is worth less than it should be."""
+    """The run, with what makes it worth less than it should be."""
     from shaftwork.integrate.cancellation import rounding
     from shaftwork.integrate.verification import objection
 
     said = objection(problem, trajectory, name)
     if said is None and problem.observed is None and name not in EXPLICIT and trajectory.t.size:
         said = rounding(problem, trajectory.t, trajectory.x)
-    if said is not None:
-        warn(said, AccuracyWarning)
-    return trajectory
+    return replace(trajectory, caveat=said or "")
 
 
 def check(name: str) -> None:

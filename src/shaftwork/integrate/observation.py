@@ -8,6 +8,8 @@ from shaftwork.integrate.problem import Array, Observed, Problem, Trajectory
 
 # So many outputs of a run are looked at, evenly and ever denser towards its start.
 SAMPLES = 12
+# So many outputs tell how large the values of each kind become.
+OUTLOOK = 500
 # A motion each of whose states is known to this part is not looked at any further.
 CERTAIN = 1e-10
 
@@ -56,15 +58,21 @@ def _patterns(n: int) -> Array:
     )
 
 
-def rounding(observed: Observed, times: Array, states: Array) -> tuple[Array, tuple[float, str]]:
-    """All values (k, m); what one rounding of each state changes, as a part of the largest of its kind, and where."""
+def outlook(observed: Observed, trajectory: Trajectory) -> Array:
+    """(k, m) values at so many outputs that the largest of each kind is hardly missed."""
+    chosen = np.unique(np.linspace(0, trajectory.t.size - 1, OUTLOOK).round().astype(int))
+    return observed.values(trajectory.t[chosen], trajectory.x[chosen])
+
+
+def rounding(observed: Observed, times: Array, states: Array) -> tuple[Array, Array]:
+    """All values (k, m), and what one rounding of each state changes (m,)."""
     patterns = np.concatenate([np.zeros((1, states.shape[1])), _patterns(states.shape[1])])
     moved = np.concatenate([states * (1 + np.finfo(float).eps * pattern) for pattern in patterns])
     found = observed.values(np.tile(times, len(patterns)), moved).reshape(len(patterns), len(times), -1)
     changed = np.abs(found - found[0])
     first = observed.first_left
     changed[..., first:] = np.abs(found[..., first:])
-    return found[0], largest_part(observed, changed.max(axis=(0, 1)), found[0])
+    return found[0], changed.max(axis=(0, 1))
 
 
 def largest_part(observed: Observed, errors: Array, values: Array) -> tuple[float, str]:

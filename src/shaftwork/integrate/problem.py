@@ -311,6 +311,7 @@ class Trajectory:
         statistics: counts by name: "steps", "rhs", "jacobians", "switches" as far as the engine knows them.
         doubt: what rounding may have changed, as a part of the largest state of its unit, where the engine can tell.
         remark: a sentence on how the engine has gone about it, where that is out of the ordinary.
+        caveat: what makes its numbers worth less than the tolerance says, in a sentence; empty where nothing does.
         met: the guard that ended the run, or None where it went on to `Problem.t_end`.
         end: time in s and state (n,) where the run ended; known of a run with guards.
     """
@@ -321,6 +322,7 @@ class Trajectory:
     statistics: Mapping[str, int] = field(default_factory=dict)
     doubt: float = field(default=0.0, kw_only=True)
     remark: str = field(default="", kw_only=True)
+    caveat: str = field(default="", kw_only=True)
     met: int | None = field(default=None, kw_only=True)
     end: tuple[float, Array] | None = field(default=None, kw_only=True)
 

@@ -18,8 +18,9 @@ from shaftwork.codegen.start_values import initial_state
 from shaftwork.codegen.switching import Switching
 from shaftwork.codegen.valueless import rough, without_value
 from shaftwork.core.callbacks import Told
-from shaftwork.core.errors import CompileError, ParameterError
+from shaftwork.core.errors import AccuracyWarning, CompileError, ParameterError
 from shaftwork.core.kept import Kept
+from shaftwork.core.notices import warn
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import Fractions, LinearInputs, Problem, Trajectory
 from shaftwork.network.netlist import Netlist
@@ -131,6 +132,8 @@ class Model(CompiledModel):
         demand = Demand(span, relative_tolerance(rtol), atol, times, engine, max_steps, told if progress else None)
         made = dict(zip(self.parameters, self.defaults.tolist(), strict=True)) | values
         motion = told.of(lambda: self._motion(values, initial, demand))
+        if motion.caveat:
+            warn(motion.caveat, AccuracyWarning)
         again = Repetition(self._rebuild, self.netlist, call_of(motion, demand, values, initial), self)
         return replace(motion, parameters=made, initial=dict(initial or {}), again=again)
 
@@ -153,6 +156,7 @@ class Model(CompiledModel):
             statistics=trajectory.statistics,
             dense=trajectory.dense,
             observer=ModelObserver(self.form, lambda: prepared.bound, instants),
+            caveat=trajectory.caveat,
         )
 
     def steady_state(

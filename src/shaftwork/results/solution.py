@@ -71,6 +71,7 @@ class Solution:
         phases: the spans of time between them.
         parameters: what the network was made of, "part.parameter" to value in SI, where it is not zero.
         initial: the start values that were given.
+        caveat: what makes the numbers worth less than the tolerance says, in a sentence; empty where nothing does.
         again: makes the motion again. One that is stored (pickled) has no compiled code: when more of it is read than
             is stored, the motion is made again.
     """
@@ -88,6 +89,7 @@ class Solution:
     phases: tuple[PhaseRow, ...] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
     initial: Mapping[str, float] = field(default_factory=dict)
+    caveat: str = ""
     again: Callable[[], Solution] | None = None
 
     def __getstate__(self) -> dict[str, Any]:

@@ -15,7 +15,8 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.observer import Impact
 from shaftwork.codegen.timeline import Timeline
-from shaftwork.core.errors import SimulationError
+from shaftwork.core.errors import AccuracyWarning, SimulationError
+from shaftwork.core.notices import warn
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import Problem, SeriesError, Trajectory
 from shaftwork.pipeline.arguments import Demand
@@ -250,6 +251,8 @@ class Run:
         if tight != problem.rtol:
             problem = replace(problem, rtol=tight, atol=problem.atol * (tight / problem.rtol))
         trajectory, _, _ = choice.solve(problem, name, why)
+        if trajectory.caveat:
+            warn(trajectory.caveat, AccuracyWarning)
         if not self.engine:
             self.engine, self.why = name.removesuffix("-adams"), why
         return trajectory
