@@ -53,15 +53,45 @@ def test_the_end_of_a_ramp_costs_no_digits_of_a_long_motion() -> None:
     assert np.abs(found - exact).max() < 1e-8 * np.abs(exact).max()
 
 
-@pytest.mark.parametrize("width", [1.0, 0.01, 1e-4], ids=lambda width: f"{width:g} s wide")
-@pytest.mark.parametrize("middle", [5.0, 5000.0], ids=lambda middle: f"at {middle:g} s")
-def test_a_pulse_of_torque_gives_its_impulse_however_far_away_it_is(width: float, middle: float) -> None:
+PULSES = {
+    "bell": (lambda x: sympy.exp(-(x**2)), lambda x: math.sqrt(math.pi) * math.erf(x) / 2),
+    "fraction": (lambda x: 1 / (1 + x**2) ** 2, lambda x: (math.atan(x) + x / (1 + x**2)) / 2),
+    "edges": (lambda x: (sympy.tanh(x + 1) - sympy.tanh(x - 1)) / 2, lambda x: _softplus(x + 1) - _softplus(x - 1)),
+}
+"""Pulses of width one, and their integrals."""
+
+
+def _softplus(x: float) -> float:
+    """Half the logarithm of cosh x, but for a constant."""
+    return (abs(x) + math.log1p(math.exp(-2 * abs(x)))) / 2
+
+
+@pytest.mark.parametrize("pulse", PULSES)
+@pytest.mark.parametrize("width", [1.0, 1e-4], ids=lambda width: f"{width:g} s wide")
+@pytest.mark.parametrize("middle", [5.0, 3333.3], ids=lambda middle: f"at {middle:g} s")
+@pytest.mark.parametrize("engine", ["auto", "heyoka", "scipy", "sundials"])
+def test_a_pulse_of_torque_gives_its_impulse_however_far_away_it_is(
+    width: float, middle: float, pulse: str, engine: str
+) -> None:
+    shape, integral = PULSES[pulse]
     net = sw.Network("pulse")
     net.add(sw.Inertia("J", J=1.0), "a")
-    net.add(sw.TorqueSource("T", tau=sympy.exp(-(((sw.t - middle) / width) ** 2)) / width), "a")
-    sol = net.simulate(1e4, engine="heyoka", rtol=1e-9, t_eval=2)
-    # the time itself is rounded to 1e-12 s, a part of 1e-8 of the narrowest pulse; heyoka's steps add 1e-10 each
-    assert sol["J.omega"][-1] == pytest.approx(math.sqrt(math.pi), rel=3e-8)
+    net.add(sw.TorqueSource("T", tau=shape((sw.t - middle) / width) / width), "a")
+    sol = net.simulate(1e4, engine=engine, rtol=1e-9, t_eval=2)
+    impulse = integral((1e4 - middle) / width) - integral(-middle / width)
+    # the time itself is rounded to 1e-12 s, a part of 1e-8 of the narrowest pulse; steps add 1e-10 each, of CVODE more
+    assert sol["J.omega"][-1] == pytest.approx(impulse, rel=3e-7 if engine == "sundials" else 3e-8)
+
+
+def test_a_pulse_beside_a_friction_is_not_stepped_over_either() -> None:
+    """The friction takes 0.1 N m off a pulse of 20 N m that is 0.01 s wide; scipy stepped over it."""
+    net = sw.Network("pulse and friction")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.DryFriction("friction", tau_c=0.1), "a")
+    net.add(sw.TorqueSource("T", tau=20 / (1 + ((sw.t - 50.0) / 0.01) ** 2) ** 2), "a")
+    peaks = [net.simulate(100.0, engine=engine).max("J.omega") for engine in ("heyoka", "scipy", "sundials")]
+    assert 0.3 < peaks[0] < 0.1 * math.pi
+    assert peaks[1:] == pytest.approx([peaks[0]] * 2, rel=1e-6)
 
 
 def test_a_motion_long_after_a_pulse_is_as_exact_as_before_it() -> None:

@@ -14,7 +14,7 @@ from sympy import Expr, Min, Symbol, pi, sin
 from shaftwork.codegen.code import scalar, vectorised
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.timeline import CLEARANCE, NOTHING, Timeline, timeline
-from shaftwork.components.laws import line, switches
+from shaftwork.components.laws import line, narrow_places, switches
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.kept import Kept
@@ -33,6 +33,8 @@ ROUNDINGS = 8
 # part of the run and of the way to the next change, until it keeps its sides.
 FARTHEST, CLEAR = 1e-6, 1 / 8
 PROBES = np.array([1.0, 1.5, 2.0, 3.0, 4.0])
+DECADES = np.array([sign * 10.0**-place for place in range(1, 13) for sign in (-1, 1)])
+"""Distances from a pulse that goes on far away, as parts of the run: no step gets from one to the next unawares."""
 KEPT = 8
 """Timelines of other runs that are kept."""
 
@@ -54,6 +56,7 @@ class _Switch:
         shown: the argument in the symbols of the network.
         whole: the line passes a level at every whole number, and these are not in `levels`.
         acts: it is in the law of a branch, and not in what ends a mode alone.
+        far: what a law has where it is zero goes on far away from there.
     """
 
     part: str
@@ -65,6 +68,7 @@ class _Switch:
     shown: Expr
     whole: bool = False
     acts: bool = True
+    far: bool = False
 
 
 class Switching:
@@ -76,7 +80,8 @@ class Switching:
 
     def __init__(self, form: StateForm) -> None:
         self._switches = tuple(_switches(form))
-        self._places = sorted({place for switch in self._switches for place in switch.places})
+        self._narrow = tuple(_narrow(form))
+        self._places = sorted({place for one in (*self._switches, *self._narrow) for place in one.places})
         self._found = Kept[tuple[bytes, float, float, bool], Timeline](KEPT)
 
     def known(self, p: Array) -> tuple[float, ...]:
@@ -121,7 +126,7 @@ class Switching:
         Raises:
             ParameterError: a law switches too often to be followed.
         """
-        if not self._switches:
+        if not self._switches and not self._narrow:
             return NOTHING
         key = (p[self._places].tobytes(), t0, t_end, modes)
         return self._found(key, lambda: self._searched(p, t0, t_end, modes=modes))
@@ -134,7 +139,7 @@ class Switching:
             else:
                 levels = _whole_numbers(switch, p, t0, t_end) if switch.whole else switch.levels
                 found += _on_a_line(switch, levels, p)
-        return timeline(found, t0, t_end)
+        return timeline(found, t0, t_end, _inside(self._narrow, p, t0, t_end))
 
 
 def _switches(form: StateForm) -> Iterator[_Switch]:
@@ -155,6 +160,24 @@ def _switches(form: StateForm) -> Iterator[_Switch]:
             if argument.free_symbols <= {TIME, *symbols} and key not in seen:
                 seen.add(key)
                 yield replace(_made(part, argument, levels, symbols, places), acts=acts)
+
+
+def _narrow(form: StateForm) -> Iterator[_Switch]:
+    """Where laws may have pulses and edges that are narrower than any step."""
+    for part, law, symbols, acts in _laws(form):
+        for argument, far in narrow_places(law) if acts and law.has(TIME) else ():
+            places = tuple(part.parameters[symbol.name] for symbol in symbols)
+            if argument.free_symbols <= {TIME, *symbols}:
+                yield replace(_made(part, argument, (0.0,), symbols, places), far=far)
+
+
+def _inside(switches: Sequence[_Switch], p: Array, t0: float, t_end: float) -> Iterator[float]:
+    """Times in s at which arguments are zero, which are lines or polynomials."""
+    for one in switches:
+        found = _searched(one, p, t0, t_end) if one.line is None else _on_a_line(one, one.levels, p)
+        for time, _ in found:
+            yield time
+            yield from (time + DECADES * (t_end - t0)).tolist() if one.far else ()
 
 
 def _laws(form: StateForm) -> Iterator[tuple[GraphPart, Expr, tuple[Symbol, ...], bool]]:

@@ -26,11 +26,18 @@ class Timeline:
         times: strictly increasing.
         before: for each of them, earlier than whatever jumps there.
         after: for each of them, later than whatever jumps there.
+        narrow: where a pulse or an edge may be that is narrower than any step, in s, increasing.
     """
 
     times: tuple[float, ...] = ()
     before: tuple[float, ...] = ()
     after: tuple[float, ...] = ()
+    narrow: tuple[float, ...] = ()
+
+    @cached_property
+    def stops(self) -> tuple[float, ...]:
+        """Times in s at which an engine ends a step, increasing: the instants, and where inputs may be narrow."""
+        return tuple(sorted({*self.times, *self.narrow}))
 
     def sides(self, time: float) -> tuple[float, float]:
         """Times to read the inputs before and after a time: itself where nothing jumps."""
@@ -55,7 +62,7 @@ class Timeline:
         return np.array(self.times), np.array(self.before), np.array(self.after)
 
 
-def timeline(found: Iterable[tuple[float, float]], t0: float, t_end: float) -> Timeline:
+def timeline(found: Iterable[tuple[float, float]], t0: float, t_end: float, narrow: Iterable[float] = ()) -> Timeline:
     """The instants of a run from t0 to t_end.
 
     Those that rounding does not tell apart are one, at the earliest of their times; at a rounding from the start or the
@@ -65,6 +72,7 @@ def timeline(found: Iterable[tuple[float, float]], t0: float, t_end: float) -> T
         found: time and reach in s of everything that jumps or bends; farther away than its reach it certainly does not.
         t0: start of the run, s.
         t_end: its end, s.
+        narrow: times in s at which nothing jumps and yet a step is to end.
     """
     clearance = CLEARANCE * math.ulp(max(abs(t0), abs(t_end)))
     spans = ((time, max(reach, clearance)) for time, reach in found)
@@ -78,7 +86,11 @@ def timeline(found: Iterable[tuple[float, float]], t0: float, t_end: float) -> T
         else:
             merged.append((low, time, high))
     instants = [_clipped(low, time, high, t0, t_end) for low, time, high in merged]
-    return Timeline(*zip(*instants, strict=True)) if instants else NOTHING
+    lows, highs = (np.array([row[place] for row in merged]) for place in (0, 2))
+    inside = (time for time in sorted(set(narrow)) if t0 + clearance < time < t_end - clearance)
+    apart = tuple(time for time in inside if not np.any((lows <= time) & (time <= highs)))
+    times, before, after = zip(*instants, strict=True) if instants else ((), (), ())
+    return Timeline(times, before, after, apart)
 
 
 def _clipped(low: float, time: float, high: float, t0: float, t_end: float) -> tuple[float, float, float]:

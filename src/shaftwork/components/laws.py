@@ -195,6 +195,11 @@ class InterpolationSlope(_TableFunction):
         return _latex_call("slope", self, printer, exp)
 
 
+EDGES = (
+    *(sympy.exp, sympy.sinh, sympy.cosh, sympy.tanh, sympy.coth, sympy.sech, sympy.csch),
+    *(sympy.erf, sympy.erfc, sympy.atan, sympy.Pow),
+)
+"""Functions that rise or fall in a small part of their argument's range, powers where they are negative."""
 NUMERICAL = {"Interpolation": interpolate, "InterpolationSlope": interpolation_slope, **noise.NUMERICAL}
 """Names and numerical functions of tables and noise, for a code printer other than `sympy.lambdify`."""
 
@@ -310,6 +315,21 @@ def switches_of(node: sympy.Basic) -> Iterable[tuple[sympy.Expr, Sequence[float]
             # a sine changes sign at every whole number, and no list of levels would have an end
             return [(sympy.sin(sympy.pi * node.args[0]), (0.0,))]
     return []
+
+
+def narrow_places(expression: sympy.Basic) -> Iterator[tuple[sympy.Expr, bool]]:
+    """Polynomials of time that are zero where an expression of it may have a narrow pulse or edge.
+
+    Law: a function f(g(t)) of an edge, tanh((t - 5) / 1e-3), has it where g is zero; that of a pulse,
+    exp(-((t - 5) / 1e-3)^2) or 1 / (1 + ((t - 5) / 1e-3)^2), where g has its turning point. What a fraction has goes
+    on far away from there, which is told with it.
+    """
+    for node in sympy.preorder_traversal(expression):
+        if not isinstance(node, EDGES) or (isinstance(node, sympy.Pow) and not node.exp.is_negative):
+            continue
+        argument = node.args[0]
+        if argument.has(t) and (polynomial := argument.as_poly(t)) is not None:
+            yield argument if polynomial.degree() == 1 else argument.diff(t), isinstance(node, sympy.Pow)
 
 
 def between_steps(expression: sympy.Expr) -> set[sympy.Symbol]:

@@ -63,7 +63,7 @@ def objection(problem: Problem, trajectory: Trajectory, engine: str) -> str | No
 
 
 def _part(observed: Observed, trajectory: Trajectory, errors: Array, values: Array, limit: float) -> tuple[float, str]:
-    """The largest error (m,) as a part of the largest value of its kind, and whose; an objection takes a closer look."""
+    """The largest error (m,) as a part of the largest value of its kind, and whose; looked at closer to object."""
     part, name = largest_part(observed, errors, values)
     return (part, name) if part <= limit else largest_part(observed, errors, outlook(observed, trajectory))
 

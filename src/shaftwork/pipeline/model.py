@@ -290,7 +290,7 @@ class Model(CompiledModel):
             atol=demand.tolerances(prepared.atol, self.states),
             rtol=rtol,
             overall=demand.sizes.overall,
-            breakpoints=tuple(time for time in instants.times if span[0] < time < span[1]),
+            breakpoints=tuple(time for time in instants.stops if span[0] < time < span[1]),
             jump=(lambda t, x: prepared.bound.impulse(x, *instants.sides(t))) if self.form.has_impulses else None,
             sides=instants.sides,
             switches=(lambda t, x: prepared.bound.switches(t, x))  # noqa: PLW0108 (which makes the matrices)

@@ -173,8 +173,8 @@ class Run:
     def _problem(self, t: float, moment: Moment, passing: Passing | None = None) -> Problem:
         """The motion from a time on, up to the next instant at which an input jumps."""
         demand, regime, times = self.demand, moment.regime, self._instants(moment)
-        following = bisect_right(times.times, t)
-        end = min([*times.times[following : following + 1], demand.span[1]])
+        following = bisect_right(times.stops, t)
+        end = min([*times.stops[following : following + 1], demand.span[1]])
         problem = regime.assembly.problem(moment, (t, end), times)
         states = regime.assembly.model.states
         atol = demand.rtol * problem.atol
