@@ -79,7 +79,8 @@ def solve(problem: Problem) -> Trajectory:
     except OverflowError as error:
         raise failure(problem, "exact", problem.t_end, trajectory.x[-1], str(error)) from error
     bits = precise.power.bits
-    remark = f"Floats may lose a part of {part:.1g} of it, so it is computed in whole numbers of {bits} bits."
+    lost = "it" if part >= 1 else f"a part of {part:.1g} of it"
+    remark = f"Floats may lose {lost}, so it is computed in whole numbers of {bits} bits."
     return replace(made, remark=remark, statistics={"bits": bits})
 
 

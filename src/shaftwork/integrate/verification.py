@@ -47,7 +47,7 @@ def objection(problem: Problem, trajectory: Trajectory, engine: str) -> str | No
         )
     if engine == "exact":
         return _doubt(trajectory)
-    run = exact.reference(replace(problem, t_eval=times))
+    run = exact.reference(replace(problem, t_eval=times, progress=None))
     if run is None:
         return None
     limit = max(TOLERATED * problem.rtol, SMALLEST) + run.doubt
