@@ -197,6 +197,7 @@ def test_no_code_runs_from_a_text(text: str, monkeypatch: pytest.MonkeyPatch) ->
         ("(10**40*t)**1000", 11, "power that is too large"),
         ("10**30*t*10**30", 1, "beyond 1e40"),
         ("t**1001", 2, "beyond 1000"),
+        ("**".join(["(1/3)"] * 20), 97, "more than 4 powers of numbers"),
         ("2t", 2, "does not go on with 't'"),
         ("t^2", 2, "Write a power as x**2"),
         ("t = 1", 3, "Compare with =="),

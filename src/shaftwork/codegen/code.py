@@ -9,7 +9,7 @@ from functools import lru_cache, reduce
 from typing import Any
 
 import numpy as np
-from sympy import ITE, And, Basic, Expr, Float, Or, Piecewise, Pow, S, Symbol
+from sympy import ITE, And, Basic, Expr, Float, Integer, Or, Piecewise, Pow, S, Symbol
 from sympy.printing.numpy import NumPyPrinter
 from sympy.printing.pycode import PythonCodePrinter
 
@@ -46,6 +46,10 @@ class _Real:
 
     def _print_Symbol(self, symbol: Symbol) -> str:
         raise CompileError(f"'{symbol}' stands in a law and has no value: it is no argument and no parameter.")
+
+    def _print_Integer(self, number: Integer) -> str:
+        # numpy would take those that no machine integer holds for objects
+        return str(number) if abs(number) < 2**53 else repr(float(number))
 
     def _print_Float(self, number: Float) -> str:
         return repr(float(number))  # sympy prints 15 digits, which is another float

@@ -158,7 +158,12 @@ class _TableFunction(sympy.Function):  # type: ignore[misc]
 
     @classmethod
     def eval(cls, argument: sympy.Expr, table: Table) -> sympy.Expr | None:
-        return sympy.Float(cls._imp_(float(argument), (table.xs, table.ys))) if argument.is_number else None
+        if not argument.is_number:
+            return None
+        try:
+            return sympy.Float(cls._imp_(float(argument), (table.xs, table.ys)))
+        except TypeError:  # a complex number, which sympy tries on its own
+            return None
 
     def _eval_is_real(self) -> bool | None:
         return self.argument.is_extended_real  # type: ignore[no-any-return]

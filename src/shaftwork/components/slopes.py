@@ -20,6 +20,7 @@ from sympy import (
     atan2,
     ceiling,
     cos,
+    cosh,
     cot,
     csc,
     floor,
@@ -27,7 +28,9 @@ from sympy import (
     sec,
     sign,
     sin,
+    sinh,
     tan,
+    tanh,
 )
 from sympy.core.relational import Relational
 
@@ -60,14 +63,19 @@ def slope(expression: Expr, symbol: Symbol) -> Expr:
         symbol: what to differentiate by.
     """
     kinks = expression.atoms(sign, Heaviside, Abs, floor)
-    if not kinks:
+    # whether one is real sympy finds out by expanding an argument of which it does not know it: for ever, of a power
+    doubtful = {node for node in expression.atoms(sinh, cosh, tanh) if not node.args[0].is_extended_real}
+    if not kinks | doubtful:
         return expression.diff(symbol)
-    held = {node: Dummy(real=True) for node in kinks}
+    held = {node: Dummy(real=True) for node in kinks | doubtful}
     smooth = expression.xreplace(held)  # from the outside in: what is inside a kink is not seen
     total = smooth.diff(symbol)
     for node in expression.atoms(Abs):
         inner = node.args[0]
         total += smooth.diff(held[node]) * sign(inner) * slope(inner, symbol)
+    for node in doubtful:
+        if (inner := slope(node.args[0], symbol)) != 0 and (outer := smooth.diff(held[node])) != 0:
+            total += outer * node.fdiff(1) * inner
     made: Expr = total.xreplace({dummy: node for node, dummy in held.items()})
     return made
 

@@ -28,6 +28,7 @@ from shaftwork.network.grammar import (
     MAXIMUM_DIGITS,
     MAXIMUM_EXTREMA,
     MAXIMUM_INTEGER,
+    MAXIMUM_TOWER,
     NOT_REAL,
     Boolean,
     Function,
@@ -207,6 +208,8 @@ class _Parser:
         return self.raised(sign, self.number(first, base), exponent)
 
     def raised(self, token: Token, base: _Node, exponent: _Node) -> _Node:
+        if exponent.value is not None and exponent.expression.count(sympy.Pow) > MAXIMUM_TOWER:
+            self.fail(token, f"has more than {MAXIMUM_TOWER} powers of numbers in an exponent", "Write its number.")
         coefficient = self.number(token, base).expression.as_coeff_Mul()[0]
         if exponent.value is not None and coefficient.is_Rational:
             size = (max(abs(coefficient.p), coefficient.q) - 1).bit_length() * abs(exponent.value)

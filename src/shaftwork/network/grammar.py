@@ -27,6 +27,8 @@ MAXIMUM_INTEGER = 10**40
 """Largest integer, numerator and denominator, also of intermediate results."""
 MAXIMUM_EXPONENT = 1000
 """Largest exponent that is a number."""
+MAXIMUM_TOWER = 4
+"""Powers in an exponent without symbols: sympy takes four times as long for each to find how large it is."""
 MAXIMUM_EXTREMA = 16
 """Arguments of all Max and Min of an expression together: sympy compares each with each."""
 
