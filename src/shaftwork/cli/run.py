@@ -80,7 +80,8 @@ def _motion(net: Network, t_end: float, wanted: tuple[str, ...], options: Namesp
 def _angles(net: Network, wanted: tuple[str, ...]) -> tuple[str, ...]:
     """The parts whose angle, position or flux linkage is wanted."""
     parts = {part.name for part in net.parts}
-    owners = (name.rpartition(".")[0] for name in wanted if name.rpartition(".")[2] in INTEGRALS)
+    asked = (name.rpartition(".") for name in wanted)
+    owners = (owner for owner, _, name in asked if name.partition("_")[0] in INTEGRALS and not name.endswith("_rel"))
     return tuple(dict.fromkeys(owner for owner in owners if owner in parts))
 
 

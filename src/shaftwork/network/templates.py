@@ -74,6 +74,7 @@ class BranchTemplate:
         through: of a coupling that loses power, the factors of its through variable, one for each term; else empty.
         conservative: what a through law takes in it gives back.
         stored: what a through law stores, J, in INTEGRAL and parameters.
+        meter: whether nothing passes through it, and its angle alone is recorded.
     """
 
     kind: Kind
@@ -87,6 +88,7 @@ class BranchTemplate:
     through: tuple[Expr, ...] = ()
     conservative: bool = False
     stored: Expr = S.Zero
+    meter: bool = False
 
     @property
     def balances(self) -> tuple[tuple[Expr, End, End], ...]:

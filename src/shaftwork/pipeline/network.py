@@ -17,6 +17,7 @@ from shaftwork.equations.kirchhoff import kirchhoff
 from shaftwork.equations.records import Equations, NamedPhase
 from shaftwork.network.builder import NetworkBuilder
 from shaftwork.network.graph import CircuitGraph
+from shaftwork.network.meters import with_meters
 from shaftwork.network.netlist import Netlist
 from shaftwork.network.storage import read_netlist, write_netlist
 from shaftwork.network.wording import listed
@@ -143,8 +144,9 @@ class Network(NetworkBuilder):
 
         Args:
             expand: of the network with its shafts written out part by part.
-            angles: parts whose angle (position, flux linkage) is recorded, besides those that a law reads; not at a
-                node without inertia between springs, which turns at once where a torque jumps.
+            angles: parts whose angle (position, flux linkage) is recorded, besides those that a law reads: of a part
+                at one node `phi`, between two that of the first against the second, of a gear `phi_a` and `phi_b`; not
+                at a node without inertia between springs, which turns at once where a torque jumps.
             algebraic_loops: a nonlinear law at a massless node is refused with its name, or solved together with the
                 motion (slower, and the solution need not be the only one).
 
@@ -319,7 +321,7 @@ class Compiler:
             if form.waves:
                 warn_of_rounding(form.graph)
             if self.angles:
-                form = state_form(form.graph, tuple(_branch_of(form.graph, name) for name in self.angles))
+                form = state_form(*with_meters(form.graph, self.angles))
                 _refuse_between_springs(form)
             chosen = form.waves or any(item.choices for item in netlist.placed)
             kind = PhasedModel if any(part.modes for part in form.graph.parts) and not chosen else Model
@@ -363,16 +365,6 @@ def _without_collection() -> Iterator[None]:
     finally:
         if running:
             gc.enable()
-
-
-def _branch_of(graph: CircuitGraph, name: str) -> int:
-    """The branch whose across variable is integrated for the angle of a part."""
-    part = next((part for part in graph.parts if part.name == name), None)
-    branches = () if part is None else tuple(k for k in part.branches if not graph.branches[k].terms)
-    if not branches:
-        able = (part.name for part in graph.parts if any(not graph.branches[k].terms for k in part.branches))
-        raise SignalError(f"There is no angle of '{name}'. Parts with an angle are: {', '.join(able)}.")
-    return branches[0]
 
 
 def _refuse_between_springs(form: StateForm) -> None:

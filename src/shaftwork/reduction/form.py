@@ -43,7 +43,7 @@ class StateForm:
     Args:
         graph: the circuit graph.
         tree: its normal tree.
-        angles: branches whose angle (position, flux linkage) is asked for although no law reads it.
+        angles: branches whose angle (position, flux linkage) is recorded although no law reads it.
     """
 
     graph: CircuitGraph
@@ -141,7 +141,8 @@ class StateForm:
     def has_impulses(self) -> bool:
         """Whether a jump of a source is an impulse to stores that are joined to it rigidly."""
         speeds = self.dependent_across and self.across_sources
-        return bool(speeds or (self.dependent_through and self.tree.links[Kind.THROUGH_SOURCE]))
+        torques = (k for k in self.tree.links[Kind.THROUGH_SOURCE] if not self.graph.branches[k].template.meter)
+        return bool(speeds or (self.dependent_through and any(True for _ in torques)))
 
     @cached_property
     def states(self) -> tuple[State, ...]:
@@ -176,6 +177,8 @@ def integral_name(graph: CircuitGraph, branch: GraphBranch) -> str:
     """The name of the integral of what is across a branch: "gap.phi", "gap.phi_left" beside others of the part."""
     part = graph.parts[branch.part]
     name = f"{part.name}.{_domain(graph, branch).integral.name}"
+    if branch.template.meter:
+        return f"{name}_{branch.template.label}" if branch.template.label else name
     if all(other == branch.index for other in graph.integrated[branch.part]):
         return name
     return f"{name}_{branch.template.label or part.branches.index(branch.index) + 1}"

@@ -305,7 +305,9 @@ class Solution:
             return name
         error = no_quantity(name, self.name, dict.fromkeys((*units, *self.observer.profiles)))
         owner, _, quantity = name.rpartition(".")
-        if quantity in ("phi", "s", "psi") and any(other.rpartition(".")[0] == owner for other in units):
+        if quantity.partition("_")[0] in ("phi", "s", "psi") and any(
+            other.rpartition(".")[0] == owner for other in units
+        ):
             raise SignalError(f"{error} An angle is recorded when asked for: net.compile(angles=['{owner}']).")
         raise error
 
