@@ -172,6 +172,19 @@ def test_a_touch_is_seen_however_short_a_part_of_the_step_it_is(depth: float, en
     assert 0 < cut - (1 - np.sqrt(depth)) < 1e-8
 
 
+def test_a_step_that_attempts_do_not_end_at_its_switch_is_halved() -> None:
+    """The motion of a shorter step is another one, whose switch may again lie elsewhere, and so on without end."""
+    problem = falling(lambda _t, x: x[:, :1])
+
+    def dense(t: np.ndarray) -> np.ndarray:
+        return np.column_stack([(1 - t) ** 2 - 0.01, 2 * (t - 1)])
+
+    first, last = dense(np.array([0.0, 1.0]))
+    crossings = Crossings(problem, pieces(problem)[0])
+    cuts = [crossings.cut(0.0, first, 1.0, last, dense) for _ in range(5)]
+    assert cuts == pytest.approx([0.9, 0.9, 0.9, 0.9, 0.5], abs=1e-8)
+
+
 @pytest.mark.parametrize("depth", [-1e-2, -1e-5])
 def test_a_step_that_only_comes_near_to_a_switch_stands(depth: float) -> None:
     problem = falling(lambda _t, x: x[:, :1])

@@ -11,7 +11,7 @@ import sympy
 
 import shaftwork as sw
 from shaftwork.studies.truth import QUANTITIES, truth, with_model
-from shaftwork.studies.work_precision import work_precision
+from shaftwork.studies.work_precision import Trial, WorkPrecision, work_precision
 
 SMALL = (sw.OneSpring(), sw.Lumped(10), sw.Lumped(20), sw.CentralDifference(10), sw.Spectral(8), sw.Wave(3))
 
@@ -89,10 +89,17 @@ def test_the_study_ranks_the_models_as_their_orders_say() -> None:
 
 @pytest.mark.slow
 def test_a_model_that_fails_is_a_row_with_its_reason(tmp_path: Path) -> None:
-    models = (sw.Wave(), sw.Spectral(4))
+    models, told = (sw.Wave(), sw.Spectral(4)), list[Trial]()
     study = work_precision(
-        sw.scenes.shaft_step(), "line", t_end=0.01, models=models, engines=("scipy",), points=np.int64(11)
+        sw.scenes.shaft_step(),
+        "line",
+        t_end=0.01,
+        models=models,
+        engines=("scipy",),
+        points=np.int64(11),
+        report=told.append,
     )
+    assert tuple(told) == study.trials
     failed, good = study.trials
     assert "knows no travelling waves" in failed.why
     assert np.isinf(failed.error)
@@ -132,3 +139,14 @@ def test_frequencies_are_judged_with_the_damping_at_the_ends() -> None:
 def test_a_wrong_argument_is_one_clear_error(wrong: dict[str, object]) -> None:
     with pytest.raises(sw.ParameterError, match=r"must be|There is no engine"):
         work_precision(sw.scenes.shaft_step(), "line", t_end=0.1, **wrong)  # type: ignore[arg-type]
+
+
+def test_the_table_has_a_line_for_each_trial_and_a_reason_behind_one_that_failed() -> None:
+    good = Trial("OneSpring()", "scipy", 3, 0.1, 0.01, {"tau_a": 1e-3}, 0, asked="scipy")
+    failed = Trial("Wave(places=5)", "scipy", 0, 0.0, np.inf, {}, why="knows no waves", asked="scipy")
+    assert str(WorkPrecision("train", "line", (good, failed), ("waves", 1e-9))).splitlines() == [
+        "train, shaft 'line', errors against waves (1e-09)",
+        "model           engine  states  set-up ms  CPU ms  tau_a    extra modes",
+        "OneSpring()     scipy   3       100        10.00   1.0e-03  0",
+        "Wave(places=5)  scipy   -       -          -       -        -  knows no waves",
+    ]
