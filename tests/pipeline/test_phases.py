@@ -299,6 +299,22 @@ def test_auto_stays_with_heyoka_where_a_stiff_contact_is_over_before_it_costs_mu
     assert auto["J2.omega"][-1] == pytest.approx(implicit["J2.omega"][-1], rel=1e-9)
 
 
+def test_speeds_along_a_shaft_are_read_in_every_phase() -> None:
+    """Between its ends, which are the nodes, before and after a brake holds one of them."""
+    net = sw.Network("braked shaft")
+    net.add(sw.TorqueSource("motor", tau=10.0), "a")
+    net.add(sw.Inertia("J1", J=0.1), "a")
+    net.add(sw.Shaft("line", length=1.0, diameter=0.02, model=sw.Lumped(4)), "a", "b")
+    net.add(sw.Inertia("J2", J=0.1), "b")
+    net.add(sw.Brake("brake", tau=50.0, t_on=0.01), "b")
+    sol = net.simulate(0.02, t_eval=21)
+    assert len(sol.phases) > 1
+    speeds = sol["line.omega"]
+    assert speeds.shape == (21, len(sol.places["line.omega"]))
+    np.testing.assert_allclose(speeds[:, 0], sol["J1.omega"], rtol=1e-12)
+    np.testing.assert_allclose(speeds[:, -1], sol["J2.omega"], rtol=1e-12)
+
+
 def test_modes_that_contradict_each_other_keep_no_frames_of_those_who_asked() -> None:
     """They are looked at again and again in a long motion: each time would leave its frames behind."""
     net = sw.Network("belt")

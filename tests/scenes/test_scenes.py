@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -79,3 +80,9 @@ def test_the_crane_motor_pulls_out_above_its_rated_torque() -> None:
 
 def test_the_list_of_scenes_begins_with_the_simplest_crane() -> None:
     assert list(sw.scenes.SCENES)[:4] == ["crane-start", "crane", "six-phases", "excavator"]
+
+
+def test_the_step_on_a_rigid_shaft_accelerates_all_inertia() -> None:
+    sol = sw.scenes.shaft_step(sw.Rigid(), torque=5.0).simulate(0.2)
+    shaft = 7900.0 * math.pi * 0.02**4 / 32  # 1 m of 20 mm, steel
+    assert sol["Jm.omega"][-1] == pytest.approx(5.0 * 0.2 / (0.11 + 0.025 + shaft), rel=1e-9)
