@@ -176,6 +176,13 @@ def test_a_body_at_rest_under_dry_friction_stays_at_rest():
     assert (run.x == 0.0).all()
 
 
+def test_the_sign_of_steps_of_time_is_one_in_size():
+    """It is no switch of the motion: between the steps it stands."""
+    law = 5 * sign(Rational(3, 2) - sympy.floor(4 * t))  # 5 until 0.5, then -5
+    run = heyoka_taylor.solve(replace(problem((law,), (0.0,), 0.8), breakpoints=(0.25, 0.5, 0.75)))
+    assert run.x[-1, 0] == pytest.approx(5 * 0.5 - 5 * 0.3, rel=1e-12)
+
+
 def test_new_parameters_and_start_states_compile_nothing(monkeypatch):
     program = build((x, v), t, (a, b), (v, -a * x - b * Abs(v) * v))
     made = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 import sympy
 
 from shaftwork.components.laws import line, t
@@ -25,6 +26,12 @@ def test_a_part_that_stands_in_many_places_is_met_once() -> None:
 def test_the_degree_of_a_formula_does_not_depend_on_how_often_its_parts_stand_in_it() -> None:
     assert pieces_degree(t * nested(K, 60)) == 1
     assert pieces_degree(t + nested(t, 60)) is None
+
+
+@pytest.mark.parametrize("law", [t**2, t * (t + K), t * sympy.Max(0, t - 1)], ids=str)
+def test_what_bends_has_no_degree(law: sympy.Expr) -> None:
+    """The engine for straight inputs would take it for a straight line."""
+    assert pieces_degree(law) is None
 
 
 def test_what_does_not_move_is_not_expanded_to_find_a_line_in_time() -> None:

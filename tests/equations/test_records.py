@@ -11,10 +11,11 @@ from unittest import mock
 import numpy as np
 import pytest
 from hypothesis import given
-from sympy import Expr, Symbol
+from sympy import Expr, Symbol, sin
 
 from shaftwork.components.base import REGISTRY, Component, Derived, Port, component
 from shaftwork.components.branches import ACROSS, AcrossStore, Branch
+from shaftwork.components.laws import t
 from shaftwork.components.rotation import Gear, Inertia, Spring
 from shaftwork.components.shaft_models import (
     CentralDifference,
@@ -94,6 +95,17 @@ def largest(expression: Expr, values: dict[Symbol, float]) -> float:
 @pytest.mark.parametrize("name", [*MECHANICAL, "dc drive"])
 def test_printed_rates_are_the_compiled_rates(name: str) -> None:
     assert_agrees_with_compiled_rows(equations_of(MECHANICAL[name]() if name in MECHANICAL else dc_drive()))
+
+
+def test_a_changing_torque_between_springs_in_series_is_in_their_rate() -> None:
+    """The node between them has no inertia: the springs share what the source gives, and its slope twists them."""
+    net = NetworkBuilder("series")
+    net.add(Inertia("J1", J=0.5), "a")
+    net.add(Spring("s1", c=100.0), "a", "between")
+    net.add(TorqueSource("pull", tau=5.0 * t + sin(3.0 * t)), "between")
+    net.add(Spring("s2", c=300.0), "between", "b")
+    net.add(Inertia("J2", J=2.0), "b")
+    assert_agrees_with_compiled_rows(equations_of(net))
 
 
 SHAFTS = (

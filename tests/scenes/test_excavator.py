@@ -71,13 +71,14 @@ def test_a_soil_is_found_by_its_name_from_python_and_from_a_file(soil: str, tmp_
     assert loaded.parts[-1].mean_torque == net.parts[-1].mean_torque
 
 
-def test_the_excavator_as_a_train_digs_with_the_same_wheel() -> None:
-    """Eleven masses, and the buckets of the scene of two."""
+@pytest.mark.parametrize("kind", [sw.CageMotor, sw.BucketWheelLoad])
+def test_the_excavator_as_a_train_has_the_same_motor_and_wheel(kind: type[sw.Component]) -> None:
+    """Eleven masses, driven and braked as the scene of two."""
     train, scene = (made("fault zone", seed=3.0) for made in (sw.scenes.excavator_train, sw.scenes.excavator))
     assert sum(isinstance(part, sw.Inertia) for part in train.parts) == 11
-    wheels = [[part for part in net.parts if isinstance(part, sw.BucketWheelLoad)] for net in (train, scene)]
-    assert len(wheels[0]) == 1
-    assert wheels[0] == wheels[1]
+    found, wanted = ([part for part in net.parts if isinstance(part, kind)] for net in (train, scene))
+    assert len(found) == 1
+    assert found == wanted
 
 
 def test_an_unknown_soil_is_one_problem_that_names_those_there_are() -> None:
