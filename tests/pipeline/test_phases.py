@@ -315,6 +315,14 @@ def test_speeds_along_a_shaft_are_read_in_every_phase() -> None:
     np.testing.assert_allclose(speeds[:, -1], sol["J2.omega"], rtol=1e-12)
 
 
+@pytest.mark.parametrize("engine", ["heyoka", "scipy"])
+def test_the_limit_of_steps_is_that_of_all_phases_together(engine: str) -> None:
+    steps = model().simulate(3.0, engine=engine).statistics["steps"]
+    assert model().simulate(3.0, engine=engine, max_steps=steps).statistics["steps"] == steps
+    with pytest.raises(sw.SimulationError, match="steps were not enough"):
+        model().simulate(3.0, engine=engine, max_steps=steps - 1)
+
+
 def test_modes_that_contradict_each_other_keep_no_frames_of_those_who_asked() -> None:
     """They are looked at again and again in a long motion: each time would leave its frames behind."""
     net = sw.Network("belt")
