@@ -333,6 +333,7 @@ def test_the_nameplates_hold_what_the_source_prints_and_say_what_is_chosen() -> 
     ("wrong", "said"),
     [
         ({"tau_k": 3.0}, r"tau_n = 3.8 N m is not less than the pull-out torque tau_k = 3 N m.*times tau_n"),
+        ({"tau_k": 3.8}, r"tau_n = 3.8 N m is not less than the pull-out torque tau_k = 3.8 N m"),
         ({"n_n": 3010.0}, r"n_n = 3010 1/min is not less than the synchronous speed n_sync = 3000 1/min.*60 f / pole"),
     ],
 )

@@ -251,6 +251,7 @@ def test_the_bode_plot_has_a_magnitude_and_a_phase() -> None:
     resonance = net.modes().frequencies[1]
     magnitude, phase = net.frequency_response("motor.tau", "J1.omega", [1.0, 5.0, resonance, 50.0]).plot().axes
     assert "(rad/s) / (N m)" in magnitude.get_ylabel()
+    assert magnitude.get_shared_x_axes().joined(magnitude, phase)  # zoomed into as one
     assert np.isfinite(magnitude.lines[0].get_ydata()).all()
     assert np.isfinite(phase.lines[0].get_ydata()).all()
     assert magnitude.lines[1].get_xdata()[0] == resonance  # marked, for it has no height

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from scipy.integrate import BDF, DOP853, LSODA, OdeSolution, Radau
+from scipy.integrate import DOP853, OdeSolution, Radau
 
 from shaftwork.core.errors import SimulationError
-from shaftwork.core.notices import FILTERS
 from shaftwork.integrate.cancellation import cancellation
 from shaftwork.integrate.crossings import Crossings
 from shaftwork.integrate.guards import LEAST, SHORTER, GuardWatch
@@ -29,9 +27,9 @@ from shaftwork.integrate.pieces import (
 from shaftwork.integrate.problem import Array, Problem, Trajectory, tightened
 from shaftwork.integrate.stiffness import rates
 
-Method = Literal["DOP853", "Radau", "BDF", "LSODA"]
+Method = Literal["DOP853", "Radau"]
 
-METHODS: dict[str, Any] = {"DOP853": DOP853, "Radau": Radau, "BDF": BDF, "LSODA": LSODA}
+METHODS: dict[str, Any] = {"DOP853": DOP853, "Radau": Radau}
 
 # Below this relative tolerance scipy's methods only warn and clip, so it is clipped here without the warning.
 TIGHTEST_RTOL = 100 * np.finfo(float).eps
@@ -65,7 +63,7 @@ def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
 
     Args:
         problem: what to solve.
-        method: "DOP853" (explicit, order 8) for smooth motion, "Radau" or "BDF" for stiff systems, "LSODA" switches.
+        method: "DOP853" (explicit, order 8) for smooth motion, "Radau" (implicit, order 5) for stiff systems.
 
     Raises:
         SimulationError: the step became too small, a value was not finite, or `max_steps` were not enough.
@@ -187,14 +185,12 @@ def _advance(problem: Problem, solver: Any, method: Method, guard: GuardedFuncti
     """
     if np.isnan(getattr(solver, "h_abs", 0.0)):  # scipy would look for a first step without end
         raise failure(problem, "scipy", t, x, f"{method}: no first step was found", guard)
-    reason = _step(solver, method)
+    reason = str(solver.step() or "")
     if solver.status == "failed":
         good = x if np.isfinite(x).all() else solver.y
         raise failure(problem, "scipy", t, good, f"{method}: {reason}", guard)
     if not np.isfinite(solver.y.sum()):
         raise failure(problem, "scipy", solver.t, solver.y, f"{method}: the state is not finite", guard)
-    if solver.t <= t:  # LSODA goes on with steps below the spacing of numbers
-        raise failure(problem, "scipy", solver.t, solver.y, f"{method}: the step became too small")
 
 
 def _rows(dense: Callable[[Array], Array]) -> Callable[[Array], Array]:
@@ -205,15 +201,5 @@ def _rows(dense: Callable[[Array], Array]) -> Callable[[Array], Array]:
 def _solver(problem: Problem, piece: Piece, x: Array, method: Method, guard: GuardedFunctions, longest: float) -> Any:
     options: dict[str, Any] = {"rtol": max(problem.rtol, TIGHTEST_RTOL), "atol": problem.atol, "max_step": longest}
     if method != "DOP853" and problem.jacobian is not None:
-        options["jac"] = guard.dense_jacobian if method == "LSODA" else guard.jacobian
+        options["jac"] = guard.jacobian
     return METHODS[method](guard.rhs, piece.start, x, piece.end, **options)
-
-
-def _step(solver: Any, method: Method) -> str:
-    """Take one step; the solver's message, which LSODA gives as a warning."""
-    if method != "LSODA":
-        return str(solver.step() or "")
-    with FILTERS, warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        message = solver.step()
-    return "; ".join([*(str(warning.message) for warning in caught), str(message or "")])
