@@ -13,7 +13,9 @@ from scipy.integrate import solve_ivp
 from shaftwork.core.errors import AccuracyWarning, SimulationError
 from shaftwork.integrate.lossless import commensurate
 from shaftwork.integrate.lossless import engine as delay
-from shaftwork.integrate.lossless.lines import DelayProblem
+from shaftwork.integrate.lossless.collocation import POINTS
+from shaftwork.integrate.lossless.lines import DelayProblem, Lines, Past
+from shaftwork.integrate.lossless.panels import History
 
 # The steel shaft of Popenda (8)-(23): 1 m long, 20 mm thick.
 DENSITY, MODULUS = 7900.0, 77.5e9
@@ -468,3 +470,19 @@ def test_a_long_motion_that_its_panels_cannot_resolve_says_so(monkeypatch):
     problem = replace(two_inertias(step, 2e5 * T, rtol=1e-7, t_eval=times, steady=True), x0=np.array([1.0, -1.0]))
     with pytest.warns(AccuracyWarning, match="wrinkles finer than [34] panels in a delay"):
         delay.solve(problem)
+
+
+def test_what_arrives_over_two_panels_is_what_left_in_each() -> None:
+    """A wave with a kink where the panels meet: each point has the polynomial of its own."""
+
+    def wave(t: np.ndarray) -> np.ndarray:
+        return np.where(t < -0.4, -(t + 0.4), 3.0 * (t + 0.4))
+
+    starts, lengths = np.array([-1.0, -0.4]), np.array([0.6, 0.4])
+    left = starts[:, None] + lengths[:, None] * (1 + POINTS) / 2
+    past = Past(starts, lengths, np.array([[wave(times), 2 * wave(times)] for times in left]))
+    history = History(Lines.of(np.array([1.0])), past, 1e-12)
+    arrived, cut = history.arriving(0.0, 1.0, np.full(2, 1e-9))
+    expected = wave(-1.0 + (1 + POINTS) / 2)
+    np.testing.assert_allclose(arrived, [-2 * expected, -expected], atol=1e-13)
+    assert cut == pytest.approx(0.6)  # where the kink arrives

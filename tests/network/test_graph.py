@@ -103,6 +103,16 @@ def test_parts_that_look_at_their_own_numbers_have_branches_of_their_own() -> No
             assert described(together, f"stack{k}") == described(stacked(number), "stack0")
 
 
+def test_a_ground_that_is_added_first_leaves_its_node_to_what_moves_there() -> None:
+    net = sw.Network("wagon")
+    net.add(sw.Ground("frame"), "wall")
+    net.add(sw.TranslationalSpring("buffer", c=100.0), "wall", "car")
+    net.add(sw.Mass("m", m=1.0), "car")
+    names = net.simulate(0.1).names
+    assert "wall.v" in names
+    assert not any(name.endswith((".omega", ".tau")) for name in names)
+
+
 def test_parts_that_are_alike_are_worked_out_once() -> None:
     """What makes a chain of a thousand springs quick; a number that becomes zero may change the branches."""
     worked: list[Any] = []
