@@ -168,6 +168,8 @@ def faults(kind: str, first: int, count: int) -> Iterator[str]:
     signal.signal(signal.SIGPROF, _overrun)
     with tempfile.TemporaryDirectory() as folder:
         _load_libraries()
+        gc.collect()
+        gc.freeze()
         for number in range(first, first + count):
             gc.collect()
             _limit_memory()

@@ -1,12 +1,31 @@
-"""Where heyoka keeps compiled code between processes."""
+"""Where heyoka keeps compiled code between processes, and how code that has changed on the disk is kept from running.
+
+heyoka runs what it finds. So each process, when it ends, puts down sums of all that is kept, and the next one drops
+whatever has no sum or another one: a flipped bit would crash it, or change its numbers.
+"""
 
 from __future__ import annotations
 
+import atexit
+import json
+import sqlite3
+import zlib
+from contextlib import closing, suppress
+from pathlib import Path
+from typing import Any
+
 import heyoka
+
+from shaftwork.core.files import replaced
 
 ROOM = 2**25
 """Bytes of compiled code that are kept, of the most recently used: opening it takes longer the more there is, 0.3 s of
 each process for 1 GiB, which is more than most networks take to compile."""
+KEPT, SUMS = "cache.db", "sums.json"
+"""heyoka's file and ours."""
+PATIENCE = 2.0
+"""So long in s another process is waited for."""
+_COLUMNS = "hash, bitcode, comp_flag, env_fingerprint, opt_bc, opt_ir, obj"
 
 
 def keep_apart() -> None:
@@ -14,10 +33,77 @@ def keep_apart() -> None:
     state = heyoka.llvm_state
     path = state.get_diskcache_path()
     if path.name == "heyoka":  # nobody has said where
+        own = path.parent / "shaftwork"
+        if not _is_sound(own):
+            state.set_diskcache_enabled(False)
+            return
         try:
-            state.set_diskcache_path(path.parent / "shaftwork")
+            state.set_diskcache_path(own)
             state.set_diskcache_limit(ROOM)  # opens the folder
         except RuntimeError:
             state.set_diskcache_enabled(False)
+        else:
+            atexit.register(_put_down_sums, own)
     elif not path.name:  # no home: it would be where the process is
         state.set_diskcache_enabled(False)
+
+
+def _is_sound(folder: Path) -> bool:
+    """Whether all code that is kept is as it was written, once what is not has been dropped."""
+    place = folder / KEPT
+    if not place.exists():
+        return True
+    try:
+        known = _known(folder)
+        with closing(_opened(place)) as kept, kept:
+            spoilt = [(key,) for key, found in _sums(kept).items() if known.get(key) != found]
+            if spoilt:
+                kept.executemany("DELETE FROM cache WHERE hash = ?", spoilt)
+                kept.execute(
+                    "UPDATE config SET value = (SELECT coalesce(sum(size), 0) FROM cache) WHERE key = 'total_size'"
+                )
+    except sqlite3.Error as error:
+        if isinstance(error, sqlite3.OperationalError) and "locked" in str(error):
+            return False
+        return _removed(folder)
+    return True
+
+
+def _removed(folder: Path) -> bool:
+    """Whether a file that cannot be read could be removed, so that heyoka begins a new one."""
+    try:
+        for name in (KEPT, f"{KEPT}-wal", f"{KEPT}-shm"):
+            (folder / name).unlink(missing_ok=True)
+    except OSError:
+        return False
+    return True
+
+
+def _put_down_sums(folder: Path) -> None:
+    """Put down the sums of what is new; what was there keeps that which it had."""
+    with suppress(sqlite3.Error, OSError):
+        with closing(_opened(folder / KEPT)) as kept:
+            found = _sums(kept)
+        known = _known(folder)
+        if found.keys() - known.keys():
+            with replaced(folder / SUMS) as file:
+                json.dump({key: known.get(key, made) for key, made in found.items()}, file)
+
+
+def _opened(place: Path) -> sqlite3.Connection:
+    return sqlite3.connect(f"{place.as_uri()}?mode=rw", timeout=PATIENCE, uri=True)
+
+
+def _known(folder: Path) -> dict[int, int]:
+    """Sums by what they are of; none where they cannot be read."""
+    try:
+        made: Any = json.loads((folder / SUMS).read_text(encoding="utf-8"))
+        return {int(key): int(value) for key, value in made.items()}
+    except (OSError, ValueError, TypeError, AttributeError, RecursionError):
+        return {}
+
+
+def _sums(kept: sqlite3.Connection) -> dict[int, int]:
+    """A sum over each piece of code and what it was made of."""
+    rows = kept.execute(f"SELECT {_COLUMNS} FROM cache")  # noqa: S608 (names of our own)
+    return {int(row[0]): zlib.crc32(repr(row).encode()) for row in rows}
