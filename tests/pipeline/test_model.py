@@ -488,9 +488,20 @@ def between_springs() -> sw.Network:
 
 
 @pytest.mark.parametrize("name", ["push", "first", "second"])
-def test_an_angle_at_a_massless_node_between_springs_is_refused(name: str) -> None:
-    with pytest.raises(sw.SignalError, match=f"angle of '{name}' is not recorded.*Give that node an inertia"):
+def test_an_angle_at_a_massless_node_between_springs_is_refused_with_what_to_read(name: str) -> None:
+    with pytest.raises(
+        sw.SignalError, match=f"angle of '{name}' is not recorded.*Give that node an inertia"
+    ) as refused:
         between_springs().simulate(2.0, angles=name)
+    instead = re.search(r"or read (.*?)(, with angles=(.*))?, less what that is at the start", str(refused.value))
+    assert instead is not None
+    times = np.linspace(0.0, 2.0, 20001)
+    sol = between_springs().simulate(2.0, t_eval=times, rtol=1e-10, angles=re.findall(r"'(\w+)'", instead[3] or ""))
+    angle = sum(
+        (-1.0 if sign == "-" else 1.0) * sol[read] for sign, read in re.findall(r"(-?) ?sol\['([\w.]+)'\]", instead[1])
+    )
+    speed = sol[f"{name}.omega" if name == "push" else f"{name}.omega_rel"]
+    assert angle[-1] - angle[0] == pytest.approx(simpson(speed, x=times), rel=1e-7)
 
 
 @pytest.mark.parametrize("name", ["J1", "J2"])

@@ -11,16 +11,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self
 
-from shaftwork.core.errors import NetworkError, NetworkWarning, ParameterError, Problem, SignalError
+from shaftwork.core.errors import NetworkError, NetworkWarning, ParameterError, Problem
 from shaftwork.core.notices import warn
 from shaftwork.equations.kirchhoff import kirchhoff
 from shaftwork.equations.records import Equations, NamedPhase
 from shaftwork.network.builder import NetworkBuilder
 from shaftwork.network.graph import CircuitGraph
-from shaftwork.network.meters import with_meters
 from shaftwork.network.netlist import Netlist
 from shaftwork.network.storage import read_netlist, write_netlist
 from shaftwork.network.wording import listed
+from shaftwork.pipeline.angles import with_angles
 from shaftwork.pipeline.beside_waves import warn_of_rounding, waving, with_one_law
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.model import PhasedModel
@@ -321,8 +321,7 @@ class Compiler:
             if form.waves:
                 warn_of_rounding(form.graph)
             if self.angles:
-                form = state_form(*with_meters(form.graph, self.angles))
-                _refuse_between_springs(form)
+                form = with_angles(form.graph, self.angles)
             chosen = form.waves or any(item.choices for item in netlist.placed)
             kind = PhasedModel if any(part.modes for part in form.graph.parts) and not chosen else Model
             return kind(form, netlist, self)
@@ -365,21 +364,3 @@ def _without_collection() -> Iterator[None]:
     finally:
         if running:
             gc.enable()
-
-
-def _refuse_between_springs(form: StateForm) -> None:
-    """Refuse angles whose speed contains the rate of a torque, as that of a node between springs in series does.
-
-    Raises:
-        SignalError: there is one; names the part.
-    """
-    hidden = frozenset(form.dependent_through)
-    for branch in form.angles:
-        if branch in hidden or not hidden.isdisjoint(form.tree.loops.get(branch, ())):
-            name = form.graph.part_of(branch).name
-            springs = listed(tuple(dict.fromkeys(form.graph.part_of(k).name for k in form.dependent_through)))
-            raise SignalError(
-                f"The angle of '{name}' is not recorded: its speed is that of a node without inertia between springs "
-                f"({springs} among them), which turns at once where a torque jumps. Give that node an inertia, or read "
-                f"the twist of a spring, such as phi_rel."
-            )
