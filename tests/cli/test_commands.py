@@ -170,6 +170,16 @@ def test_signals_are_chosen_and_angles_recorded(model: str, capsys: pytest.Captu
     assert [line.split()[0] for line in table] == ["shaft.tau", "J1.phi", "loss.power"]
 
 
+def test_a_run_that_writes_says_what_it_has_written(
+    model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert main(["run", model, "--t-end", "0.01", "--out", str(out)]) == DONE
+    said = capsys.readouterr().out.splitlines()[-1]
+    assert said.startswith("written: ")
+    assert str(out / "signals.csv") in said.removeprefix("written: ").split(", ")
+
+
 @pytest.mark.parametrize(
     ("name", "words"),
     [("shaft.tua", "'shaft' has: shaft.tau"), ("shaft", "'shaft' has: shaft.tau"), ("axle.phi", "part or node 'axle'")],

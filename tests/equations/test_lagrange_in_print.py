@@ -81,3 +81,16 @@ def test_a_motor_by_its_catalogue_keeps_inside_the_margins_with_values(form: str
     made = net.lagrangian() if form == "lagrange" else net.equations()
     log = compile_latex(made.document(values=True), tmp_path)
     assert max(overfull(log), default=0.0) < 10.0
+
+
+@pytest.mark.parametrize(("driven", "said"), [("", "for all } k"), ("a", "for all other } k"), ("ab", None)])
+def test_forces_of_zero_are_named_only_where_there_are_some(driven: str, said: str | None) -> None:
+    net = sw.Network("pair")
+    for k, node in enumerate("ab"):
+        net.add(sw.Inertia(f"J{k}", J=1.0), node)
+        if node in driven:
+            net.add(sw.TorqueSource(f"pull{k}", tau=1.0 + k), node)
+    net.add(sw.Spring("s", c=5.0), "a", "b")
+    text = net.lagrangian().latex()
+    assert ("for all" in text) is (said is not None)
+    assert said is None or said in text

@@ -367,3 +367,9 @@ def test_a_unit_step_is_printed_as_one(arguments: tuple[int, ...]) -> None:
     text = equations_of(net).latex(form="kirchhoff")
     assert r"\mathrm{H}\left(\omega_{\mathrm{J}}\right)" in text
     assert "theta" not in text
+
+
+def test_a_factor_of_two_terms_stands_before_their_bracket() -> None:
+    """As textbooks print the rate of a spring."""
+    text = equations_of(crane()).latex(form="state")
+    assert r"&= c_{\mathrm{shaft}} \left( \omega_{1} - \omega_{2} \right)" in re.sub(r" +", " ", text)

@@ -149,3 +149,9 @@ def test_an_unknown_variant_names_those_that_exist(name: str, known: str) -> Non
 def test_six_phases_need_a_gap() -> None:
     with pytest.raises(sw.ParameterError, match="leaves nothing to close"):
         sw.scenes.six_phases(0.0)
+
+
+def test_at_6_5_s_the_motor_goes_off_and_the_brake_comes_on() -> None:
+    """Marinkovic 2012, section 3."""
+    parts = {part.name: part for part in sw.scenes.crane().parts}
+    assert parts["motor"].t_off == parts["brake"].t_on == 6.5
