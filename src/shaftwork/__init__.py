@@ -155,15 +155,21 @@ def __getattr__(name: str) -> Any:
     elif name.startswith("_"):
         raise AttributeError(f"module 'shaftwork' has no attribute '{name}'")
     else:
-        registry = import_module("shaftwork.components").REGISTRY
-        if name not in registry or not registry[name].__module__.startswith("shaftwork."):
+        components = _components()
+        if name not in components:
             raise AttributeError(
-                f"module 'shaftwork' has no attribute '{name}'. Components are: {', '.join(registry)}."
+                f"module 'shaftwork' has no attribute '{name}'. Components are: {', '.join(components)}."
             )
-        value = registry[name]
+        value = components[name]
     globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
-    return sorted({*_MODULE_OF, *_PACKAGES, *import_module("shaftwork.components").REGISTRY})
+    return sorted({*_MODULE_OF, *_PACKAGES, *_components()})
+
+
+def _components() -> dict[str, Any]:
+    """The components of the library; users' own stand in the registry beside them."""
+    registry = import_module("shaftwork.components").REGISTRY
+    return {name: made for name, made in registry.items() if made.__module__.startswith("shaftwork.")}

@@ -42,7 +42,8 @@ def agrees(train: Train) -> bool:
         for part in train.parts:
             net.add(getattr(sw, part.type)(part.name, **part.values), *part.nodes)
         model = net.compile()
-        initial = {name: value for name, value in train.initial.items() if name in model.states}
+        states = {state.name for state in model.form.states}
+        initial = {name: value for name, value in train.initial.items() if name in states}
         try:
             made = motion_sensitivities(net, measures, t_end=train.t_end, initial=initial)
         except sw.SimulationError:

@@ -207,7 +207,7 @@ class _Start:
                 self._x[place], self._fixed[place] = self._rest[place] + speed, True
 
     def _refuse_other(self, name: str, reached: float, size: float) -> None:
-        if abs(reached - self._values[name]) > CONSISTENT * size:
+        if abs(reached - self._values[name]) > CONSISTENT * max(size, np.finfo(float).tiny):
             others = ", ".join(other for other in self._values if other != name) or "its sources"
             raise ParameterError(
                 f"The start value {name} = {self._values[name]:g} contradicts {others}: with them it would be "

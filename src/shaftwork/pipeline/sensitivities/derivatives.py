@@ -125,7 +125,10 @@ def motion_sensitivities(
     span, tolerance = time_span(0.0, t_end), relative_tolerance(rtol)
     states = {state.name for state in model.form.states}
     if unknown := [name for name in initial or {} if name not in states]:
-        raise ParameterError(f"'{unknown[0]}' is no state, so it starts at another state for other parameters.")
+        raise ParameterError(
+            f"'{unknown[0]}' is no state, so it starts at another state for other parameters. Give start values of "
+            f"states: {', '.join(sorted(states))}."
+        )
     rows_of(model)
     smooth_parameters(model, parameters, (model,), span)  # what is wrong with them is said before the motion is made
     integrands = dict.fromkeys(made for measure in measures.values() if (made := integrand(measure)) is not None)
