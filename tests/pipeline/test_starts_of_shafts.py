@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import sympy
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -170,3 +171,15 @@ def test_what_a_source_jolts_at_the_start_has_not_yet_run_along_a_shaft(jolt: fl
     sol = start(net, {"J3.omega": 3.0})
     assert [sol[f"line.omega_{k}"][0] for k in (1, 2, 3)] == pytest.approx([0.75, 1.5, 2.25], rel=1e-12)
     assert (sol["J2.omega"][0] != 0.0) == (jolt != 0.0)
+
+
+@pytest.mark.parametrize("speed", [3 * sympy.sin(12 * sw.t), sympy.Max(0, sympy.sin(12 * sw.t))])
+def test_a_start_value_may_be_the_one_that_a_moving_source_has(speed: sympy.Expr) -> None:
+    net = sw.Network("driven")
+    net.add(sw.SpeedSource("drive", omega=speed), "a")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.Spring("shaft", c=10.0), "a", "b")
+    net.add(sw.Inertia("J2", J=1.0), "b")
+    assert net.simulate(0.1, initial={"J1.omega": 0.0, "J2.omega": 0.0})["J1.omega"][0] == pytest.approx(0.0, abs=1e-12)
+    with pytest.raises(sw.ParameterError, match=r"J1\.omega = 1e-06 contradicts"):
+        net.simulate(0.1, initial={"J1.omega": 1e-6})

@@ -22,6 +22,8 @@ CONSISTENT = 1e-9
 """Two given values contradict each other when they differ by more than this fraction."""
 INDEPENDENT = 1e-9
 """A state does not move a quantity that it changes by less than this part of what others change it by."""
+AT_ONCE = 1e-12
+"""Sources are read so many seconds after the start at most: 3 sin(12 t) is then not quite the zero that is given."""
 
 
 def initial_state(bound: BoundArrays, given: Mapping[str, float], t0: float) -> Array:
@@ -127,7 +129,9 @@ class _Start:
         size = np.abs(np.append(rows * np.where(of_kind, x, 0.0), values)).max(initial=0.0)
         reached = rows @ x + constants
         for k, (quantity, row) in enumerate(demands):
-            self._refuse_other(quantity.name, self._read(quantity) if row.moved else float(reached[k]), size)
+            found = self._read(quantity) if row.moved else float(reached[k])
+            if not abs(found - values[k]) <= self._drift(quantity):
+                self._refuse_other(quantity.name, found, size)
 
     def _constant(self, quantity: Quantity, row: Row) -> float:
         """What the states do not add to a quantity.
@@ -152,6 +156,11 @@ class _Start:
 
     def _read(self, quantity: Quantity) -> float:
         return float(quantity.read(History(self._bound, np.array([self._t]), self._x[None, :]))[0])
+
+    def _drift(self, quantity: Quantity) -> float:
+        """How far sources move a quantity within a time that is none beside any motion."""
+        times = np.array([self._t, self._t + AT_ONCE])
+        return float(np.ptp(quantity.read(History(self._bound, times, np.array([self._x, self._x])))))
 
     def _changes(self, rows: Array, gaps: Array, movable: Any, *, is_across: bool) -> Array:
         """(k,) changes of the movable states with which rows close their gaps and all that can be at rest is.
