@@ -42,7 +42,6 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
     from shaftwork.components.laws import (
         Ramp as Ramp,
         Step as Step,
-        Table as Table,
         omega as omega,
         phi as phi,
         psi as psi,
@@ -70,6 +69,7 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
     )
     from shaftwork.components.shafts import *
     from shaftwork.components.sources import *
+    from shaftwork.components.tables import Table as Table
     from shaftwork.components.translation import *
     from shaftwork.core.domains import ELECTRICAL as ELECTRICAL, ROTATION as ROTATION, TRANSLATION as TRANSLATION
     from shaftwork.core.errors import (
@@ -122,7 +122,8 @@ _HOME = {
     "shaftwork.components.motor_catalogue": ("motors",),
     "shaftwork.components.bucket_wheel": ("Soil",),
     "shaftwork.components.noise": ("HeldNoise", "SmoothNoise"),
-    "shaftwork.components.laws": ("Ramp", "Step", "Table", "omega", "phi", "psi", "s", "t", "u", "v"),
+    "shaftwork.components.tables": ("Table",),
+    "shaftwork.components.laws": ("Ramp", "Step", "omega", "phi", "psi", "s", "t", "u", "v"),
     "shaftwork.core.domains": ("ELECTRICAL", "ROTATION", "TRANSLATION"),
     "shaftwork.core.errors": (
         "AccuracyWarning",

@@ -11,7 +11,7 @@ import sympy
 from sympy import Abs, Eq, Heaviside, Max, Min, Ne, Piecewise, Rational, sign
 
 from shaftwork.codegen.heyoka import build
-from shaftwork.components.laws import Table
+from shaftwork.components.tables import Table
 from shaftwork.core.errors import CompileError, MissingExtraError
 from shaftwork.integrate import heyoka_taylor, scipy_ivp
 from shaftwork.integrate.problem import Problem

@@ -6,8 +6,9 @@ import pytest
 import sympy
 from sympy import Abs, Derivative, DiracDelta, Heaviside, Max, Piecewise, sign, sqrt
 
-from shaftwork.components.laws import Table, omega, phi, t
+from shaftwork.components.laws import omega, phi, t
 from shaftwork.components.slopes import jumps, slope, wraps
+from shaftwork.components.tables import Table
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,8 @@ import sympy
 from hypothesis import assume, given, reject
 from hypothesis import strategies as st
 
-from shaftwork.components.laws import SYMBOLS, Ramp, Step, Table, omega, phi, t, v
+from shaftwork.components.laws import SYMBOLS, Ramp, Step, omega, phi, t, v
+from shaftwork.components.tables import Table
 from shaftwork.core.errors import ModelFileError
 from shaftwork.network import grammar
 from shaftwork.network.expressions import parse, write

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shaftwork.components.laws import Table
+from shaftwork.components.tables import Table
 from shaftwork.core.errors import ModelFileError
 from shaftwork.network import textfile
 from shaftwork.network.textfile import ModelText, PartText, read, write

@@ -10,7 +10,8 @@ from hypothesis import given
 
 from shaftwork.components import bldc, electrical, induction_machine, loads, machines, rotation, sources, translation  # noqa: F401 - registers all
 from shaftwork.components.base import REGISTRY
-from shaftwork.components.laws import Ramp, Step, Table, omega, phi, t
+from shaftwork.components.laws import Ramp, Step, omega, phi, t
+from shaftwork.components.tables import Table
 from shaftwork.core.errors import ParameterError, Problem
 from shaftwork.network.netlist import Netlist, Placed
 from shaftwork.reduction.diagnosis import diagnose

@@ -7,7 +7,8 @@ from sympy import Basic, Expr
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
-from shaftwork.components.laws import Table, as_expression
+from shaftwork.components.laws import as_expression
+from shaftwork.components.tables import Table
 from shaftwork.network.graph import GraphPart
 from shaftwork.network.templates import substitution
 from shaftwork.network.wording import title

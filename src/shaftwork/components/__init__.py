@@ -21,7 +21,7 @@ from shaftwork.components import (
     translation,
 )
 from shaftwork.components.base import REGISTRY, Component, Port, Signal, component
-from shaftwork.components.laws import Table
+from shaftwork.components.tables import Table
 
 __all__ = [
     "REGISTRY",

@@ -6,7 +6,7 @@ from typing import Any
 
 from sympy import Expr, Max, Piecewise, Symbol
 
-from shaftwork.components.laws import Interpolation
+from shaftwork.components.tables import Interpolation
 
 
 def no_less(p: Any, name: str, least: int) -> Expr:

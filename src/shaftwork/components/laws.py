@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import combinations, pairwise
-from typing import Any, Self
+from itertools import combinations
+from typing import Any
 
-import numpy as np
 import sympy
-from numpy.typing import NDArray
 from sympy.core.relational import Relational
 
 from shaftwork.components import noise
 from shaftwork.components.branches import ACROSS, INTEGRAL, readings_in
 from shaftwork.components.noise import SmoothNoise
+from shaftwork.components.tables import Table, TableFunction, interpolate, interpolation_slope
 from shaftwork.core.errors import ParameterError
+from shaftwork.core.parameters import in_si, is_quantity
 
 t = sympy.Symbol("t", real=True)
 """Time in s."""
@@ -35,170 +34,6 @@ psi = sympy.Symbol("psi", real=True)
 
 SYMBOLS: tuple[sympy.Symbol, ...] = (t, omega, phi, v, s, u, psi)
 """Every symbol that a law may contain."""
-
-Samples = tuple[tuple[float, ...], tuple[float, ...]]
-
-
-class Table(sympy.Atom):  # type: ignore[misc]
-    """A measured curve: straight lines between its points, constant beyond its ends.
-
-    Law: y = y_k + (y_{k+1} - y_k) (x - x_k) / (x_{k+1} - x_k) for x_k <= x <= x_{k+1}.
-
-    `Table(x, y)` alone, where a law is expected, is a law of time; `Table(x, y)(argument)` is a sympy expression of
-    any argument, such as a motor's torque over its speed.
-    """
-
-    is_commutative = True
-
-    def __new__(cls, x: Sequence[float] | NDArray[Any], y: Sequence[float] | NDArray[Any]) -> Self:
-        """The curve through the points.
-
-        Args:
-            x: n >= 2 strictly increasing arguments, in the unit of the argument.
-            y: n values, in the unit of the law.
-
-        Raises:
-            ParameterError: a value is no finite number, x does not increase, or the lengths differ.
-        """
-        xs, ys = _finite_floats("x", x), _finite_floats("y", y)
-        if len(xs) != len(ys) or len(xs) < 2:
-            raise ParameterError(
-                f"Table: x has {len(xs)} values and y has {len(ys)}. Give both the same number, 2 or more."
-            )
-        for index, (left, right) in enumerate(pairwise(xs)):
-            if left >= right:
-                raise ParameterError(
-                    f"Table: x must increase strictly, but x[{index + 1}] = {right!r} follows x[{index}] = {left!r}. "
-                    "Sort the points; write a jump as a Step."
-                )
-            if not math.isfinite((ys[index + 1] - ys[index]) / (right - left)):
-                raise ParameterError(
-                    f"Table: between x[{index}] = {left!r} and x[{index + 1}] = {right!r} the slope is not finite. "
-                    "Write a jump as a Step."
-                )
-        table: Self = super().__new__(cls)
-        table.xs, table.ys = xs, ys
-        return table
-
-    xs: tuple[float, ...]
-    ys: tuple[float, ...]
-
-    def __call__(self, argument: Any) -> sympy.Expr:
-        return Interpolation(argument, self)
-
-    def __getnewargs__(self) -> Samples:
-        return self.xs, self.ys
-
-    def _hashable_content(self) -> Samples:
-        return self.xs, self.ys
-
-    def _sympystr(self, _printer: Any) -> str:
-        return f"Table({list(self.xs)}, {list(self.ys)})"
-
-    _sympyrepr = _sympystr
-
-    def _pythoncode(self, _printer: Any) -> str:
-        return f"({self.xs!r}, {self.ys!r})"
-
-    _numpycode = _lambdacode = _pythoncode
-
-    def _latex(self, printer: Any) -> str:
-        points = [
-            rf"{_printed(sympy.Float(x), printer)} \mapsto {_printed(sympy.Float(y), printer)}"
-            for x, y in zip(self.xs, self.ys, strict=True)
-        ]
-        return r",\, ".join(points if len(points) <= 4 else [points[0], points[1], r"\ldots", points[-1]])
-
-
-def interpolate(x: Any, samples: Samples) -> Any:
-    """Value of a table at x, a number or an array of numbers; NaN where x is NaN."""
-    xs, ys = samples
-    if not isinstance(x, float):
-        return np.interp(x, xs, ys)
-    if x <= xs[0]:
-        return ys[0]
-    if x >= xs[-1]:
-        return ys[-1]
-    if math.isnan(x):
-        return x
-    index = bisect_right(xs, x)
-    x0, y0 = xs[index - 1], ys[index - 1]
-    return (ys[index] - y0) / (xs[index] - x0) * (x - x0) + y0
-
-
-def interpolation_slope(x: Any, samples: Samples) -> Any:
-    """Slope of a table at x, a number or an array of numbers; to the right of a point, zero beyond the ends."""
-    xs, ys = samples
-    if isinstance(x, float):
-        index = bisect_right(xs, x)
-        inside = 0 < index < len(xs)
-        return (ys[index] - ys[index - 1]) / (xs[index] - xs[index - 1]) if inside else 0.0
-    slopes = np.concatenate(([0.0], np.diff(ys) / np.diff(xs), [0.0]))
-    return slopes[np.searchsorted(xs, x, side="right")]
-
-
-class _TableFunction(sympy.Function):  # type: ignore[misc]
-    """A function of one argument whose data are the points of a table."""
-
-    @property
-    def argument(self) -> sympy.Expr:
-        return self.args[0]
-
-    @property
-    def table(self) -> Table:
-        return self.args[1]  # type: ignore[no-any-return]
-
-    @property
-    def xs(self) -> tuple[float, ...]:
-        return self.table.xs
-
-    @property
-    def ys(self) -> tuple[float, ...]:
-        return self.table.ys
-
-    @classmethod
-    def eval(cls, argument: sympy.Expr, table: Table) -> sympy.Expr | None:
-        if not argument.is_number:
-            return None
-        try:
-            return sympy.Float(cls._imp_(float(argument), (table.xs, table.ys)))
-        except TypeError:  # a complex number, which sympy tries on its own
-            return None
-
-    def _eval_is_real(self) -> bool | None:
-        return self.argument.is_extended_real  # type: ignore[no-any-return]
-
-    def _eval_evalf(self, _precision: int) -> sympy.Expr:
-        return self.func(self.argument.evalf(), self.table)
-
-
-class Interpolation(_TableFunction):
-    """`Table(x, y)(argument)` as a sympy expression; the points are `.xs` and `.ys`."""
-
-    # lambdify finds the numerical function of a sympy function under this name
-    _imp_ = staticmethod(interpolate)
-
-    def _eval_derivative(self, symbol: sympy.Symbol) -> sympy.Expr:
-        return InterpolationSlope(self.argument, self.table) * self.argument.diff(symbol)
-
-    def _sympystr(self, printer: Any) -> str:
-        return f"{self.table}({_printed(self.argument, printer)})"
-
-    def _latex(self, printer: Any, exp: str | None = None) -> str:
-        return _latex_call("table", self, printer, exp)
-
-
-class InterpolationSlope(_TableFunction):
-    """Derivative of an `Interpolation` by its argument: constant between the points."""
-
-    _imp_ = staticmethod(interpolation_slope)
-
-    def _eval_derivative(self, _symbol: sympy.Symbol) -> sympy.Expr:
-        return sympy.S.Zero
-
-    def _latex(self, printer: Any, exp: str | None = None) -> str:
-        return _latex_call("slope", self, printer, exp)
-
 
 EDGES = (
     *(sympy.exp, sympy.sinh, sympy.cosh, sympy.tanh, sympy.coth, sympy.sech, sympy.csch),
@@ -236,11 +71,11 @@ def Step(height: Any, start: Any = 0.0, before: Any = 0.0) -> sympy.Expr:
 
     Args:
         height: the jump, in the unit of the law.
-        start: time of the jump in s.
+        start: time of the jump in s, or a quantity.
         before: value before the jump, in the unit of the law.
 
     Raises:
-        ParameterError: an argument is not finite.
+        ParameterError: an argument is not finite, or the height has a unit.
     """
     rise, begin, base = _finite("Step", height=height, start=start, before=before)
     return sympy.Piecewise((base, t < begin), (base + rise, True))
@@ -253,12 +88,12 @@ def Ramp(height: Any, duration: Any, start: Any = 0.0, before: Any = 0.0) -> sym
 
     Args:
         height: the whole rise, in the unit of the law.
-        duration: time of the rise in s, greater than 0.
-        start: time at which the rise begins in s.
+        duration: time of the rise in s, greater than 0, or a quantity.
+        start: time at which the rise begins in s, or a quantity.
         before: value before the rise, in the unit of the law.
 
     Raises:
-        ParameterError: an argument is not finite, or the duration is not positive.
+        ParameterError: an argument is not finite, the duration is not positive, or the height has a unit.
     """
     rise, length, begin, base = _finite("Ramp", height=height, duration=duration, start=start, before=before)
     if length.is_nonpositive:
@@ -314,7 +149,7 @@ def switches_of(node: sympy.Basic) -> Iterable[tuple[sympy.Expr, Sequence[float]
             return [(sympy.cos(node.args[0]), (0.0,))]
         case sympy.cot() | sympy.csc():
             return [(sympy.sin(node.args[0]), (0.0,))]
-        case _TableFunction():
+        case TableFunction():
             return [(node.argument, node.xs)]
         case sympy.floor() | SmoothNoise():
             # a sine changes sign at every whole number, and no list of levels would have an end
@@ -359,32 +194,18 @@ def line(expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr] | None:
     return polynomial.coeff_monomial(t), still + polynomial.coeff_monomial(1)
 
 
-def _latex_call(name: str, node: _TableFunction, printer: Any, exponent: str | None) -> str:
-    power = "" if exponent is None else f"^{{{exponent}}}"
-    argument, table = _printed(node.argument, printer), _printed(node.table, printer)
-    return rf"\operatorname{{{name}}}{power}\left({argument};\, {table}\right)"
-
-
-def _printed(expression: sympy.Basic, printer: Any) -> str:
-    # the public doprint would open a new formula inside the formula
-    return str(printer._print(expression))  # noqa: SLF001
-
-
-def _finite_floats(name: str, values: Iterable[Any]) -> tuple[float, ...]:
-    try:
-        # adding zero turns -0.0 into 0.0, so that equal tables print alike
-        floats = tuple(float(value) + 0.0 for value in values)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise ParameterError(f"Table: {name} must be a list of numbers, such as [0.0, 1.0]: {error}.") from None
-    for index, value in enumerate(floats):
-        if not math.isfinite(value):
-            raise ParameterError(f"Table: {name}[{index}] = {value} is not finite. Remove that point.")
-    return floats
-
-
 def _finite(law: str, **arguments: Any) -> list[sympy.Expr]:
-    expressions = [sympy.sympify(value, strict=True) for value in arguments.values()]
+    expressions = [sympy.sympify(_plain(law, name, value), strict=True) for name, value in arguments.items()]
     for name, expression in zip(arguments, expressions, strict=True):
         if expression.has(sympy.nan, sympy.oo, -sympy.oo, sympy.zoo):
             raise ParameterError(f"{law}: {name} = {expression} is not finite. Give a number or an expression.")
     return expressions
+
+
+def _plain(law: str, name: str, value: Any) -> Any:
+    """An argument without its unit: times in s; of the others only the law's own unit would tell what it is."""
+    if not is_quantity(value):
+        return value
+    if name in ("start", "duration"):
+        return in_si(f"{law}: {name}", value, "s")
+    raise ParameterError(f"{law}: {name} = {value} has a unit. Give a number in the SI unit of the law, as N m.")

@@ -11,8 +11,8 @@ from sympy import Expr, Piecewise, pi
 from shaftwork.components.base import Component, Derived, Port, Role, component
 from shaftwork.components.bounds import no_less
 from shaftwork.components.branches import ACROSS, Branch, ThroughLaw
-from shaftwork.components.laws import Interpolation, Table
 from shaftwork.components.switching import number_of, off_time, on_time, refuse_no_time_on, while_on
+from shaftwork.components.tables import Interpolation, Table
 from shaftwork.components.torque_curves import bend, kloss, pull_out_slip, pull_up_share, refuse_rated_point
 from shaftwork.core.errors import NetworkWarning, ParameterError
 from shaftwork.core.notices import warn

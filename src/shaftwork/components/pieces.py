@@ -12,7 +12,8 @@ from collections.abc import Iterable, Iterator
 import sympy
 from sympy.core.relational import Relational
 
-from shaftwork.components.laws import Interpolation, InterpolationSlope, between_steps, line, switches_of, t
+from shaftwork.components.laws import between_steps, line, switches_of, t
+from shaftwork.components.tables import Interpolation, InterpolationSlope
 
 
 def parts(expressions: Iterable[sympy.Basic]) -> Iterator[sympy.Basic]:

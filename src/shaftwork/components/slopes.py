@@ -34,7 +34,7 @@ from sympy import (
 )
 from sympy.core.relational import Relational
 
-from shaftwork.components.laws import InterpolationSlope
+from shaftwork.components.tables import InterpolationSlope
 
 STEPS = (sign, Heaviside, Relational, InterpolationSlope, floor, ceiling)
 """What is constant but for jumps."""

@@ -18,7 +18,8 @@ from typing import Any, NoReturn
 
 import sympy
 
-from shaftwork.components.laws import SYMBOLS, Table, as_expression
+from shaftwork.components.laws import SYMBOLS, as_expression
+from shaftwork.components.tables import Table
 from shaftwork.core.errors import ParameterError
 from shaftwork.network.grammar import (
     COMPARISONS,

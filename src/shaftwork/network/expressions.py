@@ -5,7 +5,8 @@ from __future__ import annotations
 import sympy
 from sympy.core.relational import Relational
 
-from shaftwork.components.laws import SYMBOLS, Interpolation
+from shaftwork.components.laws import SYMBOLS
+from shaftwork.components.tables import Interpolation
 from shaftwork.core.errors import ModelFileError
 from shaftwork.network.expression_reader import parse
 from shaftwork.network.grammar import COMPARISONS, FUNCTION_NAMES, FUNCTIONS

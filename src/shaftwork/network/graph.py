@@ -12,8 +12,9 @@ from sympy import Expr, Symbol
 
 from shaftwork.components.base import Component, Derived
 from shaftwork.components.branches import End, named_in
-from shaftwork.components.laws import Table, as_expression
+from shaftwork.components.laws import as_expression
 from shaftwork.components.modes import Modes
+from shaftwork.components.tables import Table
 from shaftwork.core.domains import ROTATION, Domain
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
 from shaftwork.network.overview import overview

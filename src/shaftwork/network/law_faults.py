@@ -12,7 +12,8 @@ from sympy.logic.boolalg import BooleanAtom, BooleanFunction
 
 from shaftwork.components.base import Component
 from shaftwork.components.branches import ACROSS, HISTORY, INTEGRAL
-from shaftwork.components.laws import SYMBOLS, Interpolation, InterpolationSlope, Table, t
+from shaftwork.components.laws import SYMBOLS, t
+from shaftwork.components.tables import Interpolation, InterpolationSlope, Table
 from shaftwork.network.controlled import check_readings
 from shaftwork.network.declared import check_declared
 from shaftwork.network.grammar import FUNCTION_NAMES, FUNCTIONS

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from shaftwork.components.base import Component
-from shaftwork.components.laws import Table
+from shaftwork.components.tables import Table
 from shaftwork.core.screen import counted, on_one_screen
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
 

@@ -27,7 +27,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from shaftwork.components.laws import Table
+from shaftwork.components.tables import Table
 from shaftwork.core.errors import ModelFileError, ParameterError
 
 FORMAT = 1

@@ -21,6 +21,7 @@ from shaftwork.core.callbacks import Told
 from shaftwork.core.errors import AccuracyWarning, CompileError, ParameterError
 from shaftwork.core.kept import Kept
 from shaftwork.core.notices import warn
+from shaftwork.core.parameters import in_si
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import Fractions, LinearInputs, Problem, Trajectory
 from shaftwork.network.netlist import Netlist
@@ -178,9 +179,10 @@ class Model(CompiledModel):
             SimulationError: nothing comes to rest or to a steady speed.
         """
         values = self._checked_all(parameters)
+        time = t if isinstance(t, float) and t == math.inf else in_si("t", t, "s")
         if self._changes_structure(values):
-            return self._variant(values).steady_state(t, initial=initial)
-        return self._steady(values, t, initial)
+            return self._variant(values).steady_state(time, initial=initial)
+        return self._steady(values, time, initial)
 
     def _steady(self, values: Mapping[str, float], t: float, initial: Given) -> dict[str, float]:
         if self.form.waves:

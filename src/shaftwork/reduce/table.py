@@ -10,7 +10,8 @@ from typing import Any
 
 from sympy import Add, Expr, Integer, Symbol, latex
 
-from shaftwork.components.laws import Table, omega, phi, s, v
+from shaftwork.components.laws import omega, phi, s, v
+from shaftwork.components.tables import Table
 from shaftwork.core.errors import SignalError
 from shaftwork.equations.assembly import Group
 from shaftwork.equations.nomenclature import column, unit

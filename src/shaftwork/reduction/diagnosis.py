@@ -10,7 +10,8 @@ from typing import Any
 import networkx as nx
 import sympy
 
-from shaftwork.components.laws import InterpolationSlope, breakpoints, t
+from shaftwork.components.laws import breakpoints, t
+from shaftwork.components.tables import InterpolationSlope
 from shaftwork.core.errors import Problem
 from shaftwork.network.checks import LEFT_OUT, connection_problems, examine
 from shaftwork.network.graph import CircuitGraph, build_graph

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from shaftwork.components.laws import Table, interpolate
+from shaftwork.components.tables import Table, interpolate
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
 from shaftwork.results.observer import Array
