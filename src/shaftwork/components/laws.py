@@ -13,7 +13,7 @@ from sympy.core.relational import Relational
 from shaftwork.components import noise
 from shaftwork.components.branches import ACROSS, INTEGRAL, readings_in
 from shaftwork.components.noise import SmoothNoise
-from shaftwork.components.tables import Table, TableFunction, interpolate, interpolation_slope
+from shaftwork.components.tables import TABLE_FUNCTIONS, Table, interpolate, interpolation_slope
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si, is_quantity
 
@@ -136,6 +136,8 @@ def switches(expression: sympy.Basic) -> Iterator[tuple[sympy.Expr, Sequence[flo
 
 def switches_of(node: sympy.Basic) -> Iterable[tuple[sympy.Expr, Sequence[float]]]:
     """Arguments of a node and the levels at which the node is not smooth in them."""
+    if isinstance(node, TABLE_FUNCTIONS):
+        return [(node.argument, node.xs)]
     match node:
         case Relational():
             return [(node.lhs - node.rhs, (0.0,))]
@@ -149,8 +151,6 @@ def switches_of(node: sympy.Basic) -> Iterable[tuple[sympy.Expr, Sequence[float]
             return [(sympy.cos(node.args[0]), (0.0,))]
         case sympy.cot() | sympy.csc():
             return [(sympy.sin(node.args[0]), (0.0,))]
-        case TableFunction():
-            return [(node.argument, node.xs)]
         case sympy.floor() | SmoothNoise():
             # a sine changes sign at every whole number, and no list of levels would have an end
             return [(sympy.sin(sympy.pi * node.args[0]), (0.0,))]

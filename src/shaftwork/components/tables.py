@@ -214,7 +214,7 @@ def interpolation_slope(x: Any, samples: Samples) -> Any:
     return slopes[np.searchsorted(xs, x, side="right")]
 
 
-class TableFunction(sympy.Function):  # type: ignore[misc]
+class _TableFunction(sympy.Function):  # type: ignore[misc]
     """A function of one argument whose data are the points of a table."""
 
     @property
@@ -249,7 +249,7 @@ class TableFunction(sympy.Function):  # type: ignore[misc]
         return self.func(self.argument.evalf(), self.table)
 
 
-class Interpolation(TableFunction):
+class Interpolation(_TableFunction):
     """`Table(x, y)(argument)` as a sympy expression; the points are `.xs` and `.ys`."""
 
     # lambdify finds the numerical function of a sympy function under this name
@@ -265,7 +265,7 @@ class Interpolation(TableFunction):
         return _latex_call("table", self, printer, exp)
 
 
-class InterpolationSlope(TableFunction):
+class InterpolationSlope(_TableFunction):
     """Derivative of an `Interpolation` by its argument: constant between the points."""
 
     _imp_ = staticmethod(interpolation_slope)
@@ -277,7 +277,7 @@ class InterpolationSlope(TableFunction):
         return _latex_call("slope", self, printer, exp)
 
 
-def _latex_call(name: str, node: TableFunction, printer: Any, exponent: str | None) -> str:
+def _latex_call(name: str, node: _TableFunction, printer: Any, exponent: str | None) -> str:
     power = "" if exponent is None else f"^{{{exponent}}}"
     argument, table = _printed(node.argument, printer), _printed(node.table, printer)
     return rf"\operatorname{{{name}}}{power}\left({argument};\, {table}\right)"
@@ -301,3 +301,7 @@ def _finite_floats(name: str, values: Iterable[Any]) -> tuple[float, ...]:
         if not math.isfinite(value):
             raise ParameterError(f"Table: {name}[{index}] = {value} is not finite. Remove that point.")
     return floats
+
+
+TABLE_FUNCTIONS = (Interpolation, InterpolationSlope)
+"""Functions whose data are the points of a table, which they name `xs`."""
