@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
+from weakref import ref
 
 import numpy as np
 import sympy
@@ -32,17 +33,22 @@ WEIGHT = 1e-3
 COOLDOWN = 1e-9
 
 
-@dataclass(eq=False)
+Listener = Callable[[int], bool]
+
+
+@dataclass(frozen=True, eq=False)
 class Compiled:
     """A compiled integrator.
 
+    What its events call must not lead back to it: of such a ring Python sees no end, and would keep it for ever.
+
     Args:
         integrator: the `heyoka.taylor_adaptive`.
-        listener: asked at a guard, with its number, whether the run goes on.
+        listeners: the last one is asked at a guard, with its number, whether the run goes on.
     """
 
-    integrator: Any = None
-    listener: Callable[[int], bool] | None = None
+    integrator: Any
+    listeners: list[Listener]
 
 
 @dataclass(frozen=True)
@@ -123,7 +129,7 @@ class HeyokaProgram:
         try:
             yield compiled
         finally:
-            compiled.listener = None
+            compiled.listeners.clear()
             idle.append(compiled)
 
     def switch_values(self, t: float | Array, x: Array, parameters: Array) -> Array:
@@ -196,7 +202,7 @@ class HeyokaProgram:
     def _compile(self, tolerance: float) -> Compiled:
         import heyoka
 
-        made = Compiled()
+        listeners: list[Listener] = []
         heyoka.set_logger_level_error()  # a failed run says so itself
         options: dict[str, Any] = {}
         if self.guards:
@@ -207,10 +213,10 @@ class HeyokaProgram:
             options["t_events"] = [
                 *(self._leaves_its_side(number, switch) for number, switch in enumerate(self.switches)),
                 *(self._comes_near(number, value) for number, value in enumerate(self.fading)),
-                *(self._end(number, guard, made) for number, guard in enumerate(self.guards)),
+                *(self._end(number, guard, listeners) for number, guard in enumerate(self.guards)),
                 *(self._outgrows(number, value) for number, value in enumerate(self.fading)),
             ]
-        made.integrator = interruptible(
+        integrator = interruptible(
             heyoka.taylor_adaptive,
             list(zip(self.variables, self.rows, strict=True)),
             [0.0] * len(self.rows),
@@ -218,7 +224,7 @@ class HeyokaProgram:
             compact_mode=len(self.rows) > LARGEST_UNROLLED,
             **options,
         )
-        return made
+        return Compiled(integrator, listeners)
 
     def _comes_near(self, number: int, value: Any) -> Any:
         """The event that what is fading comes near."""
@@ -232,15 +238,19 @@ class HeyokaProgram:
 
         size = heyoka.par[self.first_weight + number] * (value**2 + NEAR**2)
 
+        program = ref(self)
+
         def weigh(integrator: Any, _direction: int) -> bool:
-            self.weigh(integrator)
+            made = program()
+            assert made is not None  # noqa: S101 (whose run it is)
+            made.weigh(integrator)
             return True
 
         return heyoka.t_event(
             (size - WEIGHT**2) * (1.0 - size), direction=heyoka.event_direction.negative, callback=weigh
         )
 
-    def _end(self, number: int, guard: Any, compiled: Compiled) -> Any:
+    def _end(self, number: int, guard: Any, listeners: list[Listener]) -> Any:
         """The event that a guard rises through an offset on its side; the run goes on if whoever listens says so."""
         import heyoka
 
@@ -249,7 +259,7 @@ class HeyokaProgram:
         met = heyoka.select(side, side * guard - offset, heyoka.expression(-1.0))
 
         def ask(_integrator: Any, _direction: int) -> bool:
-            return compiled.listener is not None and compiled.listener(number)
+            return bool(listeners) and listeners[-1](number)
 
         # heyoka's own cooldown grows with the tolerance, and hides what follows soon
         return heyoka.t_event(met, direction=heyoka.event_direction.positive, callback=ask, cooldown=COOLDOWN)
@@ -270,14 +280,16 @@ class HeyokaProgram:
 
     def _passed(self, number: int) -> Callable[[Any, int], bool]:
         """What happens where a switch leaves its side: it has the other, or a whole number gives way to the next."""
-        index = self.parameter_count + number
+        index, program = self.parameter_count + number, ref(self)
 
         def turn(integrator: Any, _direction: int) -> bool:
             integrator.pars[index] = -integrator.pars[index]
             return True
 
         def step(integrator: Any, _direction: int) -> bool:
-            self.step(number, integrator)
+            made = program()
+            assert made is not None  # noqa: S101 (whose run it is)
+            made.step(number, integrator)
             return True
 
         return step if self.held is not None and number in self.held.by_switch else turn

@@ -21,6 +21,9 @@ from shaftwork.core.files import replaced
 ROOM = 2**25
 """Bytes of compiled code that are kept, of the most recently used: opening it takes longer the more there is, 0.3 s of
 each process for 1 GiB, which is more than most networks take to compile."""
+USUAL_MEMORY, MEMORY = 2**31, 2**28
+"""Bytes of compiled code that heyoka keeps in memory for models made again, of its own accord and for us: a network has
+some 0.1 MB, and a process that makes tens of thousands of them must not grow by gigabytes."""
 KEPT, SUMS = "cache.db", "sums.json"
 """heyoka's file and ours."""
 PATIENCE = 2.0
@@ -31,6 +34,8 @@ _COLUMNS = "hash, bitcode, comp_flag, env_fingerprint, opt_bc, opt_ir, obj"
 def keep_apart() -> None:
     """Keep compiled code in a folder of our own beside heyoka's, or nowhere where no folder can be made."""
     state = heyoka.llvm_state
+    if state.get_memcache_limit() == USUAL_MEMORY:
+        state.set_memcache_limit(MEMORY)
     path = state.get_diskcache_path()
     if path.name == "heyoka":  # nobody has said where
         own = path.parent / "shaftwork"

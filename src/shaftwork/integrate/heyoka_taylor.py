@@ -101,9 +101,9 @@ class _Run:
             self._guard(self.problem.guards.sides, self.problem.guards.offsets)
         self.program.weigh(integrator)
         watch = self._watch(piece)
-        self.lent.listener = None
+        self.lent.listeners.clear()
         longest = self._first_step(piece)
-        self.lent.listener = self._reacts if watch is None else None
+        self.lent.listeners[:] = [self._reacts] if watch is None else []
         while True:
             left = self.problem.max_steps - self.steps
             raw, outcome, steps = advance(integrator, watch, left if longest == math.inf else 1, longest)
