@@ -162,20 +162,31 @@ KINDS: dict[str, Callable[[Random, Path], str]] = {
 }
 
 
-def faults(kind: str, first: int, count: int) -> Iterator[str]:
-    """What is wrong, case by case."""
-    gc.disable()  # what earlier cases have left would count as time of this one
-    signal.signal(signal.SIGPROF, _overrun)
-    with tempfile.TemporaryDirectory() as folder:
-        _load_libraries()
-        gc.collect()
-        gc.freeze()
-        for number in range(first, first + count):
-            gc.collect()
-            _limit_memory()
-            os.write(2, f"\0{kind} {number}".encode())  # if it crashes
-            if fault := KINDS[kind](Random(f"{kind} {number}"), Path(folder)):  # noqa: S311
-                yield f"{kind} {number}: {fault}"
+def faults(kind: str, first: int, count: int, before: Callable[[str], object] = lambda _: None) -> Iterator[str]:
+    """What is wrong, case by case.
+
+    Args:
+        kind: one of `KINDS`.
+        first: number of the first case.
+        count: how many.
+        before: called before each case with its name.
+    """
+    _load_libraries()
+    usual = signal.signal(signal.SIGPROF, _overrun)
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            for case in (f"{kind} {number}" for number in range(first, first + count)):
+                before(case)
+                if fault := KINDS[kind](Random(case), Path(folder)):  # noqa: S311
+                    yield f"{case}: {fault}"
+    finally:
+        signal.signal(signal.SIGPROF, usual)
+
+
+def _in_little_room(case: str) -> None:
+    gc.collect()  # what earlier cases have left would count as time of this one
+    _limit_memory()
+    os.write(2, f"\0{case}".encode())  # if it crashes
 
 
 def _load_libraries() -> None:
@@ -193,5 +204,8 @@ def _limit_memory() -> None:
 
 
 if __name__ == "__main__":
-    for fault in faults(sys.argv[1], int(sys.argv[2]), int(sys.argv[3])):
+    _load_libraries()
+    gc.disable()
+    gc.freeze()
+    for fault in faults(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]), _in_little_room):
         sys.stdout.write(f"{fault}\n\0\n")

@@ -12,9 +12,12 @@ from pathlib import Path
 
 import pytest
 
+from tests.faults.fuzz import faults
+
 ROOT = Path(__file__).parents[2]
 EXAMPLES = int(os.environ.get("SHAFTWORK_EXAMPLES", "20"))
-FEW = {"laws": 100, "files": 40, "commands": 30, "studies": 6}
+FEW = {"laws": 200, "files": 60, "commands": 0, "studies": 0}
+"""Cases that are tried in this process, within limits of time alone."""
 SHARE = {"laws": 20, "files": 10, "commands": 5, "studies": 2}
 """Cases for each of SHAFTWORK_EXAMPLES."""
 
@@ -38,7 +41,7 @@ def fuzz(kind: str, first: int, count: int) -> None:
 
 @pytest.mark.parametrize("kind", ["laws", "files"])
 def test_a_few_hundred_wrong_inputs_end_in_a_result_or_a_named_error(kind: str) -> None:
-    fuzz(kind, 0, FEW[kind])
+    assert list(faults(kind, 0, FEW[kind])) == []
 
 
 @pytest.mark.slow
