@@ -370,6 +370,11 @@ def test_a_unit_step_is_printed_as_one(arguments: tuple[int, ...]) -> None:
 
 
 def test_a_factor_of_two_terms_stands_before_their_bracket() -> None:
-    """As textbooks print the rate of a spring."""
-    text = equations_of(crane()).latex(form="state")
-    assert r"&= c_{\mathrm{shaft}} \left( \omega_{1} - \omega_{2} \right)" in re.sub(r" +", " ", text)
+    """As textbooks print Newton's law of an inertia between a motor and a shaft."""
+    net = NetworkBuilder("pair")
+    net.add(TorqueSource("motor", tau=omega - 1, symbol="M"), "a")
+    net.add(Inertia("J1", J=1.0), "a")
+    net.add(Spring("shaft", c=5.0, symbol="sh"), "a", "b")
+    net.add(Inertia("J2", J=2.0), "b")
+    text = re.sub(r" +", " ", equations_of(net).latex(form="state"))
+    assert r"&= \frac{1}{J_{1}} \left( \tau_{M} - \tau_{\mathrm{sh}} \right)" in text

@@ -46,6 +46,7 @@ def test_every_mechanical_component_is_referred_or_refused(name: str) -> None:
         assert isinstance(seen(kind, Scale(-2.5)), str) is (name in ONE_WAY)
         # a machine of one pole pair is one of two pairs at half its speed, and there is none of two and a half
         assert not isinstance(seen(kind, Scale(2.0)), str)
+        assert isinstance(seen(kind, Scale(0.4)), str) is ("pole_pairs" in kind.declared)
 
 
 def test_a_part_whose_law_does_not_scale_so_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:

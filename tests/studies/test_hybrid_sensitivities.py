@@ -193,6 +193,18 @@ def test_impacts_through_a_gear_that_rubs_equal_central_differences() -> None:
     assert_differences(net, ["end C.omega", "rms C.omega"], 0.6, ("gap.restitution", "g.ratio", "g.efficiency"))
 
 
+def test_a_motor_that_is_switched_off_later_gives_its_torque_for_so_much_longer() -> None:
+    """Without load: the speed at the end is that at t_off, and grows by tau / J."""
+    net = sw.Network("coasting")
+    net.add(sw.KlossMotor("motor", tau_k=10.0, s_k=0.2, n_sync=1500, t_off=0.5), "a")
+    net.add(sw.Inertia("J", J=0.5), "a")
+    made = motion_sensitivities(net, ["end J.omega"], t_end=1.0, parameters=("motor.t_off",))
+    torque = net.simulate(1.0, t_eval=[np.nextafter(0.5, 0.0), 1.0])["motor.tau"]
+    assert torque[0] > 1.0
+    assert torque[1] == 0.0
+    assert made["end J.omega"]["motor.t_off"] == pytest.approx(torque[0] / 0.5, rel=1e-7)
+
+
 def test_derivatives_of_a_tiny_motion_are_those_of_a_large_one() -> None:
     """The motion goes with the torque, and so do its derivatives by all that is no torque."""
 
