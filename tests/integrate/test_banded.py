@@ -397,6 +397,16 @@ def test_a_motion_that_cannot_go_on_is_named(rhs, reason):
         banded.solve(problem)
 
 
+def test_a_motion_that_two_laws_drive_back_to_their_jump_is_named(monkeypatch):
+    monkeypatch.setattr("shaftwork.integrate.pieces.STALL_STEPS", 100)
+    problem = Problem(
+        lambda _t, x: -np.sign(x) - 0.5, lambda _t, _x: sparse.csc_array((1, 1)), np.ones(1), 0.0, 3.0,
+        ("motor.omega",), np.array([1e-9]), max_steps=20_000,
+    )  # fmt: skip
+    with pytest.raises(SimulationError, match=r"banded engine failed at t = 0\.66666.*both sides of a jump"):
+        banded.solve(problem)
+
+
 def test_a_run_ends_when_its_steps_are_used_up(oscillator):
     with pytest.raises(SimulationError, match=r"banded engine.*3 steps were not enough"):
         banded.solve(replace(oscillator.problem, max_steps=3, rtol=1e-10))

@@ -442,6 +442,14 @@ def test_too_many_panels_are_refused(kind):
         delay.solve(two_inertias(step, 100 * T, max_steps=50, **KINDS[kind]))
 
 
+def test_as_many_panels_as_are_allowed_may_be_taken():
+    problem = two_inertias(step, 9 * T, linear=False)
+    steps = delay.solve(problem).statistics["steps"]
+    assert delay.solve(replace(problem, max_steps=steps)).statistics["steps"] == steps
+    with pytest.raises(SimulationError, match=f"{steps - 1} steps"):
+        delay.solve(replace(problem, max_steps=steps - 1))
+
+
 def test_a_motion_without_bounds_is_named():
     problem = two_inertias(step, 10 * T, linear=False)
     problem = replace(
