@@ -62,6 +62,14 @@ def test_every_component_is_a_frozen_value(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", OWN)
+def test_what_must_be_above_a_bound_may_be_as_small_as_one_likes(name: str) -> None:
+    """What is small depends on the machine, and a component does not know it; but for pure numbers and angles."""
+    sizes = [one for one in REGISTRY[name].declared.values() if one.above is not None and one.unit not in {"1", "rad"}]
+    assert [one.objection(1e-6) for one in sizes] == [None] * len(sizes)
+    assert all("must be above 0" in (one.objection(0.0) or "") for one in sizes)
+
+
+@pytest.mark.parametrize("name", OWN)
 def test_a_ratio_is_never_zero_and_an_efficiency_never_zero_or_above_one(name: str) -> None:
     wrong = [("ratio", 0.0), ("efficiency", 0.0), ("efficiency", 1.01), ("efficiency_back", 1.01)]
     declared = REGISTRY[name].declared

@@ -18,6 +18,12 @@ def test_a_hollow_section_is_the_solid_one_less_its_bore() -> None:
     assert hollow.stiffness == pytest.approx(solid.stiffness - bore.stiffness, rel=1e-15)
 
 
+def test_a_wire_is_as_soft_as_the_fourth_power_of_its_diameter() -> None:
+    wire = Section.of_geometry(1e-3, 2e-5)
+    assert wire.stiffness == pytest.approx(1e-12 * SHAFT.stiffness, rel=1e-14)
+    assert wire.inertia == pytest.approx(1e-12 * SHAFT.inertia, rel=1e-14)
+
+
 def test_delay_and_impedance_are_those_of_the_material() -> None:
     # Popenda 2019, (15): v = (G / rho)^0.5; Z = J' v. Square roots and products: a few roundings.
     speed = math.sqrt(77.5e9 / 7900)

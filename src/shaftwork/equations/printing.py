@@ -157,7 +157,7 @@ class Writer:
     def _group(self, group: Group) -> list[str]:
         """The pieces of a group, each with its sign."""
         factor, terms = group
-        if len(terms) < 2 or factor == 1:
+        if len(terms) < 2:
             return [piece for term in terms for piece in self._parted(factor * term)]
         if self._valued(factor) == 1:
             return [piece for term in terms for piece in self._parted(term)]
