@@ -378,3 +378,17 @@ def test_a_factor_of_two_terms_stands_before_their_bracket() -> None:
     net.add(Inertia("J2", J=2.0), "b")
     text = re.sub(r" +", " ", equations_of(net).latex(form="state"))
     assert r"&= \frac{1}{J_{1}} \left( \tau_{M} - \tau_{\mathrm{sh}} \right)" in text
+
+
+@pytest.mark.parametrize(
+    ("J", "printed"),
+    [(0.5, r"2 \left( \tau_{M} - \tau_{\mathrm{sh}} \right)"), (1.0, r"\tau_{M} - \tau_{\mathrm{sh}}")],
+)
+def test_a_factor_in_numbers_stands_before_the_bracket_unless_it_is_one(J: float, printed: str) -> None:
+    net = NetworkBuilder("pair")
+    net.add(TorqueSource("motor", tau=omega - 1, symbol="M"), "a")
+    net.add(Inertia("J1", J=J), "a")
+    net.add(Spring("shaft", c=5.0, symbol="sh"), "a", "b")
+    net.add(Inertia("J2", J=2.0), "b")
+    text = re.sub(r" +", " ", equations_of(net).latex(form="state", values=True))
+    assert rf"\frac{{d \omega_{{1}}}}{{d t}} &= {printed} \\" in text

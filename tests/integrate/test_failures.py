@@ -93,10 +93,9 @@ def choice_linear(matrix):
 def test_the_exact_engine_refuses_what_is_not_linear_or_not_straight(oscillator):
     with pytest.raises(ParameterError, match="needs a linear system"):
         choice.solve(replace(oscillator.problem, linear=None), "exact")
-    for size in (1.0, 1e-13):
-        bent = replace(oscillator.problem.linear, forcing=lambda t, size=size: np.array([0.0, size * np.sin(t)]))
-        with pytest.raises(ParameterError, match=r"'J1.omega' bends between t = 0 s and 1 s"):
-            choice.solve(replace(oscillator.problem, linear=bent), "exact")
+    bent = replace(oscillator.problem.linear, forcing=lambda t: np.array([0.0, np.sin(t)]))
+    with pytest.raises(ParameterError, match=r"'J1.omega' bends between t = 0 s and 1 s"):
+        choice.solve(replace(oscillator.problem, linear=bent), "exact")
 
 
 def test_heyoka_asks_for_a_program(oscillator):

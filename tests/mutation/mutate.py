@@ -274,6 +274,8 @@ def main() -> None:
             finished.append({**asdict(mutant), **tried(out / "tree", mutant, reach, arguments.seconds)})
             with results.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(finished[-1]) + "\n")
+    for one in (one for one in finished if one["status"] == "survived"):
+        print(f"{one['file']}:{one['line']} {one['old']} -> {one['new']}  ({one['tests']} of {one['of']} tests)")  # noqa: T201
     print(table(finished))  # noqa: T201
 
 
