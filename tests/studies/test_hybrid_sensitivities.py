@@ -220,6 +220,23 @@ def test_derivatives_of_a_tiny_motion_are_those_of_a_large_one() -> None:
     assert by_inertia(1e-9) == pytest.approx(by_inertia(1e3), rel=1e-6)
 
 
+def test_derivatives_through_tiny_impacts_are_those_through_large_ones() -> None:
+    """Which way a motion went through several changes at once is told by parts of its size, whatever that is."""
+
+    def found(size: float) -> list[float]:
+        net = sw.Network("flanks")
+        net.add(sw.TorqueSource("T", tau=3.0 * size), "a")
+        net.add(sw.Inertia("J1", J=0.6), "a")
+        net.add(sw.Backlash("g", gap=0.1 * size, restitution=0.5, omega_rest=1e-2 * size), "a", "b")
+        net.add(sw.Inertia("J2", J=1.4), "b")
+        net.add(sw.LossyGear("gear", ratio=2.0, efficiency=0.8), "b", "c")
+        net.add(sw.Inertia("J3", J=0.5), "c")
+        made = motion_sensitivities(net, ["end J2.omega"], t_end=0.8, parameters=("J1.J", "gear.efficiency"))
+        return [value / size for value in made["end J2.omega"].values()]
+
+    assert found(1e-5) == pytest.approx(found(1.0), rel=1e-8)
+
+
 def test_a_brake_that_comes_on_by_the_speed_and_the_time_is_the_closed_form() -> None:
     """On from omega + t / 1 s = 6 on: after t* = 6 / (1 + tau / J) the motion goes on with the torque that is left."""
     tau, brake, inertia, t_end = 10.0, 4.0, 2.0, 3.0
