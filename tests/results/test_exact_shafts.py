@@ -238,6 +238,18 @@ def test_a_motion_with_waves_is_a_point() -> None:
         net.compile().linearize()
 
 
+def test_a_torque_that_holds_a_shaft_against_a_spring_is_the_same_in_both() -> None:
+    """A mode of rate zero: nothing turns, and what the shaft takes in the spring takes to the frame."""
+    net = sw.Network("held")
+    net.add(sw.SpeedSource("drive", omega=10.0), "a")
+    net.add(sw.Shaft("line", length=1.0, diameter=0.02, model=sw.Wave(), **STEEL), "a", "b")
+    net.add(sw.Inertia("J", J=0.02), "b")
+    net.add(sw.Spring("holder", c=500.0), "b", "ground")
+    modes = net.modes({}, 2)
+    assert modes.rates[0] == 0
+    np.testing.assert_allclose(modes.shapes["line.tau"][0], modes.shapes["holder.tau"][0], rtol=1e-9)
+
+
 @pytest.mark.parametrize(("roots", "kept"), [((10j, 10.0001j), False), ((9j, 11j), True)])
 def test_two_starts_that_lead_to_one_root_are_no_two_modes(roots: tuple[complex, complex], kept: bool) -> None:  # noqa: FBT001
     """The mesh is then too coarse to tell them apart, and a finer one is made."""
