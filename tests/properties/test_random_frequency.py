@@ -8,8 +8,14 @@ from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
 from shaftwork.results.linear import LinearModel
-from tests.properties.examples import assert_equal_signals, compiled, inner_drives, share_of_examples
-from tests.properties.test_random_networks import _across, _through
+from tests.properties.examples import (
+    across_signals,
+    assert_equal_signals,
+    compiled,
+    inner_drives,
+    share_of_examples,
+    through_signals,
+)
 from tests.reference import mna
 from tests.reference.mna import SOURCE_VALUE
 from tests.reference.pencil import Reduced
@@ -65,7 +71,7 @@ def test_every_quantity_responds_to_all_sources_as_the_referee_says(pieces: Netw
     inputs = [f"{drive.name}.{SOURCE_VALUE[drive.type]}" for drive in drives]
     z = sum((_amplitudes(r, k, F) for k in range(len(drives))), start=np.zeros((len(d.unknowns), len(F))))
     response = mna.named(d.unknowns, r.determined, F.astype(complex), z)
-    wanted = _across(pieces, response) | dict(_through(pieces, response))
+    wanted = across_signals(pieces, response) | dict(through_signals(pieces, response))
     linear = compiled(pieces).linearize(outputs=tuple(wanted))
     assert sorted(linear.inputs) == sorted(inputs)
     found = dict(zip(linear.outputs, _transfer(linear, F).sum(axis=1), strict=True))

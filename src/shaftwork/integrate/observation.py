@@ -81,6 +81,7 @@ def largest_part(observed: Observed, errors: Array, values: Array) -> tuple[floa
     sizes = np.abs(values).max(axis=0, initial=0.0)
     sizes[observed.first_left :] = 0.0
     largest = {kind: float(sizes[kinds == kind].max()) for kind in dict.fromkeys(observed.kinds)}
+    largest[""] = float(sizes[observed.first_through :].max(initial=0.0))
     parts = [
         min(error / max(largest[kind], 1e-300), 1e300) if error else 0.0
         for error, kind in zip(errors.tolist(), observed.kinds, strict=True)

@@ -36,9 +36,10 @@ class Observed(NamedTuple):
 
     Args:
         values: from times (k,) and states (k, n) to (k, m): across, through, and what should be zero.
-        kinds: (m,) their units.
+        kinds: (m,) their units; "" of a multiplier of a coupling, which counts against all that passes through.
         names: (m,) their parts.
         direct: (m,) whether a value is a speed or a state; what dampers give is a difference times their d.
+        first_through: number of the first value that passes through a branch.
         first_left: number of the first value that should be zero.
     """
 
@@ -46,6 +47,7 @@ class Observed(NamedTuple):
     kinds: tuple[str, ...]
     names: tuple[str, ...]
     direct: Any
+    first_through: int
     first_left: int
 
 

@@ -69,7 +69,7 @@ def observed(prepared: Prepared) -> Observed:
     names = (*nodes.values(), *owners, *(owners[branch] for branch in tree))
     direct = np.arange(len(kinds)) < len(nodes)
     direct[[len(nodes) + branch for branch in form.through_states]] = True
-    return Observed(values, kinds, names, direct, len(nodes) + len(owners))
+    return Observed(values, kinds, names, direct, len(nodes), len(nodes) + len(owners))
 
 
 def nominal_tolerances(form: StateForm, coefficients: Array) -> Array:
