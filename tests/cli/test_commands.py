@@ -116,6 +116,15 @@ def test_a_wrong_sweep_is_answered_with_what_would_be_right(
     assert words in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("speeds", [("--n-max", "inf"), ("--n-max", "0"), ("--n-min", "-5", "--n-max", "10")])
+def test_speeds_that_make_no_diagram_are_refused_before_anything_is_computed(
+    speeds: tuple[str, ...], model: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sw.Network, "compile", None)
+    assert main(["campbell", model, *speeds]) == WRONG_INPUT
+    assert "give two speeds in 1/min, the lower one 0 or more" in capsys.readouterr().err
+
+
 def test_a_sweep_that_is_interrupted_goes_on_from_its_store(
     model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
