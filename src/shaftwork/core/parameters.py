@@ -202,8 +202,10 @@ def in_si(name: str, value: Any, unit: str = "1", **bounds: Any) -> float:
 
 def whole(value: Any, least: int = 1, most: float = math.inf) -> int | None:
     """A count of any kind of integer, numpy's too, as Python's own; None where it is none or out of its range."""
+    if isinstance(value, bool) or getattr(getattr(value, "dtype", None), "kind", "") == "b":  # numpy's bool too
+        return None
     try:
-        count = None if isinstance(value, bool) else index(value)
+        count = index(value)
     except TypeError:
         return None
     return count if count is not None and least <= count <= most else None
