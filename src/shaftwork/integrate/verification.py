@@ -18,6 +18,8 @@ WORTH_SAYING = 2e-7
 SMALLEST = 1e-9
 # An engine with a tolerance may be off by this many times of it, 1e-6 at the usual one: errors add up over its steps.
 TOLERATED = 100.0
+# The error of as many steps as a run has taken is no surprise either, up to this part.
+UNSURPRISING = 1e-6
 
 
 def objection(problem: Problem, trajectory: Trajectory, engine: str) -> str | None:
@@ -50,7 +52,8 @@ def objection(problem: Problem, trajectory: Trajectory, engine: str) -> str | No
     run = exact.reference(replace(problem, t_eval=times, progress=None))
     if run is None:
         return None
-    limit = max(TOLERATED * problem.rtol, SMALLEST) + run.doubt
+    added_up = min(trajectory.statistics.get("steps", 0) * problem.rtol, UNSURPRISING)
+    limit = max(TOLERATED * problem.rtol, added_up, SMALLEST) + run.doubt
     wanted = observed.values(times, run.x)
     part, name = _part(observed, trajectory, np.abs(values - wanted).max(axis=0, initial=0.0), wanted, limit)
     if part <= limit:
