@@ -90,3 +90,12 @@ def test_what_compiled_code_gives_or_raises_passes_through() -> None:
     assert interruptible(divmod, 7, 2) == (3, 1)
     with pytest.raises(ZeroDivisionError, match="by zero"):
         interruptible(divmod, 7, 0)
+
+
+def test_the_exact_engine_says_how_far_it_is_at_each_instant_of_its_inputs() -> None:
+    net = sw.Network("steps")
+    net.add(sw.TorqueSource("motor", tau=sw.Step(1.0, 1.0) + sw.Step(2.0, 2.5)), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    times: list[float] = []
+    assert net.simulate(4.0, progress=times.append).engine == "exact"
+    assert times == [1.0, 2.5, 4.0]

@@ -18,7 +18,16 @@ from shaftwork.integrate.banded_matrix import ShiftedMatrix
 from shaftwork.integrate.banded_method import ShiftedCollocation, shifted_collocation
 from shaftwork.integrate.banded_stages import LinearStages, NewtonStages, Stages, StepStart, shifted
 from shaftwork.integrate.crossings import Crossings
-from shaftwork.integrate.pieces import Pace, Piece, both_sides, check_finite, failure, pieces, start_of_piece
+from shaftwork.integrate.pieces import (
+    Pace,
+    Piece,
+    both_sides,
+    check_finite,
+    failure,
+    pieces,
+    start_of_piece,
+    used_up,
+)
 from shaftwork.integrate.problem import Array, Problem, Trajectory
 
 STAGES = 6
@@ -232,7 +241,7 @@ class _Run:
     def _check(self, start: StepStart, step: float) -> None:
         """Raise where a run cannot go on."""
         if len(self.steps) + self.rejected >= self.problem.max_steps:
-            raise failure(self.problem, "banded", start.t, start.x, f"{self.problem.max_steps} steps were not enough")
+            raise failure(self.problem, "banded", start.t, start.x, used_up(self.problem))
         if not step > 8 * np.spacing(abs(start.t)):
             reason = self.stages.reason("the step became too small")
             raise failure(self.problem, "banded", start.t, start.x, reason)

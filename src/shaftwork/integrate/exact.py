@@ -4,23 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
-from scipy import sparse
-from scipy.linalg import expm
-from scipy.sparse.linalg import expm_multiply
 
 from shaftwork.core.errors import ParameterError
 from shaftwork.integrate.driven import driven, polynomials
-from shaftwork.integrate.modal import Modes, find_modes
+from shaftwork.integrate.linear_system import LinearSystem, propagator_of, system_of
 from shaftwork.integrate.observation import difference, doubt
 from shaftwork.integrate.pieces import Piece, both_sides, failure, pieces, start_of_piece
 from shaftwork.integrate.precise import Nearby, PrecisePiece, PreciseSystem, precise_piece, precise_system, seconds
 from shaftwork.integrate.problem import Array, LinearInputs, Problem, Trajectory
-from shaftwork.integrate.stiffness import balance, norm, scale_by
 from shaftwork.integrate.straight import straight_line
 
 # Intervals of the engine's own output grid, which no accuracy depends on.
@@ -66,7 +60,7 @@ def solve(problem: Problem) -> Trajectory:
             f"small (up to {LARGEST_DRIVEN} states), its modes are well conditioned and polynomials resolve the input; "
             "take the engine 'auto'."
         )
-    system = _system(linear)
+    system = system_of(linear)
     dense_form = problem.linear is None or prefers_dense(problem, linear)
     trajectory = _propagated(problem, system, lambda piece, x: _span(problem, system, piece, x, dense_form=dense_form))
     part = doubt(problem, trajectory, _lost(problem, system, trajectory))
@@ -88,20 +82,21 @@ def _spread(problem: Problem, linear: LinearInputs, trajectory: Trajectory) -> f
     """How far a run moves where each entry of A is rounded once more, as a part of the largest value of its kind."""
     rounded = linear.A.copy()
     rounded.data = rounded.data * (1 + np.finfo(float).eps * np.random.default_rng(0).choice((-1.0, 1.0), rounded.nnz))
-    system = _System(replace(linear, A=rounded))
+    system = LinearSystem(replace(linear, A=rounded))
     dense_form = problem.linear is None or prefers_dense(problem, linear)
     if problem.linear is None and system.modes is None:
         return 1.0
+    problem = replace(problem, progress=None)
     other = _propagated(problem, system, lambda piece, x: _span(problem, system, piece, x, dense_form=dense_form))
     return difference(problem, trajectory, other)
 
 
-def _nearby(problem: Problem, system: _System, piece: Piece) -> Nearby:
+def _nearby(problem: Problem, system: LinearSystem, piece: Piece) -> Nearby:
     """The motion in floats from the node before each time: over so short a time they lose little."""
     level, slope = straight_line(problem, system.forcing, piece)
     modes, scale = system.modes, system.scale
     if modes is None:
-        return _propagator(system, level, slope, dense_form=True).between
+        return propagator_of(system, level, slope, dense_form=True).between
 
     def between(nodes: Array, states: Array, times: Array) -> Array:
         index = np.clip(np.searchsorted(nodes, times, side="right") - 1, 0, nodes.size - 1)
@@ -114,7 +109,7 @@ def _nearby(problem: Problem, system: _System, piece: Piece) -> Nearby:
     return between
 
 
-def _lost(problem: Problem, system: _System, trajectory: Trajectory) -> Array:
+def _lost(problem: Problem, system: LinearSystem, trajectory: Trajectory) -> Array:
     """(n,) what rounding may change in each state.
 
     Law: A is known to eps |A|, so in the scale of `balance` x is known to c eps |A| t |x|, c the condition of modes.
@@ -124,7 +119,7 @@ def _lost(problem: Problem, system: _System, trajectory: Trajectory) -> Array:
     return np.asarray(np.finfo(float).eps * system.condition * turns * size * system.scale)
 
 
-def _propagated(problem: Problem, system: _System, span_of: Callable[[Piece, Array], _Motion]) -> Trajectory:
+def _propagated(problem: Problem, system: LinearSystem, span_of: Callable[[Piece, Array], _Motion]) -> Trajectory:
     """The motion from piece to piece."""
     x = np.asarray(problem.x0, dtype=float)
     spans: list[_Motion] = []
@@ -134,6 +129,8 @@ def _propagated(problem: Problem, system: _System, span_of: Callable[[Piece, Arr
             span = span_of(piece, start)
         spans.append(span)
         x = span.end
+        if problem.progress is not None:
+            problem.progress(piece.end)
         if not np.isfinite(x).all():
             raise failure(problem, "exact", piece.end, x, "the motion is unbounded")
     starts = np.array([piece.start for piece in pieces(problem)])
@@ -147,7 +144,7 @@ def _propagated(problem: Problem, system: _System, span_of: Callable[[Piece, Arr
     return Trajectory(t, states, dense, {"steps": steps})
 
 
-def _precise(problem: Problem, system: _System) -> PreciseSystem | None:
+def _precise(problem: Problem, system: LinearSystem) -> PreciseSystem | None:
     """The system in whole numbers; None where a run would take too long, or inputs are no straight lines."""
     turns = system.norm * (problem.t_end - problem.t0)
     outputs = OWN_INTERVALS if problem.t_eval is None else problem.t_eval.size
@@ -166,7 +163,7 @@ def reference(problem: Problem) -> Trajectory | None:
 
 def drivable(problem: Problem) -> bool:
     """Whether inputs that are no straight lines can be followed mode by mode."""
-    if problem.driven is None or problem.x0.size > LARGEST_DRIVEN or _system(problem.driven).modes is None:
+    if problem.driven is None or problem.x0.size > LARGEST_DRIVEN or system_of(problem.driven).modes is None:
         return False
     return all(_inputs(problem.driven, piece) is not None for piece in pieces(problem))
 
@@ -175,7 +172,7 @@ def _inputs(linear: LinearInputs, piece: Piece) -> Array | None:
     """Values of the inputs of a piece that resolve them, in scaled coordinates; those of the last pieces are kept."""
     key = f"inputs from {piece.low!r} to {piece.high!r}"
     if key not in linear.found:
-        scale = _system(linear).scale[:, None]
+        scale = system_of(linear).scale[:, None]
         low, high = piece.low, piece.high
         found = polynomials(
             lambda elapsed: linear.forcing(np.clip(piece.start + elapsed, low, high)) / scale, piece.end - piece.start
@@ -201,85 +198,13 @@ def _dense_cost(problem: Problem) -> float:
 
 
 def _sparse_cost(problem: Problem, linear: LinearInputs) -> float:
-    system = _system(linear)
+    system = system_of(linear)
     products = TAYLOR_PRODUCTS * system.norm * (problem.t_end - problem.t0) + 20 * _size(problem)[1]
     return float(products * (SPARSE_CALL + system.matrix.nnz / SPARSE_RATE))
 
 
 def _size(problem: Problem) -> tuple[int, int]:
     return problem.x0.size + 2, OWN_INTERVALS if problem.t_eval is None else problem.t_eval.size
-
-
-class _System:
-    """The matrix of a problem in scaled coordinates x / scale, and its modes where they are of use."""
-
-    def __init__(self, linear: LinearInputs) -> None:
-        matrix = sparse.csr_array(linear.A)
-        self.forcing = linear.forcing
-        self.scale = balance(matrix)
-        self.matrix = scale_by(matrix, self.scale)
-        self.norm = norm(self.matrix)
-
-    @cached_property
-    def condition(self) -> float:
-        """How much the modes multiply rounding."""
-        return 1.0 if self.modes is None else self.modes.condition
-
-    @cached_property
-    def modes(self) -> Modes | None:
-        """The modes, or None where they are too badly conditioned."""
-        return find_modes(self.matrix.toarray())
-
-
-def _system(linear: LinearInputs) -> _System:
-    if "exact" not in linear.found:
-        linear.found["exact"] = _System(linear)
-    found: _System = linear.found["exact"]
-    return found
-
-
-@dataclass(frozen=True)
-class _Propagator:
-    """exp(M h) for one piece in scaled coordinates z = (x / scale, s, 1)."""
-
-    matrix: Any
-    scale: Array
-    dense_form: bool
-
-    def advance(self, block: Array, step: float) -> Array:
-        """exp(M step) times the columns of a block (n + 2, k)."""
-        if self.dense_form:
-            return np.asarray(expm(self.matrix * step) @ block)
-        return np.asarray(expm_multiply(self.matrix * step, block, traceA=self.matrix.trace() * step))
-
-    def march(self, x: Array, elapsed: float, step: float, count: int) -> Array:
-        """States (count, n) after 1..count equal steps from a state x (n,) that is `elapsed` seconds into the piece."""
-        start = np.concatenate([x / self.scale, [elapsed, 1.0]])
-        if not self.dense_form:
-            rows = expm_multiply(self.matrix, start, start=0.0, stop=step * count, num=count + 1, endpoint=True)
-            return np.asarray(rows[1:, :-2] * self.scale)
-        power = expm(self.matrix * step)
-        columns = (power @ start)[:, None]
-        # With k columns known, exp(M step k) gives the next k: about log2(count) products.
-        while columns.shape[1] < count:
-            missing = count - columns.shape[1]
-            columns = np.hstack([columns, power @ columns[:, :missing]])
-            power = power @ power
-        return np.asarray(columns[:-2].T * self.scale)
-
-    def between(self, nodes: Array, states: Array, times: Array) -> Array:
-        """States (k, n) at any times (k,) of a piece, each from the node before it."""
-        index = np.clip(np.searchsorted(nodes, times, side="right") - 1, 0, nodes.size - 1)
-        offsets = times - nodes[index]
-        # Offsets that differ by the rounding of the times share one exponential.
-        rounded = np.round(offsets / (2 * np.spacing(np.abs(nodes).max())))
-        values = states[index]
-        for key in np.unique(rounded[rounded > 0]):
-            chosen = np.flatnonzero(rounded == key)
-            elapsed = nodes[index[chosen]] - nodes[0]
-            block = np.vstack([(values[chosen] / self.scale).T, elapsed, np.ones(chosen.size)])
-            values[chosen] = self.advance(block, float(offsets[chosen].mean()))[:-2].T * self.scale
-        return values
 
 
 @dataclass(frozen=True)
@@ -331,7 +256,7 @@ class _ExactDense:
         return states
 
 
-def _span(problem: Problem, system: _System, piece: Piece, x: Array, *, dense_form: bool) -> _Span:
+def _span(problem: Problem, system: LinearSystem, piece: Piece, x: Array, *, dense_form: bool) -> _Span:
     times = _nodes(problem, piece)
     if problem.linear is None:
         return _driven_span(problem, system, piece, x, times)
@@ -347,7 +272,7 @@ def _span(problem: Problem, system: _System, piece: Piece, x: Array, *, dense_fo
             return states
 
         return _Span(times, at(np.array([piece.end]))[0], at)
-    propagator = _propagator(system, level, slope, dense_form=dense_form)
+    propagator = propagator_of(system, level, slope, dense_form=dense_form)
     states = np.empty((times.size, x.size))
     states[0] = x
     for first, count in _equal_steps(times):
@@ -357,7 +282,7 @@ def _span(problem: Problem, system: _System, piece: Piece, x: Array, *, dense_fo
     return _Span(times, states[-1], lambda asked: propagator.between(times, states, asked))
 
 
-def _driven_span(problem: Problem, system: _System, piece: Piece, x: Array, times: Array) -> _Span:
+def _driven_span(problem: Problem, system: LinearSystem, piece: Piece, x: Array, times: Array) -> _Span:
     values = None if problem.driven is None else _inputs(problem.driven, piece)
     assert values is not None and system.modes is not None  # noqa: PT018, S101 (`drivable` has said so)
     motion = driven(system.modes, values, x / system.scale, piece.end - piece.start)
@@ -385,16 +310,3 @@ def _equal_steps(times: Array) -> list[tuple[int, int]]:
     changes = np.flatnonzero(np.abs(np.diff(steps)) > 4 * np.spacing(np.abs(times).max())) + 1
     edges = [0, *changes.tolist(), steps.size]
     return [(first, last - first) for first, last in pairwise(edges)]
-
-
-def _propagator(system: _System, level: Array, slope: Array, *, dense_form: bool) -> _Propagator:
-    scale, matrix = system.scale, system.matrix
-    # A common factor of all states brings the forcing to the size of the matrix.
-    largest = max(np.abs(level / scale).max(initial=0.0), np.abs(slope / scale).max(initial=0.0))
-    size = system.norm
-    if largest > 0 and size > 0:
-        scale = scale * 2.0 ** np.ceil(np.log2(largest / size))
-    forcing = np.column_stack([slope / scale, level / scale])
-    clock = sparse.csr_array(np.array([[0.0, 1.0], [0.0, 0.0]]))
-    augmented = sparse.block_array([[matrix, sparse.csr_array(forcing)], [None, clock]], format="csr")
-    return _Propagator(augmented.toarray() if dense_form else augmented, scale, dense_form)

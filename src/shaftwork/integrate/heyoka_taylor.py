@@ -12,7 +12,7 @@ import numpy as np
 
 from shaftwork.core.errors import MissingExtraError, SimulationError
 from shaftwork.integrate.breaks import Breaks
-from shaftwork.integrate.pieces import Piece, PiecewiseDense, both_sides, failure, pieces, start_of_piece
+from shaftwork.integrate.pieces import Piece, PiecewiseDense, both_sides, failure, pieces, start_of_piece, used_up
 from shaftwork.integrate.problem import Array, Problem, SeriesError, Trajectory
 from shaftwork.integrate.switches import Watch, keeps_sides, settle
 
@@ -236,7 +236,7 @@ class _Run:
 
     def _reason(self, outcome: str, watch: Watch | None) -> str:
         if outcome == "step_limit":
-            return f"{self.problem.max_steps} steps were not enough"
+            return used_up(self.problem)
         if outcome == "err_nf_state":
             return "the state or its derivative is not finite"
         if watch is not None and watch.reason is not None:

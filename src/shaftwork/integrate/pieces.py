@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from shaftwork.core.errors import SimulationError, no_value
-from shaftwork.integrate.problem import Array, Explain, Problem, Timed
+from shaftwork.integrate.problem import Array, DaeProblem, Explain, Problem, Timed
 
 # A run has stalled when so many steps together advance by less than so many times this part of the whole time.
 STALL_STEPS, STALL_SPAN = 2000, 1e-10
@@ -199,6 +199,11 @@ def _near(problem: Timed, explain: Explain | None, t: float, x: Array) -> tuple[
     rates = problem.rhs(t, x) if isinstance(problem, Problem) else np.zeros_like(x)
     steps = np.append(0.0, AHEAD * (problem.t_end - problem.t0))[:, None]
     return explain(t + steps[:, 0], x + steps * np.where(np.isfinite(rates), rates, 0.0))
+
+
+def used_up(problem: Problem | DaeProblem) -> str:
+    """Why a run is given up that needs more steps than are allowed."""
+    return f"{problem.earlier_steps + problem.max_steps} steps were not enough"
 
 
 class Pace:

@@ -164,6 +164,7 @@ class Problem:
             in words; None where all have one. It is asked for messages.
         rough: the same of a law of which any part has no value or no slope, be it in a branch that does not hold.
         max_steps: an engine gives up, with a reason, after this many steps.
+        earlier_steps: of the same motion, before this part of it; they are told with the reason.
         progress: told again and again the time in s that an engine has reached, or None. What it raises ends the run.
         overall: the size of the largest state where it stays below one: so much smaller is a tolerance for all states.
         found: what an engine has found out about the equations, for its next run with them.
@@ -191,6 +192,7 @@ class Problem:
     explain: Explain | None = None
     rough: Explain | None = None
     max_steps: int = 10_000_000
+    earlier_steps: int = 0
     progress: Callable[[float], None] | None = None
     overall: float = 1.0
     found: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
@@ -210,8 +212,8 @@ class DaeProblem:
         x0: (n,) start values; the algebraic ones are a first guess.
         derivative0: (n,) first guess of dx/dt at the start.
         algebraic: indices of the unknowns whose derivative does not appear.
-        t0, t_end, names, atol, rtol, breakpoints, jump, sides, switches, guards, t_eval, explain, max_steps, progress:
-            as in `Problem`.
+        t0, t_end, names, atol, rtol, breakpoints, jump, sides, switches, guards, t_eval, explain, max_steps,
+            earlier_steps, progress: as in `Problem`.
     """
 
     residual: Callable[[float, Array, Array], Array]
@@ -231,6 +233,7 @@ class DaeProblem:
     t_eval: Array | None = None
     explain: Explain | None = None
     max_steps: int = 10_000_000
+    earlier_steps: int = 0
     progress: Callable[[float], None] | None = None
 
 

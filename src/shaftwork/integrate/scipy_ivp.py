@@ -23,6 +23,7 @@ from shaftwork.integrate.pieces import (
     pieces,
     reached,
     start_of_piece,
+    used_up,
 )
 from shaftwork.integrate.problem import Array, Problem, Trajectory, tightened
 from shaftwork.integrate.stiffness import rates
@@ -140,7 +141,7 @@ def _piece(
         solver = _solver(problem, piece, x, method, guard, longest)
         while times[-1] < piece.end:
             if len(interpolants) >= max_steps:
-                raise failure(problem, "scipy", solver.t, solver.y, f"{problem.max_steps} steps were not enough")
+                raise failure(problem, "scipy", solver.t, solver.y, used_up(problem))
             _advance(problem, solver, method, guard, times[-1], states[-1])
             if (objection := pace.objection(solver.t, rests=crossings.rests)) is not None:
                 raise failure(problem, "scipy", solver.t, solver.y, f"{method}: {objection}")

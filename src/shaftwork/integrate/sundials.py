@@ -27,6 +27,7 @@ from shaftwork.integrate.pieces import (
     failure,
     pieces,
     start_of_piece,
+    used_up,
 )
 from shaftwork.integrate.problem import Array, DaeProblem, Problem, Trajectory, tightened
 from shaftwork.integrate.sparsity import Pattern
@@ -260,7 +261,7 @@ def _attempt(problem: Problem | DaeProblem, open_solver: Opener, ask: Ask) -> Ma
         found.append((x, []))
         while t < piece.end:
             if left <= 0:
-                raise failure(problem, "sundials", t, x, f"{problem.max_steps} steps were not enough")
+                raise failure(problem, "sundials", t, x, used_up(problem))
             end, state = _step(problem, piece, opened, t, x, longest)
             # Its formulas meet a law at the ends of steps alone, so that a step may be cut off at a switch.
             inside = _Inside(opened, t, x, end, state)

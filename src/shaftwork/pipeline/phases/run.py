@@ -186,6 +186,7 @@ class Run:
             overall=demand.sizes.overall,
             t_eval=self._outputs(t, end),
             max_steps=demand.max_steps - self.steps,
+            earlier_steps=self.steps,
             react=passing,
             progress=demand.progress,
         )
