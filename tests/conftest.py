@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import signal
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -12,6 +13,9 @@ from hypothesis import HealthCheck, settings
 # said before numpy is loaded.
 for library in ("OMP", "OPENBLAS", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+
+# Who runs the tests in the background of a script ignores Ctrl-C, and so would they and the commands that they start.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 if importlib.util.find_spec("heyoka") is not None:
     import heyoka

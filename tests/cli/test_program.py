@@ -176,7 +176,7 @@ def test_an_unforeseen_error_ends_with_1_and_one_line(
 @pytest.mark.slow
 def test_a_reader_that_closes_the_pipe_ends_the_command_quietly() -> None:
     """The reader is gone before the first word, so that every write fails."""
-    command = [sys.executable, "-m", "shaftwork.cli", "latex", "shaft-chain"]
+    command = [sys.executable, "-m", "shaftwork", "latex", "shaft-chain"]
     reading, writing = os.pipe()
     os.close(reading)
     with os.fdopen(writing, "wb") as pipe:
@@ -220,7 +220,7 @@ def test_a_warning_goes_to_standard_error(tmp_path: Path, capsys: pytest.Capture
 
 
 def test_the_command_is_installed_and_its_help_fits_on_one_screen() -> None:
-    done = subprocess.run([sys.executable, "-m", "shaftwork.cli", "--help"], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-m", "shaftwork", "--help"], capture_output=True, text=True, check=True)
     assert len(done.stdout.splitlines()) <= 24
     for name in ("scenes", "run", "latex", "check"):
         assert name in done.stdout
@@ -249,3 +249,12 @@ def test_scenes_are_listed_for_machines_too(capsys: pytest.CaptureFixture[str]) 
     (first, *_) = json.loads(capsys.readouterr().out)["scenes"]
     assert first["name"] == "crane-start"
     assert first["t_end"] == 6.5
+
+
+def test_check_says_the_same_to_machines(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", "crane-start", "--json"]) == DONE
+    found = json.loads(capsys.readouterr().out)
+    assert found["parts"] == 5
+    assert "J1.omega" in found["states"]
+    assert found["problems"] == []
+    assert found["engine"] in ("heyoka", "scipy")

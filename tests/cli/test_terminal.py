@@ -20,7 +20,7 @@ from shaftwork.cli import DONE, INTERRUPTED
 
 pty = pytest.importorskip("pty", reason="needs pseudo-terminals")
 termios = pytest.importorskip("termios")
-COMMAND = [sys.executable, "-m", "shaftwork.cli"]
+COMMAND = [sys.executable, "-m", "shaftwork"]
 
 
 def started(

@@ -13,8 +13,20 @@ def run(options: Namespace, say: Say) -> Data:
     from shaftwork.pipeline.report import structure_report
 
     net, scene = load(options)
-    say(structure_report(net, scene.t_end if scene else FALLBACK_END))
-    return {}
+    model, t_end = net.compile(), scene.t_end if scene else FALLBACK_END
+    say(structure_report(net, model, t_end))
+    engine, why = model.choose_engine(t_end) if model.states else ("", "nothing is stored, so nothing is integrated")
+    return {
+        "network": net.name,
+        "parts": len(model.form.graph.parts),
+        "nodes": len(model.form.graph.nodes),
+        "states": model.states,
+        "problems": [{"severity": problem.severity, "text": str(problem)} for problem in net.check()],
+        "engine": engine,
+        "why": why,
+    }
 
 
-COMMAND = Command("check", "structure, states, time constants, stiffness, and the engine that auto would take", run)
+COMMAND = Command(
+    "check", "structure, states, time constants, stiffness, and the engine that auto would take", run, machines=True
+)

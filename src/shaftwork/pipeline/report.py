@@ -21,17 +21,15 @@ LARGEST_DENSE = 1500
 """States up to which all eigenvalues are computed."""
 
 
-def structure_report(net: Network, t_end: float) -> str:
+def structure_report(net: Network, model: Model, t_end: float) -> str:
     """Structure, states, time constants, stiffness, and the engine that "auto" would take, as text.
 
     Args:
         net: the network.
+        model: compiled from it.
         t_end: end of the motion that the engine is chosen for, s.
-
-    Raises:
-        NetworkError: the network cannot be assembled; lists every reason.
     """
-    return "\n".join(_lines(net, net.compile(), t_end))
+    return "\n".join(_lines(net, model, t_end))
 
 
 def _lines(net: Network, model: Model, t_end: float) -> Iterator[str]:

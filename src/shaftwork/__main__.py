@@ -1,4 +1,4 @@
-"""`python -m shaftwork.cli` is the command."""
+"""`python -m shaftwork` is the command."""
 
 from __future__ import annotations
 
