@@ -299,6 +299,8 @@ def test_at_rest_laws_are_read_at_the_start_and_parts_are_in_the_mode_they_have_
     stuck, moving = net.modes(), net.modes(at={"J1.omega": 8.0, "J2.omega": 8.0}, t=0.0)
     assert stuck.frequencies == pytest.approx([np.sqrt(24206.0 / 27.35) / (2 * np.pi)], rel=0.01)
     assert moving.frequencies == pytest.approx([0, np.sqrt(24206.0 * (1 / 27.35 + 1 / 62.5)) / (2 * np.pi)], rel=0.01)
-    assert stuck.title == "crane at rest (brake released, load stuck)"
-    assert moving.title == "crane at J1.omega = 8, J2.omega = 8 (brake released, load slipping forward)"
-    assert net.modes(t=8.0).title == "crane at rest (brake locked, load stuck)"
+    assert stuck.title == "crane at rest, laws at t = 0 s (brake released, load stuck)"
+    assert (
+        moving.title == "crane at J1.omega = 8, J2.omega = 8, laws at t = 0 s (brake released, load slipping forward)"
+    )
+    assert net.modes(t=8.0).title == "crane at rest, laws at t = 8 s (brake locked, load stuck)"
