@@ -35,6 +35,8 @@ psi = sympy.Symbol("psi", real=True)
 SYMBOLS: tuple[sympy.Symbol, ...] = (t, omega, phi, v, s, u, psi)
 """Every symbol that a law may contain."""
 
+MOST_POWER = 8
+"""Pulses of higher powers of time, and powers of such, are not looked for."""
 EDGES = (
     *(sympy.exp, sympy.sinh, sympy.cosh, sympy.tanh, sympy.coth, sympy.sech, sympy.csch),
     *(sympy.erf, sympy.erfc, sympy.atan, sympy.Pow),
@@ -168,8 +170,15 @@ def narrow_places(expression: sympy.Basic) -> Iterator[tuple[sympy.Expr, bool]]:
         if not isinstance(node, EDGES) or (isinstance(node, sympy.Pow) and not node.exp.is_negative):
             continue
         argument = node.args[0]
-        if argument.has(t) and (polynomial := argument.as_poly(t)) is not None:
-            yield argument if polynomial.degree() == 1 else argument.diff(t), isinstance(node, sympy.Pow)
+        if argument.has(t) and _is_simple(argument):
+            slope = argument.diff(t)
+            yield slope if slope.has(t) else argument, isinstance(node, sympy.Pow)
+
+
+def _is_simple(argument: sympy.Expr) -> bool:
+    """Whether an expression is a polynomial of time as pulses have it, which is soon taken apart."""
+    powers = [power.exp for power in argument.atoms(sympy.Pow) if power.has(t)]
+    return all(power.is_Integer and 0 < power <= MOST_POWER for power in powers) and argument.is_polynomial(t)
 
 
 def between_steps(expression: sympy.Expr) -> set[sympy.Symbol]:
