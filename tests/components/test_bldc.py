@@ -71,6 +71,7 @@ def test_switches_turn_at_their_angles_exactly() -> None:
     assert np.all(np.diff(np.round(steps)) == 1)
 
 
+@pytest.mark.slow
 def test_electrical_power_is_mechanical_power_copper_loss_and_what_is_stored() -> None:
     """Over the run, phase by phase of the motion, by a fine trapezoidal rule between outputs at its events."""
     model = _model()

@@ -122,7 +122,9 @@ def test_so_they_are_in_every_phase_of_every_scene(name: str) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::shaftwork.core.errors.NetworkWarning")
-@pytest.mark.parametrize("name", registered())
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow if name == "BLDCMotor" else ()) for name in registered()]
+)
 def test_so_they_are_with_every_component_in_every_mode(name: str) -> None:
     net = bed_of(name)
     (subject,) = (part for part in net.graph().parts if part.name == "subject")

@@ -146,6 +146,7 @@ def test_a_document_of_a_scene_has_each_of_its_phases_and_compiles(
         assert done.returncode == 0, done.stdout[-2000:]
 
 
+@pytest.mark.slow
 def test_without_a_phase_the_command_prints_the_one_in_which_the_motion_begins(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

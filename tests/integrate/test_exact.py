@@ -146,7 +146,7 @@ MODELS = [
 ]
 
 
-@pytest.mark.parametrize("load", [0.11, 0.025])
+@pytest.mark.parametrize("load", [0.11, pytest.param(0.025, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("model", MODELS, ids=str)
 def test_a_lossless_shaft_keeps_its_energy_for_100000_periods(model, load):
     """The shaft of Popenda 2019. The first mode turns 1e5 times, the highest 1e7 times and more."""

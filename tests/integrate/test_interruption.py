@@ -60,6 +60,7 @@ def test_a_motion_of_several_phases_says_how_far_it_is() -> None:
     assert max(times) == pytest.approx(9.0)
 
 
+@pytest.mark.slow
 def test_breaks_leave_a_compiled_run_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     """The steps are the same; heyoka drops what its time holds beyond a double, so that states round otherwise."""
     compiled = drive("pump").compile()

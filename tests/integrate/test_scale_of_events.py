@@ -69,7 +69,9 @@ def _softplus(x: float) -> float:
 @pytest.mark.parametrize("pulse", PULSES)
 @pytest.mark.parametrize("width", [1.0, 1e-4], ids=lambda width: f"{width:g} s wide")
 @pytest.mark.parametrize("middle", [5.0, 3333.3], ids=lambda middle: f"at {middle:g} s")
-@pytest.mark.parametrize("engine", ["auto", "heyoka", "scipy", "sundials"])
+@pytest.mark.parametrize(
+    "engine", ["auto", *(pytest.param(name, marks=pytest.mark.slow) for name in ("heyoka", "scipy", "sundials"))]
+)
 def test_a_pulse_of_torque_gives_its_impulse_however_far_away_it_is(
     width: float, middle: float, pulse: str, engine: str
 ) -> None:

@@ -42,7 +42,9 @@ def verdicts(engine: str, count: int) -> dict[int, str]:
     return found
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(
+    "engine", ["auto", "exact", *(pytest.param(name, marks=pytest.mark.slow) for name in ENGINES[2:])]
+)
 def test_a_network_of_extreme_values_is_right_or_says_that_it_is_not(engine: str) -> None:
     found = verdicts(engine, COUNT)
     assert [seed for seed, verdict in found.items() if verdict == "silent"] == []

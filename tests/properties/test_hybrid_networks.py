@@ -190,6 +190,7 @@ def assert_alike(train: Train, one: Solution, other: Solution) -> None:
         np.testing.assert_allclose(*times, rtol=0, atol=AGREE)
 
 
+@pytest.mark.slow
 @given(trains(most=5))
 @share_of_examples(0.12)
 def test_engines_agree_in_the_end_and_in_the_events(train: Train) -> None:

@@ -48,6 +48,7 @@ def replayed(train: Train, engine: str) -> list[str]:
     return all_objections(train.parts, Motion(sol))
 
 
+@pytest.mark.slow
 @given(drives(most=4))
 @share_of_examples(0.06)
 def test_every_law_holds_in_the_motion_of_a_random_drive(train: Train) -> None:

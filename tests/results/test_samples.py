@@ -33,7 +33,9 @@ def first_peak(damping: float) -> float:
     return TORQUE * (1 + np.exp(-np.pi * damping / np.sqrt(1 - damping**2)))
 
 
-@pytest.mark.parametrize("engine", ["auto", "heyoka", "scipy"])
+@pytest.mark.parametrize(
+    "engine", ["auto", *(pytest.param(name, marks=pytest.mark.slow) for name in ("heyoka", "scipy"))]
+)
 @pytest.mark.parametrize("frequency", [500.0, 513.7])
 def test_a_peak_between_samples_is_told_with_a_number_of_outputs_that_show_it(engine: str, frequency: float) -> None:
     if engine == "heyoka":

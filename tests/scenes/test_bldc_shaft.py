@@ -67,6 +67,7 @@ def test_torque_and_currents_ripple_at_six_times_the_electrical_frequency(J_m: f
     assert found == pytest.approx(wanted, abs=15.0)  # bins 10 Hz apart
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("J_m", "times"), [(0.11, 34.6), (0.025, 20.4)])
 def test_the_shaft_carries_several_times_the_rated_torque(J_m: float, times: float) -> None:
     """As the source says of figures 7, 8, 12 and 13, without a number; here the start on full voltage does it."""

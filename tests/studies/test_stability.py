@@ -58,6 +58,7 @@ def test_what_does_not_run_names_its_reason(study: sw.studies.Stability) -> None
             assert "3000 steps were not enough" in cell.why
 
 
+@pytest.mark.slow
 def test_auto_always_runs_where_the_model_can(study: sw.studies.Stability) -> None:
     """It is refused for two reasons alone: damped waves, and an end of a shaft without inertia where nothing is."""
     refused = {cell.why for cell in study.cells if cell.engine == "auto" and cell.verdict not in ("right", "coarse")}
@@ -65,6 +66,7 @@ def test_auto_always_runs_where_the_model_can(study: sw.studies.Stability) -> No
         assert "waves travel without internal damping" in why or "cannot be assembled" in why, why
 
 
+@pytest.mark.slow
 def test_what_auto_does_agrees_with_the_models_own_motion_far_closer_than_the_bound(
     study: sw.studies.Stability,
 ) -> None:
@@ -76,6 +78,7 @@ def test_what_auto_does_agrees_with_the_models_own_motion_far_closer_than_the_bo
             assert cell.energy < 1e-6, cell
 
 
+@pytest.mark.slow
 def test_waves_are_right_in_every_case_that_they_take(study: sw.studies.Stability) -> None:
     """To the tolerance of the run, 1e-8, times some amplification; the exact two-port is known to 1e-6."""
     cells = [cell for cell in study.cells if cell.ran == "wave"]

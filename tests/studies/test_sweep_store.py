@@ -43,6 +43,12 @@ def lines(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     return made
 
 
+@pytest.fixture(scope="module")
+def whole() -> dict[str, np.ndarray]:
+    """The measures of the sweep without a store."""
+    return swept(None).measures
+
+
 def chunk(**changes: Any) -> str:
     whole = {"variants": [0, 1], "values": [[1.0, 2.0], [3.0, 4.0]], "reasons": ["", ""], "left": 0} | changes
     made = {key: value for key, value in whole.items() if value != "no"}
@@ -80,7 +86,7 @@ def chunk(**changes: Any) -> str:
     ],
 )
 def test_a_damaged_line_is_named_and_without_it_the_sweep_goes_on(
-    tmp_path: Path, lines: list[str], line: str, says: str
+    tmp_path: Path, lines: list[str], whole: dict[str, np.ndarray], line: str, says: str
 ) -> None:
     """What the line had is computed anew, to the same digits."""
     path = tmp_path / "store.jsonl"
@@ -91,8 +97,8 @@ def test_a_damaged_line_is_named_and_without_it_the_sweep_goes_on(
     assert says in str(caught.value)
     assert path.read_bytes() == before
     path.write_text("\n".join([*lines[:2], lines[3], ""]))
-    resumed, whole = swept(path), swept(None)
-    for name, values in whole.measures.items():
+    resumed = swept(path)
+    for name, values in whole.items():
         np.testing.assert_array_equal(resumed.measures[name], values)
 
 
