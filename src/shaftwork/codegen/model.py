@@ -15,6 +15,7 @@ from shaftwork.codegen.scalar import ScalarProgram
 from shaftwork.components.pieces import pieces_degree
 from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.core.kept import Kept
+from shaftwork.core.parameters import in_si, is_quantity, without_unit
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.blocks import BlockTooLargeError
 from shaftwork.reduction.form import StateForm
@@ -115,15 +116,30 @@ class CompiledModel:
             t: time in s.
             x: (n,) states, in the order of `states`.
             p: (parameters,) values in the order of `parameters`; by default the network's.
+
+        Raises:
+            ParameterError: x or p has another length, or units: states and parameters are numbers in SI.
         """
-        if self.scalar is None:
-            return self.bind(p).rhs(t, np.asarray(x, dtype=float))
-        vector = self.defaults if p is None else np.asarray(p, dtype=float)
-        return self.scalar.bind(vector)(t, np.asarray(x, dtype=float))
+        when, states, values = self._numbers(t, x, p)
+        return (self.bind(values).rhs if self.scalar is None else self.scalar.bind(values))(when, states)
 
     def jacobian(self, t: float, x: Array, p: Array | None = None) -> Any:
         """d rhs / d x as scipy.sparse.csc_array (n, n); arguments as for `rhs`."""
-        return self.bind(p).jacobian(t, np.asarray(x, dtype=float))
+        when, states, values = self._numbers(t, x, p)
+        return self.bind(values).jacobian(when, states)
+
+    def _numbers(self, t: Any, x: Any, p: Any) -> tuple[float, Array, Array]:
+        """Time in s, states and parameters of one evaluation."""
+        states = self._vector("x", x, len(self.states), "state")
+        values = self.defaults if p is None else self._vector("p", p, len(self.parameters), "parameter")
+        return in_si("t", t, "s") if is_quantity(t) else t, states, values
+
+    @staticmethod
+    def _vector(name: str, given: Any, size: int, what: str) -> Array:
+        vector = np.asarray(without_unit(name, given, f"of each {what}"), dtype=float)
+        if vector.shape != (size,):
+            raise ParameterError(f"{name} has the shape {vector.shape}: give {size} numbers, one for each {what}.")
+        return vector
 
     @property
     def code(self) -> str:

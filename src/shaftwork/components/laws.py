@@ -15,7 +15,7 @@ from shaftwork.components.branches import ACROSS, INTEGRAL, readings_in
 from shaftwork.components.noise import SmoothNoise
 from shaftwork.components.tables import TABLE_FUNCTIONS, Table, interpolate, interpolation_slope
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.parameters import in_si, is_quantity
+from shaftwork.core.parameters import in_si, is_quantity, without_unit
 
 t = sympy.Symbol("t", real=True)
 """Time in s."""
@@ -213,8 +213,6 @@ def _finite(law: str, **arguments: Any) -> list[sympy.Expr]:
 
 def _plain(law: str, name: str, value: Any) -> Any:
     """An argument without its unit: times in s; of the others only the law's own unit would tell what it is."""
-    if not is_quantity(value):
-        return value
-    if name in ("start", "duration"):
+    if name in ("start", "duration") and is_quantity(value):
         return in_si(f"{law}: {name}", value, "s")
-    raise ParameterError(f"{law}: {name} = {value} has a unit. Give a number in the SI unit of the law, as N m.")
+    return without_unit(f"{law}: {name}", value, "of the law, as N m")

@@ -182,6 +182,22 @@ def numbers_in_si(name: str, values: Any, unit: str = "1") -> Any:
     return values
 
 
+def without_unit(name: str, value: Any, whose: str) -> Any:
+    """A value whose unit hangs on something that is not known here: a number is itself, a quantity is refused.
+
+    Args:
+        name: of the argument, for the message.
+        value: the number or quantity.
+        whose: in whose SI unit it counts, such as "of the law, as N m".
+
+    Raises:
+        ParameterError: it is a quantity.
+    """
+    if is_quantity(value):
+        raise ParameterError(f"{name} = {value} has a unit. Give a number in the SI unit {whose}.")
+    return value
+
+
 def in_si(name: str, value: Any, unit: str = "1", **bounds: Any) -> float:
     """A number that a user gave as an argument, in SI; a quantity with units is converted.
 

@@ -12,7 +12,7 @@ from shaftwork.codegen.elements import Array
 from shaftwork.components.base import Component
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.parameters import in_si, numbers_in_si
+from shaftwork.core.parameters import in_si, numbers_in_si, whole
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.prepared import NOMINAL
@@ -102,6 +102,18 @@ def relative_tolerance(rtol: Any) -> float:
             "1e-8 is a good choice, and no engine gains much below 1e-13."
         )
     return value
+
+
+def step_limit(max_steps: Any) -> int:
+    """The most steps of a run.
+
+    Raises:
+        ParameterError: it is no count.
+    """
+    count = whole(max_steps)
+    if count is None:
+        raise ParameterError(f"max_steps = {max_steps!r} must be a whole number of steps, 1 or more.")
+    return count
 
 
 def absolute_tolerances(atol: Any, size: int) -> Array:

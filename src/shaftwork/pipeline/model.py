@@ -33,6 +33,7 @@ from shaftwork.pipeline.arguments import (
     output_times,
     refuse_unrecorded,
     relative_tolerance,
+    step_limit,
     time_span,
 )
 from shaftwork.pipeline.implicit import at_rest, solve_loops
@@ -128,9 +129,9 @@ class Model(CompiledModel):
             options |= {"engine": engine, "initial": initial, "max_steps": max_steps, "progress": progress}
             return self._variant(values).simulate(t_end, **options)
         span = time_span(t_start, t_end)
-        times = output_times(t_eval, *span)
+        asked = relative_tolerance(rtol), atol, output_times(t_eval, *span), engine, step_limit(max_steps)
         told = Told(progress)
-        demand = Demand(span, relative_tolerance(rtol), atol, times, engine, max_steps, told if progress else None)
+        demand = Demand(span, *asked, told if progress else None)
         made = dict(zip(self.parameters, self.defaults.tolist(), strict=True)) | values
         motion = told.of(lambda: self._motion(values, initial, demand))
         if motion.caveat:

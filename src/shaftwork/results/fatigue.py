@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.parameters import in_si
+from shaftwork.core.parameters import in_si, without_unit
 from shaftwork.results.observer import Array
 from shaftwork.results.rainflow import Rainflow
 
@@ -43,7 +43,7 @@ class SNLine:
 
     def __post_init__(self) -> None:
         for item in fields(self):
-            value = getattr(self, item.name)
+            value = without_unit(item.name, getattr(self, item.name), "of the quantity that is counted, as N m")
             if item.name == "limit":
                 in_si("limit", value, at_least=0)
             elif not (value is None and item.name == "slope_below") and value != math.inf:
@@ -58,7 +58,9 @@ class SNLine:
             amplitude: any shape, in the unit of the quantity.
             mean: the same shape.
         """
-        a, b = np.asarray(amplitude, dtype=float), np.abs(np.asarray(mean, dtype=float))
+        whose = "of the quantity that is counted, as N m"
+        a = np.asarray(without_unit("amplitude", amplitude, whose), dtype=float)
+        b = np.abs(np.asarray(without_unit("mean", mean, whose), dtype=float))
         share = 1.0 - b / self.ultimate
         with np.errstate(divide="ignore", over="ignore"):
             counted = np.where(share > 0.0, a / np.maximum(share, np.finfo(float).tiny), np.inf)

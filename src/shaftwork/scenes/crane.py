@@ -14,6 +14,7 @@ from shaftwork.components.loads import CoulombLoad, RandomLoad
 from shaftwork.components.motor_catalogue import motors
 from shaftwork.components.rotation import Inertia, Spring
 from shaftwork.core.errors import ParameterError
+from shaftwork.core.parameters import in_si
 from shaftwork.pipeline.network import Network
 from shaftwork.scenes.catalog import Scene, choice
 
@@ -73,12 +74,13 @@ def crane_start(pull_out_torque: float = MOTOR.tau_k) -> Network:
     Raises:
         ParameterError: it is not more.
     """
-    if not pull_out_torque > MOTOR.tau_n:
+    tau_k = in_si("crane_start: pull_out_torque", pull_out_torque, "N*m")
+    if not tau_k > MOTOR.tau_n:
         raise ParameterError(
-            f"crane_start: pull_out_torque = {pull_out_torque} N m must be more than the rated {MOTOR.tau_n} N m."
+            f"crane_start: pull_out_torque = {tau_k} N m must be more than the rated {MOTOR.tau_n} N m."
         )
     net = Network("crane start")
-    net.add(replace(MOTOR, tau_k=pull_out_torque).kloss("motor", symbol="M", **GEAR), "rotor")
+    net.add(replace(MOTOR, tau_k=tau_k).kloss("motor", symbol="M", **GEAR), "rotor")
     net.add(Inertia("J1", J=27.35, symbol="1"), "rotor")
     net.add(_shaft(0.0), "rotor", "wheel")
     net.add(Inertia("J2", J=62.5, symbol="2"), "wheel")

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.parameters import whole
+from shaftwork.core.parameters import whole, without_unit
 from shaftwork.core.progress import progress
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import OutputTimes, checked_parameter, relative_tolerance, time_span
@@ -231,6 +231,8 @@ def _limits(require: Mapping[str, Any] | None, readers: Mapping[str, Reader]) ->
     for name, pair in (require or {}).items():
         if name not in readers:
             raise ParameterError(f"require: there is no measure '{name}'. There are: {', '.join(readers)}.")
+        for side in pair if isinstance(pair, tuple | list) else ():
+            without_unit(f"require['{name}']", side, "of the measure, as N m")
         try:
             low, high = (None if side is None else float(side) for side in pair)
         except (TypeError, ValueError):
