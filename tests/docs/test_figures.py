@@ -15,20 +15,19 @@ GIVEN = re.compile(r"<!-- given: (?P<figures>.*?) -->", re.DOTALL)
 """Figures that no code makes: those of sources and norms, and definitions."""
 NO_FIGURE = re.compile(
     r"`[^`\n]+`|\$\$.*?\$\$|\$[^$\n]+\$|(?<=\])\([^)]*\)|<!--.*?-->"  # code, formulas, targets of links, comments
+    r"|^\d\. |\b1/[a-zA-Z]\b"  # numbers of a list, 1/c
     r"|\(\d+[a-z]?\)|\b(?:[Ff]igures?|[Ss]ections?|[Tt]able|eqs?) \d+(?:(?:, | and | to |-)\d+)*(?:\.\d+)*"
     r"|\b(?:19|20)\d\d\b|\b1/min\b|\b(?:IEC|EN|ASTM|Python|fig\.) [\w.-]+|\b[A-Za-zτωφ]+[-_]?\d[\w-]*",  # names: J1
-    re.DOTALL,
+    re.DOTALL | re.MULTILINE,
 )
 FIGURE = re.compile(r"(?<![\w.])\d+(?:[., ]\d+)*(?:e[-+]?\d+)?(?: ?%)?")
-SMALL = re.compile(r"\d")
-"""Counts up to nine are words that happen to be written as digits."""
 
 
 def figures(text: str) -> list[str]:
     """The figures of the sentences and tables of a page that stand in none of its marked places."""
     for pattern in (BLOCK, MADE_PART, MEASURED, HIDDEN, GIVEN, NO_FIGURE):
         text = pattern.sub(" ", text)
-    return [figure for figure in FIGURE.findall(text) if not SMALL.fullmatch(figure)]
+    return FIGURE.findall(text)
 
 
 def backed(text: str) -> set[str]:
