@@ -196,3 +196,31 @@ def test_what_has_no_derivative_is_refused() -> None:
     assert "s.d" not in frequency_sensitivities(undamped).parameters
     with pytest.raises(sw.ParameterError, match="decides which equations hold"):
         frequency_sensitivities(undamped, parameters=["s.d"])
+
+
+@pytest.mark.parametrize("name", ["gear.ratio", "drive.omega"])
+def test_what_moves_the_start_of_a_shaft_has_no_derivative_unless_its_speeds_are_given(name: str) -> None:
+    """Speeds inside run straight between those of the ends, of which a gear or a source determines one."""
+    net = sw.Network("wound")
+    if name == "gear.ratio":
+        net.add(sw.Inertia("J0", J=0.1), "m")
+        net.add(sw.Gear("gear", ratio=3.0), "m", "a")
+    else:
+        net.add(sw.SpeedSource("drive", omega=10.0), "a")
+    net.add(sw.Shaft("line", length=1.7, diameter=0.031, model=sw.Lumped(3)), "a", "b")
+    net.add(sw.Inertia("J", J=0.2), "b")
+    initial = {"line.omega_b": 10.0} | ({"J0.omega": 30.0} if name == "gear.ratio" else {})
+    measure = "end line.omega_b"
+    with pytest.raises(sw.ParameterError, match=f"'{name}' moves the start: line.omega_1, line.omega_2 follow"):
+        motion_sensitivities(net, [measure], t_end=5e-4, initial=initial, parameters=[name])
+    left = motion_sensitivities(net, [measure], t_end=5e-4, initial=initial)
+    assert name not in left.parameters and "J.J" in left.parameters
+    initial |= {"line.omega_1": 10.0, "line.omega_2": 10.0}
+    made, model = motion_sensitivities(net, [measure], t_end=5e-4, initial=initial), net.compile()
+
+    def end(value: float) -> list[float]:
+        solution = model.simulate(5e-4, initial=initial, parameters={name: value}, rtol=1e-13, t_eval=2)
+        return [float(solution["line.omega_b"][-1])]
+
+    expected = differences(end, made.parameters[name])[0]
+    assert made[measure][name] == pytest.approx(expected, rel=1e-6)

@@ -73,6 +73,47 @@ class _Columns(History):
         return self._given
 
 
+@dataclass(frozen=True)
+class GivenSpeeds:
+    """Which speeds start values give, by themselves or together with sources.
+
+    Args:
+        states: four columns: the given states; the changes of all states from rest; any numbers for the given states
+            and the sources behind given speeds; any numbers for all other states.
+        others: three columns: what sources prescribe; any numbers for laws, and for accelerations.
+    """
+
+    states: History
+    others: History
+
+    def of(self, read: Read, rest: Any = 0.0) -> Array:
+        """Speeds: as they are where they follow from start values and sources alone, else at rest.
+
+        What rests is moved by given speeds all the same: the carrier of a planetary gear by that of its ring.
+
+        Args:
+            read: takes the speeds from all branch quantities.
+            rest: what they are at rest.
+        """
+        states, others = read(self.states), read(self.others)
+        follows = _is_nothing(states, self.states)[..., 3] & _is_nothing(others, self.others)[..., 1:].all(axis=-1)
+        return np.where(follows, states[..., 0] + others[..., 0], rest + states[..., 1])
+
+    def move(self, read: Read) -> Any:
+        """Whether start values have a part in speeds."""
+        return ~_is_nothing(read(self.states), self.states)[..., 2]
+
+
+def _is_nothing(speeds: Array, history: History) -> Any:
+    """Whether speeds are rounding beside the largest one of their column."""
+    return np.abs(speeds) <= ROUNDING * np.abs(history.across).max(axis=0, initial=0.0)
+
+
+def _any_numbers(count: int) -> Array:
+    """Numbers of like size, no two alike."""
+    return np.asarray(0.5 + np.arange(1, count + 1) * GOLDEN % 1)
+
+
 class LinearReadings:
     """The rows of quantities.
 
@@ -106,10 +147,30 @@ class LinearReadings:
         size = np.abs(values).max(axis=1, keepdims=True, initial=0.0)
         return [int(k) for k in np.flatnonzero((np.abs(values) > ROUNDING * size).any(axis=0))]
 
-    def still(self, x: Array) -> History:
-        """All branch quantities at states (n,) where sources give nothing and nothing accelerates."""
-        zero = np.zeros((self._prescribed.size, 1))
-        return _Columns(self._bound, x[:, None], zero, np.zeros((self._size, 1)), zero)
+    def given_speeds(self, x: Array, rest: Array, is_given: Any, prescribed: Sequence[Quantity]) -> GivenSpeeds:
+        """Which speeds start values give.
+
+        Args:
+            x: (n,) states.
+            rest: (n,) the states at rest.
+            is_given: (n,) which of the states the start values have set.
+            prescribed: those start values that sources of time have a part in.
+        """
+        anything = _any_numbers(self._size)
+        states = np.stack([is_given * x, x - rest, is_given * anything, ~is_given * anything], axis=1)
+        u, zero = np.zeros((self._prescribed.size, 4)), np.zeros_like(states)
+        u[:, 2] = self._are_behind(prescribed) * _any_numbers(self._prescribed.size)
+        return GivenSpeeds(_Columns(self._bound, states, u, zero, np.zeros_like(u)), self._others())
+
+    def _are_behind(self, quantities: Sequence[Quantity]) -> Any:
+        """(m,) which of the inputs are sources of time that have a part in quantities."""
+        sources = np.flatnonzero(self._bound.program.inputs.of_time)
+        behind = np.zeros(self._prescribed.size, dtype=bool)
+        if quantities:
+            u, x = np.eye(self._prescribed.size)[:, sources], np.zeros((self._size, sources.size))
+            values = self._values(quantities, _Columns(self._bound, x, u, x, np.zeros_like(u)))
+            behind[sources] = (values != 0).any(axis=0)
+        return behind
 
     def _values(self, quantities: Sequence[Quantity], columns: _Columns) -> Array:
         return np.array([quantity.read(columns) for quantity in quantities])
@@ -126,10 +187,9 @@ class LinearReadings:
         return made
 
     def _others(self) -> _Columns:
-        """Three columns: what sources prescribe, laws, accelerations; of the last two any numbers, no two alike."""
+        """Three columns: what sources prescribe, laws, accelerations; of the last two any numbers."""
         of_time, size = self._bound.program.inputs.of_time, self._size
-        any_input = 0.5 + np.arange(1, of_time.size + 1) * GOLDEN % 1
-        any_rate = 0.5 + np.arange(1, size + 1) * GOLDEN % 1
+        any_input, any_rate = _any_numbers(of_time.size), _any_numbers(size)
         zero, still = np.zeros(of_time.size), np.zeros(size)
         u = np.stack([self._prescribed, np.where(of_time, 0.0, any_input), zero], axis=1)
         rate = np.stack([still, still, any_rate], axis=1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,11 +11,11 @@ from scipy import linalg
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.linear_readings import Quantity, Row
+from shaftwork.codegen.linear_readings import GivenSpeeds, Quantity, Row
 from shaftwork.codegen.operating import energy_weights
 from shaftwork.codegen.recovery import History
 from shaftwork.codegen.start_names import StartNames
-from shaftwork.codegen.wound_shafts import speeds_inside
+from shaftwork.codegen.wound_shafts import EndSpeeds, speeds_inside
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.times import just_after
 
@@ -47,10 +48,14 @@ def initial_state(bound: BoundArrays, given: Mapping[str, float], t0: float) -> 
         SignalError: there is no such quantity.
         ParameterError: a value is not finite, contradicts another one or is none to start from.
     """
-    rest = bound.impulse(np.zeros(len(bound.program.form.states)), None, just_after(t0))
     if not isinstance(given, Mapping):
         raise ParameterError(f"initial = {given!r} must map quantities to values, such as {{'J1.omega': 3.0}}.")
-    return _Start(bound, rest, just_after(t0), given).states() if given else rest
+    return Start(bound, given, t0).states if given else at_rest(bound, t0)
+
+
+def at_rest(bound: BoundArrays, t0: float) -> Array:
+    """(n,) the states at rest, sources included that jump from nothing at the start t0 in s."""
+    return bound.impulse(np.zeros(len(bound.program.form.states)), None, just_after(t0))
 
 
 class _Stores(NamedTuple):
@@ -69,34 +74,50 @@ class _Stores(NamedTuple):
     is_free: Any
 
 
-class _Start:
+class Start:
     """The way from start values to states.
 
     Args:
         bound: the array program.
-        rest: (n,) states at rest.
-        t: time at which sources are read, s.
         given: values by name.
+        t0: start time, s; where something jumps there, a time after it.
+
+    Raises:
+        SignalError: there is no such quantity.
+        ParameterError: as for `initial_state`.
     """
 
-    def __init__(self, bound: BoundArrays, rest: Array, t: float, given: Mapping[str, float]) -> None:
-        self._bound, self._rest, self._t = bound, rest, t
-        self._names = StartNames(bound, t)
+    def __init__(self, bound: BoundArrays, given: Mapping[str, float], t0: float) -> None:
+        self._bound, self._rest, self._t = bound, at_rest(bound, t0), just_after(t0)
+        self._names = StartNames(bound, self._t)
         self._values = self._names.checked(given)
-        form, numbers = bound.program.form, np.arange(rest.size)
+        form, numbers = bound.program.form, np.arange(self._rest.size)
         first, last = len(form.across_states), len(form.across_states) + len(form.through_states)
         self._of_kind = {True: numbers < first, False: (numbers >= first) & (numbers < last)}
-        self._x, self._fixed = rest.copy(), np.zeros(rest.size, dtype=bool)
+        self._x, self._fixed = self._rest.copy(), np.zeros(numbers.size, dtype=bool)
+        self._prescribed: list[Quantity] = []
         direct = {self._names.places[name]: v for name, v in self._values.items() if name in self._names.places}
         self._x[list(direct)], self._fixed[list(direct)] = list(direct.values()), True
 
+    @cached_property
     def states(self) -> Array:
-        """The states at the start."""
+        """(n,) the states at the start."""
+        if self._values:
+            self._meet_all()
+        return self._x
+
+    @cached_property
+    def given_speeds(self) -> GivenSpeeds:
+        """Which speeds the start values give, those inside shafts included."""
+        return self._names.readings.given_speeds(self.states, self._rest, self._fixed, self._prescribed)
+
+    def _meet_all(self) -> None:
         names, values = self._names, self._values
         shafts = {name: names.shafts[name] for name in values if name in names.shafts}
         quantities = [self._linear(name) for name in values if name not in names.places and name not in shafts]
         pairs = [*zip(quantities, names.readings.rows(quantities), strict=True)]
         self._meet([pair for pair in pairs if pair[0].is_across], is_across=True)
+        self._prescribed += [quantity for quantity, row in pairs if quantity.is_across and not row.moved]
         self._fill_shafts()
         for name, shaft in shafts.items():
             shaft.wind(self._bound, self._t, self._x, values[name], kept=self._fixed)
@@ -107,7 +128,6 @@ class _Start:
             along = shaft.along(self._bound, self._t, self._x)
             size = max(abs(values[name]), np.abs(self._x[list(shaft.states)]).max())
             self._refuse_other(name, float(along[np.abs(along - values[name]).argmax()]), size)
-        return self._x
 
     def _linear(self, name: str) -> Quantity:
         quantity = self._names.quantity(name)
@@ -210,10 +230,10 @@ class _Start:
 
     def _fill_shafts(self) -> None:
         """Let the speeds inside a shaft run straight between those of its ends, where nothing else is given."""
-        change = self._names.readings.still(self._x - self._rest)
-        for place, speed in speeds_inside(self._bound.program.form, change).items():
+        given = self._names.readings.given_speeds(self._x, self._rest, self._fixed, self._prescribed)
+        for place, speed in speeds_inside(self._bound.program.form, EndSpeeds(given)).items():
             if not self._fixed[place]:
-                self._x[place], self._fixed[place] = self._rest[place] + speed, True
+                self._x[place], self._fixed[place] = speed, True
 
     def _refuse_other(self, name: str, reached: float, size: float) -> None:
         if abs(reached - self._values[name]) > CONSISTENT * max(size, np.finfo(float).tiny):

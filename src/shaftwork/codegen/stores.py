@@ -35,7 +35,8 @@ class Stores:
         self._form = form
         kinds = (Kind.ACROSS_STORE, Kind.THROUGH_STORE)
         made = {store_name(form.graph, b): b.index for b in form.graph.branches if b.template.kind in kinds}
-        self._branches = made
+        self.branches = made
+        """The branch of every store."""
         angles = tuple(state.name for state in form.states if state.kind == "integral")
         self.names = (*made, *angles)
         """Every store and angle, named as a state whether it is one or not."""
@@ -79,7 +80,7 @@ class Stores:
                 if name in self._states:
                     made[self._states.index(name), column] = 1.0
                     continue
-                branch, across = self._branches[name], len(self._form.across_states)
+                branch, across = self.branches[name], len(self._form.across_states)
                 if branch in self._form.tree.loops:
                     made[:across, column] = loops[list(self._form.across_states), branch]
                 else:
@@ -94,7 +95,7 @@ class Stores:
             if column >= 0:
                 columns.append(x[:, column])
                 continue
-            branch = self._branches[name]
+            branch = self.branches[name]
             is_across = self._form.graph.branches[branch].template.kind is Kind.ACROSS_STORE
             columns.append((history.across if is_across else history.through)[branch])
         return np.array(columns).T
@@ -121,14 +122,14 @@ class Stores:
     def energy(self, bound: BoundArrays, held: Mapping[str, float]) -> float:
         """What is stored, in J: k v^2 / 2 in inertias and masses, tau^2 / 2 c in springs."""
         energy = 0.0
-        for name, branch in self._branches.items():
+        for name, branch in self.branches.items():
             coefficient = float(bound.part.coefficients[branch])
             energy += 0.5 * held[name] ** 2 * (1 / coefficient if name in self.through else coefficient)
         return energy
 
     def momentum(self, bound: BoundArrays, held: Mapping[str, float]) -> float:
         """The largest momentum of an inertia or mass: by what part of it an impulse is uncertain."""
-        inertias = (pair for pair in self._branches.items() if pair[0] not in self.through)
+        inertias = (pair for pair in self.branches.items() if pair[0] not in self.through)
         return max((abs(float(bound.part.coefficients[k]) * held[name]) for name, k in inertias), default=0.0)
 
     def impulses(self, bound: BoundArrays, gained: Mapping[str, float]) -> Array:
@@ -137,7 +138,7 @@ class Stores:
         Law: i_K = K (v_K' - v_K), and -Q_K i_K in the tree; beside it no torque counts.
         """
         links = np.zeros(len(self._form.graph.branches))
-        for name, branch in self._branches.items():
+        for name, branch in self.branches.items():
             if branch in self._form.dependent_across:
                 links[branch] = bound.part.coefficients[branch] * gained[name]
         return np.asarray(links - bound.part.cutsets @ links)
@@ -148,7 +149,7 @@ class Stores:
         Law: psi_S = (i_S' - i_S) / S, and F' psi_S among the links; beside it no speed counts.
         """
         tree = np.zeros(len(self._form.graph.branches))
-        for name, branch in self._branches.items():
+        for name, branch in self.branches.items():
             if branch in self._form.dependent_through:
                 tree[branch] = gained[name] / bound.part.coefficients[branch]
         return np.asarray(tree + bound.part.loops.T @ tree)
@@ -206,8 +207,8 @@ class Stores:
                 by_inputs[twists, :laws] = made[twists, other] @ cutsets[np.ix_(other, list(form.laws))]
             by_stores = np.zeros((len(self._states), len(self.names)))
             for column, name in enumerate(self.names):
-                if name in self._branches:
-                    by_stores[:, column] = made[:, self._branches[name]]
+                if name in self.branches:
+                    by_stores[:, column] = made[:, self.branches[name]]
                 else:
                     by_stores[self._states.index(name), column] = 1.0
             self._maps = part, by_stores, by_inputs

@@ -10,6 +10,7 @@ import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
+from shaftwork.codegen.linear_readings import GivenSpeeds
 from shaftwork.codegen.recovery import History
 from shaftwork.components.base import Profile
 from shaftwork.network.graph import GraphPart
@@ -63,13 +64,32 @@ def _wound_shafts(form: StateForm) -> Iterator[tuple[str, WoundShaft]]:
                 yield f"{part.name}.{name}", WoundShaft(part, profile, tuple(state[k] for k in stores))
 
 
-def speeds_inside(form: StateForm, change: History) -> dict[int, float]:
-    """For each state that is a speed inside a shaft, what lies on the straight line between those of the shaft's ends.
+class EndSpeeds:
+    """The speeds between which those along a shaft run at the start.
+
+    A speed that start values and sources give counts as it is. What a source has jolted at the start is at rest here:
+    that has not yet run along the shaft. Of a shaft with no given speed at either end both are at rest.
 
     Args:
-        form: the state form.
-        change: branch quantities of the states less those at rest, one column.
+        given: the speeds that start values give.
     """
+
+    def __init__(self, given: GivenSpeeds) -> None:
+        self._speeds, self._is_given = given.of(_potentials), given.move(_potentials)
+
+    def of(self, first: int, last: int) -> tuple[float, float]:
+        """Those of a shaft between two nodes, rad/s."""
+        if not (self._is_given[first] or self._is_given[last]):
+            return 0.0, 0.0
+        return float(self._speeds[first]), float(self._speeds[last])
+
+
+def _potentials(history: History) -> Array:
+    return history.potentials
+
+
+def speeds_inside(form: StateForm, ends: EndSpeeds) -> dict[int, float]:
+    """For each state that is a speed inside a shaft, what lies on the straight line between those of its ends."""
     owner = {form.graph.branches[branch].plus: k for k, branch in enumerate(form.across_states)}
     found: dict[int, float] = {}
     for part in form.graph.parts:
@@ -77,7 +97,7 @@ def speeds_inside(form: StateForm, change: History) -> dict[int, float]:
             if profile.kind != "across" or profile.lines or len(profile.of) <= 2:
                 continue
             nodes = [part.nodes[name] for ((_, name),) in profile.of]
-            first, last = (float(change.potentials[node, 0]) for node in (nodes[0], nodes[-1]))
+            first, last = ends.of(nodes[0], nodes[-1])
             for node, share in zip(nodes[1:-1], profile.places[1:-1], strict=True):
                 if node in owner:
                     found[owner[node]] = first + share * (last - first)

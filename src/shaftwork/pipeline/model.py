@@ -356,7 +356,7 @@ class Model(CompiledModel):
         from shaftwork.pipeline.waves import start_of_waves
 
         given = dict(zip(self.parameters, prepared.p.tolist(), strict=True))
-        return start_of_waves(self.form, self._twin.bind(self._twin.vector(given)), initial or {}, after)
+        return start_of_waves(prepared.bound, self._twin.bind(self._twin.vector(given)), initial or {}, after)
 
     @cached_property
     def _twin(self) -> Model:

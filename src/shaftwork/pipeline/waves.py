@@ -10,10 +10,11 @@ import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.recovery import History
-from shaftwork.codegen.start_values import initial_state
+from shaftwork.codegen.start_values import Start, at_rest
+from shaftwork.codegen.stores import Stores
 from shaftwork.codegen.waves import WaveSystem
+from shaftwork.codegen.wound_shafts import EndSpeeds
 from shaftwork.components.base import Component
 from shaftwork.components.modes import ALL_IN_ONE
 from shaftwork.components.shaft_models import Lumped, Wave
@@ -87,13 +88,15 @@ def twin(netlist: Netlist) -> Netlist:
 
 
 def start_of_waves(
-    form: StateForm, twin: BoundArrays, given: Mapping[str, float], t0: float
+    bound: BoundArrays, twin: BoundArrays, given: Mapping[str, float], t0: float
 ) -> tuple[Array, WaveStart]:
-    """States (n,) and waves from which a network starts: those of its twin.
+    """States (n,) and waves from which a network starts: those of its twin, at rest its own.
+
+    Where a source jolts inertias at the start, the twin's springs take inertia of the shaft along, and a wave does not.
 
     Args:
-        form: of the network.
-        twin: array program of its twin.
+        bound: array program of the network.
+        twin: that of its twin.
         given: start values by name, also those that the twin alone knows: the torque along a shaft.
         t0: start time, s; where something jumps there, a time after it.
 
@@ -101,18 +104,20 @@ def start_of_waves(
         SignalError: there is no such quantity.
         ParameterError: values are not finite or contradict each other, or the ends of a wave are given two torques.
     """
-    x = initial_state(twin, _all_along(form, given), t0)
-    motion = np.vstack([initial_state(twin, {}, t0), x])
-    times = np.full(2, just_after(t0))
-    observer, history = ModelObserver(twin.program.form, lambda: twin), History(twin, times, motion)
-    states = np.array([observer.signal(state.name, times, motion)[1] for state in form.states])
-    graph, speeds, torques = twin.program.form.graph, [], []
+    form, graph = bound.program.form, twin.program.form.graph
+    start = Start(twin, _all_along(form, given), t0)
+    times, x = np.array([just_after(t0)]), start.states[None, :]
+    stores = Stores(twin.program.form)
+    stored = dict(zip(stores.names, stores.of(lambda: twin, times, x)[0], strict=True))
+    states = np.array([stored[state.name] for state in form.states])
+    inertias = [stores.branches[state.name] for state in form.states if state.kind == "across"]
+    states[: len(inertias)] = start.given_speeds.of(
+        lambda history: history.across[inertias], at_rest(bound, t0)[: len(inertias)]
+    )
     springs = [b for b in graph.branches if b.template.kind is Kind.THROUGH_STORE and _is_wave(form, b.part)]
-    for spring in springs:
-        # What sources have jolted at the start has not yet run along the shaft.
-        speeds += [history.potentials[node, 1] - history.potentials[node, 0] for node in (spring.plus, spring.minus)]
-        torques.append(history.through[spring.index, 1])
-    return states, WaveStart(np.array(speeds), np.array(torques))
+    ends, through = EndSpeeds(start.given_speeds), History(twin, times, x).through
+    speeds = [speed for spring in springs for speed in ends.of(spring.plus, spring.minus)]
+    return states, WaveStart(np.array(speeds), np.array([through[spring.index, 0] for spring in springs]))
 
 
 def _all_along(form: StateForm, given: Mapping[str, float]) -> dict[str, float]:

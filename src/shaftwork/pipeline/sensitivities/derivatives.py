@@ -22,6 +22,7 @@ from shaftwork.pipeline.sensitivities.differentiable import rows_of, smooth_para
 from shaftwork.pipeline.sensitivities.measure_slopes import integrand, measured
 from shaftwork.pipeline.sensitivities.motion_legs import motion_of
 from shaftwork.pipeline.sensitivities.motion_slopes import MotionSlopes
+from shaftwork.pipeline.sensitivities.start_slopes import without_start
 from shaftwork.results.measures import Measure
 from shaftwork.results.sensitivities import FrequencySensitivities, MotionSensitivities
 from shaftwork.results.slopes import Complex
@@ -113,7 +114,8 @@ def motion_sensitivities(
         measures: by name; all kinds but "damage".
         t_end: end of the motion, s.
         parameters: names; by default all in which the motion is smooth.
-        initial: start values of states, which do not change with the parameters.
+        initial: start values of states, which do not change with the parameters. Parameters that move other states at
+            the start are left out; one that is asked for is refused.
         rtol: relative tolerance; that of the motion is tighter.
 
     Raises:
@@ -134,6 +136,7 @@ def motion_sensitivities(
     integrands = dict.fromkeys(made for measure in measures.values() if (made := integrand(measure)) is not None)
     motion = motion_of(model, span, initial, max(TIGHTER * tolerance, TIGHTEST))
     names = smooth_parameters(model, parameters, motion.models, span)
+    names = without_start(model, names, initial, span, are_asked=parameters is not None)
     given = {name: model.parameters[name] for name in names}
     quantities = dict.fromkeys(measure.quantity for measure in measures.values())
     if unknown := [name for name in quantities if name not in motion.solution]:
