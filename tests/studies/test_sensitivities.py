@@ -209,13 +209,14 @@ def test_what_moves_the_start_of_a_shaft_has_no_derivative_unless_its_speeds_are
         net.add(sw.SpeedSource("drive", omega=10.0), "a")
     net.add(sw.Shaft("line", length=1.7, diameter=0.031, model=sw.Lumped(3)), "a", "b")
     net.add(sw.Inertia("J", J=0.2), "b")
-    initial = {"line.omega_b": 10.0} | ({"J0.omega": 30.0} if name == "gear.ratio" else {})
+    initial = {"line.omega_b": 4.0} | ({"J0.omega": 30.0} if name == "gear.ratio" else {})
     measure = "end line.omega_b"
     with pytest.raises(sw.ParameterError, match=f"'{name}' moves the start: line.omega_1, line.omega_2 follow"):
         motion_sensitivities(net, [measure], t_end=5e-4, initial=initial, parameters=[name])
     left = motion_sensitivities(net, [measure], t_end=5e-4, initial=initial)
-    assert name not in left.parameters and "J.J" in left.parameters
-    initial |= {"line.omega_1": 10.0, "line.omega_2": 10.0}
+    assert name not in left.parameters
+    assert "J.J" in left.parameters
+    initial |= {"line.omega_1": 8.0, "line.omega_2": 6.0}
     made, model = motion_sensitivities(net, [measure], t_end=5e-4, initial=initial), net.compile()
 
     def end(value: float) -> list[float]:
