@@ -87,3 +87,26 @@ def test_beside_a_wave_a_gap_passes_nothing_until_half_of_it_is_passed(way: floa
     sol = net.simulate(0.015, t_eval=[0.0, 0.0141, 0.0142, 0.015])
     assert (sol["gap.tau"][:2] == 0.0).all()
     assert (way * sol["gap.tau"][2:] > 0.0).all()
+
+
+@pytest.mark.parametrize("torque", [10.0, -10.0])
+@pytest.mark.parametrize("twist", [0.0, 0.011, -0.02])
+@pytest.mark.parametrize("damping", [0.0, 5.0, 300.0])
+def test_beside_a_wave_a_drive_runs_through_its_gap_to_steady_operation(torque: float, twist: float, damping: float):
+    """Against the modes of the gap beside a spring: from its middle and from both flanks, on which dampers jump."""
+    found = []
+    for model in (sw.Wave(), sw.OneSpring()):
+        net = sw.Network("gap")
+        net.add(sw.TorqueSource("motor", tau=torque), "a")
+        net.add(sw.Inertia("J1", J=0.1), "a")
+        net.add(sw.Backlash("gap", gap=0.02, c=1000.0, d=damping), "a", "b")
+        net.add(sw.Inertia("J2", J=0.1), "b")
+        net.add(sw.Shaft("line", length=1.0, diameter=0.02, model=model), "b", "c")
+        net.add(sw.Inertia("J3", J=0.1), "c")
+        net.add(sw.ViscousLoad("load", d=0.5), "c")
+        compiled = net.compile()
+        found.append(compiled.steady_state(initial={"gap.phi": twist}))
+        stays = compiled.simulate(1e-3, initial=found[-1])
+        assert np.abs(stays["J3.omega"] - torque / 0.5).max() < 1e-9
+    for name in ("J1.omega", "gap.phi"):
+        assert found[0][name] == pytest.approx(found[1][name], rel=1e-9)

@@ -14,6 +14,8 @@ from shaftwork.core.errors import SimulationError
 
 SMALLEST_STEP = 1e-6
 """First step of the way to a steady state, s."""
+JUMP = 1e-12
+"""A law jumps where so short a step, s, still leaves a defect: the flank of a damped gap, which the drive runs onto."""
 DEFECT = 0.3
 """A step on that way is taken when its equation is left with less than this fraction of the rates."""
 STANDSTILL = 1e-6
@@ -35,8 +37,9 @@ def steady_state(
 
     Law: implicit Euler steps (I/h - J) dx = rhs, each with one iteration of Newton's method. A step is taken where its
     defect is small, and the next is then longer: first the motion of the drive is followed, so that of several steady
-    states the one it runs to is found, and in the end the steps are those of Newton's method. No state is known better
-    than to rounding of the whole stored energy: a drive that stands under load has the speeds that its torques leave.
+    states the one it runs to is found, and in the end the steps are those of Newton's method. A jump of a law is passed
+    in a step that is next to nothing. No state is known better than to rounding of the whole stored energy: a drive
+    that stands under load has the speeds that its torques leave.
 
     Raises:
         SimulationError: the rates do not vanish; the message names the state that keeps changing.
@@ -59,7 +62,8 @@ def steady_state(
             np.linalg.norm(weights * rate), np.linalg.norm(weights * size) * tolerance, np.finfo(float).tiny
         )
         over = ends is not None and ends(x + trial)
-        if not defect < DEFECT or (over and h > SMALLEST_STEP):
+        is_right = defect < DEFECT or (h < JUMP and np.isfinite(defect))
+        if not is_right or (over and h > SMALLEST_STEP):
             h = h / 4
             continue
         if over:
