@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from random import Random
@@ -142,6 +143,28 @@ def test_a_network_that_cannot_be_saved_leaves_the_older_file(tmp_path: Path) ->
         swing().save(path)
     assert [made.name for made in tmp_path.iterdir()] == ["net.toml"]
     assert path.read_bytes() == before
+
+
+def test_threads_that_save_to_one_file_leave_a_whole_one(tmp_path: Path) -> None:
+    """A network of 40 springs and one of 80 take turns; whoever comes last has written it all."""
+    networks = []
+    for count in (40, 80):
+        net = sw.Network(f"{count} springs")
+        for k in range(count):
+            net.add(sw.Inertia(f"J{k}", J=1.0), f"n{k}")
+            net.add(sw.Spring(f"s{k}", c=1e3), f"n{k}", f"n{k + 1}")
+        networks.append(net)
+
+    whole = [net.netlist() for net in networks]
+
+    def save(net: sw.Network) -> None:
+        for _ in range(10):
+            net.save(tmp_path / "net.toml")
+            assert sw.Network.load(tmp_path / "net.toml").netlist() in whole
+
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(save, networks * 2))
+    assert [path.name for path in tmp_path.iterdir()] == ["net.toml"]
 
 
 def test_a_network_is_saved_through_a_link_and_keeps_the_rights_of_its_file(tmp_path: Path) -> None:

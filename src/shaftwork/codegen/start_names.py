@@ -126,17 +126,6 @@ class StartNames:
                 made[above : above + len(rows), states] = sparse.csr_array(matrix)[list(rows)][:, list(columns)]
         return sparse.csr_array(made)
 
-    def together(self, states: Iterable[int]) -> list[int]:
-        """States, with those beside which they are in a tied store: given all at once, none of these is left open."""
-        found = np.zeros(len(self.places), dtype=bool)
-        found[list(states)] = True
-        entries = self.ties != 0
-        while True:
-            wider = found | ((entries @ found).astype(bool) @ entries).astype(bool)
-            if (wider == found).all():
-                return [int(k) for k in np.flatnonzero(found)]
-            found = wider
-
     def advice(self, name: str) -> str:
         """The start values to give instead of one, in words."""
         return _in_words(self._instead(name))

@@ -1,10 +1,11 @@
-"""Files that are whole at every moment: whoever stops the program, and however full the disk is."""
+"""Files that are whole at every moment: whoever stops the program or writes beside it, and however full the disk is."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import shutil
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
@@ -24,7 +25,8 @@ def replaced(path: str | Path) -> Iterator[IO[str]]:
         with place.open("w", encoding="utf-8", newline="") as file:
             yield file
         return
-    draft = place.with_name(f".{place.name[:100]}.{os.getpid()}.part")
+    # each thread has its own, whose name fits beside any 4-byte letters
+    draft = place.with_name(f".{place.name[:50]}.{os.getpid()}.{threading.get_ident()}.part")
     try:
         with draft.open("w", encoding="utf-8", newline="") as file:
             yield file
