@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import mpmath
 import numpy as np
 import pytest
 import sympy
+from scipy.special import ive
 
 import shaftwork as sw
 from shaftwork.integrate.modal import phi
@@ -63,6 +66,32 @@ def test_between_the_outputs_it_is_as_right() -> None:
     fine = chain(SMOOTH[0]).simulate(1.0, t_eval=997)
     times = fine.t[1:-1]
     np.testing.assert_allclose(sol.at(times)["s1.tau"], fine["s1.tau"][1:-1], atol=1e-13)
+
+
+@pytest.mark.parametrize("width", [0.1, 0.02, 0.003])
+def test_no_blow_of_a_train_of_them_is_overlooked(width: float) -> None:
+    """100 N m and ten blows of 500 exp(-(sin(pi (t - 0.3)) / w)^2): its mean is exp(-1 / 2 w^2) I0(1 / 2 w^2)."""
+    net = sw.Network("hammer mill")
+    blow = sympy.exp(-((sympy.sin(sympy.pi * (t - sympy.Rational(3, 10))) / width) ** 2))
+    net.add(sw.TorqueSource("motor", tau=100 + 500 * blow), "a")
+    net.add(sw.Inertia("J1", J=2.0), "a")
+    net.add(sw.Spring("s", c=1e4, d=1.0), "a", "b")
+    net.add(sw.Inertia("J2", J=3.0), "b")
+    sol = net.simulate(10.0)
+    assert sol.engine == "exact"
+    momentum = 2 * sol["J1.omega"][-1] + 3 * sol["J2.omega"][-1]
+    assert momentum == pytest.approx(1000 + 5000 * ive(0, 0.5 / width**2), rel=1e-11)
+
+
+def test_runs_to_other_ends_do_not_pile_up_what_they_have_made_of_the_inputs() -> None:
+    model = chain(sympy.sin(300 * t)).compile()
+    model.simulate(1.0)
+    tracemalloc.start()
+    for end in (1.1, 1.2, 1.3, 1.4):
+        model.simulate(end)
+    kept, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert kept < 1.5e6  # of each 1.1 MB
 
 
 def test_phi_functions_are_right_on_both_sides_of_their_series() -> None:

@@ -78,10 +78,7 @@ class Stages(Protocol):
 
 def shifted(linear: LinearInputs) -> ShiftedMatrix:
     """The matrix of a linear system, arranged once for all runs."""
-    if "banded" not in linear.found:
-        linear.found["banded"] = ShiftedMatrix(linear.A)
-    found: ShiftedMatrix = linear.found["banded"]
-    return found
+    return linear.kept("banded", lambda: ShiftedMatrix(linear.A))
 
 
 class _Factors:

@@ -13,6 +13,8 @@ from shaftwork.integrate.problem import Array
 
 # Degree of a panel's polynomials, the part of an input that they may leave out, and that which rounding may take.
 DEGREE, LEFT_OUT, ROUNDED = 8, 1e-13, 1e-10
+# Panels of a run at least: where an input is nothing but for short blows, fewer nodes may all lie between these.
+FEWEST = 512
 # Inputs of more values, states by nodes, are left to engines that step.
 MOST_VALUES = 10_000_000
 _NODES = (1 - np.cos(np.pi * np.arange(DEGREE + 1) / DEGREE)) / 2
@@ -66,7 +68,7 @@ def _moved(rates: Complex, length: float, inside: Array, start: Complex, inputs:
     return np.asarray(motion)
 
 
-def polynomials(forcing: Callable[[Array], Array], length: float) -> Array | None:
+def polynomials(forcing: Callable[[Array], Array], length: float, fewest: int) -> Array | None:
     """Values (n, panels, degree + 1) of inputs at the nodes of panels that resolve them, or None where none do.
 
     Law: panels are halved until the last Chebyshev coefficients of all inputs are below `LEFT_OUT` of the largest
@@ -75,8 +77,9 @@ def polynomials(forcing: Callable[[Array], Array], length: float) -> Array | Non
     Args:
         forcing: inputs (n, k) at times (k,) in s after the start, smooth.
         length: of the span, s.
+        fewest: panels, at least.
     """
-    panels, before, most = 1, np.inf, MOST_VALUES / (DEGREE + 1) / len(forcing(np.zeros(1)))
+    panels, before, most = fewest, np.inf, MOST_VALUES / (DEGREE + 1) / len(forcing(np.zeros(1)))
     while panels <= most:
         times = length / panels * (np.arange(panels)[:, None] + _NODES)
         values = forcing(times.ravel()).reshape(-1, panels, DEGREE + 1)

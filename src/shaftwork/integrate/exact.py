@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from itertools import pairwise
 
 import numpy as np
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.integrate.driven import driven, polynomials
+from shaftwork.integrate.driven import FEWEST, driven, polynomials
 from shaftwork.integrate.linear_system import LinearSystem, propagator_of, system_of
 from shaftwork.integrate.observation import difference, doubt
-from shaftwork.integrate.pieces import Piece, both_sides, failure, pieces, start_of_piece
+from shaftwork.integrate.pieces import Piece, both_sides, failure, pieces, piecewise, start_of_piece
 from shaftwork.integrate.precise import Nearby, PrecisePiece, PreciseSystem, precise_piece, precise_system, seconds
 from shaftwork.integrate.problem import Array, LinearInputs, Problem, Trajectory
 from shaftwork.integrate.straight import straight_line
@@ -61,21 +63,22 @@ def solve(problem: Problem) -> Trajectory:
             "take the engine 'auto'."
         )
     system = system_of(linear)
-    dense_form = problem.linear is None or prefers_dense(problem, linear)
-    trajectory = _propagated(problem, system, lambda piece, x: _span(problem, system, piece, x, dense_form=dense_form))
+    trajectory = _propagated(problem, system, _in_floats(problem, system))
     part = doubt(problem, trajectory, _lost(problem, system, trajectory))
-    if part <= DOUBTED or (precise := _precise(problem, system)) is None:
-        return replace(trajectory, doubt=part if part <= DOUBTED else _spread(problem, linear, trajectory))
+    if part <= DOUBTED:
+        return replace(trajectory, doubt=part)
+    precise = _precise(problem, system)
+    if precise is None:
+        return replace(trajectory, doubt=_spread(problem, linear, trajectory))
+    lost = "it" if part >= 1 else f"a part of {part:.1g} of it"
+    remark = f"Floats may lose {lost}, so it is computed in whole numbers of {precise.power.bits} bits."
     try:
-        made = _propagated(
+        trajectory = _propagated(
             problem, system, lambda piece, x: precise_piece(problem, precise, piece, x, _nearby(problem, system, piece))
         )
     except OverflowError as error:
         raise failure(problem, "exact", problem.t_end, trajectory.x[-1], str(error)) from error
-    bits = precise.power.bits
-    lost = "it" if part >= 1 else f"a part of {part:.1g} of it"
-    remark = f"Floats may lose {lost}, so it is computed in whole numbers of {bits} bits."
-    return replace(made, remark=remark, statistics={"bits": bits})
+    return replace(trajectory, remark=remark, statistics={"bits": precise.power.bits})
 
 
 def _spread(problem: Problem, linear: LinearInputs, trajectory: Trajectory) -> float:
@@ -83,12 +86,10 @@ def _spread(problem: Problem, linear: LinearInputs, trajectory: Trajectory) -> f
     rounded = linear.A.copy()
     rounded.data = rounded.data * (1 + np.finfo(float).eps * np.random.default_rng(0).choice((-1.0, 1.0), rounded.nnz))
     system = LinearSystem(replace(linear, A=rounded))
-    dense_form = problem.linear is None or prefers_dense(problem, linear)
     if problem.linear is None and system.modes is None:
         return 1.0
     problem = replace(problem, progress=None)
-    other = _propagated(problem, system, lambda piece, x: _span(problem, system, piece, x, dense_form=dense_form))
-    return difference(problem, trajectory, other)
+    return difference(problem, trajectory, _propagated(problem, system, _in_floats(problem, system)))
 
 
 def _nearby(problem: Problem, system: LinearSystem, piece: Piece) -> Nearby:
@@ -119,10 +120,12 @@ def _lost(problem: Problem, system: LinearSystem, trajectory: Trajectory) -> Arr
     return np.asarray(np.finfo(float).eps * system.condition * turns * size * system.scale)
 
 
-def _propagated(problem: Problem, system: LinearSystem, span_of: Callable[[Piece, Array], _Motion]) -> Trajectory:
+def _propagated(
+    problem: Problem, system: LinearSystem, span_of: Callable[[Piece, Array], _Span | PrecisePiece]
+) -> Trajectory:
     """The motion from piece to piece."""
     x = np.asarray(problem.x0, dtype=float)
-    spans: list[_Motion] = []
+    spans: list[_Span | PrecisePiece] = []
     for piece in pieces(problem):
         start = start_of_piece(problem, piece, x)
         with np.errstate(over="ignore", invalid="ignore"):
@@ -134,7 +137,7 @@ def _propagated(problem: Problem, system: LinearSystem, span_of: Callable[[Piece
         if not np.isfinite(x).all():
             raise failure(problem, "exact", piece.end, x, "the motion is unbounded")
     starts = np.array([piece.start for piece in pieces(problem)])
-    dense = _ExactDense(tuple(spans), starts, system.norm)
+    dense = _ExactDense(spans, starts, system.norm, x.size)
     if problem.t_eval is None:
         t, states = both_sides(problem, [span.times for span in spans], [span.at(span.times) for span in spans])
     else:
@@ -165,21 +168,29 @@ def drivable(problem: Problem) -> bool:
     """Whether inputs that are no straight lines can be followed mode by mode."""
     if problem.driven is None or problem.x0.size > LARGEST_DRIVEN or system_of(problem.driven).modes is None:
         return False
-    return all(_inputs(problem.driven, piece) is not None for piece in pieces(problem))
+    return _inputs(problem, problem.driven) is not None
 
 
-def _inputs(linear: LinearInputs, piece: Piece) -> Array | None:
-    """Values of the inputs of a piece that resolve them, in scaled coordinates; those of the last pieces are kept."""
-    key = f"inputs from {piece.low!r} to {piece.high!r}"
-    if key not in linear.found:
-        scale = system_of(linear).scale[:, None]
-        low, high = piece.low, piece.high
-        found = polynomials(
-            lambda elapsed: linear.forcing(np.clip(piece.start + elapsed, low, high)) / scale, piece.end - piece.start
-        )
-        linear.found[key] = found
-    kept: Array | None = linear.found[key]
-    return kept
+def _inputs(problem: Problem, linear: LinearInputs) -> dict[Piece, Array] | None:
+    """Values of the inputs of every piece of a run that resolve them, or None where in one piece none do."""
+    spans, duration = pieces(problem), problem.t_end - problem.t0
+
+    def resolved() -> dict[Piece, Array] | None:
+        values = {}
+        for piece in spans:
+            length = piece.end - piece.start
+            found = polynomials(partial(_inside, linear, piece), length, math.ceil(FEWEST * length / duration))
+            if found is None:
+                return None
+            values[piece] = found
+        return values
+
+    return linear.kept("inputs", resolved, spans)
+
+
+def _inside(linear: LinearInputs, piece: Piece, elapsed: Array) -> Array:
+    """The inputs (n, k) at times (k,) after the start of a piece, on its side of jumps."""
+    return linear.forcing(np.clip(piece.start + elapsed, piece.low, piece.high))
 
 
 def prefers_dense(problem: Problem, linear: LinearInputs) -> bool:
@@ -222,9 +233,6 @@ class _Span:
     at: Callable[[Array], Array]
 
 
-_Motion = _Span | PrecisePiece
-
-
 class _ExactDense:
     """The motion at any time of the run.
 
@@ -232,12 +240,13 @@ class _ExactDense:
         spans: the pieces.
         starts: of them, s.
         rate: no mode is faster, 1/s.
+        size: number of states n.
     """
 
-    def __init__(self, spans: tuple[_Motion, ...], starts: Array, rate: float) -> None:
-        self._spans, self._starts, self._rate = spans, starts, rate
+    def __init__(self, spans: Sequence[_Span | PrecisePiece], starts: Array, rate: float, size: int) -> None:
+        self._spans, self._starts, self._rate, self._size = spans, starts, rate, size
 
-    @property
+    @cached_property
     def steps(self) -> Array:
         """The nodes, and ever longer steps after the start of a piece: what fades fast there lies between some."""
         return np.unique(np.concatenate([self._graded(span.times) for span in self._spans]))
@@ -248,30 +257,39 @@ class _ExactDense:
         return np.concatenate([nodes[:1] + first * 0.5 ** np.arange(halvings, 0, -1), nodes])
 
     def __call__(self, times: Array) -> Array:
-        times = np.atleast_1d(np.asarray(times, dtype=float))
-        index = np.clip(np.searchsorted(self._starts, times, side="right") - 1, 0, len(self._spans) - 1)
-        states = np.empty((times.size, self._spans[0].end.size))
-        for number in np.unique(index):
-            states[index == number] = self._spans[number].at(times[index == number])
-        return states
+        return piecewise(self._starts, [span.at for span in self._spans], self._size, times)
 
 
-def _span(problem: Problem, system: LinearSystem, piece: Piece, x: Array, *, dense_form: bool) -> _Span:
-    times = _nodes(problem, piece)
-    if problem.linear is None:
-        return _driven_span(problem, system, piece, x, times)
-    level, slope = straight_line(problem, system.forcing, piece)
+def _in_floats(problem: Problem, system: LinearSystem) -> Callable[[Piece, Array], _Span]:
+    """The motion in a piece from its first state (n,): in modes, or by exponentials where these are of no use."""
+    dense_form = problem.linear is None or prefers_dense(problem, problem.linear)
     modes = system.modes if dense_form else None
-    if modes is not None:
-        scale = system.scale
-        start, line = x / scale, (level / scale, slope / scale)
+    if modes is None:
+        return partial(_by_exponentials, problem, system, dense_form)
+    inputs = None if problem.driven is None else _inputs(problem, problem.driven)
+
+    def span(piece: Piece, x: Array) -> _Span:
+        start, scale = x / system.scale, system.scale
+        motion: Callable[[Array], Array]  # of times after the start of the piece
+        if inputs is None:
+            level, slope = straight_line(problem, system.forcing, piece)
+            motion = partial(modes.response, start, level / scale, slope / scale)
+        else:
+            motion = driven(modes, inputs[piece] / scale[:, None, None], start, piece.end - piece.start)
 
         def at(asked: Array) -> Array:
-            states = modes.response(start, *line, asked - piece.start) * scale
+            states = motion(asked - piece.start) * scale
             states[asked == piece.start] = x  # without the rounding of the way to the modes and back
             return states
 
-        return _Span(times, at(np.array([piece.end]))[0], at)
+        return _Span(_nodes(problem, piece), at(np.array([piece.end]))[0], at)
+
+    return span
+
+
+def _by_exponentials(problem: Problem, system: LinearSystem, dense_form: bool, piece: Piece, x: Array) -> _Span:  # noqa: FBT001
+    """The motion in a piece from node to node; times between start from the node before them."""
+    times, (level, slope) = _nodes(problem, piece), straight_line(problem, system.forcing, piece)
     propagator = propagator_of(system, level, slope, dense_form=dense_form)
     states = np.empty((times.size, x.size))
     states[0] = x
@@ -280,19 +298,6 @@ def _span(problem: Problem, system: LinearSystem, piece: Piece, x: Array, *, den
         block = propagator.march(states[first], times[first] - piece.start, step, count)
         states[first + 1 : first + 1 + count] = block
     return _Span(times, states[-1], lambda asked: propagator.between(times, states, asked))
-
-
-def _driven_span(problem: Problem, system: LinearSystem, piece: Piece, x: Array, times: Array) -> _Span:
-    values = None if problem.driven is None else _inputs(problem.driven, piece)
-    assert values is not None and system.modes is not None  # noqa: PT018, S101 (`drivable` has said so)
-    motion = driven(system.modes, values, x / system.scale, piece.end - piece.start)
-
-    def at(asked: Array) -> Array:
-        states = motion(asked - piece.start) * system.scale
-        states[asked == piece.start] = x
-        return states
-
-    return _Span(times, at(np.array([piece.end]))[0], at)
 
 
 def _nodes(problem: Problem, piece: Piece) -> Array:

@@ -44,10 +44,7 @@ class LinearSystem:
 
 def system_of(linear: LinearInputs) -> LinearSystem:
     """The system of a linear form, made once."""
-    if "exact" not in linear.found:
-        linear.found["exact"] = LinearSystem(linear)
-    found: LinearSystem = linear.found["exact"]
-    return found
+    return linear.kept("exact", lambda: LinearSystem(linear))
 
 
 @dataclass(frozen=True)

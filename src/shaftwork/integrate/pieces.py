@@ -118,13 +118,18 @@ class PiecewiseDense:
     size: int
 
     def __call__(self, times: Array) -> Array:
-        times = np.atleast_1d(np.asarray(times, dtype=float))
-        index = np.clip(np.searchsorted(self.starts, times, side="right") - 1, 0, len(self.parts) - 1)
-        states = np.empty((times.size, self.size))
-        for number in np.unique(index):
-            chosen = index == number
-            states[chosen] = self.parts[number](times[chosen])
-        return states
+        return piecewise(self.starts, self.parts, self.size, times)
+
+
+def piecewise(starts: Array, parts: Sequence[Callable[[Array], Array]], size: int, times: Array) -> Array:
+    """States (k, n) at times (k,), each from the last span that has started; arguments as for `PiecewiseDense`."""
+    times = np.atleast_1d(np.asarray(times, dtype=float))
+    index = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, len(parts) - 1)
+    states = np.empty((times.size, size))
+    for number in np.unique(index):
+        chosen = index == number
+        states[chosen] = parts[number](times[chosen])
+    return states
 
 
 def _no_jacobian(t: float, x: Array) -> Any:

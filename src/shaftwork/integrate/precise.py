@@ -173,20 +173,14 @@ def _are_even(times: Array) -> bool:
 
 def precise_system(problem: Problem, linear: LinearInputs) -> PreciseSystem | None:
     """The system of a problem, which is kept for its next run; None where it has no exact form."""
-    if "fractions" not in linear.found:
-        linear.found["fractions"] = linear.fractions()
-    fractions: Fractions | None = linear.found["fractions"]
+    fractions = linear.kept("fractions", linear.fractions)
     if fractions is None:
         return None
     spans = pieces(problem)
     lines = [straight_line(problem, fractions.inputs, piece) for piece in spans]
     active = np.flatnonzero(np.any([(level != 0) | (slope != 0) for level, slope in lines], axis=0)).tolist()
     length = max(piece.end - piece.start for piece in spans)
-    key = f"precise to {length!r} with {active}"
-    if key not in linear.found:
-        linear.found[key] = PreciseSystem(linear, fractions, length, active)
-    found: PreciseSystem = linear.found[key]
-    return found
+    return linear.kept("precise", lambda: PreciseSystem(linear, fractions, length, active), (length, active))
 
 
 def precise_piece(problem: Problem, system: PreciseSystem, piece: Piece, x: Array, nearby: Nearby) -> PrecisePiece:

@@ -14,6 +14,7 @@ from shaftwork.core.errors import SimulationError
 from shaftwork.core.times import around
 
 Array = NDArray[np.float64]
+Made = TypeVar("Made")
 Explain = Callable[[Array, Array], tuple[float, str] | None]
 
 
@@ -59,13 +60,20 @@ class LinearInputs:
         A: (n, n) scipy.sparse.csr_array, 1/s times the units of the states.
         forcing: u(t), shape (n,), or (n, k) at times (k,); evaluated strictly inside a piece it is that piece's own.
         fractions: makes the same system without rounding, or None where there is no such form.
-        found: what an engine has found out about A, for the next run with the same parameters.
     """
 
     A: Any
     forcing: Callable[[Any], Array]
     fractions: Callable[[], Fractions | None] = lambda: None
-    found: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
+    _kept: dict[str, tuple[object, Any]] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    def kept(self, name: str, make: Callable[[], Made], key: object = None) -> Made:
+        """What engines make of the system, kept for the next run with the same parameters; for the last key alone."""
+        entry = self._kept.get(name)
+        if entry is None or entry[0] != key:
+            entry = self._kept[name] = key, make()
+        made: Made = entry[1]
+        return made
 
 
 @dataclass(frozen=True)
