@@ -56,6 +56,21 @@ def test_modes_about_a_point(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["modes", "crane-start", "--steady", "--at", "J1.omega=1"]) == WRONG_INPUT
     assert main(["modes", "crane-start", "--at", "J1.omega=fast"]) == WRONG_INPUT
     assert "'fast' must be a number in SI" in capsys.readouterr().err
+    assert main(["modes", "crane-start", "--at", "J1.omega=1", "--at", "J1.omega=2"]) == WRONG_INPUT
+    assert "--at gives 'J1.omega' twice" in capsys.readouterr().err
+
+
+def test_a_speed_of_a_point_may_have_its_unit(capsys: pytest.CaptureFixture[str]) -> None:
+    """30 rpm are pi rad/s; Hz is refused, which may count revolutions or radians."""
+    pytest.importorskip("pint")
+    found = []
+    for speed in ("30 rpm", str(np.pi)):
+        point = ("--at", f"J1.omega={speed}", "--at", f"J2.omega={speed}")
+        assert main(["modes", "crane-start", "--json", *point]) == DONE
+        found.append([mode["frequency"] for mode in json.loads(capsys.readouterr().out)["modes"]])
+    assert found[0] == pytest.approx(found[1], rel=1e-12)
+    assert main(["modes", "crane-start", "--at", "J1.omega=2 Hz"]) == WRONG_INPUT
+    assert "may count revolutions or radians" in capsys.readouterr().err
 
 
 @pytest.mark.slow
@@ -105,7 +120,15 @@ def test_a_sweep_is_that_of_the_library(model: str, tmp_path: Path, capsys: pyte
         (("--vary", "shaft.c=-1:2:3"), "shaft.c must be"),
         (("--vary", "shaft.k=1,2"), "There is no parameter 'shaft.k'"),
         (("--vary", "shaft.c"), "such as --vary shaft.c=2e4,3e4"),
+        (("--vary", "shaft.c=1,2", "--vary", "shaft.c=3,4"), "--vary gives 'shaft.c' twice"),
+        (("--vary", "shaft.c=1,2", "--set", "shaft.c=3"), "so --set shaft.c=... has no effect. Leave it out"),
         (("--vary", "shaft.c=1,2", "--require", "max shaft.tau<300 N"), "write 'max shaft.tau<=300'"),
+        (("--vary", "shaft.c=1,2", "--require", "max shaft.tau<=1 kN*m"), "a number in the SI unit of the measure"),
+        (("--vary", "shaft.c=1,2", "--require", "3<=max shaft.tau<=4"), "Two limits are two --require"),
+        (
+            ("--vary", "shaft.c=1,2", "--require", "max shaft.tau<=3", "--require", "max shaft.tau<=4"),
+            "--require gives 'max shaft.tau<=' twice",
+        ),
         (("--vary", "shaft.c=1,2", "--require", "min shaft.tau<=300"), "there is no measure 'min shaft.tau'"),
     ],
 )
@@ -169,6 +192,13 @@ def test_export_writes_over_nothing(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert path.read_text(encoding="utf-8") == "mine"
     assert main(["export", "crane-start", str(tmp_path / "crane.txt")]) == WRONG_INPUT
     assert "must end in .toml" in capsys.readouterr().err
+
+
+def test_a_folder_that_does_not_exist_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "nowhere"
+    assert main(["export", "crane-start", str(folder / "x.toml")]) == WRONG_INPUT
+    said = f"'{folder / 'x.toml'}' cannot be written: there is no folder '{folder}'. Make it, or give another path."
+    assert said in capsys.readouterr().err
 
 
 def test_signals_are_chosen_and_angles_recorded(model: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -93,6 +93,11 @@ def test_a_wrong_value_is_answered_with_what_would_be_right(
     assert words in capsys.readouterr().err
 
 
+def test_a_parameter_is_set_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", model(tmp_path), "--set", "J1.J=3", "--set", "J1.J=4"]) == WRONG_INPUT
+    assert "--set gives 'J1.J' twice. Give it once." in capsys.readouterr().err
+
+
 def test_a_unit_without_the_library_of_units_is_answered_with_the_extra(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -248,6 +248,7 @@ def test_requirements_filter_and_a_measure_ranks() -> None:
         ({"parameters": {"J.J": [1.0]}, "measures": ["damage shaft.tau"]}, r"needs an S-N line"),
         ({"parameters": {"J.J": [1.0]}, "require": {"max": (0, 1)}}, r"there is no measure 'max'"),
         ({"parameters": {"J.J": [1.0]}, "require": {"end J.omega": 1.0}}, r"must be \(low, high\)"),
+        ({"parameters": {"J.J": [1.0]}, "require": {"end J.omega": (None, "300")}}, r"'300' is a text. Give a number"),
         ({"parameters": {"J.J": [1.0]}, "require": {"end J.omega": (400, 100)}}, r"at least 400.0 and at most 100.0"),
         ({"parameters": {"J.J": [1.0]}, "require": {"end J.omega": (float("nan"), 1)}}, r"at least nan"),
         ({"parameters": {"J.J": [1.0]}, "initial": {"zz": 1}}, r"No quantity 'zz' in 'swing'"),

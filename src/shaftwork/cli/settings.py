@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from shaftwork.core.errors import MissingExtraError, ModelFileError, ParameterError
 
@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from shaftwork.components.base import Component
     from shaftwork.core.parameters import Parameter
     from shaftwork.pipeline.network import Network
+
+Item = TypeVar("Item")
 
 _QUANTITY = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\W\d].*)")
 """A number and a unit behind it; no law reads so."""
@@ -31,7 +33,7 @@ def with_settings(net: Network, settings: Iterable[str]) -> Network:
         ParameterError: there is no such parameter, or the value is not admissible.
         MissingExtraError: a value has a unit, and pint is not installed.
     """
-    values = dict(setting(net, text) for text in settings)
+    values = once("--set", (setting(net, text) for text in settings))
     if not values:
         return net
     varied = type(net)(net.name)
@@ -85,19 +87,56 @@ def numbers(net: Network, text: str) -> tuple[str, list[Any]]:
     return name, np.linspace(first[0], last[0], count).tolist()
 
 
-def point(texts: Iterable[str]) -> dict[str, float]:
-    """Quantities and their values, each written as name=value.
+def varied(net: Network, texts: Iterable[str], settings: Iterable[str]) -> dict[str, list[Any]]:
+    """The parameters that a sweep varies and their values, each text as of `numbers`.
+
+    Args:
+        net: the network.
+        texts: of `--vary`.
+        settings: of `--set`, for parameters that are not varied.
 
     Raises:
-        ParameterError: one is none.
+        ParameterError: a text is wrong, or a parameter is there twice.
+        MissingExtraError: a value has a unit, and pint is not installed.
     """
-    values: dict[str, float] = {}
-    for text in texts:
-        name, written = named(text, "--at", "J1.omega=100")
-        try:
-            values[name] = float(written)
-        except ValueError:
-            raise ParameterError(f"{text}: {written!r} must be a number in SI.") from None
+    values = once("--vary", (numbers(net, text) for text in texts))
+    for name in (named(text, "--set", "shaft.c=2e4")[0] for text in settings):
+        if name in values:
+            raise ParameterError(f"--vary gives '{name}' its values, so --set {name}=... has no effect. Leave it out.")
+    return values
+
+
+def point(texts: Iterable[str]) -> dict[str, Any]:
+    """Quantities and their values, each written as name=value: a number in SI, or one with its unit.
+
+    Raises:
+        ParameterError: one is none, or is there twice.
+        MissingExtraError: a value has a unit, and pint is not installed.
+    """
+    return once("--at", (_of_point(text) for text in texts))
+
+
+def _of_point(text: str) -> tuple[str, Any]:
+    name, written = named(text, "--at", "J1.omega=100")
+    try:
+        return name, float(written)
+    except ValueError:
+        if _QUANTITY.fullmatch(written):
+            return name, _quantity(name, written)
+        raise ParameterError(f"{text}: {written!r} must be a number in SI, or one with its unit.") from None
+
+
+def once(option: str, pairs: Iterable[tuple[str, Item]]) -> dict[str, Item]:
+    """Names and their values as a mapping.
+
+    Raises:
+        ParameterError: a name is there twice; the last value would hold, and nobody would see that the first does not.
+    """
+    values: dict[str, Item] = {}
+    for name, value in pairs:
+        if name in values:
+            raise ParameterError(f"{option} gives '{name}' twice. Give it once.")
+        values[name] = value
     return values
 
 

@@ -8,7 +8,7 @@ from argparse import ArgumentParser, Namespace
 from shaftwork.cli.command import Command, Data, Say, end_option, folder_option, solver_options
 from shaftwork.cli.folder import Folder, write_picture
 from shaftwork.cli.models import end_of, load
-from shaftwork.cli.settings import numbers
+from shaftwork.cli.settings import varied
 from shaftwork.core.errors import ParameterError
 
 FILES = ("sweep.csv", "sweep.png")
@@ -41,7 +41,7 @@ def run(options: Namespace, say: Say) -> Data:
     try:
         made = sweep(
             net,
-            dict(numbers(net, text) for text in options.vary),
+            varied(net, options.vary, options.set),
             t_end=end_of(options, scene),
             measures=options.measure,
             require=_limits(options.require),
@@ -65,17 +65,22 @@ def run(options: Namespace, say: Say) -> Data:
 
 
 def _limits(texts: list[str]) -> dict[str, tuple[float | None, float | None]]:
-    limits: dict[str, tuple[float | None, float | None]] = {}
+    limits: dict[str, dict[str, float]] = {}
     for text in texts:
-        match = re.fullmatch(r"\s*(.+?)\s*(<=|>=)\s*(\S+)\s*", text)
+        match = re.fullmatch(r"\s*([^<>=]+?)\s*(<=|>=)\s*(\S+)\s*", text)
         try:
             value = float(match[3] if match else "")
         except ValueError:
-            raise ParameterError(f"--require {text!r}: write 'max shaft.tau<=300', or >= for a least value.") from None
+            raise ParameterError(
+                f"--require {text!r}: write 'max shaft.tau<=300', or >= for a least value, with a number in the SI "
+                "unit of the measure. Two limits are two --require."
+            ) from None
         assert match is not None  # noqa: S101 (else there was no number)
-        low, high = limits.get(match[1], (None, None))
-        limits[match[1]] = (low, value) if match[2] == "<=" else (value, high)
-    return limits
+        sides = limits.setdefault(match[1], {})
+        if match[2] in sides:
+            raise ParameterError(f"--require gives '{match[1]}{match[2]}' twice. Give it once.")
+        sides[match[2]] = value
+    return {name: (sides.get(">="), sides.get("<=")) for name, sides in limits.items()}
 
 
 COMMAND = Command("sweep", "variants of a model: every combination of values, measured", run, arguments, machines=True)

@@ -27,11 +27,19 @@ def replaced(path: str | Path) -> Iterator[IO[str]]:
         return
     # each thread has its own, whose name fits beside any 4-byte letters
     draft = place.with_name(f".{place.name[:50]}.{os.getpid()}.{threading.get_ident()}.part")
+    if not place.parent.is_dir():
+        raise FileNotFoundError(
+            f"'{path}' cannot be written: there is no folder '{place.parent}'. Make it, or give another path."
+        )
     try:
         with draft.open("w", encoding="utf-8", newline="") as file:
             yield file
         with contextlib.suppress(FileNotFoundError):
             shutil.copymode(place, draft)
         draft.replace(place)
+    except OSError as error:
+        if error.filename == str(draft):  # the user knows the path, not the draft
+            error.filename = str(path)
+        raise
     finally:
         draft.unlink(missing_ok=True)

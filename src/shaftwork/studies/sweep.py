@@ -233,6 +233,10 @@ def _limits(require: Mapping[str, Any] | None, readers: Mapping[str, Reader]) ->
             raise ParameterError(f"require: there is no measure '{name}'. There are: {', '.join(readers)}.")
         for side in pair if isinstance(pair, tuple | list) else ():
             without_unit(f"require['{name}']", side, "of the measure, as N m")
+            if isinstance(side, str | bytes):
+                raise ParameterError(
+                    f"require['{name}'] = {pair!r}: {side!r} is a text. Give a number in the SI unit of the measure."
+                )
         try:
             low, high = (None if side is None else float(side) for side in pair)
         except (TypeError, ValueError):
