@@ -197,7 +197,7 @@ def test_export_writes_over_nothing(tmp_path: Path, capsys: pytest.CaptureFixtur
 def test_a_folder_that_does_not_exist_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "nowhere"
     assert main(["export", "crane-start", str(folder / "x.toml")]) == WRONG_INPUT
-    said = f"'{folder / 'x.toml'}' cannot be written: there is no folder '{folder}'. Make it, or give another path."
+    said = f"{folder / 'x.toml'} cannot be written: there is no folder '{folder}'. Give the path of a file in a folder"
     assert said in capsys.readouterr().err
 
 

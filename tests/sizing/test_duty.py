@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -68,6 +69,13 @@ class Hand:
             roots = [r.real for r in value.deriv().roots() if 0 < r.real < length]
             found += [value(t) for t in (0.0, length, *roots)]
         return found
+
+
+def test_no_figure_is_minus_zero() -> None:
+    """What comes from a product with a sign may be -0.0, which is printed as what it is: nothing."""
+    duty = sw.sizing.duty(rigid((0.0, 1.0), (0.0, 10.0), 2.0, 0.0, 0.0), "drive")
+    lines = str(dataclasses.replace(duty, tau_min=-0.0)).splitlines()
+    assert [line.split()[-2:] for line in lines if line.startswith("torque, smallest")] == [["0", "N*m"]]
 
 
 def rigid(times: Sequence[float], speeds: Sequence[float], J: float, d: float, load: float) -> sw.Solution:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import shutil
 import threading
@@ -28,9 +29,7 @@ def replaced(path: str | Path) -> Iterator[IO[str]]:
     # each thread has its own, whose name fits beside any 4-byte letters
     draft = place.with_name(f".{place.name[:50]}.{os.getpid()}.{threading.get_ident()}.part")
     if not place.parent.is_dir():
-        raise FileNotFoundError(
-            f"'{path}' cannot be written: there is no folder '{place.parent}'. Make it, or give another path."
-        )
+        raise FileNotFoundError(errno.ENOENT, f"there is no folder '{place.parent}'", str(path))
     try:
         with draft.open("w", encoding="utf-8", newline="") as file:
             yield file

@@ -47,8 +47,9 @@ def write_netlist(netlist: Netlist, path: str | Path) -> None:
         with replaced(place) as file:
             file.write(text)
     except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or error
         raise ModelFileError(
-            f"{place} cannot be written: {error}. Give the path of a file in a folder that exists."
+            f"{place} cannot be written: {why}. Give the path of a file in a folder that exists."
         ) from None
 
 

@@ -83,7 +83,7 @@ def _levels(bound: BoundArrays, x: Array, times: Array) -> Iterator[tuple[str, f
             span, place = np.unravel_index(int(np.nanargmax(sizes)), sizes.shape)
             time, earlier = float(times[span, place]), courses[span, place]
             name, sign, unit = _quantity(graph, graph.branches[branch])
-            levels = f"gives {sign * final + 0.0:.6g} {unit} and gave {sign * earlier + 0.0:.6g} {unit}"
+            levels = f"gives {sign * final:z.6g} {unit} and gave {sign * earlier:z.6g} {unit}"
             yield f"'{name}' {levels} at t = {time:.6g} s", time
 
 

@@ -43,7 +43,7 @@ class Extreme(float):
 
     def __repr__(self) -> str:
         where = "" if self.place is None else f", {self.place:g} m along"
-        return f"{self.name} = {float(self):.8g} {self.unit} at t = {self.t:.8g} s{where}"
+        return f"{self.name} = {float(self):z.8g} {self.unit} at t = {self.t:.8g} s{where}"
 
     __str__ = float.__repr__
 
@@ -120,8 +120,8 @@ class Extremes(Mapping[str, tuple[Extreme, Extreme]]):
         for name in names:
             least, most, mean, end = self.row(name)
             lines.append(
-                f"{name:{width}}  {least.unit:8} {least:12.5g} {least.t:8.4g} {most:12.5g} {most.t:8.4g} "
-                f"{mean + 0.0:12.5g} {end + 0.0:12.5g}"
+                f"{name:{width}}  {least.unit:8} {float(least):z12.5g} {least.t:8.4g} {float(most):z12.5g} {most.t:8.4g} "
+                f"{mean:z12.5g} {end:z12.5g}"
             )
         return "\n".join(lines)
 

@@ -18,8 +18,9 @@ class SNLine:
     """The number of cycles that a part bears, over their amplitude: a straight line on logarithmic scales.
 
     Law: N = cycles (amplitude / a)^m with m = `slope`, or `slope_below` where a < `amplitude`; no damage up to `limit`.
-    With `ultimate` a cycle about the mean b counts as the amplitude a / (1 - |b| / ultimate) (Goodman); the sign of a
-    mean torque makes no difference to a shaft. Amplitudes are those of the quantity that is counted: for a stress S at
+    With `ultimate` a cycle about the mean b counts as the amplitude a / (1 - |b| / ultimate) (Goodman); where a + |b|
+    reaches `ultimate` the part breaks at once: N = 0, and the damage is infinite. The sign of a mean torque makes no
+    difference to a shaft. Amplitudes are those of the quantity that is counted: for a stress S at
     the surface of a round solid shaft the torque is S pi diameter^3 / 16. Source: ASTM E739, DIN 743-4.
 
     Args:

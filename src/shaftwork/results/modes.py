@@ -87,8 +87,8 @@ class Modes:
         width = max([len(name) for name in self.names], default=4)
         lines = [f"{'mode':<{width}}  {'Hz':>12}  {'damping':>10}  {'rate in 1/s':>26}  moves most"]
         for name, frequency, damping, rate, node in self.table:
-            shown = f"{rate.real:.5g}{rate.imag:+.5g}j" if rate.imag else f"{rate.real:.5g}"
-            lines.append(f"{name:<{width}}  {frequency:>12.6g}  {damping:>10.4g}  {shown:>26}  {node}")
+            shown = f"{rate.real:z.5g}{rate.imag:+.5g}j" if rate.imag else f"{rate.real:z.5g}"
+            lines.append(f"{name:<{width}}  {frequency:>12.6g}  {damping:>z10.4g}  {shown:>26}  {node}")
         return "\n".join([f"{self.title}: {len(self)} modes", *lines])
 
     def plot(self, *numbers: int) -> Figure:

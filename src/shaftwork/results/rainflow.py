@@ -122,7 +122,7 @@ class Rainflow:
             return head
         lines = [f"{'range in ' + self.unit:>14}  {'mean':>12}  {'count':>5}  {'from s':>10}  {'to s':>10}"]
         for k in np.argsort(-self.range, kind="stable")[:SHOWN].tolist():
-            row = f"{self.range[k]:>14.6g}  {self.mean[k]:>12.6g}  {self.count[k]:>5g}"
+            row = f"{self.range[k]:>14.6g}  {self.mean[k]:>z12.6g}  {self.count[k]:>5g}"
             lines.append(f"{row}  {self.start[k]:>10.6g}  {self.end[k]:>10.6g}")
         more = len(self) - SHOWN
         return "\n".join([f"{head}, the largest of them:", *lines, *([f"and {more} smaller"] if more > 0 else [])])

@@ -113,7 +113,7 @@ class MotionSensitivities:
         return _frame(self.relative, list(self.measures), "MotionSensitivities.table()")
 
     def __str__(self) -> str:
-        header = [f"{name} = {value:.6g}" for name, value in self.measures.items()]
+        header = [f"{name} = {value:z.6g}" for name, value in self.measures.items()]
         return _text(f"{self.name}: percent of a measure for a percent of a parameter", header, self.relative)
 
 

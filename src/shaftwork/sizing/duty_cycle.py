@@ -264,7 +264,7 @@ class Duty:
         return tuple(made)
 
     def __str__(self) -> str:
-        rows = [f"{name:34}{value:>12.6g} {unit}" for name, (value, unit) in self.figures.items()]
+        rows = [f"{name:34}{value:>z12.6g} {unit}" for name, (value, unit) in self.figures.items()]
         return "\n".join((f"duty of {self.motor} in '{self.title}'", *rows, *(f"- {note}" for note in self.notes)))
 
 

@@ -51,7 +51,7 @@ class Reserve:
 
     def __str__(self) -> str:
         return (
-            f"{self.ratio:.4g} times: {self.tau:.6g} of {self.limit:.6g} N*m at {self.n:.6g} 1/min, {self.time:.6g} s"
+            f"{self.ratio:.4g} times: {self.tau:z.6g} of {self.limit:.6g} N*m at {self.n:.6g} 1/min, {self.time:.6g} s"
         )
 
 

@@ -147,7 +147,7 @@ class Sweep:
         given = {**self.parameters, **self.measures}
         passed, shown = self.passed, range(min(len(self), SHOWN))
         rows = [
-            [f"{k}", *(f"{given[name][k]:.6g}" for name in names), "yes" if passed[k] else "no", self.reasons[k]]
+            [f"{k}", *(f"{given[name][k]:z.6g}" for name in names), "yes" if passed[k] else "no", self.reasons[k]]
             for k in shown
         ]
         header = ["", *names, "passed", "reason" if any(self.reasons) else ""]
