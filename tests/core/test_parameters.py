@@ -55,6 +55,28 @@ def test_a_wrong_or_missing_argument_is_answered_with_the_parameters() -> None:
         sw.Ground("frame", J=1.0)
 
 
+def test_what_is_per_speed_says_whether_it_counts_revolutions_or_radians() -> None:
+    """3 N m per revolution a minute are 3 / (2 pi / 60) N m s/rad; of 3 N m per 1/min nobody knows."""
+    unit = pint.UnitRegistry()
+    newton_metre, volt = unit.N * unit.m, unit.V
+    for d, expected in (
+        (3 * newton_metre / unit.rpm, 90 / math.pi),
+        (3 * newton_metre * unit.s, 3.0),
+        (3 * newton_metre * unit.minute / unit.rad, 180.0),
+    ):
+        net = sw.Network("per speed")
+        net.add(sw.SpeedSource("drive", omega=1.0), "a")
+        net.add(sw.Damper("d", d=d), "a")
+        assert net.compile().parameters["d.d"] == pytest.approx(expected, rel=1e-12)
+    for part in (
+        sw.Damper("d", d=3 * newton_metre / (1 / unit.minute)),
+        sw.Damper("d", d=3 * newton_metre / unit.Hz),
+        sw.Spring("d", c=1.0, d=3 * newton_metre * unit.hour),
+        sw.DCMachine("d", k=2 * volt / (1000 / unit.minute)),
+    ):
+        assert "may count revolutions or radians; write rpm or rad into it" in problem_of(part)
+
+
 def test_quantities_with_units_are_converted_and_wrong_units_are_refused() -> None:
     unit = pint.UnitRegistry()
     net = sw.Network("units")

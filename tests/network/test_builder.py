@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -188,6 +190,22 @@ def test_a_part_is_replaced_where_it_stands() -> None:
         "first_middle",
         "mid",
     )
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy])
+def test_a_copy_of_a_network_is_changed_alone(copied: Callable[[sw.Network], sw.Network]) -> None:
+    net = sw.Network("first", ports=("a",))
+    net.add(sw.Inertia("J", J=2.0), "a")
+    net.add(sw.Damper("d", d=1.0), "a")
+    before, other = net.netlist(), copied(net)
+    assert isinstance(other, sw.Network)
+    assert other.netlist() == before
+    other.replace(sw.Inertia("J", J=5.0))
+    other.remove("d")
+    other.add(sw.TorqueSource("T", tau=1.0), "a")
+    other.name = "second"
+    assert net.netlist() == before
+    assert [part.name for part in other.parts] == ["J", "T"]
 
 
 @pytest.mark.parametrize("change", ["remove", "replace"])

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import builtins
+import copy
+import pickle
 from typing import Any
 
 import numpy as np
@@ -86,6 +88,30 @@ def test_other_times_come_from_the_dense_output_and_outside_times_are_refused(so
     assert sol.at([0.5])["shaft.tau"][0] == pytest.approx(sol["shaft.tau"][50], rel=1e-8)
     with pytest.raises(sw.SignalError, match="from t = 0 s to 2 s"):
         sol.at([2.5])
+
+
+def test_times_and_states_cannot_be_written_to(sol: sw.Solution) -> None:
+    for motion in (sol, sol.at([0.5, 1.0]), copy.copy(sol), copy.deepcopy(sol), pickle.loads(pickle.dumps(sol))):
+        for values in (motion.t, motion.x, motion.steps):
+            with pytest.raises(ValueError, match="read-only"):
+                values[-1] = 99.0
+
+
+def test_what_a_user_changes_later_changes_no_motion() -> None:
+    """Neither the output times that were given, nor arrays that were read, as those converted to 1/min in place."""
+    net, times = sw.Network("spring"), np.linspace(0.0, 1.0, 11)
+    net.add(sw.TorqueSource("T", tau=1.0), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.Spring("s", c=10.0), "a", "b")
+    net.add(sw.Inertia("K", J=1.0), "b")
+    sol = net.simulate(1.0, t_eval=times)
+    times[-1] = 0.5
+    assert sol.t[-1] == 1.0
+    for name in sol.names:
+        first = sol[name]
+        before = first.copy()
+        first *= 30.0 / np.pi
+        assert np.array_equal(sol[name], before), name
 
 
 def test_tables_hold_the_named_quantities_with_units(sol: sw.Solution) -> None:

@@ -154,7 +154,7 @@ class ModelObserver:
         if name in self.quantities.integrals:
             return np.asarray(x[:, self.quantities.integrals[name]])
         if name in self.quantities.nodes:
-            return self._read(t, x, lambda history: np.asarray(history.potentials[self.quantities.nodes[name]]))
+            return self._read(t, x, lambda history: np.array(history.potentials[self.quantities.nodes[name]]))
         owner, quantity = name.rsplit(".", 1)
         part = next(part for part in self._graph.parts if part.name == owner)
         if quantity == "power":

@@ -18,6 +18,10 @@ REQUIRED: Any = object()
 SMALLEST, LARGEST = 1e-60, 1e60
 """Sizes of values in SI: beyond them products of a few parameters leave the range of floating-point numbers."""
 ANGLES = ("radian", "degree", "turn", "revolution", "gradian", "arc")
+PER_ANGLE = ("rad", "N*m/A")
+"""In SI units of what is per angle or speed: a torque constant in N*m/A is one of V*s/rad, too."""
+RATES = ("minute", "hour", "hertz")
+"""In units of speeds that are given in revolutions as a rule."""
 BOUNDS = ("above", "at_least", "at_most", "nonzero", "whole", "law", "record")
 """Fields of `Parameter` that say which values are admissible."""
 
@@ -146,11 +150,15 @@ def converted(value: Any, unit: str) -> tuple[Any, str | None]:
     """The number, or array of numbers, of a quantity in a unit; and the objection to its units, or None.
 
     Units with angles need care: to a library of units a revolution is 2 pi and a radian is 1, pure numbers. So a
-    speed needs a unit that says which it counts, and a frequency counts revolutions, whatever it is given in.
+    speed needs a unit that says which it counts, and a frequency counts revolutions, whatever it is given in. What is
+    per speed, such as N*m*s/rad, may be given without an angle in seconds (N*m*s, per rad/s), but not per 1/min or Hz.
     """
-    counts_angle = any(word in str(value.units) for word in ANGLES)
-    if "rad/s" in unit and not counts_angle and (value.check("1/[time]") or "hertz" in str(value.units)):
+    words = format(value.units, "D")
+    counts_angle = any(word in words for word in ANGLES)
+    if "rad/s" in unit and not counts_angle and (value.check("1/[time]") or "hertz" in words):
         return value, f"is given in '{value.units}', which may count revolutions or radians; give rpm or rad/s"
+    if any(word in unit for word in PER_ANGLE) and not counts_angle and any(word in words for word in RATES):
+        return value, f"is given in '{value.units}', which may count revolutions or radians; write rpm or rad into it"
     turns = {"1/min": "revolution / minute", "Hz": "revolution / second", "1/s": "revolution / second"}
     plain = {"1": "dimensionless", "1/min": "1 / minute", "Hz": "1 / second"}
     target = turns.get(unit) if counts_angle else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from difflib import get_close_matches
-from typing import TypeVar, overload
+from typing import Self, TypeVar, overload
 
 from shaftwork.components.base import Component
 from shaftwork.core.errors import ParameterError, ShaftworkError
@@ -33,6 +33,12 @@ class NetworkBuilder:
         if not all(isinstance(port, str) and port for port in self.ports) or len({*self.ports}) < len(self.ports):
             raise ParameterError(f"ports = {ports!r} must be names of nodes, each once: ports=('in_', 'out').")
         self._placed: list[Placed] = []
+
+    def __copy__(self) -> Self:
+        """A network of the same parts, which are immutable; what is added, replaced or removed in one is so there."""
+        made = object.__new__(type(self))
+        vars(made).update(vars(self), _placed=[*self._placed])
+        return made
 
     @overload
     def add(self, part: C, *nodes: str) -> C: ...

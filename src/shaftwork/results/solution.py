@@ -92,12 +92,24 @@ class Solution:
     caveat: str = ""
     again: Callable[[], Solution] | None = None
 
+    def __post_init__(self) -> None:
+        vars(self)["t"] = np.array(self.t)  # the times may be those that the user gave
+        self._protect()
+
+    def _protect(self) -> None:
+        """Refuse writing into times and states: all that is read of the motion comes from them."""
+        vars(self).update(t=_read_only(self.t), x=_read_only(self.x))
+
     def __getstate__(self) -> dict[str, Any]:
         stored = (item.name for item in fields(self) if item.name not in COMPILED)
         return {name: getattr(self, name) for name in stored}
 
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        vars(self).update(state)
+        self._protect()
+
     def __deepcopy__(self, _memo: Any) -> Solution:
-        return replace(self, t=self.t.copy(), x=self.x.copy())
+        return replace(self, x=self.x.copy())
 
     if not TYPE_CHECKING:
 
@@ -127,7 +139,7 @@ class Solution:
     @property
     def steps(self) -> Array:
         """(s,) ends of the integration steps."""
-        return self.dense.steps
+        return _read_only(self.dense.steps)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -324,6 +336,13 @@ class Solution:
             '  Read a quantity with sol["part.quantity"]; all are in sol.names.',
         ]
         return on_one_screen(title, lines, len(lines))
+
+
+def _read_only(values: Array) -> Array:
+    """The same numbers, not to be written into."""
+    made = values.view()
+    made.flags.writeable = False
+    return made
 
 
 def _require(library: str, extra: str, purpose: str) -> Any:
