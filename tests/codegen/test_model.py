@@ -44,6 +44,13 @@ def test_parameters_are_arguments_in_the_order_of_the_parts() -> None:
     np.testing.assert_array_equal(model.rhs(0.0, rest, model.vector({"motor.tau": 8.0, "J0.J": 4.0})), [2.0, 0.0, 0.0])
 
 
+def test_parameters_of_a_model_cannot_be_written_to() -> None:
+    """A value that is written there would change nothing; `simulate(parameters=...)` takes it."""
+    model = _chain(2).compile()
+    with pytest.raises(TypeError, match="does not support item assignment"):
+        model.parameters["s0.c"] = 1.0  # type: ignore[index]
+
+
 def test_an_unknown_parameter_is_told_what_there_is() -> None:
     model = _chain(2).compile()
     with pytest.raises(sw.ParameterError, match=r"stiffness.*s0\.c"):

@@ -91,7 +91,8 @@ def test_other_times_come_from_the_dense_output_and_outside_times_are_refused(so
 
 
 def test_times_and_states_cannot_be_written_to(sol: sw.Solution) -> None:
-    for motion in (sol, sol.at([0.5, 1.0]), copy.copy(sol), copy.deepcopy(sol), pickle.loads(pickle.dumps(sol))):
+    stored = pickle.loads(pickle.dumps(sol))  # noqa: S301 (our own bytes)
+    for motion in (sol, sol.at([0.5, 1.0]), copy.copy(sol), copy.deepcopy(sol), stored):
         for values in (motion.t, motion.x, motion.steps):
             with pytest.raises(ValueError, match="read-only"):
                 values[-1] = 99.0

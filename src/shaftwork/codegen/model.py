@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -54,7 +55,7 @@ class CompiledModel:
 
     def __init__(self, form: StateForm) -> None:
         self.form = form
-        self.parameters: dict[str, float] = dict(form.graph.parameters)
+        self.parameters: Mapping[str, float] = MappingProxyType(dict(form.graph.parameters))
         self.arrays = ArrayProgram(form)
         self.defaults = np.array(list(self.parameters.values()), dtype=float)
         self._bound = Kept[bytes, BoundArrays](1)

@@ -119,10 +119,8 @@ class Extremes(Mapping[str, tuple[Extreme, Extreme]]):
         lines = [f"{head} {'mean':>12} {'end':>12}"]
         for name in names:
             least, most, mean, end = self.row(name)
-            lines.append(
-                f"{name:{width}}  {least.unit:8} {float(least):z12.5g} {least.t:8.4g} {float(most):z12.5g} {most.t:8.4g} "
-                f"{mean:z12.5g} {end:z12.5g}"
-            )
+            ends = f"{float(least):z12.5g} {least.t:8.4g} {float(most):z12.5g} {most.t:8.4g}"
+            lines.append(f"{name:{width}}  {least.unit:8} {ends} {mean:z12.5g} {end:z12.5g}")
         return "\n".join(lines)
 
     def __str__(self) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from functools import cached_property, partial
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -49,7 +50,8 @@ class PhaseModel(CompiledModel):
     def __init__(self, form: StateForm, name: str, numbers: Mapping[str, float]) -> None:
         super().__init__(form)
         self.name = name
-        self.parameters |= {key: value for key, value in numbers.items() if key in self.parameters}
+        known = {key: value for key, value in numbers.items() if key in self.parameters}
+        self.parameters = MappingProxyType({**self.parameters, **known})
         self.defaults = np.array(list(self.parameters.values()), dtype=float)
 
     def __repr__(self) -> str:
