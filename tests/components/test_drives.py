@@ -72,6 +72,8 @@ def test_below_s_k_f_n_standstill_has_a_share_of_the_pull_out_torque_that_a_boos
     boost = (share**-0.5 - 1) / (1 - f / 100.0)
     (boosted,) = torque(sw.FrequencyDrive("m", **MOTOR, f=f, boost=boost, f_boost=100.0), [0.0])
     assert boosted == pytest.approx(MOTOR["tau_k"], rel=1e-12)
+    told = " ".join((sw.FrequencyDrive.__doc__ or "").split())
+    assert "at standstill the motor has 2 x / (1 + x^2) of tau_k flux^2, with x = f / (s_k f_n)" in told
 
 
 def test_a_boost_raises_the_flux_at_low_frequency_alone() -> None:

@@ -53,7 +53,8 @@ def objection(problem: Problem, trajectory: Trajectory, engine: str) -> str | No
     if run is None:
         return None
     added_up = min(trajectory.statistics.get("steps", 0) * problem.rtol, UNSURPRISING)
-    limit = max(TOLERATED * problem.rtol, added_up, SMALLEST) + run.doubt
+    allowed = max(TOLERATED * problem.rtol, added_up, SMALLEST)
+    limit = max(allowed - run.doubt, run.doubt)  # the exact motion may itself be off so far, either way
     wanted = observed.values(times, run.x)
     part, name = _part(observed, trajectory, np.abs(values - wanted).max(axis=0, initial=0.0), wanted, limit)
     if part <= limit:
