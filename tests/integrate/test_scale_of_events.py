@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import sympy
 from scipy.optimize import brentq
+from scipy.special import ive
 
 import shaftwork as sw
 
@@ -94,6 +95,31 @@ def test_a_pulse_beside_a_friction_is_not_stepped_over_either() -> None:
     peaks = [net.simulate(100.0, engine=engine).max("J.omega") for engine in ("heyoka", "scipy", "sundials")]
     assert 0.3 < peaks[0] < 0.1 * math.pi
     assert peaks[1:] == pytest.approx([peaks[0]] * 2, rel=1e-6)
+
+
+@pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials"])
+@pytest.mark.parametrize("wave", [sympy.sin, sympy.cos])
+def test_no_blow_of_a_train_is_stepped_over(wave: type[sympy.Expr], engine: str) -> None:
+    """Blows of exp(-(sin(pi (t - 0.3)) / w)^2), whose mean is exp(-1 / 2 w^2) I0(1 / 2 w^2), beside a friction."""
+    width = 0.02
+    net = sw.Network("hammer mill")
+    net.add(sw.Inertia("J", J=20.0), "a")
+    net.add(sw.DryFriction("friction", tau_c=40.0), "a")
+    blow = sympy.exp(-((wave(sympy.pi * (sw.t - sympy.Rational(3, 10))) / width) ** 2))
+    net.add(sw.TorqueSource("T", tau=100 + 500 * blow), "a")
+    sol = net.simulate(30.0, engine=engine, rtol=1e-9)
+    momentum = 30 * (100 - 40 + 500 * ive(0, 0.5 / width**2))
+    assert 20 * sol["J.omega"][-1] == pytest.approx(momentum, rel=1e-5)
+
+
+@pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials"])
+def test_no_reversal_of_a_smooth_square_wave_is_stepped_over(engine: str) -> None:
+    net = sw.Network("reversing drive")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.TorqueSource("T", tau=10 * sympy.tanh(300 * sympy.sin(2 * sympy.pi * (sw.t - 0.3)))), "a")
+    sol = net.simulate(20.3, engine=engine, rtol=1e-9, t_eval=2)
+    assert sol["J.omega"][-1] == pytest.approx(-3.0, rel=1e-2)  # 0.3 s backwards, then whole turns
+    assert sol.max("J.omega") < 2.1
 
 
 def test_a_motion_long_after_a_pulse_is_as_exact_as_before_it() -> None:

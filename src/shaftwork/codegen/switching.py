@@ -134,11 +134,9 @@ class Switching:
     def _searched(self, p: Array, t0: float, t_end: float, *, modes: bool) -> Timeline:
         found: list[tuple[float, float]] = []
         for switch in (one for one in self._switches if one.acts or modes):
-            if switch.line is None:
-                found += _searched(switch, p, t0, t_end)
-            else:
-                levels = _whole_numbers(switch, p, t0, t_end) if switch.whole else switch.levels
-                found += _on_a_line(switch, levels, p)
+            if (changes := _changes_of(switch, p, t0, t_end)) is None:
+                raise _too_often(switch, t0, t_end)
+            found += changes
         return timeline(found, t0, t_end, _inside(self._narrow, p, t0, t_end))
 
 
@@ -172,10 +170,9 @@ def _narrow(form: StateForm) -> Iterator[_Switch]:
 
 
 def _inside(switches: Sequence[_Switch], p: Array, t0: float, t_end: float) -> Iterator[float]:
-    """Times in s at which arguments are zero, which are lines or polynomials."""
+    """Times in s at which arguments are zero, where they are not too many to be followed."""
     for one in switches:
-        found = _searched(one, p, t0, t_end) if one.line is None else _on_a_line(one, one.levels, p)
-        for time, _ in found:
+        for time, _ in _changes_of(one, p, t0, t_end) or ():
             yield time
             yield from (time + DECADES * (t_end - t0)).tolist() if one.far else ()
 
@@ -224,21 +221,25 @@ def _straight(switch: _Switch, p: Array) -> tuple[float, float]:
     return float(slope), float(offset)
 
 
-def _whole_numbers(switch: _Switch, p: Array, t0: float, t_end: float) -> Array:
-    """The whole numbers that a line passes in a run."""
-    slope, offset = _straight(switch, p)
-    low, high = sorted((slope * t0 + offset, slope * t_end + offset))
-    if not high - low < MOST_SAMPLES // RESOLVED:
-        raise _too_often(switch, t0, t_end)
-    return np.arange(math.floor(low), math.ceil(high) + 1, dtype=float)
-
-
 def _too_often(switch: _Switch, t0: float, t_end: float) -> ParameterError:
     return ParameterError(
         f"'{switch.part}': a law that changes with the sign of {switch.argument} switches too often between "
         f"t = {t0:g} s and {t_end:g} s to be followed: more than {MOST_SAMPLES // RESOLVED} times, or without end. "
         "Take a shorter run, or a smooth law."
     )
+
+
+def _changes_of(switch: _Switch, p: Array, t0: float, t_end: float) -> list[tuple[float, float]] | None:
+    """Times in s at which a switch changes sides, in a run at least, and their reach; None where too often."""
+    if switch.line is None:
+        return _searched(switch, p, t0, t_end)
+    if not switch.whole:
+        return _on_a_line(switch, switch.levels, p)
+    slope, offset = _straight(switch, p)
+    low, high = sorted((slope * t0 + offset, slope * t_end + offset))
+    if not high - low < MOST_SAMPLES // RESOLVED:
+        return None
+    return _on_a_line(switch, np.arange(math.floor(low), math.ceil(high) + 1, dtype=float), p)
 
 
 def _on_a_line(switch: _Switch, levels: Array, p: Array) -> list[tuple[float, float]]:
@@ -252,12 +253,12 @@ def _on_a_line(switch: _Switch, levels: Array, p: Array) -> list[tuple[float, fl
     return [(time, far) for time, far in zip(times.tolist(), reach.tolist(), strict=True) if math.isfinite(time)]
 
 
-def _searched(switch: _Switch, p: Array, t0: float, t_end: float) -> list[tuple[float, float]]:
-    """Times in s at which a switch changes sides in a run, and the reach of their rounding."""
+def _searched(switch: _Switch, p: Array, t0: float, t_end: float) -> list[tuple[float, float]] | None:
+    """Times in s at which a switch changes sides in a run, and the reach of their rounding; None where too often."""
     argument, sides = _argument(switch, p), _sides(switch, p)
     t = _sampled(sides, t0, t_end)
     if t is None:
-        raise _too_often(switch, t0, t_end)
+        return None
     if switch.levels.size == 1:
         t = np.sort(np.append(t, _nearest(lambda at: np.abs(argument(at) - switch.levels[0]), t)))
     return _changes(sides, t)

@@ -160,11 +160,12 @@ def switches_of(node: sympy.Basic) -> Iterable[tuple[sympy.Expr, Sequence[float]
 
 
 def narrow_places(expression: sympy.Basic) -> Iterator[tuple[sympy.Expr, bool]]:
-    """Polynomials of time that are zero where an expression of it may have a narrow pulse or edge.
+    """What is zero where an expression of time may have a narrow pulse or edge, or a train of them.
 
     Law: a function f(g(t)) of an edge, tanh((t - 5) / 1e-3), has it where g is zero; that of a pulse,
-    exp(-((t - 5) / 1e-3)^2) or 1 / (1 + ((t - 5) / 1e-3)^2), where g has its turning point. What a fraction has goes
-    on far away from there, which is told with it.
+    exp(-((t - 5) / 1e-3)^2) or 1 / (1 + ((t - 5) / 1e-3)^2), where g has its turning point, and between the edges of a
+    train, tanh(300 sin(20 t)), it has one too. What a fraction of a polynomial has goes on far away from there, which
+    is told with it.
     """
     for node in sympy.preorder_traversal(expression):
         if not isinstance(node, EDGES) or (isinstance(node, sympy.Pow) and not node.exp.is_negative):
@@ -172,13 +173,15 @@ def narrow_places(expression: sympy.Basic) -> Iterator[tuple[sympy.Expr, bool]]:
         argument = node.args[0]
         if argument.has(t) and _is_simple(argument):
             slope = argument.diff(t)
-            yield slope if slope.has(t) else argument, isinstance(node, sympy.Pow)
+            yield slope if slope.has(t) else argument, isinstance(node, sympy.Pow) and argument.is_polynomial(t)
 
 
 def _is_simple(argument: sympy.Expr) -> bool:
-    """Whether an expression is a polynomial of time as pulses have it, which is soon taken apart."""
-    powers = [power.exp for power in argument.atoms(sympy.Pow) if power.has(t)]
-    return all(power.is_Integer and 0 < power <= MOST_POWER for power in powers) and argument.is_polynomial(t)
+    """Whether an expression is a polynomial, as pulses have it, of time and of sines of lines in time."""
+    sines = {sine: sympy.Dummy() for sine in argument.atoms(sympy.sin, sympy.cos) if line(sine.args[0]) is not None}
+    plain, moving = argument.xreplace(sines), (t, *sines.values())
+    powers = [power.exp for power in plain.atoms(sympy.Pow) if power.has(*moving)]
+    return all(power.is_Integer and 0 < power <= MOST_POWER for power in powers) and plain.is_polynomial(*moving)
 
 
 def between_steps(expression: sympy.Expr) -> set[sympy.Symbol]:

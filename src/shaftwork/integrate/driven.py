@@ -15,7 +15,7 @@ from shaftwork.integrate.problem import Array
 DEGREE, LEFT_OUT, ROUNDED = 8, 1e-13, 1e-10
 # Panels of a run at least: where an input is nothing but for short blows, fewer nodes may all lie between these.
 FEWEST = 512
-# Inputs of more values, states by nodes, are left to engines that step.
+# Inputs of more values in a run, states by nodes, are left to engines that step.
 MOST_VALUES = 10_000_000
 _NODES = (1 - np.cos(np.pi * np.arange(DEGREE + 1) / DEGREE)) / 2
 # Values at the nodes of [0, 1] to the coefficients of the powers.
@@ -68,7 +68,7 @@ def _moved(rates: Complex, length: float, inside: Array, start: Complex, inputs:
     return np.asarray(motion)
 
 
-def polynomials(forcing: Callable[[Array], Array], length: float, fewest: int) -> Array | None:
+def polynomials(forcing: Callable[[Array], Array], length: float, fewest: int, most: int) -> Array | None:
     """Values (n, panels, degree + 1) of inputs at the nodes of panels that resolve them, or None where none do.
 
     Law: panels are halved until the last Chebyshev coefficients of all inputs are below `LEFT_OUT` of the largest
@@ -78,9 +78,10 @@ def polynomials(forcing: Callable[[Array], Array], length: float, fewest: int) -
         forcing: inputs (n, k) at times (k,) in s after the start, smooth.
         length: of the span, s.
         fewest: panels, at least.
+        most: values, at most.
     """
-    panels, before, most = fewest, np.inf, MOST_VALUES / (DEGREE + 1) / len(forcing(np.zeros(1)))
-    while panels <= most:
+    panels, before, each = fewest, np.inf, (DEGREE + 1) * len(forcing(np.zeros(1)))
+    while panels * each <= most:
         times = length / panels * (np.arange(panels)[:, None] + _NODES)
         values = forcing(times.ravel()).reshape(-1, panels, DEGREE + 1)
         largest = np.maximum(np.abs(values).max(axis=(1, 2)), np.finfo(float).tiny)

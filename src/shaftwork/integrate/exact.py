@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.integrate.driven import FEWEST, driven, polynomials
+from shaftwork.integrate.driven import FEWEST, MOST_VALUES, driven, polynomials
 from shaftwork.integrate.linear_system import LinearSystem, propagator_of, system_of
 from shaftwork.integrate.observation import difference, doubt
 from shaftwork.integrate.pieces import Piece, both_sides, failure, pieces, piecewise, start_of_piece
@@ -176,13 +176,13 @@ def _inputs(problem: Problem, linear: LinearInputs) -> dict[Piece, Array] | None
     spans, duration = pieces(problem), problem.t_end - problem.t0
 
     def resolved() -> dict[Piece, Array] | None:
-        values = {}
+        values, left = dict[Piece, Array](), MOST_VALUES
         for piece in spans:
             length = piece.end - piece.start
-            found = polynomials(partial(_inside, linear, piece), length, math.ceil(FEWEST * length / duration))
-            if found is None:
+            nodes = polynomials(partial(_inside, linear, piece), length, math.ceil(FEWEST * length / duration), left)
+            if nodes is None:
                 return None
-            values[piece] = found
+            values[piece], left = nodes, left - nodes.size
         return values
 
     return linear.kept("inputs", resolved, spans)
