@@ -6,6 +6,7 @@ import warnings
 from typing import Any
 
 import pytest
+import sympy
 
 import shaftwork as sw
 
@@ -40,6 +41,28 @@ def test_a_table_with_another_level_before_its_end_warns_with_both_times() -> No
         warnings.simplefilter("error")
         assert torque(model, t=41.0) == pytest.approx(0.7e6, rel=1e-9)
         assert torque(model, t=11.0) == pytest.approx(0.8e6, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("law", "words"),
+    [
+        (10 * (1 - sympy.exp(-sw.t)), r"tau = 10 - 10\*exp\(-t\) of TorqueSource 'pull'"),
+        (5 * sympy.sin(62.5 * sw.t), r"tau = 5\*sin\(62.5\*t\) of TorqueSource 'pull'"),
+        (sympy.floor(sw.t) - 2 * sympy.floor(sw.t / 2), r"tau = .*floor\(t\).* of TorqueSource 'pull'"),
+    ],
+)
+def test_a_law_that_changes_with_time_is_named_with_the_next_step(law: Any, words: str) -> None:
+    """None of them is noise, and the first levels off: at a late time it has a steady operation."""
+    net = sw.Network("pulled")
+    net.add(sw.TorqueSource("pull", tau=law), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.Damper("d", d=2.0), "a")
+    model = net.compile()
+    with pytest.raises(sw.SimulationError, match=rf"{words} changes with time.*steady_state\(t=\.\.\.\)") as refused:
+        model.steady_state()
+    assert "noise" not in str(refused.value)
+    for t in (0.5, 50.0):
+        assert model.steady_state(t=t)["J.omega"] == pytest.approx(float(law.subs(sw.t, t)) / 2.0, rel=1e-9, abs=1e-9)
 
 
 OTHER_LEVELS = {

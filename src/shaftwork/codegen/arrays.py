@@ -132,12 +132,11 @@ class BoundArrays:
 
         return part.A + part.B @ slope, np.hstack([part.B, part.B1]), given
 
-    def moving_sources(self, t: float) -> tuple[str, ...]:
-        """The parts whose laws change with time at a time."""
-        inputs, graph = self.program.inputs, self.program.form.graph
+    def moving_laws(self, t: float) -> tuple[int, ...]:
+        """The branches whose laws change with time at a time."""
+        inputs = self.program.inputs
         slopes = inputs.time_slopes(t, np.zeros(inputs.outputs), np.zeros(inputs.states), self.p)
-        branches = self.program.assembly.inputs[slopes != 0]
-        return tuple(dict.fromkeys(graph.part_of(int(branch)).name for branch in branches))
+        return tuple(map(int, self.program.assembly.inputs[slopes != 0]))
 
     def impulse(self, x: Array, before: float | None, after: float) -> Array:
         """The states after the inputs have jumped (impulses through rigid joints).

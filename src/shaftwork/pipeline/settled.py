@@ -11,6 +11,9 @@ import numpy as np
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.switching import Switching
+from shaftwork.codegen.valueless import in_words
+from shaftwork.components.laws import t as TIME
+from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.errors import NetworkWarning, SimulationError
 from shaftwork.core.notices import warn
 from shaftwork.network.templates import Kind
@@ -20,6 +23,8 @@ if TYPE_CHECKING:
 
 SAME = 1e-6
 """Levels of a law that differ by less than this fraction are one."""
+NAMED = 3
+"""Laws that a message shows."""
 MIDDLE = (1.0, 1.0 + SAME, 1.0)
 """Of a level that lasts its middle is named."""
 
@@ -30,11 +35,27 @@ def refuse_moving(bound: BoundArrays, t: float, switching: Switching) -> None:
     Raises:
         SimulationError: there is one.
     """
-    if moving := dict.fromkeys((*bound.moving_sources(t), *switching.endless(bound.p))):
-        raise SimulationError(
-            f"{', '.join(moving)} never stops changing, so there is no steady operation. Name the time at which "
-            "the sources are to be read, steady_state(t=...), or take the noise out of them (std = 0 for its mean)."
-        )
+    graph, endless = bound.program.form.graph, switching.endless(bound.p)
+    of_endless = (made.index for made in graph.branches if graph.parts[made.part].name in endless and _of_time(made))
+    moving = [graph.branches[k] for k in dict.fromkeys((*bound.moving_laws(t), *of_endless))]
+    if not moving:
+        return
+    laws = [*dict.fromkeys(in_words(graph.parts[made.part], made.template.law) for made in moving)]
+    shown = "; ".join(laws[:NAMED]) + (f" and {len(laws) - NAMED} more" if len(laws) > NAMED else "")
+    noise = ", or take the noise out (std = 0 for its mean)" if any(map(_is_noise, moving)) else ""
+    raise SimulationError(
+        f"steady_state() of '{graph.name}' finds no time from which on all laws stay as they are: {shown} "
+        f"{'changes' if len(laws) == 1 else 'change'} with time. Name the time at which laws are to be read, "
+        f"steady_state(t=...), a late one where they level off{noise}."
+    )
+
+
+def _of_time(branch: GraphBranch) -> bool:
+    return TIME in branch.template.law.free_symbols
+
+
+def _is_noise(branch: GraphBranch) -> bool:
+    return bool(branch.template.law.has(HeldNoise, SmoothNoise))
 
 
 def warn_of_earlier_levels(bound: BoundArrays, x: Array, when: float, switching: Switching) -> None:
