@@ -75,6 +75,12 @@ def test_what_is_per_speed_says_whether_it_counts_revolutions_or_radians() -> No
         sw.DCMachine("d", k=2 * volt / (1000 / unit.minute)),
     ):
         assert "may count revolutions or radians; write rpm or rad into it" in problem_of(part)
+    unit.formatter.default_format = "~P"  # symbols for names: what is shown says nothing of what is counted
+    assert "may count revolutions" in problem_of(sw.Damper("d", d=3 * newton_metre * unit.minute))
+    net = sw.Network("symbols")
+    net.add(sw.SpeedSource("drive", omega=60 * unit.rpm), "a")
+    net.add(sw.Damper("d", d=1.0), "a")
+    assert net.compile().parameters["drive.omega"] == pytest.approx(2 * math.pi)
 
 
 def test_quantities_with_units_are_converted_and_wrong_units_are_refused() -> None:

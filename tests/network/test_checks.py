@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pint
 import pytest
 import sympy
 
+import shaftwork as sw
 from shaftwork.components import electrical, laws, machines, rotation, sources, translation
 from shaftwork.components.base import Component, Port, component
 from shaftwork.components.branches import ACROSS, AcrossLaw, AcrossStore, Branch, IdealCoupling, ThroughLaw
@@ -145,19 +145,8 @@ def test_a_bad_value_is_said_with_unit_and_bounds(value: Any, words: str) -> Non
     assert (problem.parts, problem.nodes) == (("J3",), ("wheel",))
 
 
-@dataclass
-class Length:
-    """What pint gives for a length, as far as a parameter looks at it."""
-
-    units: str = "meter"
-    dimensionality: str = "[length]"
-
-    def to(self, unit: str) -> SimpleNamespace:
-        raise ValueError(f"cannot convert to {unit}")
-
-
 def test_a_wrong_unit_is_said_with_the_right_one() -> None:
-    problem = typed(rotation.Inertia("J3", J=Length()), "wheel")  # type: ignore[arg-type]
+    problem = typed(rotation.Inertia("J3", J=3 * pint.UnitRegistry().meter), "wheel")  # type: ignore[arg-type]
     assert problem.kind == "wrong unit"
     assert "is given in 'meter', but needs kg*m^2" in problem.message
 
@@ -336,6 +325,42 @@ def test_two_trains_in_one_network_are_a_note() -> None:
     (problem,) = joined((translation.Mass("m1", m=1.0), ("car",)), (brake, ("car",)))
     assert problem.message == "'m1', 'd' at node 'car' share no node with 'J1', 'shaft', 'J2'."
     assert (problem.kind, problem.severity) == ("separate train", "note")
+
+
+def named_as(part: str, at: str) -> sw.Network:
+    net = sw.Network("names")
+    net.add(sw.TorqueSource("motor", tau=1.0), "rotor")
+    net.add(sw.Inertia("J1", J=1.0), "rotor")
+    net.add(sw.Spring("shaft", c=100.0), "rotor", "wheel")
+    net.add(sw.Inertia("J2", J=1.0), "wheel")
+    net.add(sw.Inertia(part, J=1.0), at)
+    return net
+
+
+def test_a_part_with_the_name_of_a_node_where_it_is_not_is_said() -> None:
+    net = named_as("wheel", "rotor")
+    said = (
+        "shared name: Inertia 'wheel' and node 'wheel' have the same name: 'wheel.omega' is read and set at node "
+        "'rotor', where the part is, and that of node 'wheel' cannot be read. Rename one of them, for example the part "
+        "'wheel_2'."
+    )
+    with pytest.warns(sw.NetworkWarning) as caught:
+        sol = net.simulate(1.0, t_eval=11)
+    assert [str(one.message) for one in caught] == [said]
+    assert np.array_equal(sol["wheel.omega"], sol["J1.omega"])  # as the message says
+    assert not np.allclose(sol["wheel.omega"], sol["J2.omega"])
+
+
+@pytest.mark.parametrize(("part", "at"), [("wheel", "wheel"), ("wheel_2", "rotor")])
+def test_a_part_at_the_node_of_its_name_has_its_speed(part: str, at: str) -> None:
+    assert named_as(part, at).check() == ()
+
+
+def test_a_part_without_the_quantity_of_a_node_may_have_its_name() -> None:
+    """A damper has a speed between its ends, omega_rel, but none of its own."""
+    net = named_as("J3", "wheel")
+    net.add(sw.Damper("rotor", d=1.0), "rotor", "wheel")
+    assert net.check() == ()
 
 
 def test_an_inertia_alone_is_a_train() -> None:

@@ -6,9 +6,8 @@ from functools import cached_property
 
 from sympy import Expr, Symbol
 
-from shaftwork.codegen.recovery import signals_of
 from shaftwork.components.base import Signal
-from shaftwork.network.graph import GROUND, GraphPart
+from shaftwork.network.graph import GROUND, GraphPart, signals_of
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm, store_name
 from shaftwork.reduction.readings import Readings

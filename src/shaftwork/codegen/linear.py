@@ -27,13 +27,13 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.law_slopes import input_slopes
 from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.observer import ModelObserver
-from shaftwork.codegen.recovery import History, signals_of
+from shaftwork.codegen.recovery import History
 from shaftwork.codegen.waves import Dense
 from shaftwork.components.base import Signal
 from shaftwork.components.branches import INTEGRAL
 from shaftwork.components.slopes import slope
 from shaftwork.core.errors import SignalError, SimulationError
-from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
+from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart, signals_of
 from shaftwork.network.templates import BranchTemplate, Kind
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.gains import add

@@ -10,14 +10,14 @@ import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.recovery import History, signals_of
+from shaftwork.codegen.recovery import History
 from shaftwork.codegen.stores import Stores
 from shaftwork.codegen.timeline import NOTHING, Timeline
 from shaftwork.codegen.waves import Carrying, Dense, along_lines
 from shaftwork.components.base import Component, Profile, Signal
 from shaftwork.core.domains import ROTATION
 from shaftwork.core.errors import SignalError
-from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart
+from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart, signals_of
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from functools import cached_property
 from typing import Any
 
@@ -17,7 +17,7 @@ from shaftwork.components.base import Profile, Signal
 from shaftwork.components.branches import INTEGRAL, End
 from shaftwork.components.slopes import slope
 from shaftwork.core.errors import no_value
-from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart
+from shaftwork.network.graph import GROUND, GraphPart
 from shaftwork.network.templates import BranchTemplate, Kind
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.readings import Quantity
@@ -243,18 +243,3 @@ def _ends(ends: tuple[str | None, str | None], port: End) -> Iterator[float]:
         yield 1.0
     if ends[1] == port:
         yield -1.0
-
-
-def signals_of(graph: CircuitGraph, part: GraphPart) -> Mapping[str, Signal]:
-    """The signals that a part has in this network.
-
-    Those of a store that was left out are missing. A part with its optional end at rest also answers to the plain name
-    of its speed, omega for omega_rel.
-    """
-    stores = any(graph.branches[k].template.kind is Kind.THROUGH_STORE for k in part.branches)
-    declared = part.component.signals()
-    signals = {name: made for name, made in declared.items() if stores or made.kind not in ("twist", "store")}
-    ports = part.component.ports
-    if any(port.optional for port in ports) and any(part.nodes[port.name] == GROUND for port in ports):
-        signals |= {name.removesuffix("_rel"): made for name, made in signals.items()}
-    return signals

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import reprlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import networkx as nx
@@ -17,7 +17,7 @@ import sympy
 from shaftwork.components.base import Component
 from shaftwork.core.domains import Domain
 from shaftwork.core.errors import Problem, ShaftworkError
-from shaftwork.network.graph import GROUND, CircuitGraph, resolve
+from shaftwork.network.graph import GROUND, CircuitGraph, resolve, signals_of
 from shaftwork.network.law_faults import Fault, instead_of, law_faults
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
 from shaftwork.network.sharing import Shared
@@ -213,7 +213,7 @@ class _Examination:
 
 
 def connection_problems(graph: CircuitGraph) -> tuple[Problem, ...]:
-    """Parts, ends and whole trains that are not joined to the rest."""
+    """Parts, ends and whole trains that are not joined to the rest, and nodes whose speed has the name of another."""
     ends: list[list[tuple[int, str]]] = [[] for _ in graph.nodes]
     for number, part in enumerate(graph.parts):
         for port in part.component.ports:
@@ -231,7 +231,7 @@ def connection_problems(graph: CircuitGraph) -> tuple[Problem, ...]:
     joined = [train for train in trains if train[0] not in alone]
     main = max(joined, key=len, default=())
     problems += [_separate_train(graph, train, main, spelling) for train in joined if train is not main]
-    return tuple(problems)
+    return (*problems, *_shared_names(graph))
 
 
 def _trains(ends: list[list[tuple[int, str]]]) -> list[Train]:
@@ -279,6 +279,27 @@ def _loose_end(graph: CircuitGraph, number: int, port: str, node: int, spelling:
         (part.name,),
         (name,),
     )
+
+
+def _shared_names(graph: CircuitGraph) -> Iterator[Problem]:
+    """Nodes with the name of a part whose speed is another: sol["wheel.omega"] is that of the part."""
+    parts = {part.name: part for part in graph.parts}
+    for number, (node, domain) in enumerate(zip(graph.nodes, graph.domains, strict=True)):
+        if (part := parts.get(node)) is None or (read := signals_of(graph, part).get(domain.across.name)) is None:
+            continue
+        ends = tuple(GROUND if end is None else part.nodes[end] for end in read.ends)
+        if (read.kind, ends, read.sign) == ("across", (number, GROUND), 1):
+            continue
+        quantity, at = f"{node}.{domain.across.name}", tuple(graph.node_name(end) for end in ends if end != GROUND)
+        yield Problem(
+            "shared name",
+            f"{title(part.component)} and node '{node}' have the same name: '{quantity}' is read and set at "
+            f"{at_nodes(at)}, where the part is, and that of node '{node}' cannot be read.",
+            f"Rename one of them, for example the part '{node}_2'.",
+            (part.name,),
+            (node,),
+            "warning",
+        )
 
 
 def _separate_train(graph: CircuitGraph, train: Train, main: Train, spelling: Spelling) -> Problem:

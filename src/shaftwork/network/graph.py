@@ -10,7 +10,7 @@ from typing import Any
 import networkx as nx
 from sympy import Expr, Symbol
 
-from shaftwork.components.base import Component, Derived
+from shaftwork.components.base import Component, Derived, Signal
 from shaftwork.components.branches import End, named_in
 from shaftwork.components.laws import as_expression
 from shaftwork.components.modes import Modes
@@ -155,6 +155,21 @@ class CircuitGraph:
         """An expression of a template with the part's own parameter symbols replaced by the network's."""
         part = self.parts[branch.part]
         return expression.xreplace({s: self.symbol_of(part, s.name) for s in branch.template.symbols})
+
+
+def signals_of(graph: CircuitGraph, part: GraphPart) -> Mapping[str, Signal]:
+    """The signals that a part has in this network.
+
+    Those of a store that was left out are missing. A part with its optional end at rest also answers to the plain name
+    of its speed, omega for omega_rel.
+    """
+    stores = any(graph.branches[k].template.kind is Kind.THROUGH_STORE for k in part.branches)
+    declared = part.component.signals()
+    signals = {name: made for name, made in declared.items() if stores or made.kind not in ("twist", "store")}
+    ports = part.component.ports
+    if any(port.optional for port in ports) and any(part.nodes[port.name] == GROUND for port in ports):
+        signals |= {name.removesuffix("_rel"): made for name, made in signals.items()}
+    return signals
 
 
 def ends_of(branch: GraphBranch) -> tuple[tuple[tuple[int, int], int, int], ...]:
