@@ -148,6 +148,15 @@ def test_speeds_that_make_no_diagram_are_refused_before_anything_is_computed(
     assert "give two speeds in 1/min, the lower one 0 or more" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("point", [("--steady",), ("--at", "J1.omega=0")])
+def test_a_diagram_without_its_point_names_options_that_work(
+    point: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["campbell", "crane-start", "--n-max", "3000"]) == WRONG_INPUT
+    assert " ".join(point) in capsys.readouterr().err
+    assert main(["campbell", "crane-start", "--n-max", "3000", *point]) == DONE
+
+
 def test_a_sweep_that_is_interrupted_goes_on_from_its_store(
     model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
