@@ -151,6 +151,13 @@ def test_a_wrong_unit_is_said_with_the_right_one() -> None:
     assert "is given in 'meter', but needs kg*m^2" in problem.message
 
 
+def test_a_law_with_a_unit_is_said_to_be_written_in_plain_numbers() -> None:
+    torque = 10 * pint.UnitRegistry().Unit("N*m") * laws.t
+    problem = typed(sources.TorqueSource("motor", tau=torque), "wheel")
+    assert problem.kind == "wrong unit"
+    assert "tau has a unit but is no number; a law is written in plain numbers" in problem.message
+
+
 @pytest.mark.parametrize(
     ("law", "words"),
     [

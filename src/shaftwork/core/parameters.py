@@ -138,7 +138,11 @@ class Parameter:
             return value, objection
         if getattr(magnitude, "ndim", 0):
             return value, "must be one number, not several"
-        return float(magnitude), self.objection(float(magnitude))
+        try:
+            number = float(magnitude)
+        except (TypeError, ValueError):
+            return value, "has a unit but is no number; a law is written in plain numbers"
+        return number, self.objection(number)
 
 
 def is_quantity(value: Any) -> bool:
