@@ -128,6 +128,15 @@ def test_the_matrix_exponential_replaces_modes_that_are_of_no_use(monkeypatch):
     assert np.abs(by_modes.dense(asked) - by_exponential.dense(asked)).max() < 1e-11 * np.abs(by_modes.x).max()
 
 
+def test_output_times_whose_steps_grow_by_a_rounding_each_are_met(monkeypatch):
+    times = np.linspace(0.0, 1.0, 20001)
+    times += 1e-16 * np.arange(times.size) ** 2
+    monkeypatch.setattr(linear_system, "find_modes", lambda _matrix: None)
+    trajectory = exact.solve(chain(3, 1e4, times))
+    speeds, _ = chain_solution(3, 1e4, times)
+    assert np.abs(trajectory.x[:, :3] - speeds).max() < 1e-11 * np.abs(speeds).max()
+
+
 def test_its_own_grid_is_refined_nowhere_and_needs_no_output_times():
     problem = chain(3, 1e2, np.linspace(0.0, 1.0, 11))
     trajectory = exact.solve(replace(problem, t_eval=None))

@@ -57,6 +57,10 @@ def test_the_end_of_a_ramp_costs_no_digits_of_a_long_motion() -> None:
 PULSES = {
     "bell": (lambda x: sympy.exp(-(x**2)), lambda x: math.sqrt(math.pi) * math.erf(x) / 2),
     "fraction": (lambda x: 1 / (1 + x**2) ** 2, lambda x: (math.atan(x) + x / (1 + x**2)) / 2),
+    "power": (
+        lambda x: 2 ** -(x**2),
+        lambda x: math.sqrt(math.pi / math.log(2)) * math.erf(x * math.sqrt(math.log(2))) / 2,
+    ),
     "edges": (lambda x: (sympy.tanh(x + 1) - sympy.tanh(x - 1)) / 2, lambda x: _softplus(x + 1) - _softplus(x - 1)),
 }
 """Pulses of width one, and their integrals."""

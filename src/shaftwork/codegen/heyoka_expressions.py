@@ -160,6 +160,8 @@ class Translator:
             return _whole_power(self.expression(node.base), int(exponent))
         if exponent.is_number and exponent > 1 and isinstance(node.base, sympy.Abs):
             return self._smooth_power(node)
+        if node.base.is_number and node.base.is_positive:
+            return self.expression(sympy.exp(exponent * sympy.log(node.base).evalf()))
         base = self.expression(node.base)
         return heyoka.sqrt(base) if exponent == sympy.S.Half else base ** self.expression(exponent)
 

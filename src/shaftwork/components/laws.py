@@ -41,7 +41,7 @@ EDGES = (
     *(sympy.exp, sympy.sinh, sympy.cosh, sympy.tanh, sympy.coth, sympy.sech, sympy.csch),
     *(sympy.erf, sympy.erfc, sympy.atan, sympy.Pow),
 )
-"""Functions that rise or fall in a small part of their argument's range, powers where they are negative."""
+"""Functions that rise or fall in a small part of their argument's range; powers, where it or a fraction is in them."""
 NUMERICAL = {"Interpolation": interpolate, "InterpolationSlope": interpolation_slope, **noise.NUMERICAL}
 """Names and numerical functions of tables and noise, for a code printer other than `sympy.lambdify`."""
 
@@ -168,12 +168,13 @@ def narrow_places(expression: sympy.Basic) -> Iterator[tuple[sympy.Expr, bool]]:
     is told with it.
     """
     for node in sympy.preorder_traversal(expression):
-        if not isinstance(node, EDGES) or (isinstance(node, sympy.Pow) and not node.exp.is_negative):
+        if not isinstance(node, EDGES):
             continue
-        argument = node.args[0]
+        fraction = isinstance(node, sympy.Pow) and node.exp.is_negative
+        argument = node.exp if isinstance(node, sympy.Pow) and not fraction else node.args[0]  # 2^-x is exp(-x log 2)
         if argument.has(t) and _is_simple(argument):
             slope = argument.diff(t)
-            yield slope if slope.has(t) else argument, isinstance(node, sympy.Pow) and argument.is_polynomial(t)
+            yield slope if slope.has(t) else argument, fraction and argument.is_polynomial(t)
 
 
 def _is_simple(argument: sympy.Expr) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import pairwise
@@ -12,7 +12,7 @@ import numpy as np
 
 from shaftwork.core.errors import ParameterError
 from shaftwork.integrate.driven import FEWEST, MOST_VALUES, driven, polynomials
-from shaftwork.integrate.linear_system import LinearSystem, propagator_of, system_of
+from shaftwork.integrate.linear_system import LinearSystem, are_even, propagator_of, system_of
 from shaftwork.integrate.observation import difference, doubt
 from shaftwork.integrate.pieces import Piece, both_sides, failure, pieces, piecewise, start_of_piece
 from shaftwork.integrate.precise import Nearby, PrecisePiece, PreciseSystem, precise_piece, precise_system, seconds
@@ -309,9 +309,15 @@ def _nodes(problem: Problem, piece: Piece) -> Array:
     return np.concatenate([[piece.start], inner, [piece.end]])
 
 
-def _equal_steps(times: Array) -> list[tuple[int, int]]:
+def _equal_steps(times: Array) -> Iterator[tuple[int, int]]:
     """Runs (first node, number of steps) of steps that are equal up to the rounding of the times."""
     steps = np.diff(times)
     changes = np.flatnonzero(np.abs(np.diff(steps)) > 4 * np.spacing(np.abs(times).max())) + 1
-    edges = [0, *changes.tolist(), steps.size]
-    return [(first, last - first) for first, last in pairwise(edges)]
+    runs = list(pairwise([0, *changes.tolist(), steps.size]))[::-1]
+    while runs:
+        first, last = runs.pop()
+        if are_even(times[first : last + 1]):
+            yield first, last - first
+        else:  # steps that grow by a rounding each
+            middle = (first + last) // 2
+            runs += [(middle, last), (first, middle)]

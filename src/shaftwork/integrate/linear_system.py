@@ -47,6 +47,12 @@ def system_of(linear: LinearInputs) -> LinearSystem:
     return linear.kept("exact", lambda: LinearSystem(linear))
 
 
+def are_even(times: Array) -> bool:
+    """Whether times (k,) have equal steps, up to rounding."""
+    evenly = np.linspace(times[0], times[-1], times.size)
+    return bool((np.abs(times - evenly) <= 4 * np.spacing(np.abs(times).max())).all())
+
+
 @dataclass(frozen=True)
 class Propagator:
     """exp(M h) for one piece in scaled coordinates z = (x / scale, s, 1)."""

@@ -13,6 +13,7 @@ from numpy.polynomial import chebyshev
 
 from shaftwork.integrate.chebyshev import Polynomial, points
 from shaftwork.integrate.fixed_point import FixedPoint, Integers
+from shaftwork.integrate.linear_system import are_even
 from shaftwork.integrate.pieces import Piece, PiecewiseDense, pieces
 from shaftwork.integrate.problem import Array, Fractions, LinearInputs, Problem
 from shaftwork.integrate.stiffness import balance, scale_by
@@ -158,17 +159,11 @@ class PrecisePiece:
 
     def at(self, times: Array) -> Array:
         """States (k, n) at times (k,)."""
-        if times.size <= FEW or _are_even(times):
+        if times.size <= FEW or are_even(times):
             return self.exactly(times)
         if self.panels is None:
             return self.nearby(*self._nodes, times)
         return np.asarray(self.panels(times))
-
-
-def _are_even(times: Array) -> bool:
-    """Whether times have equal steps, up to rounding."""
-    evenly = np.linspace(times[0], times[-1], times.size)
-    return bool((np.abs(times - evenly) <= 4 * np.spacing(np.abs(times).max())).all())
 
 
 def precise_system(problem: Problem, linear: LinearInputs) -> PreciseSystem | None:

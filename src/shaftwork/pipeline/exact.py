@@ -18,6 +18,7 @@ from shaftwork.components.modes import ALL_IN_ONE
 from shaftwork.components.shaft_models import MOST_SPECTRAL, OneSpring, Rigid, Spectral, Wave
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import AccuracyWarning, NetworkWarning, ParameterError
+from shaftwork.core.kept import Kept
 from shaftwork.core.notices import muted
 from shaftwork.network.graph import resolve
 from shaftwork.network.netlist import Netlist, Placed
@@ -73,7 +74,7 @@ class ExactNetwork:
 
     def __init__(self, model: Model, compiled: Compile, shafts: Mapping[str, Shaft]) -> None:
         self._model, self._compiled, self._shafts = model, compiled, shafts
-        self._meshes: dict[tuple[int, ...], Model] = {}
+        self._meshes = Kept[tuple[int, ...], Model](MESHES)
 
     @cached_property
     def _own(self) -> Model:
@@ -194,15 +195,9 @@ class ExactNetwork:
                 f"Up to {radius / (2 * np.pi):.4g} Hz there are {waves.max():.0f} half waves along shaft '{shaft}', "
                 f"more than are sought for. Give a smaller f_max or count, or divide the shaft into several in a row."
             )
-        if degrees not in self._meshes:
-            made = self._with(
-                {
-                    name: dataclasses.replace(shaft, model=Spectral(degree))
-                    for (name, shaft), degree in zip(self._shafts.items(), degrees, strict=True)
-                }
-            )
-            self._meshes = dict([*self._meshes.items(), (degrees, made)][-MESHES:])
-        return self._meshes[degrees]
+        shafts = zip(self._shafts.items(), degrees, strict=True)
+        changed = {name: dataclasses.replace(shaft, model=Spectral(degree)) for (name, shaft), degree in shafts}
+        return self._meshes(degrees, lambda: self._with(changed))
 
 
 def _values_of(motion: Solution, shafts: tuple[str, ...]) -> dict[str, float]:
