@@ -83,6 +83,12 @@ def test_no_blow_of_a_train_of_them_is_overlooked(width: float) -> None:
     assert momentum == pytest.approx(1000 + 5000 * ive(0, 0.5 / width**2), rel=1e-11)
 
 
+@pytest.mark.parametrize("outputs", [2, 1001])
+def test_the_largest_value_of_an_input_does_not_hang_on_the_output_times(outputs: int) -> None:
+    law = 100 + 500 * sympy.sin(sympy.pi * (t - sympy.Rational(3, 10))) ** 20000
+    assert chain(law).simulate(10.0, t_eval=outputs).max("motor.tau") == pytest.approx(600.0, rel=1e-6)
+
+
 def test_runs_to_other_ends_do_not_pile_up_what_they_have_made_of_the_inputs() -> None:
     model = chain(sympy.sin(300 * t)).compile()
     model.simulate(1.0)

@@ -282,7 +282,8 @@ def _in_floats(problem: Problem, system: LinearSystem) -> Callable[[Piece, Array
             states[asked == piece.start] = x  # without the rounding of the way to the modes and back
             return states
 
-        return _Span(_nodes(problem, piece), at(np.array([piece.end]))[0], at)
+        nodes = _nodes(problem, piece, fewest=0 if inputs is None else OWN_INTERVALS)  # a blow may lie between outputs
+        return _Span(nodes, at(np.array([piece.end]))[0], at)
 
     return span
 
@@ -300,11 +301,12 @@ def _by_exponentials(problem: Problem, system: LinearSystem, dense_form: bool, p
     return _Span(times, states[-1], lambda asked: propagator.between(times, states, asked))
 
 
-def _nodes(problem: Problem, piece: Piece) -> Array:
-    if problem.t_eval is None:
+def _nodes(problem: Problem, piece: Piece, *, fewest: int = 0) -> Array:
+    """The output times in a piece and its ends; the engine's own grid where there are none, or fewer in the run."""
+    outputs = np.empty(0) if problem.t_eval is None else np.asarray(problem.t_eval, dtype=float)
+    if problem.t_eval is None or outputs.size < fewest:
         share = (piece.end - piece.start) / (problem.t_end - problem.t0)
         return np.linspace(piece.start, piece.end, max(2, int(OWN_INTERVALS * share)) + 1)
-    outputs = np.asarray(problem.t_eval, dtype=float)
     inner = outputs[(outputs > piece.start) & (outputs < piece.end)]
     return np.concatenate([[piece.start], inner, [piece.end]])
 
