@@ -150,3 +150,37 @@ def test_what_is_read_of_a_motion_without_its_law_is_refused() -> None:
     assert sol["J.omega"][-1] == pytest.approx(3.0)
     with pytest.raises(sw.SimulationError, match=r"omega = sqrt\(1 - t\) of SpeedSource 'drive' has no real value"):
         _ = sol["J2.omega"]
+
+
+READERS: dict[str, Callable[[sw.Solution], Any]] = {
+    "values": lambda sol: sol["pull.tau"],
+    "energy": lambda sol: sol.energy,
+    "maximum": lambda sol: sol.max("pull.tau"),
+}
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_a_torque_at_a_pole_beside_a_prescribed_speed_is_named(name: str) -> None:
+    """No state moves by it, so the run knows nothing of it; 1 / (t - 1) is infinite at t = 1."""
+    net = wheel(sw.TorqueSource("free", tau=1.0))
+    net.add(sw.TorqueSource("pull", tau=1 / (sw.t - 1)), "other")
+    net.add(sw.SpeedSource("drive", omega=1.0), "other")
+    sol = net.simulate(2.0, t_eval=5)
+    assert sol["J.omega"][-1] == pytest.approx(2.0)
+    with pytest.raises(sw.SimulationError, match=r"At t = 1 s tau = 1/\(t - 1\) of TorqueSource 'pull' has no real"):
+        READERS[name](sol)
+
+
+@pytest.mark.parametrize("engine", ["heyoka", "scipy"])
+def test_a_motion_into_a_pole_ends_in_an_error_and_goes_through_by_no_engine(engine: str) -> None:
+    """J phi'' = 10 - d phi' + 0.001 / (phi - 5) climbs to the pole at phi = 5, and no number lies beyond its wall.
+
+    Without the pole phi = 10 (t - 1 + e^-t) comes to 5 where t + e^-t = 1.5, at t = 1.1983 s.
+    """
+    if engine == "heyoka":
+        pytest.importorskip("heyoka")
+    net = wheel(sw.TorqueSource("pull", tau=10 + 0.001 / (sw.phi - 5)), sw.Damper("d", d=1.0))
+    with pytest.raises(
+        sw.SimulationError, match=r"failed at t = 1\.198.*(spacing of|spacing between) numbers.*J\.omega"
+    ):
+        net.simulate(10.0, engine=engine)

@@ -345,7 +345,7 @@ def test_a_store_of_another_network_and_what_is_no_store_are_refused(tmp_path: P
     (tmp_path / "b").write_text("c = 3\n")
     with pytest.raises(sw.ParameterError, match="is no file of a sweep"):
         sweep(swing(), store=tmp_path / "b", **call)  # type: ignore[arg-type]
-    with pytest.raises(sw.ParameterError, match="cannot be used"):
+    with pytest.raises(sw.ParameterError, match="cannot be used: No such file or directory"):
         sweep(swing(), store=tmp_path / "missing" / "c", **call)  # type: ignore[arg-type]
 
 

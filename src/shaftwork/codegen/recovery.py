@@ -44,7 +44,7 @@ class History:
             SimulationError: a law has no value.
         """
         y, u = self.bound.values(self.t, self.x)
-        if np.isnan(u).any() and (law := without_value(self.bound, self.t, self.x.T)) is not None:
+        if not np.isfinite(u).all() and (law := without_value(self.bound, self.t, self.x.T)) is not None:
             raise no_value(*law)
         inputs = self.bound.program.inputs
         slopes = inputs.of_time[:, None] * inputs.time_slopes(self.t, y, self.x, self.bound.p)

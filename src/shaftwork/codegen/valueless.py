@@ -52,8 +52,8 @@ def _law_of(bound: BoundArrays, place: int) -> str:
 
 
 def first_missing(times: Array, values: Array) -> tuple[float, int] | None:
-    """The first of times (k,) at which one of the values (k, m) is none, and its number; None where all are."""
-    missing = np.isnan(values)
+    """The first of times (k,) at which one of the values (k, m) is not finite, and its number; None where all are."""
+    missing = ~np.isfinite(values)
     if not missing.any():
         return None
     row = int(np.argmax(missing.any(axis=1)))

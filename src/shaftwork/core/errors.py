@@ -81,7 +81,8 @@ def no_value(t: float, law: str) -> SimulationError:
     """
     return SimulationError(
         f"At t = {t:.9g} s {law} has no real value. Give a law that has one at all times, speeds and angles of the "
-        "motion: a root or a logarithm of Max(0, ...), a power of Abs(...), a Piecewise that ends with True."
+        "motion: a root or a logarithm of Max(0, ...), a power of Abs(...), a divisor that is never zero, a Piecewise "
+        "that ends with True."
     )
 
 

@@ -236,7 +236,8 @@ class _Run:
 
     def _reason(self, outcome: str, watch: Watch | None) -> str:
         if outcome == "step_limit":
-            return used_up(self.problem)
+            used = self.steps >= self.problem.max_steps
+            return used_up(self.problem) if used else "its steps are shorter than the spacing of numbers at this time"
         if outcome == "err_nf_state":
             return "the state or its derivative is not finite"
         if watch is not None and watch.reason is not None:

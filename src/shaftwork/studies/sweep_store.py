@@ -72,7 +72,7 @@ class Store:
             else:
                 return self._locked(FileIO(self._path, "a+"))
         except (OSError, ValueError) as error:
-            why = str(error)
+            why = getattr(error, "strerror", None) or str(error)
         raise ParameterError(f"store = '{self._path}' cannot be used: {why}. Give a file in a folder that exists.")
 
     def _locked(self, file: FileIO) -> FileIO:
