@@ -35,6 +35,8 @@ FARTHEST, CLEAR = 1e-6, 1 / 8
 PROBES = np.array([1.0, 1.5, 2.0, 3.0, 4.0])
 DECADES = np.array([sign * 10.0**-place for place in range(1, 13) for sign in (-1, 1)])
 """Distances from a pulse that goes on far away, as parts of the run: no step gets from one to the next unawares."""
+MOST_PULSES = 10_000
+"""Pulses of a law at which engines end a step: each takes 0.1 ms, so more would take longer than the run."""
 KEPT = 8
 """Timelines of other runs that are kept."""
 
@@ -172,7 +174,8 @@ def _narrow(form: StateForm) -> Iterator[_Switch]:
 def _inside(switches: Sequence[_Switch], p: Array, t0: float, t_end: float) -> Iterator[float]:
     """Times in s at which arguments are zero, where they are not too many to be followed."""
     for one in switches:
-        for time, _ in _changes_of(one, p, t0, t_end) or ():
+        found = _changes_of(one, p, t0, t_end) or []
+        for time, _ in found if len(found) <= MOST_PULSES else ():
             yield time
             yield from (time + DECADES * (t_end - t0)).tolist() if one.far else ()
 

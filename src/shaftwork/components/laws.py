@@ -179,7 +179,8 @@ def narrow_places(expression: sympy.Basic) -> Iterator[tuple[sympy.Expr, bool]]:
 
 def _is_simple(argument: sympy.Expr) -> bool:
     """Whether an expression is a polynomial, as pulses have it, of time and of sines of lines in time."""
-    sines = {sine: sympy.Dummy() for sine in argument.atoms(sympy.sin, sympy.cos) if line(sine.args[0]) is not None}
+    waves = (wave for wave in argument.atoms(sympy.sin, sympy.cos) if wave.has(t) and line(wave.args[0]) is not None)
+    sines = {wave: sympy.Dummy() for wave in waves}
     plain, moving = argument.xreplace(sines), (t, *sines.values())
     powers = [power.exp for power in plain.atoms(sympy.Pow) if power.has(*moving)]
     return all(power.is_Integer and 0 < power <= MOST_POWER for power in powers) and plain.is_polynomial(*moving)
