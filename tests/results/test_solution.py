@@ -115,6 +115,13 @@ def test_what_a_user_changes_later_changes_no_motion() -> None:
         assert np.array_equal(sol[name], before), name
 
 
+def test_a_torque_that_is_none_is_no_negative_zero() -> None:
+    net = sw.Network("free")
+    net.add(sw.TorqueSource("T", tau=0.0), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    assert not np.signbit(net.simulate(1.0, t_eval=3, initial={"J.omega": 1.0})["T.tau"]).any()
+
+
 def test_tables_hold_the_named_quantities_with_units(sol: sw.Solution) -> None:
     frame = sol.to_pandas("shaft.tau", "J2.omega")
     assert list(frame.columns) == ["shaft.tau", "J2.omega"]

@@ -150,7 +150,8 @@ class ModelObserver:
             SignalError: such an energy, and no motion.
         """
         if name in self.quantities.signals:
-            return self._read(t, x, lambda history: history.signal(*self.quantities.signals[name]))
+            part, signal = self.quantities.signals[name]
+            return self._read(t, x, lambda history: history.signal(part, signal) + 0.0)  # no -0.0, as of a sign alone
         if name in self.quantities.integrals:
             return np.asarray(x[:, self.quantities.integrals[name]])
         if name in self.quantities.nodes:
