@@ -33,6 +33,9 @@ WEIGHT = 1e-3
 COOLDOWN = 1e-9
 
 
+# Functions with poles, or an end of what they are defined on.
+POLES = (sympy.tan, sympy.cot, sympy.sec, sympy.csc, sympy.coth, sympy.csch, sympy.log, sympy.asin, sympy.acos)
+
 Listener = Callable[[int], bool]
 
 
@@ -74,6 +77,7 @@ class HeyokaProgram:
             behind these another for each, how far beyond zero it has to go; last of all one for each of `fading`.
         held: functions that are constant between switches; they are the last of the parameters.
         stepping: which of the switches depend on them.
+        singular: whether a law has a root or a pole, beyond which a series may go on otherwise than the law.
     """
 
     variables: tuple[Any, ...]
@@ -87,6 +91,7 @@ class HeyokaProgram:
     guards: tuple[Any, ...] = ()
     held: HeldParameters | None = None
     stepping: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    singular: bool = False
     _idle: dict[float, list[Compiled]] = field(default_factory=dict, repr=False, compare=False)
     _functions: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
@@ -347,6 +352,22 @@ def build(
         watched,
         HeldParameters(translator.held, translator.variables, len(parameters) + len(fixed.found)) if held else None,
         np.array(translator.stepping, dtype=bool),
+        any(_singular(node, frozenset(states), time) for row in rows for node in row.atoms(sympy.Pow, *POLES)),
+    )
+
+
+def _singular(node: sympy.Expr, states: frozenset[sympy.Symbol], time: sympy.Symbol) -> bool:
+    """Whether a power or a function has a point that a motion may reach, and a series may pass without a trace.
+
+    sqrt((1 - t)^2) is 1 - t to a series that begins before t = 1. A pole of the states takes the motion with it.
+    """
+    argument = node.args[0]
+    if not isinstance(node, sympy.Pow):
+        return bool(argument.has(time, *states))
+    whole = bool(node.exp.is_integer)
+    of_time = argument.has(time) and states.isdisjoint(argument.free_symbols)
+    return not argument.is_positive and bool(
+        (not whole and argument.has(time, *states)) or (of_time and not node.exp.is_nonnegative)
     )
 
 

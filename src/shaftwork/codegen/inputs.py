@@ -14,7 +14,7 @@ from sympy import Expr, I, Integer, Symbol, nan
 from shaftwork.codegen.code import is_rough, vectorised
 from shaftwork.codegen.elements import Array, Index, TemplateGroup, groups_of
 from shaftwork.components.branches import ACROSS, INTEGRAL
-from shaftwork.components.laws import switches
+from shaftwork.components.laws import bells, switches
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import jumps, slope
 from shaftwork.network.controlled import Reading, readings_of
@@ -41,13 +41,13 @@ class _Group:
 
     @cached_property
     def moving(self) -> tuple[tuple[Expr, tuple[float, ...]], ...]:
-        """What makes the law jump or bend because of the motion, each once, and at which levels."""
+        """What makes the law jump, bend or rise steeply because of the motion, each once, and at which levels."""
         template = self.made_of.template
         moves = (ACROSS, INTEGRAL, *template.reads)
         if not (template.kind is Kind.LAW or template.reads) or not template.law.has(*moves):
             return ()
         found = ((argument, tuple(levels)) for argument, levels in switches(template.law) if argument.has(*moves))
-        return tuple(dict.fromkeys(found))
+        return tuple(dict.fromkeys((*found, *bells(template.law, moves))))
 
     @cached_property
     def switches(self) -> tuple[tuple[Function, Array], ...]:

@@ -42,6 +42,8 @@ EDGES = (
     *(sympy.erf, sympy.erfc, sympy.atan, sympy.Pow),
 )
 """Functions that rise or fall in a small part of their argument's range; powers, where it or a fraction is in them."""
+FLANK = (-24.0, -8.0, -2.0, -0.5)
+"""Exponents at which steps end on the flank of a bell: e^-24 is below every tolerance, and the last is near the top."""
 NUMERICAL = {"Interpolation": interpolate, "InterpolationSlope": interpolation_slope, **noise.NUMERICAL}
 """Names and numerical functions of tables and noise, for a code printer other than `sympy.lambdify`."""
 
@@ -184,6 +186,18 @@ def _is_simple(argument: sympy.Expr) -> bool:
     plain, moving = argument.xreplace(sines), (t, *sines.values())
     powers = [power.exp for power in plain.atoms(sympy.Pow) if power.has(*moving)]
     return all(power.is_Integer and 0 < power <= MOST_POWER for power in powers) and plain.is_polynomial(*moving)
+
+
+def bells(expression: sympy.Basic, symbols: Sequence[sympy.Symbol]) -> Iterator[tuple[sympy.Expr, tuple[float, ...]]]:
+    """Where steps end at bells over what moves, exp(-((omega - 5) / 1e-2)^2): at their tops and on their flanks.
+
+    A step that begins before a bell and ends behind it sees nothing of it, but for the slope of the exponent.
+    """
+    for node in sorted(expression.atoms(sympy.exp), key=sympy.default_sort_key):
+        slopes = [node.args[0].diff(symbol) for symbol in symbols]
+        tops = [slope for slope, symbol in zip(slopes, symbols, strict=True) if slope.has(symbol)]
+        yield from ((top, (0.0,)) for top in tops)
+        yield from [(node.args[0], FLANK)] if tops else ()
 
 
 def between_steps(expression: sympy.Expr) -> set[sympy.Symbol]:

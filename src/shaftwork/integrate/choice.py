@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
-from shaftwork.core.errors import MissingExtraError, ParameterError
+from shaftwork.core.errors import MissingExtraError, ParameterError, SimulationError
 from shaftwork.integrate.problem import Engine, Problem, Trajectory
 
-# Why scipy goes on where heyoka stopped.
-NOT_ANALYTIC = "A law has no Taylor series where the motion passes (a square root at zero), so scipy's DOP853 is taken."
+# Why another engine goes on where heyoka stopped.
+NOT_ANALYTIC = "A law has no Taylor series where the motion passes (a square root at zero), so {} is taken."
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,10 @@ CVODE_STEP, RADAU_STEP = 5e-5, 2e-3
 # for a transient and for a radian of an oscillation at rtol 1e-8.
 STABLE, TRANSIENT_STEPS, STEPS_PER_RADIAN = 5.0, 300.0, 20.0
 
+
+# So many steps of scipy take some seconds. A motion that comes to rest where a law has an infinite slope, as that of a
+# square root of the speed does, is infinitely stiff there, and an explicit method would need a million.
+LONG_FOR_SCIPY = 5000
 
 # Of these no run is so long that the rounding of speeds spoils torques: the stiffness bounds their steps.
 EXPLICIT = ("heyoka", "scipy", ADAMS)
@@ -142,13 +147,24 @@ def solve(
     if name != "heyoka" or not (fallback or engine == "auto"):
         trajectory = _guarded(problem, load(name)(problem), name)
         return trajectory, name, f"{why or reason} {trajectory.remark}".rstrip()
-    run = load(name)
     from shaftwork.integrate.problem import SeriesError
 
     try:
-        return _guarded(problem, run(problem), name), name, why or reason
+        return _guarded(problem, load(name)(problem), name), name, why or reason
     except SeriesError:
-        return _guarded(problem, load("scipy")(problem), "scipy"), "scipy", NOT_ANALYTIC
+        *tried, last = without_series(problem.max_steps)
+    for other, because, steps in tried:
+        with suppress(SimulationError):
+            return _guarded(problem, load(other)(replace(problem, max_steps=steps)), other), other, because
+    return _guarded(problem, load(last[0])(problem), last[0]), *last[:2]
+
+
+def without_series(most: int) -> list[tuple[str, str, int]]:
+    """The engines that are tried one after another where heyoka cannot go on: name, why, and most steps."""
+    scipy, cvode = NOT_ANALYTIC.format("scipy's DOP853"), NOT_ANALYTIC.format("the implicit CVODE")
+    if not ENGINES["sundials"].installed:
+        return [("scipy", scipy, most)]
+    return [("scipy", scipy, min(most, LONG_FOR_SCIPY)), ("sundials", cvode, most), ("scipy", scipy, most)]
 
 
 def _guarded(problem: Problem, trajectory: Trajectory, name: str) -> Trajectory:

@@ -6,13 +6,23 @@ import importlib.util
 import math
 from collections.abc import Callable, Sequence
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from shaftwork.core.errors import MissingExtraError, SimulationError
-from shaftwork.integrate.breaks import Breaks
-from shaftwork.integrate.pieces import Piece, PiecewiseDense, both_sides, failure, pieces, start_of_piece, used_up
+from shaftwork.integrate.heyoka_recorders import GUARD, GridRecorder, SegmentRecorder
+from shaftwork.integrate.pieces import (
+    Piece,
+    PiecewiseDense,
+    both_sides,
+    failure,
+    pieces,
+    reached,
+    start_of_piece,
+    used_up,
+)
 from shaftwork.integrate.problem import Array, Problem, SeriesError, Trajectory
 from shaftwork.integrate.switches import Watch, keeps_sides, settle
 
@@ -23,24 +33,26 @@ LOOSEST_TOLERANCE, TIGHTEST_TOLERANCE = 1e-10, 1e-15
 # not is followed by one of a quarter of its length.
 FIRST_DEFECT, FIRST_TRIALS, SHORTER = 1e-8, 30, 0.25
 
+# Where in a step a series is compared with the equations, as parts of the step: not at its end, where a law may jump.
+INSIDE = (0.5, 0.9)
+
 # From (integrator, step callback, step limit, longest step) to (outcome, its name, steps taken); called again after an
 # interruption. It returns to Python after some steps each, which changes them by rounding alone.
 Advance = Callable[[Any, Watch | None, int, float], tuple[Any, str, int]]
-# What heyoka's outcomes are called here where a guard ended the run.
-GUARD = "guard"
 # Output times that heyoka is given at once where a guard is likely to be met before the last of them.
 CHUNK = 32
+# Two runs of one problem end at times that differ by less of its span.
+ALIKE = 1e-6
 # What is the least that rounding moves a guard of size 1.
 ROUNDING = 8 * float(np.finfo(float).eps)
-# heyoka's outcomes proper are below this number; those above are events that have ended a run.
-FIRST_OUTCOME = -(2**32)
 
 
 def solve(problem: Problem) -> Trajectory:
     """Integrate the heyoka program of a problem.
 
     With `t_eval` the run only fills the output grid; dense output and step ends are made by a second, identical run
-    when they are first asked for.
+    when they are first asked for. Where a law has a root or a pole, there is one run, and its series are compared with
+    the equations in every step.
 
     Raises:
         MissingExtraError: heyoka is not installed.
@@ -56,11 +68,15 @@ def solve(problem: Problem) -> Trajectory:
             f"heyoka compiles small networks whose laws have Taylor series. This one, of {problem.x0.size} states, is "
             "too large or has another law. Take engine='auto', 'sundials' or 'scipy'."
         )
-    if problem.t_eval is not None:
+    if problem.t_eval is not None and not problem.program.program.singular:
         return _on_grid(problem, np.asarray(problem.t_eval, dtype=float))
     dense = _Replay(problem)
     t, x = both_sides(problem, *dense.step_ends)
-    return Trajectory(t, x, dense, {"steps": dense.steps.size - 1}, met=dense.met, end=(float(t[-1]), x[-1]))
+    end = float(t[-1]), x[-1]
+    if problem.t_eval is not None:
+        t = reached(np.asarray(problem.t_eval, dtype=float), end[0])
+        x = dense(t)
+    return Trajectory(t, x, dense, {"steps": dense.steps.size - 1}, met=dense.met, end=end)
 
 
 def _tolerance(problem: Problem) -> float:
@@ -179,7 +195,8 @@ class _Run:
             integrator.step(max_delta_t=min(longest, piece.end - piece.start), write_tc=True)
             step = integrator.time - start
             good = not (step > 0.0 and np.isfinite(integrator.state).all()) or (
-                self._satisfied(piece, start, 0.9 * step) and keeps_sides(self.program, integrator, parameters, start)
+                self._satisfied(piece, start, INSIDE[-1] * step)
+                and keeps_sides(self.program, integrator, parameters, start)
             )
             integrator.time = start
             integrator.state[:], integrator.pars[:] = state, parameters
@@ -191,13 +208,24 @@ class _Run:
 
     def _satisfied(self, piece: Piece, start: float, elapsed: float) -> bool:
         """Whether the series of the last step satisfies the equations at a time inside it."""
-        terms = self.integrator.tc
-        orders = np.arange(1, terms.shape[1])
-        slope = terms[:, 1:] @ (orders * elapsed ** (orders - 1))
-        state = np.array(self.integrator.update_d_output(start + elapsed))
-        with np.errstate(all="ignore"):
-            defect = elapsed * np.abs(self.problem.rhs(piece.inside(start + elapsed), state) - slope)
-        return bool((defect <= FIRST_DEFECT * (np.abs(state) + elapsed * np.abs(slope)) + self.problem.atol).all())
+        return _satisfied(self.problem, piece, self.integrator.tc, start, elapsed, np.zeros_like(self.start))
+
+    def verify(self, piece: Piece, segments: Sequence[Any]) -> None:
+        """Refuse series that have passed a root or a pole of a law, and gone on otherwise than the law.
+
+        Raises:
+            SeriesError: says where.
+        """
+        if not segments:
+            return
+        # near a root of zero slope a series is poor in steps so short that it moves nothing
+        sizes = np.max([np.abs(segment.tcs[:, :, 0]).max(axis=0) for segment in segments], axis=0)
+        for segment in segments:
+            for (start, end), terms in zip(pairwise(segment.times), segment.tcs, strict=True):
+                for part in INSIDE:
+                    if not _satisfied(self.problem, piece, terms, start, part * (end - start), sizes):
+                        reason = f"up to t = {end:.9g} s a law has a root or a pole that a Taylor series does not show"
+                        raise SeriesError(*failure(self.problem, "heyoka", start, terms[:, 0], reason).args)
 
     def _watch(self, piece: Piece) -> Watch | None:
         """Set the signs of the switches; what has to look after them, where the motion may change them."""
@@ -245,6 +273,17 @@ class _Run:
         return f"heyoka stopped with the outcome {outcome!r}"
 
 
+def _satisfied(problem: Problem, piece: Piece, terms: Array, start: float, elapsed: float, sizes: Array) -> bool:
+    """Whether a series (n, orders) from a start in s satisfies the equations after some time; `sizes` are of states."""
+    orders = np.arange(terms.shape[1])
+    state = terms @ elapsed**orders
+    slope = terms[:, 1:] @ (orders[1:] * elapsed ** orders[:-1])
+    with np.errstate(all="ignore"):
+        defect = elapsed * np.abs(problem.rhs(piece.inside(start + elapsed), state) - slope)
+    moved = np.maximum(np.abs(state), sizes) + elapsed * np.abs(slope)
+    return bool((defect <= FIRST_DEFECT * moved + problem.atol).all())
+
+
 def _on_grid(problem: Problem, times: Array) -> Trajectory:
     with problem.program.program.lent(_tolerance(problem)) as lent:
         return _filled(_Run(problem, lent), times)
@@ -257,7 +296,7 @@ def _filled(run: _Run, times: Array) -> Trajectory:
     for piece in pieces(problem):
         # An output at a breakpoint belongs to the next piece: it is the state after the jump.
         stop = times.size if piece.end == problem.t_end else int(np.searchsorted(times, piece.end, side="left"))
-        recorder = _GridRecorder(problem, states[done:stop], times[done:stop], piece.end, chunk, stops)
+        recorder = GridRecorder(problem, states[done:stop], times[done:stop], piece.end, chunk, stops)
         run.piece(piece, recorder)
         if run.met is not None:
             done += recorder.filled
@@ -265,78 +304,8 @@ def _filled(run: _Run, times: Array) -> Trajectory:
         done = stop
     # the integrator's own time may be a rounding away from where it was sent
     end = None if problem.guards is None else (problem.t_end if run.met is None else run.integrator.time, run.state)
-    return Trajectory(times[:done], states[:done], _Replay(problem, stops), {"steps": run.steps}, met=run.met, end=end)
-
-
-class _GridRecorder:
-    """Fills rows of output while the integrator passes their times; `stops` are those at which it stops in between."""
-
-    def __init__(self, problem: Problem, rows: Array, times: Array, end: float, chunk: int, stops: list[float]) -> None:
-        self._breaks = Breaks(problem)
-        self._rows, self._chunk, self._stops = rows, chunk, stops
-        # The grid always ends with the piece, because the next piece starts from there.
-        self._grid = times if times.size and times[-1] == end else np.append(times, end)
-        self._filled = 0
-
-    @property
-    def filled(self) -> int:
-        """Rows of output that are filled."""
-        return min(self._filled, len(self._rows))
-
-    def __call__(self, integrator: Any, watch: Watch | None, limit: int, longest: float) -> tuple[Any, str, int]:
-        taken = 0
-        while True:
-            pending, now = self._grid[self._filled : self._filled + self._chunk], integrator.time
-            extra = int(pending[0] != now)  # heyoka's grid starts at the present time
-            outcome, _, _, steps, _, found = integrator.propagate_grid(
-                np.append(now, pending) if extra else pending,
-                max_steps=self._breaks.limit(limit - taken),
-                max_delta_t=longest,
-                callback=watch,
-            )
-            found, taken = found[extra:], taken + steps
-            kept = found[: len(self._rows) - self._filled]
-            self._rows[self._filled : self._filled + len(kept)] = kept
-            self._filled += len(found)
-            arrived = self._filled == self._grid.size
-            if len(found) < len(pending) and self._breaks.goes_on(integrator, outcome, steps, limit - taken):
-                continue
-            if arrived or len(found) < len(pending) or taken >= limit:
-                return outcome, _outcome(outcome, watch, arrived=arrived), taken
-            self._stops.append(integrator.time)
-
-
-class _SegmentRecorder:
-    """Keeps heyoka's continuous output of the spans that it passes, with the stops of an earlier run in between."""
-
-    def __init__(self, problem: Problem, end: float, stops: Sequence[float] = ()) -> None:
-        self._breaks = Breaks(problem)
-        self._end, self._stops = end, stops
-        self.segments: list[Any] = []
-
-    def __call__(self, integrator: Any, watch: Watch | None, limit: int, longest: float) -> tuple[Any, str, int]:
-        taken = 0
-        while True:
-            stop = min((stop for stop in self._stops if stop > integrator.time), default=self._end)
-            outcome, _, _, steps, segment, _ = integrator.propagate_until(
-                stop, max_steps=self._breaks.limit(limit - taken), max_delta_t=longest, callback=watch, c_output=True
-            )
-            taken += steps
-            if segment is not None:
-                self.segments.append(segment)
-            arrived = integrator.time == self._end
-            if integrator.time != stop and self._breaks.goes_on(integrator, outcome, steps, limit - taken):
-                continue
-            if arrived or integrator.time != stop or taken >= limit:
-                return outcome, _outcome(outcome, watch, arrived=arrived), taken
-
-
-def _outcome(outcome: Any, watch: Watch | None, *, arrived: bool) -> str:
-    """Name of heyoka's outcome; a watch that stops the very last step has stopped the run only if it has a reason."""
-    failed = watch is not None and watch.reason is not None
-    if int(outcome) > FIRST_OUTCOME and not failed:
-        return GUARD
-    return "time_limit" if arrived and not failed else str(outcome.name)
+    dense = _Replay(problem, stops, run.integrator.time)
+    return Trajectory(times[:done], states[:done], dense, {"steps": run.steps}, met=run.met, end=end)
 
 
 class _Replay:
@@ -345,21 +314,27 @@ class _Replay:
     Args:
         problem: what to solve.
         stops: times in s at which that run has stopped on its way.
+        end: of that run, s.
     """
 
-    def __init__(self, problem: Problem, stops: Sequence[float] = ()) -> None:
-        self._problem, self._stops = problem, stops
+    def __init__(self, problem: Problem, stops: Sequence[float] = (), end: float | None = None) -> None:
+        self._problem, self._stops, self._end = problem, stops, end
 
     @cached_property
     def _made(self) -> tuple[tuple[tuple[Any, ...], ...], int | None]:
-        problem, recorders = self._problem, list[_SegmentRecorder]()
+        problem, recorders = self._problem, list[SegmentRecorder]()
         with problem.program.program.lent(_tolerance(problem)) as lent:
             run = _Run(problem, lent)
             for piece in pieces(problem):
-                recorders.append(_SegmentRecorder(problem, piece.end, [s for s in self._stops if s < piece.end]))
+                recorders.append(SegmentRecorder(problem, piece.end, [s for s in self._stops if s < piece.end]))
                 run.piece(piece, recorders[-1])
+                if run.program.singular:
+                    run.verify(piece, recorders[-1].segments)
                 if run.met is not None:
                     break
+            if self._end is not None and abs(run.integrator.time - self._end) > ALIKE * (problem.t_end - problem.t0):
+                reason = f"the same run made again for its dense output ends there, not at t = {self._end:.9g} s"
+                raise failure(problem, "heyoka", run.integrator.time, run.state, reason)
         return tuple(tuple(recorder.segments) for recorder in recorders), run.met
 
     @property

@@ -107,6 +107,12 @@ class Reaction(NamedTuple):
     offsets: Sequence[float]
 
 
+# An engine with a tolerance may be off by this many times of it, 1e-6 at the usual one: errors add up over its steps.
+TOLERATED = 100.0
+# The error of as many steps as a run has taken is no surprise either, up to this part.
+UNSURPRISING = 1e-6
+
+
 class SeriesError(SimulationError):
     """A Taylor series does not show the motion, and another engine may go on.
 

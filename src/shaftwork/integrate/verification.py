@@ -9,17 +9,13 @@ import numpy as np
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate import exact
 from shaftwork.integrate.observation import largest_part, outlook, rounding, samples
-from shaftwork.integrate.problem import Array, Observed, Problem, Trajectory
+from shaftwork.integrate.problem import TOLERATED, UNSURPRISING, Array, Observed, Problem, Trajectory
 
 # Rounding is worth saying from this part of the largest value of its kind. It is an estimate, no
 # bound: with it none of 1771 random networks, parameters from 1e-12 to 1e12, is off by 1e-6 without a word.
 WORTH_SAYING = 2e-7
 # A smaller error than this is not said of an engine, whatever its tolerance: rounding adds up over its steps.
 SMALLEST = 1e-9
-# An engine with a tolerance may be off by this many times of it, 1e-6 at the usual one: errors add up over its steps.
-TOLERATED = 100.0
-# The error of as many steps as a run has taken is no surprise either, up to this part.
-UNSURPRISING = 1e-6
 
 
 def objection(problem: Problem, trajectory: Trajectory, engine: str) -> str | None:

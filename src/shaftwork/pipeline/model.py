@@ -137,7 +137,7 @@ class Model(CompiledModel):
         if motion.caveat:
             warn(motion.caveat, AccuracyWarning)
         again = Repetition(self._rebuild, self.netlist, call_of(motion, demand, values, initial), self)
-        return replace(motion, parameters=made, initial=dict(initial or {}), again=again)
+        return replace(motion, parameters=made, initial=dict(initial or {}), rtol=demand.rtol, again=again)
 
     def _motion(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
         prepared = self.prepare(self.vector(values) if values else self.defaults)

@@ -87,7 +87,7 @@ class Network(NetworkBuilder):
         Args:
             expand: of the network with its shafts written out part by part.
             phase: a phase of the motion, "gap open, load stuck", or a row of `Solution.phases`, whose name is used; by
-                default every part is in its first mode.
+                default every part is in its first mode, in which a brake slips; `start_phase` is that of the start.
 
         Raises:
             NetworkError: the network cannot be assembled; lists every reason.

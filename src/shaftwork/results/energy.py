@@ -46,9 +46,19 @@ class EnergyBalance:
     @property
     def residual(self) -> float:
         """Largest |stored - stored(0) - supplied + lost| over the run, as a fraction of work done and energy stored."""
-        gap = np.abs(self.stored - self.stored[0] - self.supplied + self.lost).max()
         size = max(self.work, float(np.abs(self.stored).max()), float(np.abs(self.lost).max()))
-        return float(gap / size) if size else 0.0
+        return float(np.abs(self._gap).max() / size) if size else 0.0
+
+    @property
+    def _gap(self) -> Array:
+        gap: Array = self.stored - self.stored[0] - self.supplied + self.lost
+        return gap
+
+    @property
+    def worst_step(self) -> tuple[float, float]:
+        """Start and end, s, of the step to which most of the residual belongs."""
+        place = int(np.argmax(np.abs(np.diff(self._gap))))
+        return float(self.t[place]), float(self.t[place + 1])
 
 
 def energy_balance(observer: Observer, dense: Dense, steps: Array) -> EnergyBalance:

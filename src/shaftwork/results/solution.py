@@ -14,6 +14,7 @@ from shaftwork.core.errors import AccuracyWarning, MissingExtraError, SignalErro
 from shaftwork.core.notices import warn
 from shaftwork.core.parameters import numbers_in_si
 from shaftwork.core.screen import counted, named, on_one_screen
+from shaftwork.integrate.problem import TOLERATED, UNSURPRISING
 from shaftwork.results.energy import EnergyBalance, energy_balance
 from shaftwork.results.extremes import Extreme, Extremes
 from shaftwork.results.fatigue import Damage, SNLine
@@ -71,6 +72,7 @@ class Solution:
         phases: the spans of time between them.
         parameters: what the network was made of, "part.parameter" to value in SI, where it is not zero.
         initial: the start values that were given.
+        rtol: relative tolerance of a step that was asked for.
         caveat: what makes the numbers worth less than the tolerance says, in a sentence; empty where nothing does.
         again: makes the motion again. One that is stored (pickled) has no compiled code: when more of it is read than
             is stored, the motion is made again.
@@ -89,6 +91,7 @@ class Solution:
     phases: tuple[PhaseRow, ...] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
     initial: Mapping[str, float] = field(default_factory=dict)
+    rtol: float = 1e-8
     caveat: str = ""
     again: Callable[[], Solution] | None = None
 
@@ -223,12 +226,25 @@ class Solution:
 
     @cached_property
     def energy(self) -> EnergyBalance:
-        """The energy balance over the run."""
-        return energy_balance(self.observer, self.dense, self.steps)
+        """The energy balance over the run.
+
+        An `AccuracyWarning` says where it leaves more unexplained than the tolerance leads one to expect.
+        """
+        balance = energy_balance(self.observer, self.dense, self.steps)
+        if balance.residual > max(TOLERATED * self.rtol, UNSURPRISING):
+            start, end = balance.worst_step
+            warn(
+                f"The energy balance of '{self.name}' leaves {balance.residual:.1g} of the work done unexplained, more "
+                f"than rtol = {self.rtol:.1g} leads one to expect, most of it from t = {start:.6g} to {end:.6g} s: the "
+                f"engine {self.engine!r} has missed something there, such as a law that is steep or has no value. Look "
+                "at that time, and compare with another engine or a smaller rtol.",
+                AccuracyWarning,
+            )
+        return balance
 
     @property
     def energy_residual(self) -> float:
-        """What the energy balance leaves unexplained, as a fraction of the work done."""
+        """What the energy balance leaves unexplained, as a fraction of the work done; it warns as `energy` does."""
         return self.energy.residual
 
     def to_pandas(self, *names: str) -> pd.DataFrame:

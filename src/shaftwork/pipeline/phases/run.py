@@ -226,8 +226,8 @@ class Run:
 
     def _passed(self, t: float, moment: Moment) -> tuple[Trajectory, Passing]:
         """One run of the engine; where heyoka cannot go on, or a stiff phase is long, another engine begins it anew."""
-        passing, noted = Passing(self.settling, moment, t, self.note, self._suits_heyoka), len(self.changes)
-        problem, soon = self._problem(t, moment, passing), [*self._soon]
+        passing = Passing(self.settling, moment, t, self.note, self._suits_heyoka)
+        problem, noted, soon = self._problem(t, moment, passing), len(self.changes), [*self._soon]
         if not problem.x0.size:
             made, _, _ = at_rest(problem, moment.regime.assembly.model.degree)
             return replace(made, end=(problem.t_end, problem.x0)), passing
@@ -235,16 +235,20 @@ class Run:
         stiff = name != "heyoka"
         if self.demand.engine != "auto" or (stiff and not self.phases.tries_heyoka(moment.regime.assembly)):
             return self._solve(problem, name, why), passing
-        first = problem if not stiff else replace(problem, max_steps=min(problem.max_steps, choice.patience(problem)))
-        try:
-            return self._solve(first, "heyoka", why), passing
-        except SimulationError as error:
-            if not stiff and not isinstance(error, SeriesError):
-                raise
-        del self.changes[noted:]
-        self._soon = soon
-        again = (name, why) if stiff else ("scipy", choice.NOT_ANALYTIC)
-        return self._solve(problem, *again), Passing(self.settling, moment, t, self.note)
+        most = problem.max_steps
+        first = min(most, choice.patience(problem)) if stiff else most
+        others = [(name, why, most)] if stiff else choice.without_series(most)
+        *tried, (last, last_why, _) = [("heyoka", why, first), *others]
+        for engine, because, steps in tried:
+            try:
+                return self._solve(replace(problem, max_steps=steps), engine, because), passing
+            except SimulationError as error:
+                if engine == "heyoka" and not stiff and not isinstance(error, SeriesError):
+                    raise
+            del self.changes[noted:]
+            self._soon = [*soon]
+            passing = Passing(self.settling, moment, t, self.note)
+        return self._solve(problem, last, last_why), passing
 
     def _solve(self, problem: Problem, name: str, why: str) -> Trajectory:
         share, loosest = FOLLOWING[name]
