@@ -40,7 +40,8 @@ def test_many_calls_leave_neither_memory_nor_files_behind(what: str) -> None:
     [-sw.omega, -sympy.Abs(sw.omega - 3), -sympy.tanh(1e3 * (sw.omega - 1)), -sympy.floor(1e3 * sw.phi)],
     ids=["smooth", "switching", "fading", "counting"],
 )
-@pytest.mark.parametrize("sticks", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("sticks", [False, True])
 def test_of_a_model_that_is_gone_no_compiled_code_stays(law: sympy.Expr, sticks: bool) -> None:  # noqa: FBT001
     """What its events call must not lead back to it."""
     pytest.importorskip("heyoka")

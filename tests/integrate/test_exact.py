@@ -150,8 +150,8 @@ MODELS = [
     sw.Lumped(40),
     sw.Lumped(100),
     sw.CentralDifference(40),
-    sw.CentralDifference(20, order=4),
-    sw.Spectral(16),
+    pytest.param(sw.CentralDifference(20, order=4), marks=pytest.mark.slow),
+    pytest.param(sw.Spectral(16), marks=pytest.mark.slow),
 ]
 
 

@@ -116,7 +116,9 @@ def test_no_blow_of_a_train_is_stepped_over(wave: type[sympy.Expr], engine: str)
     assert 20 * sol["J.omega"][-1] == pytest.approx(momentum, rel=1e-5)
 
 
-@pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials"])
+@pytest.mark.parametrize(
+    "engine", ["heyoka", *(pytest.param(name, marks=pytest.mark.slow) for name in ("scipy", "sundials"))]
+)
 def test_no_reversal_of_a_smooth_square_wave_is_stepped_over(engine: str) -> None:
     net = sw.Network("reversing drive")
     net.add(sw.Inertia("J", J=1.0), "a")

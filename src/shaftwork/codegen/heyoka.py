@@ -359,11 +359,12 @@ def build(
 def _singular(node: sympy.Expr, states: frozenset[sympy.Symbol], time: sympy.Symbol) -> bool:
     """Whether a power or a function has a point that a motion may reach, and a series may pass without a trace.
 
-    sqrt((1 - t)^2) is 1 - t to a series that begins before t = 1. A pole of the states takes the motion with it.
+    sqrt((1 - t)^2) is 1 - t to a series that begins before t = 1. A pole of the states takes the motion with it, and
+    what is clamped stays away from the ends of what a function is defined on.
     """
     argument = node.args[0]
     if not isinstance(node, sympy.Pow):
-        return bool(argument.has(time, *states))
+        return bool(argument.has(time, *states)) and not isinstance(argument, sympy.Max | sympy.Min)
     whole = bool(node.exp.is_integer)
     of_time = argument.has(time) and states.isdisjoint(argument.free_symbols)
     return not argument.is_positive and bool(
