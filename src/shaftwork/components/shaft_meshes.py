@@ -134,7 +134,7 @@ def spectral(degree: int) -> Mesh:
 def lobatto(degree: int) -> tuple[Any, Any]:
     """Nodes of [-1, 1] and weights (degree + 1,) of the quadrature of Gauss and Lobatto."""
     polynomial = Legendre.basis(degree)
-    inner = polynomial.deriv().roots() if degree > 1 else np.empty(0)
+    inner = polynomial.deriv().roots().real if degree > 1 else np.empty(0)
     for _ in range(2):  # the roots of a series are good to some ten digits, Newton's method does the rest
         inner = inner - polynomial.deriv()(inner) / polynomial.deriv(2)(inner) if degree > 1 else inner
     nodes = np.concatenate([[-1.0], np.sort(inner.real), [1.0]])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from shaftwork.results.observer import Array
 
-_INNER = np.polynomial.legendre.Legendre.basis(7).deriv().roots()
+_INNER = np.polynomial.legendre.Legendre.basis(7).deriv().roots().real
 NODES = np.concatenate([[-1.0], np.sort(_INNER), [1.0]])
 """Of Lobatto's rule, which reads both ends: there peaks are, and a jump close to an end is not overlooked."""
 WEIGHTS = 2 / (56 * np.polynomial.legendre.Legendre.basis(7)(NODES) ** 2)

@@ -56,7 +56,7 @@ def _scheme(points: Array) -> Scheme:
 
 # Gauss keeps quadratic energies; Radau IIA forgets what is infinitely fast within one panel.
 GAUSS = _scheme(POINTS)
-RADAU = _scheme(np.append(legendre.legroots([*np.zeros(STAGES - 1), -1.0, 1.0])[:-1], 1.0))
+RADAU = _scheme(np.append(legendre.legroots([*np.zeros(STAGES - 1), -1.0, 1.0]).real[:-1], 1.0))
 
 
 def squared(powers: Array, to: Array) -> Array:
