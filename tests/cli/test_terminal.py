@@ -61,6 +61,7 @@ def swinging(folder: Path, name: str = "swing") -> str:
     return str(folder / "swing.toml")
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_a_run_with_130_and_one_line_that_says_how_far_it_came(tmp_path: Path) -> None:
     run = ("run", swinging(tmp_path), "--engine", "scipy", "--rtol", "1e-12", "--t-end", "1e6", "--out", str(tmp_path))
     process, errors = started(*run)

@@ -61,6 +61,7 @@ def points(count=12):
         yield generator.uniform(-2, 2, 2), generator.uniform(0, 2), generator.uniform(0.5, 2, 2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("expression", SMOOTH + PIECEWISE, ids=str)
 def test_a_translated_expression_has_sympys_value(expression):
     for state, time, parameters in points(4):

@@ -131,6 +131,7 @@ def test_a_soil_is_read_as_the_source_prints_it(name: str) -> None:
     assert wheel.mean_torque == sw.BucketWheelLoad("wheel", radius=3.0, edge=0.6, soil=sw.Soil.read(name)).mean_torque
 
 
+@pytest.mark.slow
 def test_a_wheel_that_digs_at_once_from_a_time_on_gives_nothing_before_and_its_torque_after() -> None:
     values = {"radius": 3.0, "edge": 0.7, "buckets": 8, "soil": "fault zone", "seed": 4.0, "rise": 0.0}
     times = np.array([0.0, 0.9, 1.1, 1.7, 2.0])

@@ -121,6 +121,7 @@ def test_so_they_are_in_every_phase_of_every_scene(name: str) -> None:
         assert proof.holds, str(proof)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::shaftwork.core.errors.NetworkWarning")
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=pytest.mark.slow if name == "BLDCMotor" else ()) for name in registered()]
@@ -200,6 +201,7 @@ def test_they_are_kirchhoffs_beside_a_prescribed_speed_of_any_law(law: str, driv
     assert proof.holds, str(proof)
 
 
+@pytest.mark.slow
 @share_of_examples(0.2)
 @given(pieces=networks(max_inertias=5), data=st.data())
 def test_they_are_kirchhoffs_for_random_networks_with_speeds_of_any_law(pieces: Network, data: st.DataObject) -> None:

@@ -130,6 +130,7 @@ def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     return capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_document_of_a_scene_has_each_of_its_phases_and_compiles(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

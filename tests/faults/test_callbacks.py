@@ -58,6 +58,7 @@ RUNS = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "engine"), RUNS)
 def test_what_progress_raises_comes_out_of_every_engine(
     name: str, engine: Any, monkeypatch: pytest.MonkeyPatch
@@ -116,6 +117,7 @@ def _interrupt(_: sw.Solution) -> float:
 STOPS: dict[type[BaseException], Callable[[sw.Solution], float]] = {OwnStop: _own_stop, KeyboardInterrupt: _interrupt}
 
 
+@pytest.mark.slow
 def test_what_a_point_over_speed_or_a_report_raises_comes_out_of_their_studies() -> None:
     error = OwnError("of the user")
 

@@ -39,6 +39,7 @@ def fuzz(kind: str, first: int, count: int) -> None:
     assert last.strip() == f"{kind} {first + count - 1}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["laws", "files"])
 def test_a_few_hundred_wrong_inputs_end_in_a_result_or_a_named_error(kind: str) -> None:
     assert list(faults(kind, 0, FEW[kind])) == []

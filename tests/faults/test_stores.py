@@ -68,6 +68,7 @@ def test_a_sweep_that_is_killed_again_and_again_loses_nothing_and_does_nothing_t
     assert made["failed"] == 0
 
 
+@pytest.mark.slow
 def test_a_store_that_was_cut_anywhere_is_gone_on_with_to_the_same_bits(tmp_path: Path) -> None:
     path, random = tmp_path / "store.jsonl", Random(1)  # noqa: S311
     whole = swept(path).measures["peak"].tobytes()
@@ -95,6 +96,7 @@ def test_a_store_in_which_a_byte_has_changed_is_named_or_right(tmp_path: Path) -
     assert named > 30
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [0, 100, 700, 1000])
 def test_a_full_disk_ends_a_sweep_with_one_error_and_keeps_what_is_stored(tmp_path: Path, size: int) -> None:
     path = tmp_path / "store.jsonl"

@@ -71,6 +71,7 @@ def test_threads_that_share_a_model_get_what_each_gets_alone(name: str, engine: 
     assert warnings.filters == filters
 
 
+@pytest.mark.slow
 def test_another_thread_gets_the_equations_of_its_own_parameters() -> None:
     """Two threads ask in turns for the rates with two stiffnesses, of a network too large for unrolled code."""
     net = sw.Network("chain")
@@ -127,6 +128,7 @@ def test_a_run_within_a_run_leaves_it_as_it_is(monkeypatch: pytest.MonkeyPatch) 
     assert set(within) == {of_stiffness(NETWORKS["nonlinear"]().compile(), "heyoka", 22e3)}
 
 
+@pytest.mark.slow
 def test_a_thread_that_mutes_warnings_mutes_no_other() -> None:
     def warned(_: int) -> int:
         net = train(sw.CoulombLoad("load", tau=20.0))

@@ -397,6 +397,7 @@ def test_a_motion_that_cannot_go_on_is_named(rhs, reason):
         banded.solve(problem)
 
 
+@pytest.mark.slow
 def test_a_motion_that_two_laws_drive_back_to_their_jump_is_named(monkeypatch):
     monkeypatch.setattr("shaftwork.integrate.pieces.STALL_STEPS", 100)
     problem = Problem(

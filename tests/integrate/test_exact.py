@@ -63,6 +63,7 @@ def test_a_chain_is_right_after_thousands_of_periods(n, end):
     assert np.abs(trajectory.x[:, n:] - torques).max() < 1e-11 * np.abs(torques).max()
 
 
+@pytest.mark.slow
 def test_a_long_chain_is_solved_by_sparse_products():
     times = np.linspace(0.0, 0.2, 201)
     problem = chain(1000, 1e6, times)
@@ -128,6 +129,7 @@ def test_the_matrix_exponential_replaces_modes_that_are_of_no_use(monkeypatch):
     assert np.abs(by_modes.dense(asked) - by_exponential.dense(asked)).max() < 1e-11 * np.abs(by_modes.x).max()
 
 
+@pytest.mark.slow
 def test_output_times_whose_steps_grow_by_a_rounding_each_are_met(monkeypatch):
     times = np.linspace(0.0, 1.0, 20001)
     times += 1e-16 * np.arange(times.size) ** 2

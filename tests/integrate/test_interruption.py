@@ -38,6 +38,7 @@ def drive(line: str) -> sw.Network:
     return net
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", RUNS)
 def test_a_run_says_how_far_it_is_and_stops_where_its_caller_raises(engine: str) -> None:
     line, t_end = RUNS[engine]
@@ -53,6 +54,7 @@ def test_a_run_says_how_far_it_is_and_stops_where_its_caller_raises(engine: str)
     assert 0 < times[0] <= times[1] <= times[2] < t_end
 
 
+@pytest.mark.slow
 def test_a_motion_of_several_phases_says_how_far_it_is() -> None:
     times: list[float] = []
     sol = sw.scenes.crane(gap=0.003).simulate(9.0, engine="scipy", progress=times.append)

@@ -207,6 +207,7 @@ def test_springs_in_series_share_every_jump_of_the_torque_between_them(terms: li
     assert sol["s2.tau"][-1] - sol["s1.tau"][-1] == pytest.approx(last, abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", [*ENGINES, "exact"])
 @pytest.mark.parametrize(
     "law",
@@ -321,6 +322,7 @@ NEGATIVE = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(("law", "time"), NEGATIVE, ids=[str(law) for law, _ in NEGATIVE])
 def test_a_power_of_a_negative_base_ends_the_run_where_it_is_met(engine: str, law: sympy.Expr, time: float) -> None:

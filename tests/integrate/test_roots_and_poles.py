@@ -20,7 +20,7 @@ def coasting(law: sympy.Expr, J: float = 1.0) -> sw.Network:
     return net
 
 
-@pytest.mark.parametrize("engine", ["auto", "sundials"])
+@pytest.mark.parametrize("engine", [pytest.param("auto", marks=pytest.mark.slow), "sundials"])
 @pytest.mark.parametrize(
     ("law", "J", "start"),
     [
@@ -48,7 +48,17 @@ def test_a_root_of_a_speed_that_would_become_negative_ends_the_run_where_it_has_
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("law", [sympy.tan(t), 1 / sympy.cos(t), 1 / (t**2 - sympy.Rational(1, 2)), sympy.tan(50 * t)])
+@pytest.mark.parametrize(
+    "law",
+    [
+        sympy.tan(50 * t),
+        *(
+            pytest.param(law, marks=pytest.mark.slow)
+            for law in (sympy.tan(t), 1 / sympy.cos(t), 1 / (t**2 - sympy.Rational(1, 2)))
+        ),
+    ],
+    ids=str,
+)
 def test_no_engine_steps_over_a_pole_of_the_time(law: sympy.Expr, engine: str) -> None:
     with pytest.raises(sw.SimulationError, match="failed at t = "):
         coasting(law).simulate(2.0, engine=engine)
@@ -59,6 +69,7 @@ def test_heyoka_alone_says_what_its_series_does_not_show() -> None:
         coasting(-(sympy.Abs(w) ** 0.75)).simulate(6.0, initial={"J.omega": 1.0}, engine="heyoka")
 
 
+@pytest.mark.slow
 def test_a_root_in_one_phase_of_several_is_followed_or_refused_and_no_motion_ends_early() -> None:
     """Released from the clutch at 1 s, the wheel comes to rest at 3 s: it is followed up to there."""
 

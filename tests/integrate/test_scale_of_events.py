@@ -73,7 +73,9 @@ def _softplus(x: float) -> float:
 
 @pytest.mark.parametrize("pulse", PULSES)
 @pytest.mark.parametrize("width", [1.0, 1e-4], ids=lambda width: f"{width:g} s wide")
-@pytest.mark.parametrize("middle", [5.0, 3333.3], ids=lambda middle: f"at {middle:g} s")
+@pytest.mark.parametrize(
+    "middle", [pytest.param(5.0, marks=pytest.mark.slow), 3333.3], ids=lambda middle: f"at {middle:g} s"
+)
 @pytest.mark.parametrize(
     "engine", ["auto", *(pytest.param(name, marks=pytest.mark.slow) for name in ("heyoka", "scipy", "sundials"))]
 )
@@ -90,6 +92,7 @@ def test_a_pulse_of_torque_gives_its_impulse_however_far_away_it_is(
     assert sol["J.omega"][-1] == pytest.approx(impulse, rel=3e-7 if engine == "sundials" else 3e-8)
 
 
+@pytest.mark.slow
 def test_a_pulse_beside_a_friction_is_not_stepped_over_either() -> None:
     """The friction takes 0.1 N m off a pulse of 20 N m that is 0.01 s wide; scipy stepped over it."""
     net = sw.Network("pulse and friction")
@@ -101,6 +104,7 @@ def test_a_pulse_beside_a_friction_is_not_stepped_over_either() -> None:
     assert peaks[1:] == pytest.approx([peaks[0]] * 2, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials"])
 @pytest.mark.parametrize("wave", [sympy.sin, sympy.cos])
 def test_no_blow_of_a_train_is_stepped_over(wave: type[sympy.Expr], engine: str) -> None:
@@ -116,6 +120,7 @@ def test_no_blow_of_a_train_is_stepped_over(wave: type[sympy.Expr], engine: str)
     assert 20 * sol["J.omega"][-1] == pytest.approx(momentum, rel=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "engine", ["heyoka", *(pytest.param(name, marks=pytest.mark.slow) for name in ("scipy", "sundials"))]
 )
@@ -128,6 +133,7 @@ def test_no_reversal_of_a_smooth_square_wave_is_stepped_over(engine: str) -> Non
     assert sol.max("J.omega") < 2.1
 
 
+@pytest.mark.slow
 def test_a_motion_long_after_a_pulse_is_as_exact_as_before_it() -> None:
     net = sw.Network("after a pulse")
     net.add(sw.Inertia("J", J=1.0), "a")

@@ -35,7 +35,9 @@ def truth() -> np.ndarray:
 
 @pytest.mark.filterwarnings("ignore:the engine 'sundials' is off by [12]e-06:shaftwork.AccuracyWarning")  # as at size 1
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("size", [1e-12, 1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e9])
+@pytest.mark.parametrize(
+    "size", [1e-12, 1e-6, 1.0, 1e9, *(pytest.param(size, marks=pytest.mark.slow) for size in (1e-9, 1e-3, 1e3))]
+)
 def test_the_relative_error_does_not_depend_on_the_size_of_a_motion(engine: str, size: float) -> None:
     error = np.abs(moved(size, engine) - truth()) / np.abs(truth()).max(axis=0)
     assert error.max() < ENGINES[engine]

@@ -216,6 +216,7 @@ def test_small_impacts_leave_gears_alone_that_they_do_not_reach(gears: int) -> N
     assert {event[1] for event in sol.events if event[0] > 0} == {"stop"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials"])
 @pytest.mark.parametrize("seed", [5, 7, 11, 23])
 def test_a_jump_that_a_spring_takes_up_is_no_impact_for_a_gear(engine: str, seed: int) -> None:

@@ -120,6 +120,7 @@ def test_scipy_through_all_phases_of_random_trains_reproduces_the_motion(train: 
     assert max(by_hand(model, sol), default=0.0) < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NETWORKS)
 def test_the_jacobian_and_the_code_of_a_phase_are_those_of_its_right_hand_side(name: str) -> None:
     """Tolerance 1e-5 of the largest slope: central differences of a step of 1e-6 keep some seven digits."""

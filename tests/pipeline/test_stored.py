@@ -95,6 +95,7 @@ def read(sol: sw.Solution) -> dict[str, Any]:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize(("kind", "engine"), RUNS)
 def test_a_stored_motion_reads_the_same(kind: str, engine: str, way: str) -> None:

@@ -89,6 +89,7 @@ def test_beside_a_wave_a_gap_passes_nothing_until_half_of_it_is_passed(way: floa
     assert (way * sol["gap.tau"][2:] > 0.0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("torque", [10.0, -10.0])
 @pytest.mark.parametrize("twist", [0.0, 0.011, -0.02])
 @pytest.mark.parametrize("damping", [0.0, 5.0, 300.0])

@@ -92,6 +92,7 @@ def test_speeds_and_springs_beside_a_strong_damper_on_a_light_rotor_are_right(da
     assert largest_error(values, exact) < 1e-12  # each state is rounded once
 
 
+@pytest.mark.slow
 def test_the_motion_between_outputs_is_as_right_as_at_them() -> None:
     pieces = slow_train(1e6, 1e-5)
     times = np.concatenate([np.geomspace(1e-13, 1.0, 40), np.linspace(2.0, 1000.0, 60)])
@@ -107,6 +108,7 @@ def test_the_motion_between_outputs_is_as_right_as_at_them() -> None:
     assert sol.energy_residual < 1e-9
 
 
+@pytest.mark.slow
 def test_an_engine_that_is_further_off_than_its_tolerance_says_so() -> None:
     """CVODE over 1400 radians of an oscillation that hardly fades, at rtol 1e-8."""
     pytest.importorskip("sksundae")

@@ -132,6 +132,7 @@ def test_the_replayed_drive_has_no_objection_and_meets_what_is_to_be_judged(moti
     assert any(event[1] == "gap" and event[3] == "rebound" for event in motion.sol.events)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "values"), WRONG, ids=[f"{name}-{next(iter(values))}" for name, values in WRONG])
 def test_a_part_with_another_value_is_found(name: str, values: dict[str, Any], motion: Motion) -> None:
     parts = tuple(
@@ -140,6 +141,7 @@ def test_a_part_with_another_value_is_found(name: str, values: dict[str, Any], m
     assert all_objections(parts, motion) != []
 
 
+@pytest.mark.slow
 # without its source the law of a prescribed speed is asked of nothing, and a wheel in free motion has no torque
 @pytest.mark.parametrize("name", [part.name for part in DRIVE.parts if part.name not in ("line", "J8")])
 def test_a_part_that_is_forgotten_is_found(name: str, motion: Motion) -> None:

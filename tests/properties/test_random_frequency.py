@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import Phase, find, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
@@ -58,6 +59,7 @@ def test_random_networks_have_several_sources() -> None:
     find(_driven(), several, settings=settings(max_examples=100, phases=(Phase.generate,)))
 
 
+@pytest.mark.slow
 @share_of_examples(0.2)
 @given(_driven())
 def test_every_quantity_responds_to_all_sources_as_the_referee_says(pieces: Network) -> None:
@@ -80,6 +82,7 @@ def test_every_quantity_responds_to_all_sources_as_the_referee_says(pieces: Netw
     assert_equal_signals(found, wanted, 1e-6)
 
 
+@pytest.mark.slow
 @share_of_examples(0.2)
 @given(networks(max_inertias=12))
 def test_the_modes_are_the_eigenvalues_of_the_whole_descriptor_system(pieces: Network) -> None:

@@ -55,6 +55,7 @@ def test_the_random_networks_are_small_and_large(fewest: int, most: int) -> None
     find(networks(), fits, settings=settings(max_examples=500, phases=(Phase.generate,)))
 
 
+@pytest.mark.slow
 @share_of_examples()
 @given(driven_networks())
 def test_every_speed_and_every_torque_equals_that_of_the_referee(

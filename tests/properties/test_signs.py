@@ -238,6 +238,7 @@ def test_a_component_absorbs_what_it_stores_and_loses(name: str) -> None:
         assert "subject" in sol.observer.stored(sol.t, sol.x, sol.dense)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", registered())
 def test_the_signals_of_a_component_multiply_to_its_power(name: str) -> None:
     """Across times through, summed over the ports with the signs of the sign page, is what the part absorbs."""

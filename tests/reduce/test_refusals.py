@@ -39,6 +39,7 @@ def seen(kind: type[sw.Component], scale: Scale, domain: Domain = ROTATION) -> A
     return referred_parts.referred_part(Placed(part, nodes), nodes, scale, domain)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_every_mechanical_component_is_referred_or_refused(name: str) -> None:
     kind = BUILT_IN[name]

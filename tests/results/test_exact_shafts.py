@@ -282,6 +282,7 @@ def test_an_angle_that_no_slope_reads_is_the_integral_of_its_speed_in_each_mode(
     assert (modes.rates.real == 0).all()  # exactly: nothing is lost
 
 
+@pytest.mark.slow
 def test_the_point_of_a_motion_is_its_end_in_time_too() -> None:
     """A brake that grips harder by the second: modes about a motion read it where the motion ends, or when told."""
     net = sw.Network("gripping")

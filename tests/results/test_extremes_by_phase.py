@@ -131,6 +131,7 @@ def test_a_clutch_gives_its_slip_torque_until_both_turn_alike_and_then_what_they
     np.testing.assert_allclose(late["clutch.tau"], drive * J2 / (J1 + J2), rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_travelling_wave_is_largest_where_it_is_reflected() -> None:
     """A step on a rotor at one end of a clamped shaft: until the third delay the clamp takes twice what arrives.
 

@@ -21,6 +21,7 @@ def curves(figure: Any) -> dict[str, Any]:
     return {line.get_label(): line for axis in figure.axes for line in axis.lines if line.get_label()[0] != "_"}
 
 
+@pytest.mark.slow
 def test_a_curve_is_as_high_as_the_motion_however_fast_it_swings() -> None:
     """An oscillation of 500 Hz over 4 s has 2000 turns, and a curve of 2000 samples is lower.
 

@@ -81,6 +81,7 @@ def test_the_command_tells_on_standard_error(tmp_path: Path, capsys: pytest.Capt
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.slow
 def test_a_shaft_of_travelling_waves_tells_of_its_stations() -> None:
     """A step runs along a shaft of 1 m in 0.3 ms; output times are thrice as far apart."""
     from shaftwork.results.samples import warn_of_coarse_samples

@@ -78,6 +78,7 @@ def test_the_shaft_carries_several_times_the_rated_torque(J_m: float, times: flo
     assert np.abs(sol["motor.i_a"]).max() > 200
 
 
+@pytest.mark.slow
 def test_the_small_mass_is_at_its_steady_speed_within_the_run_and_the_large_one_not_yet() -> None:
     """The averaged motor says where they go: a little above 3000 1/min, at which the back EMF would be 424 V."""
     mean = sw.Network("mean")

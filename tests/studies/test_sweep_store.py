@@ -55,6 +55,7 @@ def chunk(**changes: Any) -> str:
     return json.dumps(made | {"check": check_of(made)})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("line", "says"),
     [
