@@ -217,3 +217,19 @@ def test_a_phase_is_made_twice_only_where_stability_bounds_its_steps() -> None:
     run = net.simulate(1.0, engine="scipy")
     assert len(run.events) > 10
     assert run.statistics["steps"] == len(run.steps) - 1
+
+
+@pytest.mark.parametrize("engine", ["auto", "exact", "scipy", "heyoka", "sundials", "scipy-radau", "banded"])
+@pytest.mark.parametrize("held", [False, True])
+@pytest.mark.parametrize("d", [0.0, 100.0])
+def test_a_train_that_idles_is_not_said_to_be_wrong_by_parts_of_nothing(engine: str, held: bool, d: float) -> None:  # noqa: FBT001
+    """All turns at one speed, and no torque passes: no part of the largest torque is an error."""
+    net = sw.Network("idle")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.Spring("shaft", c=1e4, d=d), "a", "b")
+    net.add(sw.Inertia("J2", J=2.0), "b")
+    if held:
+        net.add(sw.SpeedSource("line", omega=10.0), "z")
+        net.add(sw.Spring("coupling", c=1e4, d=d), "z", "a")
+    sol = net.simulate(1.0, initial={"J1.omega": 10.0, "J2.omega": 10.0}, engine=engine)  # a warning would be an error
+    assert np.abs(sol["shaft.tau"]).max() < 1e-12
