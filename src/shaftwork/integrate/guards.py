@@ -81,15 +81,15 @@ class GuardWatch:
         return min(max(time, start + CLEARANCE * float(np.spacing(abs(end)))), end)
 
     def follows(self, start: float, x: Array, end: float, dense: Dense) -> bool:
-        """Whether a step obeys the equations up to the guard or switch that it has met.
+        """Whether a step obeys the equations up to the guard that it has met.
 
-        What a law does just before it, as friction does that rises at low speeds, may lie between all points at which
-        the step has looked at the law.
+        What a law does just before a guard, as friction does that rises at low speeds, may lie between all points at
+        which the step has looked at it.
 
         Args:
             start: of the step, s.
             x: (n,) state there.
-            end: where it meets the guard or switch, s.
+            end: where it meets the guard, s.
             dense: its dense output, times (k,) to states (k, n).
         """
         if isinstance(self._problem, DaeProblem):

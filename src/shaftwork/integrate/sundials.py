@@ -268,14 +268,13 @@ def _attempt(problem: Problem | DaeProblem, open_solver: Opener, ask: Ask) -> Ma
             stop = watch.cut(t, x, end, state, inside)
             cut = crossings.cut(t, x, end, state, inside, again=False)
             stops = stop is not None and (cut is None or stop <= cut)
-            met = stop if stops else cut
             shortest = LEAST * (problem.t_end - problem.t0)
-            if met is not None and end - t > shortest and not watch.follows(t, x, met, inside):
+            if stop is not None and stops and end - t > shortest and not watch.follows(t, x, stop, inside):
                 longest, left = (end - t) / SHORTER, left - 1
                 opened = open_solver(replace(piece, start=t), x)
                 x = opened.start
                 continue
-            whole, end = end, end if met is None else met
+            whole, end = end, stop if stop is not None and stops else end if cut is None else cut
             x = state if end == whole else opened.inside(np.array([end]))[0]
             if (objection := pace.objection(end, rests=crossings.rests)) is not None:
                 raise failure(problem, "sundials", end, x, objection)
