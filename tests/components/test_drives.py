@@ -76,6 +76,50 @@ def test_below_s_k_f_n_standstill_has_a_share_of_the_pull_out_torque_that_a_boos
     assert "at standstill the motor has 2 x / (1 + x^2) of tau_k flux^2, with x = f / (s_k f_n)" in told
 
 
+def held_by_a_load(**options: Any) -> sw.Network:
+    """The drive, a gear of 5 behind a shaft, and a hoist that rests up to 2.18 N m at the motor."""
+    net = sw.Network("start")
+    net.add(sw.FrequencyDrive("motor", **(MOTOR | options)), "rotor")
+    net.add(sw.Inertia("J1", J=0.01), "rotor")
+    net.add(sw.Spring("shaft", c=100.0, d=0.5), "rotor", "middle")
+    net.add(sw.Gear("gear", ratio=5.0), "middle", "wheel")
+    net.add(sw.Inertia("J2", J=0.1), "wheel")
+    net.add(sw.Hoist("hoist", m=10.0, radius=0.1, efficiency=0.9), "wheel")
+    return net
+
+
+def test_a_check_notes_a_start_below_the_pull_out_torque_with_the_load_and_what_helps() -> None:
+    """2 x / (1 + x^2) of 8 N m with x = 2.5 / 15. The hoist rests up to 10 g 0.1 / 0.9, a fifth of it at the motor."""
+    net = held_by_a_load()
+    (note,) = net.check()
+    assert (note.severity, note.parts, note.nodes) == ("note", ("motor",), ("rotor",))
+    assert str(note) == (
+        "weak start: FrequencyDrive 'motor' at node 'rotor' has 2.595 N*m at standstill at 2.5 Hz, of a pull-out "
+        "torque of 8 N*m, against 2.18 N*m of Hoist 'hoist'. Give f_0 = 15 Hz, or boost = 1.01, for a start with all "
+        "of it."
+    )
+    (held,) = held_by_a_load(f=sw.Table([0.0, 1.0], [2.0, 2.0])).check()
+    assert "2.18 N*m of Hoist 'hoist', which it does not move. Give a frequency that begins at 15 Hz, or" in str(held)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"f_0": 15.0}, {"boost": 1.01}, {"f": 15.0}, {"slip_exponent": 1.0}, {"s_k": 1.2}, {"f": 10.0 + sw.omega}],
+    ids=str,
+)
+def test_a_check_has_nothing_to_note_of_a_start_with_what_helps_or_of_another_motor(options: dict[str, Any]) -> None:
+    assert held_by_a_load(**options).check() == ()
+
+
+@pytest.mark.parametrize(("frequency", "moves"), [(2.0, False), (2.5, True)])
+def test_a_load_that_the_note_says_is_not_moved_rests(frequency: float, moves: bool) -> None:  # noqa: FBT001
+    net = held_by_a_load(f=frequency)
+    (note,) = net.check()
+    assert ("does not move" not in str(note)) is moves
+    sol = net.simulate(0.5, t_eval=51, initial={"shaft.tau": 2.0})
+    assert bool(sol["J2.omega"][-1] > 0) is moves
+
+
 def test_a_boost_raises_the_flux_at_low_frequency_alone() -> None:
     """Torque goes with the square of the flux: 1.2^2 at standstill, 1.1^2 in the middle, 1 from f_boost on."""
     for f, flux in ((0.0, 1.2), (5.0, 1.1), (10.0, 1.0), (30.0, 1.0)):

@@ -152,6 +152,23 @@ class Derived:
 
 
 @dataclass(frozen=True)
+class Note:
+    """Something worth saying about a part, which stops nothing: `net.check()` lists it with the part and its nodes.
+
+    Args:
+        kind: short name, stable across releases.
+        message: what it is about, the rest of a sentence that begins with the part.
+        hint: the next step.
+        torque: with which the part starts, on its node; the loads that rest until it is exceeded are then named.
+    """
+
+    kind: str
+    message: str
+    hint: str
+    torque: float | None = None
+
+
+@dataclass(frozen=True)
 class Component:
     """Base of all components. A subclass decorated with `component` declares parameters and yields branches.
 
@@ -195,6 +212,10 @@ class Component:
 
         Equations list those that occur with their definitions; computations know the parameters alone.
         """
+        yield from ()
+
+    def notes(self) -> Iterator[Note]:
+        """Yield what is worth saying about the part by its values; by default nothing."""
         yield from ()
 
     def signals(self) -> dict[str, Signal]:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
-from sympy import Abs, Expr, Integer, Max, Piecewise, pi
+from sympy import Abs, Expr, Float, Integer, Max, Piecewise, pi
 
-from shaftwork.components.base import Component, Derived, Port, Role, component
+from shaftwork.components.base import Component, Derived, Note, Port, Role, component, symbols_of
 from shaftwork.components.branches import ACROSS, Branch, ThroughLaw
-from shaftwork.components.laws import Ramp
+from shaftwork.components.laws import Ramp, as_expression, t
 from shaftwork.components.switching import number_of, off_time, on_time, refuse_no_time_on, while_on
 from shaftwork.components.torque_curves import kloss
 from shaftwork.core.errors import ParameterError
@@ -70,11 +71,40 @@ class FrequencyDrive(Component):
         yield Derived("omega_0", 2 * pi * p.n_sync / 60, "rad/s", "synchronous speed at rated frequency", r"\omega_0")
         yield Derived("lag_k", p.s_k * p.omega_0, "rad/s", "lag at the pull-out torque", "D_k")
 
+    def notes(self) -> Iterator[Note]:
+        """Say where the start frequency is below the one at which pull-out lies at standstill, and no boost makes up.
+
+        Of a motor with s_k of 1 or more nothing is said: it has less on the mains, too.
+        """
+        p = symbols_of({name: number_of(self, name) for name in self.declared})
+        f = p.f_0 if self.f is None else _value_at(self.declared["f"].magnitude(self.f)[0], p.t_on or 0.0)
+        if f is None or p.s_k >= 1 or p.slip_exponent >= 1:
+            return
+        whole = p.f_n * p.s_k ** (1 / (1 - p.slip_exponent))
+        if not 0 <= f < whole:
+            return
+        share = float(kloss(1.0, (f / whole) ** (1 - p.slip_exponent), 1.0))
+        most = p.ratio * p.efficiency * p.tau_k
+        torque = most * share * (1 + p.boost * max(0.0, 1 - f / p.f_boost)) ** 2
+        if abs(torque) >= abs(most):
+            return
+        hint = f"Give {'f_0 =' if self.f is None else 'a frequency that begins at'} {math.ceil(10 * whole) / 10:g} Hz"
+        if 0 < f < p.f_boost:
+            hint += f", or boost = {math.ceil(100 * (share**-0.5 - 1) / (1 - f / p.f_boost)) / 100:g}"
+        message = f"has {torque:.4g} N*m at standstill at {f:g} Hz, of a pull-out torque of {most:.4g} N*m"
+        yield Note("weak start", message, f"{hint}, for a start with all of it.", torque)
+
     def branches(self, p: Any) -> Iterator[Branch]:
         f = _ramp(p) if p.f is None else p.f
         lag = p.omega_0 * f / p.f_n - p.ratio * ACROSS
         torque = kloss(p.tau_k * _flux(f, p) ** 2, lag, p.lag_k * (f / p.f_n) ** p.slip_exponent)
         yield ThroughLaw(-while_on(p.ratio * p.efficiency * torque, p))
+
+
+def _value_at(law: Any, time: float) -> float | None:
+    """The value of a law at a time in s; None where it depends on more than the time."""
+    value = as_expression(law).xreplace({t: Float(time)})
+    return float(value) if value.is_comparable else None
 
 
 def _ramp(p: Any) -> Expr:

@@ -22,6 +22,7 @@ from shaftwork.reduction.cancelling import extreme_ratios, numeric_problems
 from shaftwork.reduction.controlled import controlled_problems, reads_itself
 from shaftwork.reduction.form import StateForm, state_form
 from shaftwork.reduction.gains import value_of
+from shaftwork.reduction.starting import notes_of
 from shaftwork.reduction.tree import column_of
 from shaftwork.reduction.view import View, words_of
 
@@ -53,7 +54,7 @@ def diagnose(netlist: Netlist) -> tuple[CircuitGraph | None, StateForm | None, t
     found = [*connection_problems(graph)]
     try:
         form = state_form(graph)
-        found += [*structural_problems(form), *numeric_problems(form)]
+        found += [*structural_problems(form), *numeric_problems(form), *(() if typed else notes_of(graph))]
     except ArithmeticError:  # of the ratios: nothing else is computed with before the values are judged
         form = None
         found.append(extreme_ratios(graph, range(len(graph.branches))))
