@@ -41,11 +41,11 @@ def run(options: Namespace, say: Say) -> Data:
     net, scene = load(options)
     t_end = end_of(options, scene)
     folder = Folder(options.out, FILES, options.line) if options.out else None
+    wanted = tuple(name.strip() for text in options.signals for name in text.split(","))
+    solution = _motion(net, t_end, wanted, options)
     say(f"{net.name}: {t_end:g} s of motion" + (f" ({scene.source})" if scene else ""))
     for line in scene.chosen if scene else ():
         say(f"  chosen: {line}")
-    wanted = tuple(name.strip() for text in options.signals for name in text.split(","))
-    solution = _motion(net, t_end, wanted, options)
     signals = wanted or (scene.signals if scene else _worth_seeing(solution))
     say(f"engine {solution.engine}: {solution.why}")
     counts = ", ".join(f"{count} {name}" for name, count in solution.statistics.items())
