@@ -12,9 +12,10 @@ print. Readers do not see these, which stand between the blocks:
     <!--= expression -->figure<!--/-->      a figure in a sentence: what the expression is in that namespace
     <!-- made: name --> ... <!-- end -->    what the function of this name in `MADE` returns
     <!-- measured: script --> ... <!-- end -->    what a script of benchmarks/ prints on the machine that it names
-    <!-- given: 250 kW, 3000 -->            figures that no code makes: of sources, norms and definitions
+    <!-- given: 250 kW, two masses -->      figures that no code makes: of sources, norms and definitions
 
-The tests (tests/docs) find every figure of a page in one of these, or in what its examples are and print.
+The tests (tests/docs) find every figure of a page in one of these, or in what its examples are and print; a number in
+words is a figure, together with what it counts.
 """
 
 from __future__ import annotations

@@ -21,19 +21,34 @@ NO_FIGURE = re.compile(
     re.DOTALL | re.MULTILINE,
 )
 FIGURE = re.compile(r"(?<![\w.])\d+(?:[., ]\d+)*(?:e[-+]?\d+)?(?: ?%)?")
+NUMBER = (
+    r"(?:(?<!between )(?<!the )two|three|four|five|six|seven|eight|nine|ten|eleven|twelve"
+    r"|(?:thir|four|fif|six|seven|eigh|nine)teen|(?:twen|thir|for|fif|six|seven|eigh|nine)(?:ty|tieths?)"
+    r"|(?:hundred|thousand|million|dozen)s?|percent|twice|thrice|half|halves|halved|halfway|doubled?|quarters?"
+    r"|thirds|(?<=a )third|(?:fif|six|seven|eigh|nin|ten|hundred|thousand)ths?)"
+)
+WORDS = re.compile(
+    rf"\b{NUMBER}\b(?:[\s-]+{NUMBER}\b)*(?:[\s-]+(?:(?:of|a|the|at|in|to|as|for)\s+)?\w+)?", re.IGNORECASE
+)
+"""A number in words and what it counts; "between two" and "the two" are of the sentence itself."""
 
 
 def figures(text: str) -> list[str]:
     """The figures of the sentences and tables of a page that stand in none of its marked places."""
     for pattern in (BLOCK, MADE_PART, MEASURED, HIDDEN, GIVEN, NO_FIGURE):
         text = pattern.sub(" ", text)
-    return FIGURE.findall(text)
+    return numbers(text)
+
+
+def numbers(text: str) -> list[str]:
+    """Figures, and numbers in words with what they count."""
+    return [*FIGURE.findall(text), *(" ".join(phrase.lower().split()) for phrase in WORDS.findall(text))]
 
 
 def backed(text: str) -> set[str]:
     """The figures that examples, tables and hidden code of a page hold, and those that it names as given."""
     places = (BLOCK, MADE_PART, MEASURED, HIDDEN, GIVEN, re.compile(r"`[^`\n]+`"))
-    return {figure for pattern in places for match in pattern.finditer(text) for figure in FIGURE.findall(match[0])}
+    return {figure for pattern in places for match in pattern.finditer(text) for figure in numbers(match[0])}
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
@@ -52,4 +67,6 @@ def test_what_is_measured_names_the_script_that_measures_it(page: Path) -> None:
 def test_a_figure_that_nothing_backs_is_seen() -> None:
     text = "It takes 27.7 ms, 0.5 % of 1e-9, as (14) of 2019 and figure 13 say, or <!--= 3 -->33<!--/--> of `x = 44`.\n"
     assert figures(text) == ["27.7", "0.5 %", "1e-9"]
+    words = "Two engines\nand the thirty-two lose half of it between two nodes, <!-- given: half of it -->."
+    assert figures(words) == ["two engines", "thirty-two lose", "half of it"]
     assert backed(f"{text}<!-- given: 27.7 -->") >= {"27.7", "33", "44"}
