@@ -43,7 +43,8 @@ def run(options: Namespace, say: Say) -> Data:
     folder = Folder(options.out, FILES, options.line) if options.out else None
     wanted = tuple(name.strip() for text in options.signals for name in text.split(","))
     solution = _motion(net, t_end, wanted, options)
-    say(f"{net.name}: {t_end:g} s of motion" + (f" ({scene.source})" if scene else ""))
+    unset = "" if options.t_end is not None else " (a model file has no end time; --t-end sets it)"
+    say(f"{net.name}: {t_end:g} s of motion{f' ({scene.source})' if scene else unset}")
     for line in scene.chosen if scene else ():
         say(f"  chosen: {line}")
     signals = wanted or (scene.signals if scene else _worth_seeing(solution))
