@@ -194,19 +194,17 @@ def test_the_model_file_of_a_scene_is_the_scene(name: str, tmp_path: Path, capsy
 
 
 def test_the_end_of_a_scene_is_told_where_it_is_exported_and_its_absence_where_it_runs(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The scene ends after 0.2 s, and a model file would run for 10 s."""
+    """The scene ends after 0.2 s, and a model file runs for 10 s."""
     path = str(tmp_path / "chain.toml")
     assert main(["export", "shaft-chain", path]) == DONE
     line = capsys.readouterr().err.rstrip().partition("For the motion of the scene: shaftwork ")[2].split()
     assert line == ["run", path, "--t-end", "0.2"]
     assert main(line) == DONE
     assert capsys.readouterr().out.startswith("shaft chain: 0.2 s of motion\n")
-    assert main(["run", path]) == DONE
-    assert capsys.readouterr().out.startswith(
-        "shaft chain: 10 s of motion (a model file has no end time; --t-end sets it)\n"
-    )
+    assert main(["run", model]) == DONE
+    assert capsys.readouterr().out.startswith("pair: 10 s of motion (a model file has no end time; --t-end sets it)\n")
     assert main(["export", "shaft-chain"]) == DONE
     assert capsys.readouterr().err.rstrip().endswith("shaftwork run FILE.toml --t-end 0.2")
     assert main(["export", path]) == DONE
