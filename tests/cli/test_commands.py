@@ -148,13 +148,54 @@ def test_speeds_that_make_no_diagram_are_refused_before_anything_is_computed(
     assert "give two speeds in 1/min, the lower one 0 or more" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("point", [("--steady",), ("--at", "J1.omega=0")])
+@pytest.mark.parametrize(
+    "point",
+    [
+        ("--steady",),
+        ("--at", "J1.omega=0"),
+        pytest.param(("--at", "J1.omega=n", "--at", "J2.omega=n"), marks=pytest.mark.slow),
+    ],
+)
 def test_a_diagram_without_its_point_names_options_that_work(
     point: tuple[str, ...], capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["campbell", "crane-start", "--n-max", "3000"]) == WRONG_INPUT
     assert " ".join(point) in capsys.readouterr().err
     assert main(["campbell", "crane-start", "--n-max", "3000", *point]) == DONE
+
+
+@pytest.mark.slow
+def test_a_diagram_may_have_a_point_for_each_speed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A spring that stiffens with the twist, and a gear in between: n at the motor is n / 2 behind it."""
+    net = sw.Network("stiffening")
+    net.add(sw.KlossMotor("motor", tau_k=300.0, s_k=0.3, n_sync=3000.0), "a")
+    net.add(sw.Inertia("J1", J=2.0), "a")
+    net.add(sw.Spring("shaft", c=1e4), "a", "b")
+    net.add(sw.Gear("gear", ratio=2.0), "b", "c")
+    net.add(sw.Inertia("J2", J=3.0), "c")
+    net.add(sw.FanLoad("fan", tau_n=100.0, n_n=1500.0), "c")
+    path = tmp_path / "stiffening.toml"
+    net.save(path)
+    arguments = ["campbell", str(path), "--n-max", "3000", "--orders", "1,2", "--json"]
+    assert main([*arguments, "--at", "J1.omega=n", "--at", "J2.omega = 1*n/2"]) == DONE
+    found = json.loads(capsys.readouterr().out)["crossings"]
+    wanted = net.campbell(
+        np.linspace(0.0, 100 * np.pi, 61), (1, 2), at=lambda n: {"J1.omega": n, "J2.omega": n / 2}
+    ).crossings
+    assert [made["speed"] for made in found] == [made.speed for made in wanted]
+    assert found
+
+
+@pytest.mark.parametrize("value", ["m", "n/0", "n*2", "2 n/3"])
+def test_a_point_of_a_diagram_is_a_multiple_of_its_speed(
+    value: str, model: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["campbell", model, "--n-max", "3000", "--at", "J2.omega=n", "--at", f"J1.omega={value}"]) == WRONG_INPUT
+    assert "J1.omega=" in capsys.readouterr().err
+    assert main(["campbell", model, "--n-max", "3000", "--at", "J2.omega=n", "--steady"]) == WRONG_INPUT
+    assert "--steady and --at both name a point" in capsys.readouterr().err
+    assert main(["modes", model, "--at", "J1.omega=n"]) == WRONG_INPUT
+    assert "'n' must be a number in SI, or one with its unit" in capsys.readouterr().err
 
 
 def test_a_sweep_that_is_interrupted_goes_on_from_its_store(
@@ -201,8 +242,6 @@ def test_the_end_of_a_scene_is_told_where_it_is_exported_and_its_absence_where_i
     assert main(["export", "shaft-chain", path]) == DONE
     line = capsys.readouterr().err.rstrip().partition("For the motion of the scene: shaftwork ")[2].split()
     assert line == ["run", path, "--t-end", "0.2"]
-    assert main(line) == DONE
-    assert capsys.readouterr().out.startswith("shaft chain: 0.2 s of motion\n")
     assert main(["run", model]) == DONE
     assert capsys.readouterr().out.startswith("pair: 10 s of motion (a model file has no end time; --t-end sets it)\n")
     assert main(["export", "shaft-chain"]) == DONE

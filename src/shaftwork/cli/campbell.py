@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from functools import partial
 
 from shaftwork.cli.command import Command, Data, Say, folder_option, point_options
 from shaftwork.cli.folder import Folder, write_picture, write_rows
 from shaftwork.cli.models import load, point_of
+from shaftwork.cli.settings import follows_speed, point
 from shaftwork.core.errors import ParameterError
 
 SPEEDS = 61
@@ -20,7 +22,7 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--orders", metavar="K,...", type=_orders, default=(1.0, 2.0, 3.0), help="excitations per turn (default 1,2,3)"
     )
-    point_options(parser)
+    point_options(parser, "; J1.omega=n or J2.omega=n/3 follows the speed n")
     folder_option(parser, "the diagram and its crossings as CSV")
 
 
@@ -36,8 +38,10 @@ def run(options: Namespace, say: Say) -> Data:
         )
     folder = Folder(options.out, ("campbell.csv", "campbell.png"), options.line) if options.out else None
     speeds = np.linspace(options.n_min, options.n_max, SPEEDS) * math.pi / 30
+    moves = any(map(follows_speed, options.at)) and not options.steady
+    at = partial(point, options.at) if moves else point_of(options, net)
     diagram = net.campbell(
-        speeds, options.orders, options.f_max, at=point_of(options, net), count=options.count, exact=options.exact
+        speeds, options.orders, options.f_max, at=at, count=options.count, exact=options.exact
     )
     say(str(diagram))
     rows = [

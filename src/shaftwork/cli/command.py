@@ -57,14 +57,14 @@ def solver_options(parser: ArgumentParser) -> None:
     )
 
 
-def point_options(parser: ArgumentParser) -> None:
+def point_options(parser: ArgumentParser, besides: str = "") -> None:
     """The options that say about which point a network is linearised, and how many modes are wanted."""
     parser.add_argument(
         "--at",
         metavar="NAME=X",
         action="append",
         default=[],
-        help="a speed, twist or torque of the point, in SI or with its unit: J1.omega=8.5, 'J1.omega=80 rpm'",
+        help=f"a speed, twist or torque of the point, in SI or with its unit: J1.omega=8.5, 'J1.omega=80 rpm'{besides}",
     )
     parser.add_argument("--steady", action="store_true", help="about the steady operation instead of rest")
     parser.add_argument("--count", metavar="N", type=int, help="modes wanted, the lowest (default: all)")

@@ -17,6 +17,8 @@ Item = TypeVar("Item")
 
 _QUANTITY = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\W\d].*)")
 """A number and a unit behind it; no law reads so."""
+_OF_SPEED = re.compile(r"(-?)(?:(\d+\.?\d*|\.\d+)\s*\*\s*)?n(?:\s*/\s*(\d+\.?\d*|\.\d+))?")
+"""A multiple of the speed n of a diagram: n, -n, 2*n, n/3, 2*n/3."""
 _UNIT = re.compile(r"(?:[^\W\d]\w*+|[*/() ·]|(?:\*\*|\^) *[-+]?\d(?:\.\d+)?(?! *(?:\*\*|\^)))*+")
 """Names of units, their products and quotients, and powers of one digit: the reader behind computes any other number,
 of any size."""
@@ -106,24 +108,37 @@ def varied(net: Network, texts: Iterable[str], settings: Iterable[str]) -> dict[
     return values
 
 
-def point(texts: Iterable[str]) -> dict[str, Any]:
+def follows_speed(text: str) -> bool:
+    """Whether a quantity of a point is a multiple of the speed n."""
+    return _OF_SPEED.fullmatch(named(text, "--at", "J1.omega=n")[1]) is not None
+
+
+def point(texts: Iterable[str], n: float | None = None) -> dict[str, Any]:
     """Quantities and their values, each written as name=value: a number in SI, or one with its unit.
+
+    Args:
+        texts: of `--at`.
+        n: speed in rad/s, where values may be multiples of it.
 
     Raises:
         ParameterError: one is none, or is there twice.
         MissingExtraError: a value has a unit, and pint is not installed.
     """
-    return once("--at", (_of_point(text) for text in texts))
+    return once("--at", (_of_point(text, n) for text in texts))
 
 
-def _of_point(text: str) -> tuple[str, Any]:
+def _of_point(text: str, n: float | None) -> tuple[str, Any]:
     name, written = named(text, "--at", "J1.omega=100")
+    multiple = None if n is None else _OF_SPEED.fullmatch(written)
+    if n is not None and multiple and (divisor := float(multiple[3] or 1)):
+        return name, float(f"{multiple[1]}{multiple[2] or 1}") * n / divisor
     try:
         return name, float(written)
     except ValueError:
         if _QUANTITY.fullmatch(written):
             return name, _quantity(name, written)
-        raise ParameterError(f"{text}: {written!r} must be a number in SI, or one with its unit.") from None
+        multiples = "" if n is None else ", or a multiple of the speed such as n, 2*n or n/3"
+        raise ParameterError(f"{text}: {written!r} must be a number in SI, or one with its unit{multiples}.") from None
 
 
 def once(option: str, pairs: Iterable[tuple[str, Item]]) -> dict[str, Item]:

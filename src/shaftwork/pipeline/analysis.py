@@ -157,8 +157,8 @@ def _refuse_no_point(model: CompiledModel) -> None:
     raise ParameterError(
         f"campbell() of '{graph.name}' needs a point: how it swings depends on how it runs ({parts}). Give the speeds "
         f"of all inertias where the exciting shaft turns at n rad/s, at=lambda n: {{{turning}}}; or one point for "
-        "all speeds, such as at=model.steady_state(), or at={} for rest. The command takes one point for all speeds: "
-        f"--steady, or --at {speeds[0]}=0 for rest."
+        "all speeds, such as at=model.steady_state(), or at={} for rest. On the command line: "
+        f"{' '.join(f'--at {name}=n' for name in speeds)}; or --steady, or --at {speeds[0]}=0 for rest."
     )
 
 
