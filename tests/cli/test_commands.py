@@ -190,7 +190,9 @@ def test_a_diagram_may_have_a_point_for_each_speed(tmp_path: Path, capsys: pytes
 def test_a_point_of_a_diagram_is_a_multiple_of_its_speed(
     value: str, model: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["campbell", model, "--n-max", "3000", "--at", "J2.omega=n", "--at", f"J1.omega={value}"]) == WRONG_INPUT
+    assert (
+        main(["campbell", model, "--n-max", "3000", "--at", "J2.omega=n", "--at", f"J1.omega={value}"]) == WRONG_INPUT
+    )
     assert "J1.omega=" in capsys.readouterr().err
     assert main(["campbell", model, "--n-max", "3000", "--at", "J2.omega=n", "--steady"]) == WRONG_INPUT
     assert "--steady and --at both name a point" in capsys.readouterr().err
