@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -31,6 +32,16 @@ WORDS = re.compile(
     rf"\b{NUMBER}\b(?:[\s-]+{NUMBER}\b)*(?:[\s-]+(?:(?:of|a|the|at|in|to|as|for)\s+)?\w+)?", re.IGNORECASE
 )
 """A number in words and what it counts; "between two" and "the two" are of the sentence itself."""
+NOTEBOOKS = tuple(sorted((ROOT / "notebooks").glob("*.ipynb")))
+
+
+def page_of(path: Path) -> str:
+    """A page, or a notebook as one; what its cells compute they have to assert, since their outputs are not stored."""
+    text = path.read_text(encoding="utf-8")
+    if path.suffix != ".ipynb":
+        return text
+    cells = (("".join(cell["source"]), cell["cell_type"]) for cell in json.loads(text)["cells"])
+    return "\n".join(f"```python\n{source}\n```" if kind == "code" else source for source, kind in cells)
 
 
 def figures(text: str) -> list[str]:
@@ -51,9 +62,9 @@ def backed(text: str) -> set[str]:
     return {figure for pattern in places for match in pattern.finditer(text) for figure in numbers(match[0])}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", [*PAGES, *NOTEBOOKS], ids=lambda page: page.name)
 def test_every_figure_in_a_sentence_is_computed_printed_made_or_given(page: Path) -> None:
-    text = page.read_text(encoding="utf-8")
+    text = page_of(page)
     known = backed(text)
     assert [figure for figure in figures(text) if figure not in known] == []
 
