@@ -46,10 +46,9 @@ def run(options: Namespace, say: Say) -> Data:
         (made.speed * 30 / math.pi, made.speed, made.order, made.frequency, made.mode) for made in diagram.crossings
     ]
     if folder:
-        with folder.new_files() as place:
+        with folder.new_files(say) as place:
             write_rows(place / "campbell.csv", ("speed [1/min]", "speed [rad/s]", "order", "f [Hz]", "mode"), rows)
             write_picture(place / "campbell.png", diagram.plot)
-        say(f"\n{folder.written()}")
     keys = ("n", "speed", "order", "frequency", "mode")
     return {"network": diagram.title, "crossings": [dict(zip(keys, row, strict=True)) for row in rows]}
 

@@ -59,10 +59,9 @@ def run(options: Namespace, say: Say) -> Data:
         raise KeyboardInterrupt(f"{len(done)} models are done, as told above; nothing was written") from None
     say(f"{study}\n\n{study.advice}")
     if folder:
-        with folder.new_files() as place:
+        with folder.new_files(say) as place:
             study.to_csv(place / "work-precision.csv")
             write_picture(place / "work-precision.png", study.plot)
-        say(f"\n{folder.written()}")
     return dataclasses.asdict(study)
 
 

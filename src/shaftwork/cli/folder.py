@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from shaftwork.cli.command import Say
 from shaftwork.core.errors import MissingExtraError, ParameterError
 from shaftwork.core.files import replaced
 
@@ -52,8 +53,8 @@ class Folder:
             )
 
     @contextmanager
-    def new_files(self) -> Iterator[Path]:
-        """A folder to write into; all in it takes the place of the older run's files once everything is written.
+    def new_files(self, say: Say) -> Iterator[Path]:
+        """A folder to write into; once everything is written it takes the place of the older run's files, and is said.
 
         Raises:
             ParameterError: something cannot be written, as on a full disk.
@@ -69,6 +70,7 @@ class Folder:
             raise ParameterError(
                 f"--out {self.path} cannot be written: {error}. Make room, or give another folder."
             ) from None
+        say(f"\nwritten: {', '.join(str(self.path / name) for name in self._files())}")
 
     def _take(self, draft: Path) -> None:
         """Put the files of a draft in the place of the older run's; wherever it ends, the next run knows them all."""
@@ -85,10 +87,6 @@ class Folder:
         manifest = {"command": ["shaftwork", *self._line], "files": names}
         with replaced(self.path / MANIFEST) as file:
             file.write(json.dumps(manifest, indent=2, ensure_ascii=False) + "\n")
-
-    def written(self) -> str:
-        """What is there, in words."""
-        return f"written: {', '.join(str(self.path / name) for name in self._files())}"
 
     def _files(self) -> list[str]:
         """Names of the files of the run that is there."""

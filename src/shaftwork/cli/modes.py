@@ -25,10 +25,9 @@ def run(options: Namespace, say: Say) -> Data:
     say(str(modes))
     rows = [(name, f, damping, rate.real, rate.imag, node) for name, f, damping, rate, node in modes.table]
     if folder:
-        with folder.new_files() as place:
+        with folder.new_files(say) as place:
             write_rows(place / "modes.csv", HEAD, rows)
             write_picture(place / "modes.png", modes.plot)
-        say(f"\n{folder.written()}")
     keys = ("name", "frequency", "damping", "rate_real", "rate_imaginary", "moves_most")
     return {"network": modes.title, "modes": [dict(zip(keys, row, strict=True)) for row in rows]}
 

@@ -54,9 +54,8 @@ def run(options: Namespace, say: Say) -> Data:
     say(solution.extremes.table(signals))
     _say_phases(solution, say)
     if folder:
-        with folder.new_files() as place:
+        with folder.new_files(say) as place:
             _write(solution, signals, place)
-        say(f"\n{folder.written()}")
     return _data(solution, signals)
 
 

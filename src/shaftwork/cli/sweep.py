@@ -57,10 +57,9 @@ def run(options: Namespace, say: Say) -> Data:
     if made.why:
         say(f"\n{made.why}")
     if folder:
-        with folder.new_files() as place:
+        with folder.new_files(say) as place:
             made.to_csv(place / "sweep.csv")
             write_picture(place / "sweep.png", made.plot)
-        say(f"\n{folder.written()}")
     return {"network": made.name, "columns": made.columns, "why": made.why}
 
 
