@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pint
 import pytest
@@ -80,3 +82,13 @@ def test_the_pull_out_torque_of_the_crane_may_have_a_unit() -> None:
     assert kilo.max("motor.tau") == pytest.approx(sw.scenes.crane_start(13.0).simulate(1.0).max("motor.tau"), rel=1e-12)
     with pytest.raises(sw.ParameterError, match=r"pull_out_torque = 3.0 N m must be more than the rated 3.8"):
         sw.scenes.crane_start(pull_out_torque=0.003 * UNIT.kN * UNIT.m)
+
+
+@pytest.mark.parametrize(
+    ("speed", "words"), [(80 * UNIT.rpm, "80 1/min"), (8 * UNIT("rad/s"), "8 rad/s"), (0.5 * UNIT.krpm, "0.5 krpm")]
+)
+def test_titles_have_the_units_of_their_point_as_diagrams_do(speed: Any, words: str) -> None:
+    net = sw.Network("fan")
+    net.add(sw.Inertia("J", J=2.0), "a")
+    net.add(sw.FanLoad("load", tau_n=20.0, n_n=100.0), "a")
+    assert net.modes(at={"J.omega": speed}).title == f"fan at J.omega = {words}"

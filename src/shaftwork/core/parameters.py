@@ -150,6 +150,11 @@ def is_quantity(value: Any) -> bool:
     return hasattr(value, "dimensionality") and hasattr(value, "to")
 
 
+def briefly(value: Any) -> str:
+    """A number for a title, and the unit of a quantity as diagrams write it: "80 1/min", "2 kN*m"."""
+    return f"{value:.4g~C}".replace(" rpm", " 1/min") if is_quantity(value) else f"{value:.4g}"
+
+
 def converted(value: Any, unit: str) -> tuple[Any, str | None]:
     """The number, or array of numbers, of a quantity in a unit; and the objection to its units, or None.
 

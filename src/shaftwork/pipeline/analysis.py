@@ -13,7 +13,7 @@ from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.start_values import initial_state
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.parameters import in_si
+from shaftwork.core.parameters import briefly, in_si
 from shaftwork.network.templates import Kind
 from shaftwork.network.wording import listed
 from shaftwork.results import campbell as diagram
@@ -75,7 +75,7 @@ def about(model: CompiledModel, at: Point, t: float) -> str:
     when = f"{diagram.LAWS}{t:g} s" if any(TIME in law.free_symbols for law in laws) else ""
     if isinstance(at, Solution):
         return f"at t = {at.t[0]:g} s of a motion" + ("" if t == at.t[0] else when)
-    given = [f"{name} = {value:.4g}" for name, value in (at or {}).items()]
+    given = [f"{name} = {briefly(value)}" for name, value in (at or {}).items()]
     shown = ", ".join(given if len(given) <= NAMED else [*given[: NAMED - 1], "..."])
     return (f"at {shown}" if given else "at rest") + when
 
