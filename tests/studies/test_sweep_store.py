@@ -112,6 +112,20 @@ def test_what_is_no_file_of_a_sweep_is_refused_and_stays_as_it_is(tmp_path: Path
     assert path.read_text() == text
 
 
+@pytest.mark.parametrize(("version", "told"), [("0.0.9", "version 0.0.9"), (None, "an earlier version")])
+def test_a_store_of_another_version_is_refused_and_stays_as_it_is(
+    tmp_path: Path, lines: list[str], version: str | None, told: str
+) -> None:
+    title = json.loads(lines[0])
+    assert title.pop("version") == sw.__version__
+    path = tmp_path / "store.jsonl"
+    path.write_text("\n".join([json.dumps(title | ({"version": version} if version else {})), *lines[1:], ""]))
+    before = path.read_bytes()
+    with pytest.raises(sw.ParameterError, match=f"begun by {told} of Shaftwork, and this is {sw.__version__}"):
+        swept(path)
+    assert path.read_bytes() == before
+
+
 def test_a_heading_that_was_cut_off_is_written_anew(tmp_path: Path, lines: list[str]) -> None:
     path = tmp_path / "store.jsonl"
     path.write_text(lines[0][:30])

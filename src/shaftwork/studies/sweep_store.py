@@ -10,12 +10,12 @@ import hashlib
 import json
 import math
 import os
+import sys
 import zlib
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from io import FileIO
 from pathlib import Path
-from sys import float_info
 from typing import Any, Self
 
 import numpy as np
@@ -47,7 +47,7 @@ class Store:
 
     def __init__(self, path: str | Path, task: Task) -> None:
         self._path, self._title = Path(path), _title(task)
-        title = (json.dumps(self._title) + "\n").encode()
+        title = (json.dumps(self._title | {"version": _version()}) + "\n").encode()
         self._file = self._opened()
         try:
             raw = self._file.read()
@@ -130,6 +130,11 @@ class Store:
                     f"store = '{self._path}' holds another sweep, which differs in its {what}, so its results are "
                     "not those of this one. Give another name, or repeat the call that made it."
                 )
+        if (before := found.get("version")) != _version():
+            raise ParameterError(
+                f"store = '{self._path}' was begun by {f'version {before}' if before else 'an earlier version'} of "
+                f"Shaftwork, and this is {_version()}: other versions may come to other digits. Give another name."
+            )
 
     def _read(self, line: bytes, number: int, task: Task) -> Chunk:
         made = _parsed(line)
@@ -204,7 +209,13 @@ def _counts(made: Any, most: int) -> bool:
 
 def _measured(made: Any) -> bool:
     """A number, or nothing where a variant failed."""
-    return made is None or (type(made) in (int, float) and abs(made) <= float_info.max)
+    return made is None or (type(made) in (int, float) and abs(made) <= sys.float_info.max)
+
+
+def _version() -> str:
+    """Of this library, without an import of the whole of it."""
+    version: str = sys.modules[__name__.partition(".")[0]].__version__
+    return version
 
 
 def _title(task: Task) -> dict[str, str | int]:
