@@ -31,12 +31,6 @@ def test_delay_and_impedance_are_those_of_the_material() -> None:
     assert SHAFT.impedance == pytest.approx(SHAFT.inertia * speed, rel=1e-15)
 
 
-def test_a_gear_keeps_the_delay_and_divides_the_impedance_by_its_ratio_squared() -> None:
-    seen = SHAFT.seen_through_gear(3.0)
-    assert seen.delay == pytest.approx(SHAFT.delay, rel=1e-15)
-    assert seen.impedance == pytest.approx(SHAFT.impedance / 9, rel=1e-15)
-
-
 def test_a_station_at_a_junction_belongs_to_the_side_that_is_asked_for() -> None:
     line = Line((SHAFT, SHAFT), (0.0, 0.0, 0.0))
     assert line.locate(1.0, "left") == (0, 1.0)

@@ -116,13 +116,6 @@ class Section:
         """Whether the section has neither damping nor friction."""
         return self.damping == 0 and self.friction == 0
 
-    def seen_through_gear(self, ratio: float) -> Section:
-        """The section as a shaft feels it that turns `ratio` times as fast: everything over ratio squared."""
-        scale = ratio**-2
-        return Section(
-            self.length, self.inertia * scale, self.stiffness * scale, self.damping * scale, self.friction * scale
-        )
-
 
 @dataclass(frozen=True)
 class Line:
