@@ -90,8 +90,8 @@ def solve(problem: Problem) -> Trajectory:
 
 def is_chain(problem: Problem) -> bool:
     """Whether the equations of a problem are solved in a narrow band."""
-    if problem.linear is not None:
-        return shifted(problem.linear).is_narrow
+    if problem.straight is not None:
+        return shifted(problem.straight).is_narrow
     return problem.jacobian is not None and ShiftedMatrix(_matrix(problem)).is_narrow
 
 
@@ -294,17 +294,17 @@ class _BandedDense:
 
 def _stages(problem: Problem) -> tuple[ShiftedCollocation, Stages]:
     """The method that suits a problem, and what solves its stage equations."""
-    if problem.linear is not None:
+    if problem.straight is not None:
         method = shifted_collocation("gauss" if is_undamped(problem) else "radau", STAGES)
-        return method, LinearStages(problem.linear, method)
+        return method, LinearStages(problem.straight, method)
     method = shifted_collocation("radau", STAGES)
     return method, NewtonStages(problem, ShiftedMatrix(_matrix(problem)), method)
 
 
 def _matrix(problem: Problem) -> Any:
     """The Jacobian (n, n) at the start."""
-    if problem.linear is not None:
-        return problem.linear.A
+    if problem.straight is not None:
+        return problem.straight.A
     if problem.jacobian is None:
         raise ParameterError("The banded engine needs a Jacobian, and this problem has none. Take 'scipy-radau'.")
     return problem.jacobian(pieces(problem)[0].inside(problem.t0), problem.x0)

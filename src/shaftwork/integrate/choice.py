@@ -85,16 +85,16 @@ def choose(problem: Problem) -> tuple[str, str]:
 
     It looks at eigenvalues at a few states (milliseconds), so keep the answer where many similar problems are solved.
     """
-    if problem.linear is not None:
+    if problem.straight is not None:
         from shaftwork.integrate.exact import cost
 
-        seconds = cost(problem, problem.linear)
+        seconds = cost(problem, problem.straight)
         longest = LONGEST_EXACT_CHAIN if seconds > LONGEST_EXACT_CHAIN and _is_damped_chain(problem) else LONGEST_EXACT
         if seconds <= longest:
             return "exact", "The system is linear with inputs of straight pieces, so it is propagated exactly."
         if _is_chain(problem):
             return "banded", f"The system is a long linear chain: exact propagation would take about {seconds:.2g} s."
-    if problem.driven is not None:
+    elif problem.linear is not None:
         from shaftwork.integrate.exact import drivable
 
         if drivable(problem):

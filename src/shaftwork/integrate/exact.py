@@ -50,13 +50,13 @@ def solve(problem: Problem) -> Trajectory:
     Source: Van Loan, Computing integrals involving the matrix exponential, 1978; Al-Mohy and Higham, Computing the
     action of the matrix exponential, 2011.
     """
-    linear = problem.linear or problem.driven
+    linear = problem.linear
     if linear is None:
         raise ParameterError(
             "The exact engine needs a linear system, and here a law is not linear in speed and angle. "
             "Take the engine 'auto'."
         )
-    if problem.linear is None and not drivable(problem):
+    if not linear.straight and not drivable(problem):
         raise ParameterError(
             "The exact engine takes an input that is no straight line between breakpoints only where the system is "
             f"small (up to {LARGEST_DRIVEN} states), its modes are well conditioned and polynomials resolve the input; "
@@ -86,7 +86,7 @@ def _spread(problem: Problem, linear: LinearInputs, trajectory: Trajectory) -> f
     rounded = linear.A.copy()
     rounded.data = rounded.data * (1 + np.finfo(float).eps * np.random.default_rng(0).choice((-1.0, 1.0), rounded.nnz))
     system = LinearSystem(replace(linear, A=rounded))
-    if problem.linear is None and system.modes is None:
+    if not linear.straight and system.modes is None:
         return 1.0
     problem = replace(problem, progress=None)
     return difference(problem, trajectory, _propagated(problem, system, _in_floats(problem, system)))
@@ -152,13 +152,13 @@ def _precise(problem: Problem, system: LinearSystem) -> PreciseSystem | None:
     turns = system.norm * (problem.t_end - problem.t0)
     outputs = OWN_INTERVALS if problem.t_eval is None else problem.t_eval.size
     slow = seconds(problem.x0.size, turns, outputs) > LONGEST_PRECISE
-    return None if slow or problem.linear is None else precise_system(problem, problem.linear)
+    return None if slow or problem.straight is None else precise_system(problem, problem.straight)
 
 
 def reference(problem: Problem) -> Trajectory | None:
     """The motion against which another engine is measured; None where it would take too long or is in doubt itself."""
-    linear = problem.linear or problem.driven
-    if linear is None or problem.x0.size > LARGEST_REFERENCE or (problem.linear is None and not drivable(problem)):
+    linear = problem.linear
+    if linear is None or problem.x0.size > LARGEST_REFERENCE or not (linear.straight or drivable(problem)):
         return None
     trajectory = solve(problem)
     return trajectory if trajectory.doubt <= DOUBTED else None
@@ -166,9 +166,10 @@ def reference(problem: Problem) -> Trajectory | None:
 
 def drivable(problem: Problem) -> bool:
     """Whether inputs that are no straight lines can be followed mode by mode."""
-    if problem.driven is None or problem.x0.size > LARGEST_DRIVEN or system_of(problem.driven).modes is None:
+    linear = problem.linear
+    if linear is None or linear.straight or problem.x0.size > LARGEST_DRIVEN or system_of(linear).modes is None:
         return False
-    return _inputs(problem, problem.driven) is not None
+    return _inputs(problem, linear) is not None
 
 
 def _inputs(problem: Problem, linear: LinearInputs) -> dict[Piece, Array] | None:
@@ -262,11 +263,12 @@ class _ExactDense:
 
 def _in_floats(problem: Problem, system: LinearSystem) -> Callable[[Piece, Array], _Span]:
     """The motion in a piece from its first state (n,): in modes, or by exponentials where these are of no use."""
-    dense_form = problem.linear is None or prefers_dense(problem, problem.linear)
+    dense_form = problem.straight is None or prefers_dense(problem, problem.straight)
     modes = system.modes if dense_form else None
     if modes is None:
         return partial(_by_exponentials, problem, system, dense_form)
-    inputs = None if problem.driven is None else _inputs(problem, problem.driven)
+    linear = problem.linear
+    inputs = None if linear is None or linear.straight else _inputs(problem, linear)
 
     def span(piece: Piece, x: Array) -> _Span:
         start, scale = x / system.scale, system.scale

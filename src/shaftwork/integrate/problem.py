@@ -60,11 +60,13 @@ class LinearInputs:
         A: (n, n) scipy.sparse.csr_array, 1/s times the units of the states.
         forcing: u(t), shape (n,), or (n, k) at times (k,); evaluated strictly inside a piece it is that piece's own.
         fractions: makes the same system without rounding, or None where there is no such form.
+        straight: whether u is a straight line between breakpoints.
     """
 
     A: Any
     forcing: Callable[[Any], Array]
     fractions: Callable[[], Fractions | None] = lambda: None
+    straight: bool = True
     _kept: dict[str, tuple[object, Any]] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def kept(self, name: str, make: Callable[[], Made], key: object = None) -> Made:
@@ -168,9 +170,7 @@ class Problem:
         react: how the run goes on past guards, or None where each of them ends it.
         t_eval: strictly increasing output times in [t0, t_end], or None for the engine's own steps. At a breakpoint the
             state after the jump is the output.
-        linear: the same system in linear form, where it is one and its input is, between breakpoints, a polynomial of
-            degree at most 1 in t; else None.
-        driven: the same system in linear form, where it is one and its input is another smooth function; else None.
+        linear: the same system in linear form, where it is one; else None.
         observed: all quantities of a linear network, or None.
         symbolic: the same system as a heyoka program with its parameters (`codegen.heyoka.BoundProgram`), a function
             that makes this where an engine asks for it, or None where there is none.
@@ -200,7 +200,6 @@ class Problem:
     react: React | None = None
     t_eval: Array | None = None
     linear: LinearInputs | None = None
-    driven: LinearInputs | None = None
     observed: Observed | None = None
     symbolic: Any = None
     explain: Explain | None = None
@@ -210,6 +209,11 @@ class Problem:
     progress: Callable[[float], None] | None = None
     overall: float = 1.0
     found: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
+
+    @property
+    def straight(self) -> LinearInputs | None:
+        """The linear form, where there is one and its inputs are straight lines between breakpoints."""
+        return self.linear if self.linear is not None and self.linear.straight else None
 
     @cached_property
     def program(self) -> Any:

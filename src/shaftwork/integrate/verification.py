@@ -69,7 +69,7 @@ def _goes_on_as_it_is(problem: Problem, trajectory: Trajectory) -> bool:
 
     So a train runs that idles at one speed, or that a prescribed speed turns as a whole.
     """
-    linear = problem.linear or problem.driven
+    linear = problem.linear
     moved, largest = np.ptp(trajectory.x, axis=0), np.abs(trajectory.x).max(axis=0)
     if linear is None or (moved > STILL * largest).all():
         return False

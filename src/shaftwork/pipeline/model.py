@@ -300,8 +300,7 @@ class Model(CompiledModel):
             if self.arrays.inputs.switching
             else None,
             t_eval=demand.t_eval,
-            linear=None if self.degree is None else prepared.linear,
-            driven=prepared.linear if self.degree is None else None,
+            linear=prepared.linear,
             observed=observed(prepared) if self.linear else None,
             symbolic=prepared.symbolic,
             explain=lambda t, x: without_value(prepared.bound, t, x),
@@ -376,7 +375,8 @@ class Model(CompiledModel):
             return None if found is None else Fractions(*found)
 
         matrix = bound.jacobian(0.0, np.zeros(n)).tocsr()
-        return LinearInputs(matrix, lambda t: bound.rhs(t, np.zeros((n, *np.shape(t)))), fractions)
+        straight = self.degree is not None
+        return LinearInputs(matrix, lambda t: bound.rhs(t, np.zeros((n, *np.shape(t)))), fractions, straight)
 
     def _changes_structure(self, values: Mapping[str, float]) -> bool:
         """Whether other equations hold for new values: a value becomes zero or ceases to, ratios meet, `Auto`."""
