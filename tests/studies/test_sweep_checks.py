@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -132,3 +135,24 @@ def test_what_hardly_moves_is_known_with_a_smaller_tolerance() -> None:
         return made.measures["max s.tau"] / size
 
     np.testing.assert_allclose(peaks(1e-8), peaks(1.0), rtol=1e-5)  # as docs/sweeps.md says
+
+
+UNGUARDED = """
+import shaftwork as sw
+net = sw.Network("train")
+net.add(sw.SpeedSource("drive", omega=10 * sw.t), "a")
+net.add(sw.Spring("shaft", c=100.0, d=1.0), "a", "b")
+net.add(sw.Inertia("J", J=1.0), "b")
+sw.studies.sweep(net, {"J.J": [1.0, 2.0, 3.0, 4.0]}, t_end=0.1, measures=["end J.omega"], processes=2)
+"""
+
+
+@pytest.mark.slow
+def test_a_script_without_a_guard_is_told_so_once(tmp_path: Path) -> None:
+    """The processes run the script again: each of them printed a page of its own."""
+    script = tmp_path / "script.py"
+    script.write_text(UNGUARDED)
+    told = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False, timeout=120).stderr
+    assert "must do so under 'if __name__ == \"__main__\":'" in told.splitlines()[-1]
+    assert "bootstrapping" not in told
+    assert "spawn" not in told

@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from sympy import Expr, Min, Symbol, pi, sin
 
+from shaftwork.codegen.bumps import GOLDEN, bumps, irregular
 from shaftwork.codegen.code import scalar, vectorised
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.timeline import CLEARANCE, NOTHING, Timeline, timeline
-from shaftwork.components.laws import line, narrow_places, switches
+from shaftwork.components.laws import line, narrow_places, switches, unsolved_places
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.kept import Kept
@@ -26,7 +28,6 @@ from shaftwork.reduction.form import StateForm
 FEWEST_SAMPLES, MOST_SAMPLES = 2**12, 2**22
 RESOLVED = 8
 """Samples that there must be for each change of side."""
-GOLDEN = (math.sqrt(5) - 1) / 2
 # Rounding of a linear argument, in units of its terms.
 ROUNDINGS = 8
 # An argument rounds badly where its terms cancel: it is looked at farther and farther from a change of side, up to this
@@ -83,7 +84,9 @@ class Switching:
     def __init__(self, form: StateForm) -> None:
         self._switches = tuple(_switches(form))
         self._narrow = tuple(_narrow(form))
-        self._places = sorted({place for one in (*self._switches, *self._narrow) for place in one.places})
+        self._unsolved = tuple(_unsolved(form))
+        every = (*self._switches, *self._narrow, *self._unsolved)
+        self._places = sorted({place for one in every for place in one.places})
         self._found = Kept[tuple[bytes, float, float, bool], Timeline](KEPT)
 
     def known(self, p: Array) -> tuple[float, ...]:
@@ -128,7 +131,7 @@ class Switching:
         Raises:
             ParameterError: a law switches too often to be followed.
         """
-        if not self._switches and not self._narrow:
+        if not self._switches and not self._narrow and not self._unsolved:
             return NOTHING
         key = (p[self._places].tobytes(), t0, t_end, modes)
         return self._found(key, lambda: self._searched(p, t0, t_end, modes=modes))
@@ -139,7 +142,8 @@ class Switching:
             if (changes := _changes_of(switch, p, t0, t_end)) is None:
                 raise _too_often(switch, t0, t_end)
             found += changes
-        return timeline(found, t0, t_end, _inside(self._narrow, p, t0, t_end))
+        sampled = (bumps(_argument(one, p), t0, t_end).tolist() for one in self._unsolved)
+        return timeline(found, t0, t_end, (*_inside(self._narrow, p, t0, t_end), *chain.from_iterable(sampled)))
 
 
 def _switches(form: StateForm) -> Iterator[_Switch]:
@@ -169,6 +173,14 @@ def _narrow(form: StateForm) -> Iterator[_Switch]:
             places = tuple(part.parameters[symbol.name] for symbol in symbols)
             if argument.free_symbols <= {TIME, *symbols}:
                 yield replace(_made(part, argument, (0.0,), symbols, places), far=far)
+
+
+def _unsolved(form: StateForm) -> Iterator[_Switch]:
+    """Functions of time that are sampled for pulses and edges."""
+    for part, law, symbols, acts in _laws(form):
+        for function in dict.fromkeys(unsolved_places(law, symbols)) if acts and law.has(TIME) else ():
+            places = tuple(part.parameters[symbol.name] for symbol in symbols)
+            yield _made(part, function, (), symbols, places)
 
 
 def _inside(switches: Sequence[_Switch], p: Array, t0: float, t_end: float) -> Iterator[float]:
@@ -297,9 +309,7 @@ def _sampled(sides: Sides, t0: float, t_end: float) -> Array | None:
     """Times (k,) from t0 to t_end between which a switch changes sides at most once, or None."""
     size, before = FEWEST_SAMPLES, -1
     while size <= MOST_SAMPLES:
-        places = np.arange(size)
-        # An irregular grid has no frequency that it mistakes for another.
-        t = np.append(t0 + (t_end - t0) * ((places + places * GOLDEN % 1.0) / size), t_end)
+        t = irregular(t0, t_end, size)
         changes = int(np.count_nonzero(np.diff(sides(t))))
         if changes == before and changes * RESOLVED <= size:
             return np.unique(t)

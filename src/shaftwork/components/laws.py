@@ -170,13 +170,34 @@ def narrow_places(expression: sympy.Basic) -> Iterator[tuple[sympy.Expr, bool]]:
     is told with it.
     """
     for node in sympy.preorder_traversal(expression):
-        if not isinstance(node, EDGES):
-            continue
-        fraction = isinstance(node, sympy.Pow) and node.exp.is_negative
-        argument = node.exp if isinstance(node, sympy.Pow) and not fraction else node.args[0]  # 2^-x is exp(-x log 2)
-        if argument.has(t) and _is_simple(argument):
-            slope = argument.diff(t)
-            yield slope if slope.has(t) else argument, fraction and argument.is_polynomial(t)
+        if isinstance(node, EDGES):
+            argument, fraction = _inside(node)
+            if argument.has(t) and _is_simple(argument):
+                slope = argument.diff(t)
+                yield slope if slope.has(t) else argument, fraction and argument.is_polynomial(t)
+
+
+def unsolved_places(expression: sympy.Basic, symbols: Iterable[sympy.Symbol]) -> Iterator[sympy.Expr]:
+    """What in an expression may have pulses and edges that `narrow_places` cannot solve for, as sin(t)^20000.
+
+    Args:
+        expression: a law.
+        symbols: what it may hold beside the time.
+    """
+    nodes = sympy.preorder_traversal(expression)
+    for node in nodes:
+        if isinstance(node, EDGES) and node.has(t) and node.free_symbols <= {t, *symbols}:
+            whole = isinstance(node, sympy.Pow) and node.exp.is_Integer and 0 < node.exp <= MOST_POWER
+            argument, _ = _inside(node)
+            if not whole and not (argument.has(t) and _is_simple(argument)):
+                nodes.skip()
+                yield node
+
+
+def _inside(node: sympy.Basic) -> tuple[sympy.Expr, bool]:
+    """The argument of a function that may have an edge, and whether it is a fraction."""
+    fraction = isinstance(node, sympy.Pow) and node.exp.is_negative
+    return node.exp if isinstance(node, sympy.Pow) and not fraction else node.args[0], fraction  # 2^-x is exp(-x log 2)
 
 
 def _is_simple(argument: sympy.Expr) -> bool:

@@ -41,6 +41,8 @@ def chunks(worker: Worker, task: Task, variants: Index, processes: int | None) -
         processes: how many; None for as many as there are cores. Variants side by side take to them only where what is
             left takes long enough, others also where so many are asked for.
     """
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        sys.exit(1)  # a script without a guard, run again by a process that it has started: the first one says so
     parts = [variants[first : first + worker.chunk] for first in range(0, variants.size, worker.chunk)]
     asked = processes if processes is not None else cores() if _can_be_sent(task) else 1
     if processes is not None and asked > 1 and worker.why:

@@ -85,9 +85,9 @@ class Ensemble:
         form, model = self.model.form, self.model
         if model.rows is None or form.waves or form.loop_laws or not form.states:
             raise CompileError("The network is too large, holds waves, or has a nonlinear law at a massless node.")
-        times = model.switching.timeline(model.defaults, *self.span, modes=False).times
+        times = model.switching.timeline(model.defaults, *self.span, modes=False).stops
         if form.has_impulses or form.across_sources or times:
-            raise CompileError("A source switches or jumps at a time of its own.")
+            raise CompileError("A source switches, jumps or has a pulse at a time of its own.")
         if not {*form.graph.zeros, *form.tree.frozen}.isdisjoint(self.names):
             raise CompileError("A parameter that varies decides which equations hold.")
         if any(isinstance(part.component, Shaft) for part in self._varied):
