@@ -52,7 +52,7 @@ def test_the_random_networks_are_small_and_large(fewest: int, most: int) -> None
     def fits(pieces: Network) -> bool:
         return fewest <= sum(piece.type in ("Inertia", "Mass") for piece in pieces) <= most
 
-    find(networks(), fits, settings=settings(max_examples=500, phases=(Phase.generate,)))
+    find(networks(), fits, settings=settings(max_examples=5000, phases=(Phase.generate,)))
 
 
 @pytest.mark.slow

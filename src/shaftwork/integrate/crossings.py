@@ -115,8 +115,9 @@ class Crossings:
 
     def _longest(self, look: Look, row: int) -> float:
         """The time in s in which no state moves by more than its tolerance, near a row of a look."""
-        rows = slice(max(row - 2, 0), row + 2)
-        rates = np.abs(np.diff(look.states[rows], axis=0) / np.diff(look.times[rows])[:, None]).max(axis=0)
+        first = max(row - 2, 0)
+        times, kept = np.unique(look.times[first : row + 2], return_index=True)  # of a tiny step some are equal
+        rates = np.abs(np.diff(look.states[first + kept], axis=0) / np.diff(times)[:, None]).max(axis=0, initial=0.0)
         with np.errstate(divide="ignore"):
             return float(np.min(self._scale(look.states[row]) / rates, initial=np.inf))
 

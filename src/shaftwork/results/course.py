@@ -74,9 +74,13 @@ class Course:
         return float(self.panels.integrals(self.values).sum() / self.panels.length.sum())
 
     def extremes(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Time and value of the first minimum, and of the first maximum; on either side of a jump too."""
+        """Time and value of the first minimum, and of the first maximum; on either side of a jump too.
+
+        Of several that are equal but for rounding it is the first, on every machine.
+        """
         times, values = self.points(_may_hold_extremes(self.values))
-        low, high = int(values.argmin()), int(values.argmax())
+        rounding = ROUNDINGS * float(np.abs(values).max())
+        low, high = int((values <= values.min() + rounding).argmax()), int((values >= values.max() - rounding).argmax())
         return (float(times[low]), float(values[low])), (float(times[high]), float(values[high]))
 
     def points(self, chosen: Mask | None = None) -> tuple[Array, Array]:

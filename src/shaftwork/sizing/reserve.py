@@ -25,6 +25,8 @@ INSTANTS = 257
 """At which the pull-out torque of a motor is looked for that changes with time; between them it is a straight line."""
 NO_LIMIT = 1e9
 """Torque over its limit where there is none left of it."""
+EQUAL = 1e-9
+"""Reserves that differ by less, as a part of themselves, are equal; it is the first instant that counts."""
 AS_ARRAY = (
     "Let it take an array of speeds in 1/min and give as many torques in N m: lambda n: np.where(n < 1500, 20.0, 10.0)."
 )
@@ -66,7 +68,7 @@ def reserve_of(shaft: MotorShaft, limit: Limit) -> Reserve:
             return np.where(tau == 0, 0.0, np.minimum(np.abs(tau) / most, NO_LIMIT))
 
     worst = turning_points(used, shaft.steps, smallest=SMALLEST)
-    place = int(worst.values.argmax())
+    place = int((worst.values >= (1 - EQUAL) * worst.values.max()).argmax())
     time = worst.t[place : place + 1]
     (tau,), (omega,) = shaft.read(time)
     (most,) = limited(time, np.abs([omega]) * RPM)
