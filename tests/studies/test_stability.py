@@ -43,6 +43,7 @@ def study() -> sw.studies.Stability:
 
 
 @pytest.mark.slow
+@pytest.mark.xdist_group("study of stability")
 def test_nothing_is_wrong_without_a_word(study: sw.studies.Stability) -> None:
     assert study.wrong == ()
     assert study.counts["right"] > 40
@@ -50,6 +51,7 @@ def test_nothing_is_wrong_without_a_word(study: sw.studies.Stability) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.xdist_group("study of stability")
 def test_what_does_not_run_names_its_reason(study: sw.studies.Stability) -> None:
     for cell in study.cells:
         assert bool(cell.why) or cell.verdict in ("right", "coarse")
@@ -59,6 +61,7 @@ def test_what_does_not_run_names_its_reason(study: sw.studies.Stability) -> None
 
 
 @pytest.mark.slow
+@pytest.mark.xdist_group("study of stability")
 def test_auto_always_runs_where_the_model_can(study: sw.studies.Stability) -> None:
     """It is refused for two reasons alone: damped waves, and an end of a shaft without inertia where nothing is."""
     refused = {cell.why for cell in study.cells if cell.engine == "auto" and cell.verdict not in ("right", "coarse")}
@@ -67,6 +70,7 @@ def test_auto_always_runs_where_the_model_can(study: sw.studies.Stability) -> No
 
 
 @pytest.mark.slow
+@pytest.mark.xdist_group("study of stability")
 def test_what_auto_does_agrees_with_the_models_own_motion_far_closer_than_the_bound(
     study: sw.studies.Stability,
 ) -> None:
@@ -79,6 +83,7 @@ def test_what_auto_does_agrees_with_the_models_own_motion_far_closer_than_the_bo
 
 
 @pytest.mark.slow
+@pytest.mark.xdist_group("study of stability")
 def test_waves_are_right_in_every_case_that_they_take(study: sw.studies.Stability) -> None:
     """To the tolerance of the run, 1e-8, times some amplification; the exact two-port is known to 1e-6."""
     cells = [cell for cell in study.cells if cell.ran == "wave"]
@@ -234,6 +239,7 @@ def test_an_explicit_engine_shortens_its_steps_and_never_becomes_unstable() -> N
 
 
 @pytest.mark.slow
+@pytest.mark.xdist_group("study of stability")
 def test_the_table_is_written_and_drawn(study: sw.studies.Stability, tmp_path: Path) -> None:
     study.to_csv(tmp_path / "table.csv")
     rows = list(csv.DictReader((tmp_path / "table.csv").read_text(encoding="utf-8").splitlines()))
