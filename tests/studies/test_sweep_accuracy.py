@@ -93,6 +93,8 @@ def test_blows_that_no_formula_places_are_seen_by_variants_that_could_run_side_b
     net.add(sw.TorqueSource("air", tau=-0.01 * sw.omega * sympy.Abs(sw.omega)), "a")
     inertias = np.linspace(1.0, 2.0, 16)
     made = sweep(net, samples={"J.J": inertias}, t_end=4.0, measures=["end J.omega"], processes=1)
-    alone = [net.simulate(4.0, parameters={"J.J": J}, engine="scipy-radau", t_eval=2)["J.omega"][-1] for J in (1.0, 2.0)]
+    alone = [
+        net.simulate(4.0, parameters={"J.J": J}, engine="scipy-radau", t_eval=2)["J.omega"][-1] for J in (1.0, 2.0)
+    ]
     # two runs of rtol = 1e-8 with different engines, each within 100 of it
     np.testing.assert_allclose(made.measures["end J.omega"][[0, -1]], alone, rtol=2e-6)
