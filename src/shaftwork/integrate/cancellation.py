@@ -17,8 +17,10 @@ from shaftwork.integrate.stiffness import LARGEST_EIGENVALUES, balance, scale_by
 
 # So many states of a run tell what its dampers take.
 SAMPLES = 8
-# Where torques may be off by this part because of the rounding of speeds, a run says so.
-WORTH_SAYING = 1e-4
+# Where torques may be off by this part because of the rounding of speeds, a run says so. Of a linear network less is
+# said already (`verification`): there every torque is read, and here only the Jacobian tells.
+SPOILED = 1e-4
+REMEDY = "Make such a coupling rigid: leave the damper out and wire its ends to one node."
 
 
 def cancellation(problem: Problem, times: Array, states: Array) -> float:
@@ -34,22 +36,22 @@ def cancellation(problem: Problem, times: Array, states: Array) -> float:
     return _largest(problem, times, states, springs=True)
 
 
-def rounding(problem: Problem, times: Array, states: Array) -> str | None:
-    """What to say where the rounding of the speeds alone spoils the torques of dampers, or None.
+def spoiled(problem: Problem, times: Array, states: Array) -> str | None:
+    """What to say where rounding spoils the torques of dampers in a network that is not linear, or None.
 
     Args:
         problem, times, states: as in `cancellation`.
     """
     duration, eps = problem.t_end - problem.t0, float(np.finfo(float).eps)
     most = max(float(part.sizes.sum(axis=1).max(initial=0.0)) for part in _parts(problem, times[:1], states[:1]))
-    if not most * duration * eps > WORTH_SAYING:
+    if not most * duration * eps > SPOILED:
         return None
     part = eps * _largest(problem, times, states, springs=False)
-    if part < WORTH_SAYING:
+    if part < SPOILED:
         return None
     return (
         f"strong damping: dampers couple speeds so strongly that the rounding of these speeds alone may change torques "
-        f"by a part of {part:.1g}. Make such a coupling rigid: leave the damper out and wire its ends to one node."
+        f"by a part of {part:.1g}. {REMEDY}"
     )
 
 

@@ -169,12 +169,12 @@ def without_series(most: int) -> list[tuple[str, str, int]]:
 
 def _guarded(problem: Problem, trajectory: Trajectory, name: str) -> Trajectory:
     """The run, with what makes it worth less than it should be."""
-    from shaftwork.integrate.cancellation import rounding
+    from shaftwork.integrate.cancellation import spoiled
     from shaftwork.integrate.verification import objection
 
     said = objection(problem, trajectory, name)
     if said is None and problem.observed is None and name not in EXPLICIT and trajectory.t.size:
-        said = rounding(problem, trajectory.t, trajectory.x)
+        said = spoiled(problem, trajectory.t, trajectory.x)
     return replace(trajectory, caveat=said or "")
 
 

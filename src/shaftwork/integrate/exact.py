@@ -69,7 +69,7 @@ def solve(problem: Problem) -> Trajectory:
         return replace(trajectory, doubt=part)
     precise = _precise(problem, system)
     if precise is None:
-        return replace(trajectory, doubt=_spread(problem, linear, trajectory))
+        return replace(trajectory, doubt=_moved_by_rounding(problem, linear, trajectory))
     lost = "it" if part >= 1 else f"a part of {part:.1g} of it"
     remark = f"Floats may lose {lost}, so it is computed in whole numbers of {precise.power.bits} bits."
     try:
@@ -81,8 +81,12 @@ def solve(problem: Problem) -> Trajectory:
     return replace(trajectory, remark=remark, statistics={"bits": precise.power.bits})
 
 
-def _spread(problem: Problem, linear: LinearInputs, trajectory: Trajectory) -> float:
-    """How far a run moves where each entry of A is rounded once more, as a part of the largest value of its kind."""
+def _moved_by_rounding(problem: Problem, linear: LinearInputs, trajectory: Trajectory) -> float:
+    """What rounding may change in a run that is too long for whole numbers, as a part of the largest value of its kind.
+
+    Law: the run is made again with every entry of A one rounding away, up or down at random, and the two differ by
+    about as much as either is off. It is 1 where the changed matrix has no modes of use.
+    """
     rounded = linear.A.copy()
     rounded.data = rounded.data * (1 + np.finfo(float).eps * np.random.default_rng(0).choice((-1.0, 1.0), rounded.nnz))
     system = LinearSystem(replace(linear, A=rounded))

@@ -8,6 +8,7 @@ import numpy as np
 
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate import exact
+from shaftwork.integrate.cancellation import REMEDY
 from shaftwork.integrate.observation import largest_part, outlook, rounding, samples
 from shaftwork.integrate.problem import TOLERATED, UNSURPRISING, Array, Observed, Problem, Trajectory
 
@@ -42,8 +43,7 @@ def objection(problem: Problem, trajectory: Trajectory, engine: str) -> str | No
     if part > WORTH_SAYING:
         return (
             f"strong damping: what couples speeds at {name!r} is so strong that the rounding of these speeds alone may "
-            f"change what passes through parts by {part:.1g} of the largest. Make such a coupling rigid: leave the "
-            "damper out and wire its ends to one node."
+            f"change what passes through parts by {part:.1g} of the largest. {REMEDY}"
         )
     if engine == "exact":
         return _doubt(trajectory)
