@@ -56,9 +56,8 @@ def sweep(
 
     Where all measures have names, many variants run side by side in compiled code (extra `fast`), and those that it
     cannot follow run one by one. Results do not depend on the number of processes, and that of a variant not on those
-    beside it, except the first: that one gives the nominal sizes of the states, on which the absolute part of the
-    tolerance rests, and says in which modes variants run side by side. Another first one changes results within the
-    tolerance.
+    beside it, except the first: that one gives the nominal sizes of the states, for the absolute tolerance, and says in
+    which modes variants run side by side. Another first one changes results within the tolerance.
 
     Args:
         net: the network.
@@ -90,18 +89,24 @@ def sweep(
     readers = _readers(measures, columns)
     limits = _limits(require, readers)
     _, end = time_span(0.0, t_end)
-    (name,) = engine_names([engine])
+    options = _options(readers, rtol, engine, initial, t_eval)
     count = _count(processes)
-    options = {"rtol": relative_tolerance(rtol), "engine": name, "initial": initial, "t_eval": t_eval}
-    if t_eval is None and all(isinstance(reader, Measure) for reader in readers.values()):
-        options["t_eval"] = 2  # they read the motion between these
     task = Task(net, columns, readers, _lines(sn, readers), end, options)
     worker = Worker(task)
     with nullcontext() if store is None else Store(store, task) as kept:
         values, reasons, left = _run(task, worker, count, kept)
     why = worker.why or (f"{left} of {len(task)} variants ran one by one: {LEFT}" if left else "")
-    measured = dict(zip(readers, values.T, strict=True))
-    return Sweep(net.name, columns, measured, limits, reasons, why)
+    return Sweep(net.name, columns, dict(zip(readers, values.T, strict=True)), limits, reasons, why)
+
+
+def _options(
+    readers: Mapping[str, Reader], rtol: float, engine: str, initial: Any, t_eval: OutputTimes
+) -> dict[str, Any]:
+    """What each simulation is told."""
+    (name,) = engine_names([engine])
+    if t_eval is None and all(isinstance(reader, Measure) for reader in readers.values()):
+        t_eval = 2  # they read the motion between these
+    return {"rtol": relative_tolerance(rtol), "engine": name, "initial": initial, "t_eval": t_eval}
 
 
 def _count(processes: int | None) -> int | None:
