@@ -303,13 +303,13 @@ class _Writer:
         springs, torques = _by_symbol(self.springs, at.symbols), _by_symbol(self.torques, at.symbols)
         moved = _moved(at)
         for node, symbol, velocity in zip(at.free, at.symbols, at.velocities, strict=True):
-            force = Add(*(-made.size * made.along.diff(symbol) for made in torques[symbol]))
+            force = Add(*(-term.size * term.along.diff(symbol) for term in torques[symbol]))
             stored = (*inertias[velocity], *springs[symbol], *dampers[velocity])
-            numbers = [*(made.branch for made in stored), *(made.branch for made in torques[symbol])]
+            numbers = [*(term.branch for term in stored), *(term.branch for term in torques[symbol])]
             branches = dict.fromkeys(sorted(numbers))
             parts = dict.fromkeys(self.graph.part_of(branch).name for branch in branches)
-            pulls = [made.pull(symbol) for made in springs[symbol]]
-            pulls += [made.pull(velocity) for made in dampers[velocity]]
+            pulls = [term.pull(symbol) for term in springs[symbol]]
+            pulls += [term.pull(velocity) for term in dampers[velocity]]
             make = partial(self._sides, velocity, inertias[velocity], pulls, force)
             origin = (tuple(parts), tuple(branches), tuple(moved[symbol]))
             yield MotionEquation(*origin, make, self.graph.nodes[node], symbol, force, moved[symbol])

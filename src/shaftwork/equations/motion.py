@@ -110,10 +110,10 @@ class Motion:
     @cached_property
     def _readable(self) -> dict[Symbol, Expr]:
         """What laws may read: speeds of nodes, twists of branches and torques of springs."""
-        found = {symbol: speed for symbol, speed in self._speeds.items() if symbol not in self._given}
-        found |= {self.quantities.angle(k): position for k, position in self.coordinates.positions.items() if k >= 0}
-        found |= self._integrals
+        readable = {symbol: speed for symbol, speed in self._speeds.items() if symbol not in self._given}
+        readable |= {self.quantities.angle(k): position for k, position in self.coordinates.positions.items() if k >= 0}
+        readable |= self._integrals
         for branch in self.graph.branches:
             if branch.template.kind is Kind.THROUGH_STORE:
-                found[self.quantities.store(branch.index)] = self.through(branch)
-        return {symbol: made for symbol, made in found.items() if symbol != made}
+                readable[self.quantities.store(branch.index)] = self.through(branch)
+        return {symbol: expression for symbol, expression in readable.items() if symbol != expression}

@@ -189,26 +189,27 @@ def _quantity_letters(form: StateForm, quantities: Quantities) -> Iterator[tuple
             template = graph.branches[index].template
             if several and template.kind is Kind.THROUGH_STORE:
                 yield flow.part, _letter(quantities.store(index), quantity, template.label)
-    for made in graph.branches:
-        if made.template.kind is Kind.ACROSS_SOURCE:
-            quantity, symbol = quantities.domain((made.plus, made.minus)).integral, quantities.integral(made.index)
+    for branch in graph.branches:
+        if branch.template.kind is Kind.ACROSS_SOURCE:
+            quantity = quantities.domain((branch.plus, branch.minus)).integral
+            symbol = quantities.integral(branch.index)
             _, _, label = symbol.name.partition(f".{quantity.name}_")
-            yield made.part, _letter(symbol, quantity, label)
-        if made.template.is_history:
-            line, _, end = made.template.label.partition("_")
+            yield branch.part, _letter(symbol, quantity, label)
+        if branch.template.is_history:
+            line, _, end = branch.template.label.partition("_")
             meaning = f"torque wave that arrives at {end}"
-            symbol = quantities.history(made.index)
-            yield made.part, Letter(symbol.name, "h", _mark(end), "N*m", meaning, number=split_index(line)[1])
-        if made.terms:
-            quantity = quantities.multiplier_quantity(made.index)
-            label = quantities.multiplier_label(made.index)
-            yield made.part, _letter(quantities.multiplier(made.index), quantity, label)
+            symbol = quantities.history(branch.index)
+            yield branch.part, Letter(symbol.name, "h", _mark(end), "N*m", meaning, number=split_index(line)[1])
+        if branch.terms:
+            quantity = quantities.multiplier_quantity(branch.index)
+            label = quantities.multiplier_label(branch.index)
+            yield branch.part, _letter(quantities.multiplier(branch.index), quantity, label)
     for state in form.states:
         if state.kind == "integral":
-            made = graph.branches[state.branch]
-            quantity = quantities.domain((made.plus, made.minus)).integral
+            branch = graph.branches[state.branch]
+            quantity = quantities.domain((branch.plus, branch.minus)).integral
             label = state.name.rsplit(".", 1)[1].removeprefix(quantity.name).removeprefix("_")
-            yield made.part, _letter(quantities.integral(made.index), quantity, label)
+            yield branch.part, _letter(quantities.integral(branch.index), quantity, label)
 
 
 def _node_letters(quantities: Quantities) -> Iterator[tuple[int, Letter]]:

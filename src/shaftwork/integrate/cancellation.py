@@ -75,16 +75,17 @@ class _Part:
 
 
 def _largest(problem: Problem, times: Array, states: Array, *, springs: bool) -> float:
+    """The largest ratio of the parts of a damper's torque to this torque, or to what else acts there."""
     chosen = np.unique(np.linspace(0, times.size - 1, SAMPLES).astype(int))
-    made, found, other = (np.full(problem.x0.size, np.finfo(float).tiny) for _ in range(3))
+    sums, torques, other = (np.full(problem.x0.size, np.finfo(float).tiny) for _ in range(3))
     slowest = 1 / (problem.t_end - problem.t0)
     parts = _parts(problem, times[chosen], states[chosen])
     for part, state in zip(parts, states[chosen], strict=True):
         x = state / part.scale
-        made = np.maximum(made, part.sizes @ np.abs(x))
-        found = np.maximum(found, np.abs(part.damping @ x))
+        sums = np.maximum(sums, part.sizes @ np.abs(x))
+        torques = np.maximum(torques, np.abs(part.damping @ x))
         other = np.maximum(other, (np.maximum(slowest, part.oscillation) if springs else slowest) * np.abs(x))
-    return float(np.max(made / np.maximum(found, other), initial=1.0))
+    return float(np.max(sums / np.maximum(torques, other), initial=1.0))
 
 
 def _parts(problem: Problem, times: Array, states: Array) -> list[_Part]:

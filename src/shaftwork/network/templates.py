@@ -221,12 +221,12 @@ def _in_parameters(derived: tuple[Derived, ...]) -> dict[Symbol, Expr]:
 
 def _occurring(derived: tuple[Derived, ...], laws: Iterable[Expr]) -> tuple[Derived, ...]:
     """Those that stand in the laws, or in the law of one that does."""
-    found = set[Symbol]().union(*(law.free_symbols for law in laws))  # only asked for membership
+    symbols = set[Symbol]().union(*(law.free_symbols for law in laws))  # only asked for membership
     kept: list[Derived] = []
-    for made in reversed(derived):
-        if Symbol(made.name, real=True) in found:
-            found |= made.law.free_symbols
-            kept.append(made)
+    for item in reversed(derived):
+        if Symbol(item.name, real=True) in symbols:
+            symbols |= item.law.free_symbols
+            kept.append(item)
     return tuple(reversed(kept))
 
 

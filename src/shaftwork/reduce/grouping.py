@@ -57,9 +57,9 @@ def groupings(chain: Chain, masses: int, keep: str, driven: int) -> tuple[Groupi
     """
     count = len(chain.stations)
     if whole(masses, 1, count) is None:
-        held = "" if all(station.inertia for station in chain.stations) else " and prescribed speeds"
+        besides = "" if all(station.inertia for station in chain.stations) else " and prescribed speeds"
         raise ParameterError(
-            f"masses = {masses!r} must be a whole number from 1 to the {count} inertias{held} of the chain."
+            f"masses = {masses!r} must be a whole number from 1 to the {count} inertias{besides} of the chain."
         )
     kept = next((k for k, link in enumerate(chain.links) if keep and link.has(keep)), None) if masses > 1 else None
     fixed = _fixed(chain, masses, kept)
@@ -72,8 +72,10 @@ def groupings(chain: Chain, masses: int, keep: str, driven: int) -> tuple[Groupi
         )
     true = _swing(chain, driven, kept)
     cuts = (tuple(sorted((*some, *fixed))) for some in combinations(free, chosen))
-    found = (_measured(chain, each, kept, driven, true) for each in cuts)
-    return tuple(sorted(found, key=lambda made: (round(made.frequency_error, DIGITS), made.torque_error)))
+    measured = (_measured(chain, each, kept, driven, true) for each in cuts)
+    return tuple(
+        sorted(measured, key=lambda grouping: (round(grouping.frequency_error, DIGITS), grouping.torque_error))
+    )
 
 
 def _fixed(chain: Chain, masses: int, kept: int | None) -> tuple[int, ...]:

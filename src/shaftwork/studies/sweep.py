@@ -77,7 +77,6 @@ def sweep(
         processes: how many; by default as many as there are cores, where the sweep takes long enough. Variants side by
             side are divided only then: in the seconds that a process needs to start, 50 000 are done.
         store: a file to which all that is done is appended. The same call with the same file goes on where it stopped.
-            It is for one call at a time: a second one is refused.
 
     Raises:
         ParameterError: an argument is out of its range, there is no such parameter or measure, or the store is that of

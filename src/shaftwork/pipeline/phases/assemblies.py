@@ -129,17 +129,17 @@ class Assembly:
         taken: list[int] = []
         for leave in mode.leaves:
             when = readings.guard(part, self.elements[number].modes, leave.when)
-            for side, made in ((1.0, when), (-1.0, -when)):
-                known = self._known.get((number, made))
+            for side, expression in ((1.0, when), (-1.0, -when)):
+                known = self._known.get((number, expression))
                 if known is not None and known not in taken:
-                    found = Watched(known, side, leave)
+                    watched = Watched(known, side, leave)
                     break
             else:
                 self._expressions.append(when)
-                found = Watched(len(self._expressions) - 1, 1.0, leave)
-                self._known.setdefault((number, when), found.guard)
-            taken.append(found.guard)
-            yield found
+                watched = Watched(len(self._expressions) - 1, 1.0, leave)
+                self._known.setdefault((number, when), watched.guard)
+            taken.append(watched.guard)
+            yield watched
 
     def watched(self, modes: ModeNames) -> tuple[tuple[int, Watched], ...]:
         """Element and guard of everything that may end one of the modes."""
@@ -311,11 +311,11 @@ class Assembly:
     def without_value(self, p: Array, modes: ModeNames, times: Array, states: Array) -> tuple[float, str] | None:
         """The first time at which a law or a guard of the modes has no value, and which one."""
         law, pairs = without_value(self.bound(p), times, states), self.watched(modes)
-        found = first_missing(times, self.guards(p)(times, states)[:, [made.guard for _, made in pairs]])
-        if law is not None or found is None:
+        missing = first_missing(times, self.guards(p)(times, states)[:, [watched.guard for _, watched in pairs]])
+        if law is not None or missing is None:
             return law
-        number, made = pairs[found[1]]
-        return found[0], in_words(self.elements[number].part, made.leave.when)
+        number, watched = pairs[missing[1]]
+        return missing[0], in_words(self.elements[number].part, watched.leave.when)
 
     def _rough(self, p: Array, modes: ModeNames, times: Array, states: Array) -> tuple[float, str] | None:
         """The first time at which a law or a guard has no value in some branch, and which one."""

@@ -25,21 +25,21 @@ def leaving(regime: Regime, step: float, here: Course, beside: Course, on_limit:
         on_limit: elements and guards.
     """
     further = _bent if regime.bends else later
-    ways, found = (here, beside), list[tuple[float, Way]]()
+    ways, beyond = (here, beside), list[tuple[float, Way]]()
     for _ in range(2):  # where nothing moves yet, its acceleration tells
         ways = further(regime, step, ways[0]), further(regime, step, ways[1])
         moving = []
         for pair in on_limit:
-            made, k = pair[1], pair[1].guard
-            gain, other = made.side * (ways[0][3][k] - here[3][k]), made.side * (ways[1][3][k] - beside[3][k])
+            watched, k = pair[1], pair[1].guard
+            gain, other = watched.side * (ways[0][3][k] - here[3][k]), watched.side * (ways[1][3][k] - beside[3][k])
             units = abs(beside[3][k] - here[3][k]) / ROUNDINGS
             if abs(gain) > max(abs(gain - other), FEW * units):
                 moving.append((gain, pair))
-        found = [one for one in moving if one[0] > 0]
-        if found:
+        beyond = [one for one in moving if one[0] > 0]
+        if beyond:
             break
         on_limit = [pair for pair in on_limit if all(pair is not one for _, one in moving)]
-    return found
+    return beyond
 
 
 def moved(moment: Moment, t: float, step: float) -> Moment:

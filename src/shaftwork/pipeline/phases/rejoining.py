@@ -30,13 +30,13 @@ def settled(settling: Settling, t: float, after: float, moment: Moment, met: int
     new = settling.regime(with_modes(regime.modes, joins))
     x = new.assembly.stores.states(new.assembly.bound(new.p), after, settling.held(moment, after))
     joined = Moment(new, x)
-    found, changes = settling.settle(t, after, joined, None)
-    if found.regime.modes == regime.modes:  # rounding hides what was met
-        named = next(((k, made.leave) for k, made in regime.watched if made.guard == met), None)
-        same = next((made.guard for k, made in new.watched if (k, made.leave) == named), None)
-        found, changes = settling.settle(t, after, joined, same)
+    outcome, changes = settling.settle(t, after, joined, None)
+    if outcome.regime.modes == regime.modes:  # rounding hides what was met
+        named = next(((k, watched.leave) for k, watched in regime.watched if watched.guard == met), None)
+        same = next((watched.guard for k, watched in new.watched if (k, watched.leave) == named), None)
+        outcome, changes = settling.settle(t, after, joined, same)
     begun = [Change(t, settling.elements[k], regime.modes[k], name) for k, name in joins.items()]
-    return found, together([*begun, *changes])
+    return outcome, together([*begun, *changes])
 
 
 def _held(settling: Settling, regime: Regime) -> Iterator[tuple[int, str]]:

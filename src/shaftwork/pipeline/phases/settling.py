@@ -177,22 +177,22 @@ class Settling:
         blocked, repeats = None, 0
         # a guard is met where it is beyond zero by its band, which then still is the band of what is the same after it
         ended = moment
-        found = first
-        if found is None:
-            moment, found = self._violated(moment, after, ended, still)
-        while found is not None:
-            moment, made, contradiction = self._follow(t, after, moment, *found)
-            changes, blocked = [*changes, *made], contradiction or blocked
-            impact = bool(made) and made[0].impact
-            again = bool(made) and not impact and moment.regime.modes in seen
+        exceeded = first
+        if exceeded is None:
+            moment, exceeded = self._violated(moment, after, ended, still)
+        while exceeded is not None:
+            moment, latest, contradiction = self._follow(t, after, moment, *exceeded)
+            changes, blocked = [*changes, *latest], contradiction or blocked
+            impact = bool(latest) and latest[0].impact
+            again = bool(latest) and not impact and moment.regime.modes in seen
             repeats += again
             if repeats > MOST_REPEATS or len(changes) > MOST_AT_ONCE:
                 raise self._endless(t, changes, blocked)
             if again or impact:
                 seen.clear()
-            still = [] if made else [*still, found]
+            still = [] if latest else [*still, exceeded]
             seen[moment.regime.modes] = None
-            moment, found = self._violated(moment, after, ended, still, repeats)
+            moment, exceeded = self._violated(moment, after, ended, still, repeats)
         return moment, changes
 
     def _violated(
@@ -242,13 +242,13 @@ class Settling:
                 beyond.append((value, pair))
         if repeats > 1 and beyond:
             soon = later(regime, self.ahead(regime, rates), (t, x, rates, now))[3]
-            beyond = [found for found in beyond if found[1][1].side * soon[found[1][1].guard] > 0]
+            beyond = [excess for excess in beyond if excess[1][1].side * soon[excess[1][1].guard] > 0]
         # impacts come first: torques are those of the motion after them
-        hits = [found for found in beyond if not found[1][1].leave.by_torque]
+        hits = [excess for excess in beyond if not excess[1][1].leave.by_torque]
         if on_limit and not hits:
             courses = (t, x, rates, now), (t + self.tick, rounded, others, near)
             soon_beyond = leaving(regime, self.ahead(regime, rates), *courses, on_limit)
-            hits = [found for found in soon_beyond if found[1][1].leave.rebound is not None]
+            hits = [excess for excess in soon_beyond if excess[1][1].leave.rebound is not None]
             beyond = beyond + soon_beyond if repeats else beyond or soon_beyond
         return Moment(regime, moment.x, clear_of_limits(regime, now, bands)), hits or beyond
 

@@ -94,16 +94,16 @@ def _stretch(run: Run, span: Span, phase: Phase) -> Stretch:
 
 def _impacts(run: Run) -> tuple[Impact, ...]:
     """Changes and sources with which speeds may jump, those of one time in one, with the part of the first change."""
-    found = [jump for jump in run.jumps if jump.given or jump.lost]
+    jumps = [jump for jump in run.jumps if jump.given or jump.lost]
     for change in run.changes:
         modes = change.element.modes
         if change.rebound or change.given or change.lost or modes[change.before].form != modes[change.after].form:
-            found.append(Impact(change.time, change.element.part.name, change.given, change.lost))
+            jumps.append(Impact(change.time, change.element.part.name, change.given, change.lost))
     by_time: dict[float, Impact] = {}
-    for made in found:
-        known = by_time.get(made.time, Impact(made.time, "", {}, {}))
-        energies = (_sums(known.given, made.given), _sums(known.lost, made.lost))
-        by_time[made.time] = Impact(made.time, known.part or made.part, *energies)
+    for jump in jumps:
+        known = by_time.get(jump.time, Impact(jump.time, "", {}, {}))
+        energies = (_sums(known.given, jump.given), _sums(known.lost, jump.lost))
+        by_time[jump.time] = Impact(jump.time, known.part or jump.part, *energies)
     return tuple(by_time.values())
 
 

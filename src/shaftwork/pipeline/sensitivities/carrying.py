@@ -154,21 +154,23 @@ class Carrying:
 
     def _along(self, steps: Sequence[_Step], before: Leg, t: float, end: End) -> tuple[Array, Array]:
         """States (n',) and their total derivatives (n', m) at the end of a way."""
-        model, p, (x, _, made, shift) = before.model, before.p, end
+        model, p, (x, _, slopes, shift) = before.model, before.p, end
         for step in steps:
             assembly, old = self._phases.assembly(step.modes), p
             p = assembly.vector({}, self._phases.numbers(step.modes))
             if assembly.model is model and step.rebound is None:
                 continue
-            held = self._held(model, t, x, old, made, shift)
-            x, made = self._taken(assembly, t, p, held, shift)
+            stored = self._held(model, t, x, old, slopes, shift)
+            x, slopes = self._taken(assembly, t, p, stored, shift)
             if step.rebound is not None:
-                held = self._thrown(assembly, p, held, self._held(assembly.model, t, x, p, made, shift), step.rebound)
+                stored = self._thrown(
+                    assembly, p, stored, self._held(assembly.model, t, x, p, slopes, shift), step.rebound
+                )
                 assembly = self._phases.assembly(step.parted)
                 p = assembly.vector({}, self._phases.numbers(step.parted))
-                x, made = self._taken(assembly, t, p, held, shift)
+                x, slopes = self._taken(assembly, t, p, stored, shift)
             model = assembly.model
-        return x, made
+        return x, slopes
 
     def _held(self, model: Model, t: float, x: Array, p: Array, slopes: Array, shift: Array) -> _Held:
         takeover = self._equations(model).takeover
