@@ -113,3 +113,25 @@ def test_a_warning_of_a_brake_that_comes_on_names_a_time_before_it() -> None:
     with pytest.warns(sw.NetworkWarning, match=r"'brake' changes its mode at t = 7 s.*steady_state\(t=3.5\)"):
         assert model.steady_state()["J1.omega"] == 0.0
     assert model.steady_state(t=3.5)["J1.omega"] == pytest.approx(2.0, rel=1e-9)
+
+
+def test_a_friction_brings_an_inertia_to_rest() -> None:
+    net = sw.Network("braked")
+    net.add(sw.Inertia("J", J=2.0), "a")
+    net.add(sw.CoulombLoad("load", tau=3.0), "a")
+    assert net.compile().steady_state(initial={"J.omega": 1.0}) == {"J.omega": 0.0}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("start", "c"), [(0.02, 1e3), (-0.03, 1e3), (0.0051, 1e6), (1.0, 1e6)])
+def test_without_torque_an_undamped_gap_comes_to_rest_at_a_flank(start: float, c: float) -> None:
+    """From a twist beyond a flank. A speed counts as none where, for 1 s, it moves the gap by a millionth of itself."""
+    net = sw.Network("coasting")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.Backlash("gap", c=c, gap=0.01), "a", "b")
+    net.add(sw.Inertia("J2", J=2.0), "b")
+    net.add(sw.CoulombLoad("load", tau=3.0), "b")
+    found = net.compile().steady_state(initial={"gap.phi": start})
+    assert abs(found["gap.phi"]) == pytest.approx(0.005, rel=1e-6)
+    assert abs(found["J1.omega"]) < 1e-6 * 0.01
+    assert found["J2.omega"] == 0.0

@@ -66,14 +66,25 @@ def steady_state(
         if not is_right or (over and h > SMALLEST_STEP):
             h = h / 4
             continue
-        if over:
-            return np.asarray(x + trial)
+        if over and ends is not None:
+            return _just_beyond(x, trial, ends)
         x, rate, step, h = x + trial, new, trial, min(h * (2.0 if defect > DEFECT / 10 else 8.0), 1e12)
     worst = int(np.argmax(np.abs(weights * rate)))
     raise SimulationError(
         f"No steady state was found: '{names[worst]}' still changes by {rate[worst]:.3g} per second at {x[worst]:.6g}. "
         f"Does something hold the speed (a load, a damper, a motor's curve)? Give a start near the operating point."
     )
+
+
+def _just_beyond(x: Array, step: Array, ends: Callable[[Array], bool]) -> Array:
+    """The shortest part of a step that ends the way, to rounding: what comes to rest there has no speed left.
+
+    The whole step where the way had ended before it, so that it goes on.
+    """
+    inside, beyond = (1.0 if ends(x) else 0.0), 1.0
+    while inside < (share := (inside + beyond) / 2) < beyond:
+        inside, beyond = (inside, share) if ends(x + share * step) else (share, beyond)
+    return np.asarray(x + beyond * step)
 
 
 def energy_weights(bound: BoundArrays) -> Array:

@@ -162,15 +162,16 @@ class PhasedModel(Model):
             x = moment.x
             if x.size:
                 x = steady_state(bound, x, when, ends=partial(settling.ends, moment, when))
+            beyond = settling.ends(moment, when, x)
             moment, changes = settling.settle(when, when, moment._replace(x=x), None)
-            if not changes:
+            if not (changes or beyond):
                 if not math.isfinite(t):
                     assembly = moment.regime.assembly
                     warn_of_earlier_levels(assembly.bound(moment.regime.p), moment.x, when, assembly.model.switching)
                 return settling.held(moment, when)
         raise SimulationError(
-            f"No steady operation was found: after {MOST_CHANGES} changes '{changes[-1].element.name}' still goes from "
-            f"'{changes[-1].before}' to '{changes[-1].after}'. Give a start near the operating point."
+            f"No steady operation was found: after {MOST_CHANGES} changes of its modes '{self.name}' still goes on, "
+            f"with {self._words(moment)}. Give a start near the operating point."
         )
 
     def _near(self, values: Mapping[str, float], at: Point, t: Time, inputs: Names, outputs: Names) -> LinearModel:
