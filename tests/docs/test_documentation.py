@@ -12,11 +12,10 @@ import pytest
 import sympy
 
 import shaftwork as sw
-from docs.generate import PAGES, ROOT, SLOW, components, remade, same
+from docs.generate import NOTEBOOKS, PAGES, ROOT, SLOW, components, remade, same
 from shaftwork.components import REGISTRY, Component
 
 DOCS = ROOT / "docs"
-NOTEBOOKS = tuple(sorted((ROOT / "notebooks").glob("*.ipynb")))
 TEXTS = {page.name: page.read_text(encoding="utf-8") for page in PAGES}
 STORIES = TEXTS | {
     notebook.name: "".join(

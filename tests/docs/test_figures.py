@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from docs.generate import BLOCK, HIDDEN, MADE_PART, PAGES, ROOT
+from docs.generate import BLOCK, HIDDEN, MADE_PART, NOTEBOOKS, PAGES, ROOT
 
 MEASURED = re.compile(r"<!-- measured: (?P<script>[\w./-]+) -->\n.*?<!-- end -->", re.DOTALL)
 """What a benchmark prints; times differ from machine to machine, so nothing compares them."""
@@ -32,7 +32,6 @@ WORDS = re.compile(
     rf"\b{NUMBER}\b(?:[\s-]+{NUMBER}\b)*(?:[\s-]+(?:(?:of|a|the|at|in|to|as|for)\s+)?\w+)?", re.IGNORECASE
 )
 """A number in words and what it counts; "between two" and "the two" are of the sentence itself."""
-NOTEBOOKS = tuple(sorted((ROOT / "notebooks").glob("*.ipynb")))
 
 
 def page_of(path: Path) -> str:
