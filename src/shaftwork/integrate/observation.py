@@ -76,15 +76,22 @@ def rounding(observed: Observed, times: Array, states: Array) -> tuple[Array, Ar
 
 
 def largest_part(observed: Observed, errors: Array, values: Array) -> tuple[float, str]:
-    """The largest error (m,) against the largest of the values (k, m) of its kind, and whose it is."""
+    """The largest error (m,) against the largest of the values (k, m) of its kind, and whose it is.
+
+    What passes between parts counts against such values alone; springs and dampers in them may be far larger.
+    """
     kinds = np.array(observed.kinds)
     sizes = np.abs(values).max(axis=0, initial=0.0)
     sizes[observed.first_left :] = 0.0
-    largest = {kind: float(sizes[kinds == kind].max()) for kind in dict.fromkeys(observed.kinds)}
-    largest[""] = float(sizes[observed.first_through :].max(initial=0.0))
+    largest = {
+        (kind, inner): float(sizes[(kinds == kind) & (inner | ~observed.inner)].max(initial=0.0))
+        for kind in dict.fromkeys(observed.kinds)
+        for inner in (False, True)
+    }
+    largest["", False] = largest["", True] = float(sizes[observed.first_through :].max(initial=0.0))
     parts = [
-        min(error / max(largest[kind], 1e-300), 1e300) if error else 0.0
-        for error, kind in zip(errors.tolist(), observed.kinds, strict=True)
+        min(error / max(largest[kind, inner], 1e-300), 1e300) if error else 0.0
+        for error, kind, inner in zip(errors.tolist(), observed.kinds, observed.inner.tolist(), strict=True)
     ]
     worst = int(np.argmax(parts)) if parts else 0
     return (parts[worst], observed.names[worst]) if parts else (0.0, "")

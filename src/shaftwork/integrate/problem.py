@@ -40,6 +40,7 @@ class Observed(NamedTuple):
         kinds: (m,) their units; "" of a multiplier of a coupling, which counts against all that passes through.
         names: (m,) their parts.
         direct: (m,) whether a value is a speed or a state; what dampers give is a difference times their d.
+        inner: (m,) whether a value passes through one of several branches side by side in a part.
         first_through: number of the first value that passes through a branch.
         first_left: number of the first value that should be zero.
     """
@@ -48,6 +49,7 @@ class Observed(NamedTuple):
     kinds: tuple[str, ...]
     names: tuple[str, ...]
     direct: Any
+    inner: Any
     first_through: int
     first_left: int
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -46,30 +47,37 @@ class Prepared:
 def observed(prepared: Prepared) -> Observed:
     """What the branches of a linear network show to the engines.
 
-    The through variable of a conductance in the tree comes from the balance of a node, so its law tells what rounding
-    has left of it.
+    A spring and a damper side by side in a part count together too: their sum is what others feel. The through
+    variable of a conductance in the tree comes from the balance of a node, so its law tells what rounding has left of it.
     """
     form, graph = prepared.form, prepared.form.graph
     parts = [(part, part.nodes[port.name]) for part in graph.parts for port in part.component.ports]
     nodes = {node: part.name for part, node in parts if node != GROUND}
     places, tree = list(nodes), list(form.tree_conductances)
+    beside: dict[tuple[int, int, int], list[int]] = {}
+    for branch in graph.branches:
+        beside.setdefault((branch.part, branch.plus, branch.minus), []).append(branch.index)
+    pairs = [branches for branches in beside.values() if len(branches) > 1]
 
     def values(times: Array, states: Array) -> Array:
         history = History(prepared.bound, times, states)
         left = history.through[tree] - prepared.bound.part.coefficients[tree][:, None] * history.across[tree]
-        return np.concatenate([history.potentials[places], history.through, left]).T
+        sums = [history.through[pair].sum(axis=0, keepdims=True) for pair in pairs]
+        return np.concatenate([history.potentials[places], history.through, *sums, left]).T
 
     domains = [graph.domains[max(branch.plus, branch.minus)] for branch in graph.branches]
     through = [  # that of a coupling is a multiplier, whatever its ratios make of it
         "" if branch.template.kind is Kind.COUPLING else domain.through.unit
         for branch, domain in zip(graph.branches, domains, strict=True)
     ]
-    kinds = (*(graph.domains[node].across.unit for node in nodes), *through, *(through[branch] for branch in tree))
+    shown = [*range(len(through)), *(pair[0] for pair in pairs), *tree]
+    kinds = (*(graph.domains[node].across.unit for node in nodes), *(through[branch] for branch in shown))
     owners = [graph.part_of(branch.index).name for branch in graph.branches]
-    names = (*nodes.values(), *owners, *(owners[branch] for branch in tree))
+    names = (*nodes.values(), *(owners[branch] for branch in shown))
     direct = np.arange(len(kinds)) < len(nodes)
     direct[[len(nodes) + branch for branch in form.through_states]] = True
-    return Observed(values, kinds, names, direct, len(nodes), len(nodes) + len(owners))
+    inner = np.isin([*[-1] * len(nodes), *range(len(through)), *[-1] * len(pairs), *tree], list(chain.from_iterable(pairs)))
+    return Observed(values, kinds, names, direct, inner, len(nodes), len(kinds) - len(tree))
 
 
 def nominal_tolerances(form: StateForm, coefficients: Array) -> Array:
