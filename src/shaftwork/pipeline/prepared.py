@@ -48,7 +48,7 @@ def observed(prepared: Prepared) -> Observed:
     """What the branches of a linear network show to the engines.
 
     A spring and a damper side by side in a part count together too: their sum is what others feel. The through
-    variable of a conductance in the tree comes from the balance of a node, so its law tells what rounding has left of it.
+    variable of a conductance in the tree comes from the balance of a node, so its law tells what rounding has left.
     """
     form, graph = prepared.form, prepared.form.graph
     parts = [(part, part.nodes[port.name]) for part in graph.parts for port in part.component.ports]
@@ -76,7 +76,9 @@ def observed(prepared: Prepared) -> Observed:
     names = (*nodes.values(), *(owners[branch] for branch in shown))
     direct = np.arange(len(kinds)) < len(nodes)
     direct[[len(nodes) + branch for branch in form.through_states]] = True
-    inner = np.isin([*[-1] * len(nodes), *range(len(through)), *[-1] * len(pairs), *tree], list(chain.from_iterable(pairs)))
+    inner = np.isin(
+        [*[-1] * len(nodes), *range(len(through)), *[-1] * len(pairs), *tree], list(chain.from_iterable(pairs))
+    )
     return Observed(values, kinds, names, direct, inner, len(nodes), len(kinds) - len(tree))
 
 
