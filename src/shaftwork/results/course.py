@@ -79,8 +79,7 @@ class Course:
         Of several that are equal but for rounding it is the first, on every machine.
         """
         times, values = self.points(_may_hold_extremes(self.values))
-        rounding = ROUNDINGS * float(np.abs(values).max())
-        low, high = int((values <= values.min() + rounding).argmax()), int((values >= values.max() - rounding).argmax())
+        low, high = _first_largest(times, -values), _first_largest(times, values)
         return (float(times[low]), float(values[low])), (float(times[high]), float(values[high]))
 
     def points(self, chosen: Mask | None = None) -> tuple[Array, Array]:
@@ -97,6 +96,13 @@ class Course:
             order = np.argsort(times, kind="stable")
             times, values = times[order], values[order]
         return times, values
+
+
+def _first_largest(times: Array, values: Array) -> int:
+    """Place of the largest value, and of several that are equal but for rounding the first."""
+    first = int((values >= values.max() - ROUNDINGS * np.abs(values).max()).argmax())
+    there = times <= times[first] + SHORTEST * np.spacing(np.abs(times).max())
+    return int(values[there].argmax())
 
 
 def course(read: Read, steps: Array, *, even: bool = False) -> Course:
