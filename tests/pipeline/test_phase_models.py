@@ -26,6 +26,19 @@ from tests.trains import Train, trains
 BLDC = {"U": 100.0, "R": 0.5, "L": 1e-3, "k": 0.2, "pole_pairs": 2.0}
 
 
+def geared() -> sw.Network:
+    """A friction behind a spring, and an inertia whose speed is no state, as a gear gives it."""
+    net = sw.Network("geared")
+    net.add(sw.TorqueSource("motor", tau=5.0), "a")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.Gear("gear", ratio=2.0), "a", "b")
+    net.add(sw.Inertia("J2", J=0.5), "b")
+    net.add(sw.Spring("shaft", c=1e3, d=1.0), "b", "c")
+    net.add(sw.Inertia("J3", J=1.0), "c")
+    net.add(sw.CoulombLoad("brake", tau=1.0), "c")
+    return net
+
+
 def crane() -> sw.Network:
     """A motor that turns round, a gap, a load and a brake."""
     net = sw.Network("crane")
@@ -179,6 +192,45 @@ def test_the_states_of_the_model_are_those_of_its_motions_and_start_another_one(
     initial = dict(zip(model.states, held.x[0].tolist(), strict=True))
     again = model.simulate(end, t_start=middle, initial=initial, rtol=1e-10)
     assert np.abs((again.x[-1] - sol.x[-1]) / np.abs(sol.x).max(axis=0)).max() < 1e-6
+
+
+def waving() -> sw.Network:
+    """A travelling wave between two inertias."""
+    net = sw.Network("waving")
+    net.add(sw.TorqueSource("motor", tau=5.0), "a")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.Shaft("line", diameter=0.1, length=2.0, model=sw.Wave()), "a", "b")
+    net.add(sw.Inertia("J2", J=1.0), "b")
+    return net
+
+
+@pytest.mark.parametrize("build", [crane, waving])
+def test_a_point_that_is_no_moment_of_this_network_is_refused(build: Callable[[], sw.Network]) -> None:
+    """As that of a network without modes is."""
+    net, other = build(), sw.Network("other")
+    other.add(sw.Inertia("J9", J=1.0), "a")
+    sol, moment = net.simulate(0.1), other.simulate(0.1).at([0.1])
+    with pytest.raises(sw.ParameterError, match=r"a motion of 1001 times; take one of them, such as at=sol.at\(\[0.1"):
+        net.modes(sol, count=2)
+    with pytest.raises(sw.ParameterError, match=r"a motion of 'other' with other states. The states here are: J1.om"):
+        net.modes(moment, count=2)
+    assert len(net.modes(sol.at([0.1]), count=2)) == 2
+
+
+def test_the_time_of_the_laws_at_a_moment_of_a_motion_must_be_a_number() -> None:
+    model = crane().compile()
+    moment = model.simulate(0.2).at([0.2])
+    with pytest.raises(sw.ParameterError, match="t = 'soon' must be a number"):
+        model.linearize(moment, t="soon")  # type: ignore[arg-type]
+
+
+def test_sensitivities_at_a_moment_are_those_of_the_modes_there_where_a_speed_is_no_state() -> None:
+    """Rigid bodies swing against each other at sqrt(c / J1' + c / J3) with J1' = J2 + 4 J1: half a per cent by c."""
+    net = geared()
+    moment = net.simulate(1.0).at([0.5])
+    made = sw.studies.frequency_sensitivities(net, moment)
+    np.testing.assert_allclose(made.frequencies, net.modes(moment).frequencies[-1:], rtol=1e-12)
+    assert made.relative["shaft.c"][0] == pytest.approx(0.5, abs=1e-3)  # the damping moves it by its square, 3e-4
 
 
 @pytest.mark.parametrize("name", registered())

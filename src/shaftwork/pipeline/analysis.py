@@ -98,7 +98,7 @@ def operating_point(model: CompiledModel, p: Array, at: Point, t: Time, settled:
         SignalError: there is no such quantity.
     """
     if isinstance(at, Solution):
-        time, x = _moment(model, at)
+        time, x = moment_of(at, tuple(state.name for state in model.form.states))
         return time if t is None else in_si("t", t, "s"), x
     time = settled if t is None else in_si("t", t, "s")
     return time, initial_state(model.bind(p), at if at is not None else {}, time)
@@ -166,12 +166,20 @@ def _listed(names: str | Sequence[str]) -> tuple[str, ...]:
     return (names,) if isinstance(names, str) else tuple(names)
 
 
-def _moment(model: CompiledModel, motion: Solution) -> tuple[float, Array]:
+def moment_of(motion: Solution, states: tuple[str, ...]) -> tuple[float, Array]:
+    """Time in s and states (n,) of a motion that is a point.
+
+    Args:
+        motion: at one time.
+        states: names of those that it must have.
+
+    Raises:
+        ParameterError: it has other states, or not one time.
+    """
     if len(motion.t) != 1:
         raise ParameterError(
             f"at is a motion of {len(motion.t)} times; take one of them, such as at=sol.at([{motion.t[-1]:g}])."
         )
-    states = tuple(state.name for state in model.form.states)
     if motion.states != states:
         raise ParameterError(
             f"at is a motion of '{motion.name}' with other states. The states here are: {', '.join(states)}."

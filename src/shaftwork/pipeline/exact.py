@@ -22,7 +22,17 @@ from shaftwork.core.kept import Kept
 from shaftwork.core.notices import muted
 from shaftwork.network.graph import resolve
 from shaftwork.network.netlist import Netlist, Placed
-from shaftwork.pipeline.analysis import Names, Point, SmallMotions, Time, input_names, near, operating_point, titled
+from shaftwork.pipeline.analysis import (
+    Names,
+    Point,
+    SmallMotions,
+    Time,
+    input_names,
+    moment_of,
+    near,
+    operating_point,
+    titled,
+)
 from shaftwork.pipeline.model import Model
 from shaftwork.results.exact import ExactModel, ExactSlopes
 from shaftwork.results.exact_lines import ExactLines
@@ -129,7 +139,8 @@ class ExactNetwork:
         """
         given = at
         if isinstance(at, Solution) and self._own is not self._model:
-            t, at = float(at.t[-1]) if t is None else t, _values_of(at, self.lines.names)
+            time, _ = moment_of(at, self._model.states)
+            t, at = time if t is None else t, _values_of(at, self.lines.names)
         p = self._own.vector()
         time, x = operating_point(self._own, p, at, t, self._own.settled(p))
         values = self._read(time, x)
@@ -201,7 +212,7 @@ class ExactNetwork:
 
 
 def _values_of(motion: Solution, shafts: tuple[str, ...]) -> dict[str, float]:
-    """The last time of a motion with waves, by speeds, twists and torques that a mesh has too."""
+    """The one time of a motion with waves, by speeds, twists and torques that a mesh has too."""
     names = (*motion.states, *(f"{name}.omega_{end}" for name in shafts for end in "ab"))
     own = {name: k for k, name in enumerate(motion.states)}
-    return {name: float(motion.x[-1, own[name]] if name in own else motion[name][-1]) for name in names}
+    return {name: float(motion.x[0, own[name]] if name in own else motion[name][0]) for name in names}

@@ -16,8 +16,19 @@ from shaftwork.codegen.model import CompiledModel, Cost
 from shaftwork.codegen.operating import steady_state
 from shaftwork.codegen.start_values import initial_state
 from shaftwork.core.errors import CompileError, SimulationError
+from shaftwork.core.parameters import in_si
 from shaftwork.equations.records import NamedPhase
-from shaftwork.pipeline.analysis import Given, Names, Point, Time, about, input_names, operating_point, titled
+from shaftwork.pipeline.analysis import (
+    Given,
+    Names,
+    Point,
+    Time,
+    about,
+    input_names,
+    moment_of,
+    operating_point,
+    titled,
+)
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.moments import Moment
@@ -174,19 +185,33 @@ class PhasedModel(Model):
             f"with {self._words(moment)}. Give a start near the operating point."
         )
 
-    def _near(self, values: Mapping[str, float], at: Point, t: Time, inputs: Names, outputs: Names) -> LinearModel:
+    def point(self, values: Mapping[str, float], at: Point, t: Time) -> tuple[float, Moment]:
+        """Time in s at a point, and the modes that go on there with their states.
+
+        Args:
+            values: parameters that differ from the network's.
+            at: the point, as for `linearize`.
+            t: time at which laws are read, s; by default as for `linearize`.
+
+        Raises:
+            ParameterError: the point is none.
+            SignalError: there is no such quantity.
+        """
         first = self.phases.assembly(self.phases.first)
         settling = Settling(self.phases, values, (0.0, 1.0))
-        p = first.vector(values, self.phases.numbers(self.phases.first))
+        p = settling.regime(self.phases.first).p
         if isinstance(at, Solution):
-            time, held = self._of(at)
-            time = time if t is None else t
-            moment = settling.started(time, first.stores.states(first.bound(p), time, held))
+            time, stored = moment_of(at, self.states)
+            time = time if t is None else in_si("t", t, "s")
+            held = dict(zip(self.states, stored.tolist(), strict=True))
+            x = first.stores.states(first.bound(p), time, held)
         else:
             usual = 0.0 if at is None else first.model.settled(p)  # what rests has not begun to move
             time, x = operating_point(first.model, p, at, t, usual)
-            moment = settling.started(time, x)
-        moment, _ = settling.settle(time, time, moment, None)
+        return time, settling.settle(time, time, settling.started(time, x), None)[0]
+
+    def _near(self, values: Mapping[str, float], at: Point, t: Time, inputs: Names, outputs: Names) -> LinearModel:
+        time, moment = self.point(values, at, t)
         model = moment.regime.assembly.model
         slopes = Linearization(model, moment.regime.p, moment.x, time, input_names(model, inputs))
         named = None if outputs is None else (outputs,) if isinstance(outputs, str) else tuple(outputs)
@@ -197,10 +222,6 @@ class PhasedModel(Model):
         """The phase of a moment, "gap open, brake locked"."""
         pairs = zip(self.phases.elements, moment.regime.modes, strict=True)
         return ", ".join(f"{element.name} {element.modes[name].words}" for element, name in pairs)
-
-    @staticmethod
-    def _of(motion: Solution) -> tuple[float, dict[str, float]]:
-        return float(motion.t[0]), dict(zip(motion.states, np.asarray(motion.x[0]).tolist(), strict=True))
 
     def _moment(self, settling: Settling, t: float, initial: Given) -> Moment:
         first = self.phases.assembly(self.phases.first)

@@ -17,7 +17,6 @@ from shaftwork.pipeline.analysis import Given, Point, Time, operating_point
 from shaftwork.pipeline.arguments import relative_tolerance, time_span
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.model import PhasedModel
-from shaftwork.pipeline.phases.settling import Settling
 from shaftwork.pipeline.sensitivities.differentiable import rows_of, smooth_parameters
 from shaftwork.pipeline.sensitivities.measure_slopes import integrand, measured
 from shaftwork.pipeline.sensitivities.motion_legs import motion_of
@@ -154,10 +153,5 @@ def _near(model: Model, at: Point, t: Time) -> tuple[Model, Array, Array, float]
         p = model.defaults
         time, x = operating_point(model, p, at, t, model.settled(p))
         return model, p, x, time
-    phases = model.phases
-    first = phases.assembly(phases.first)
-    p = first.vector({}, phases.numbers(phases.first))
-    time, x = operating_point(first.model, p, at, t, 0.0 if at is None else first.model.settled(p))
-    settling = Settling(phases, {}, (0.0, 1.0))
-    moment, _ = settling.settle(time, time, settling.started(time, x), None)
+    time, moment = model.point({}, at, t)
     return moment.regime.assembly.model, moment.regime.p, moment.x, time
