@@ -57,6 +57,25 @@ def test_a_model_of_a_shaft_and_a_law_are_set_as_in_a_model_file(
     assert '"2*sin(t)"' in new.read_text(encoding="utf-8")
 
 
+def test_a_network_with_other_values_has_its_ports_and_its_places_in_the_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    net = sw.Network("coupled", ports=("a", "b"))
+    net.add(sw.Inertia("J1", J=2.0), "a")
+    net.add(sw.Spring("s", c=1e3), "a", "b")
+    path, new = tmp_path / "coupled.toml", tmp_path / "new.toml"
+    net.save(path)
+    assert main(["export", str(path), str(new), "--set", "s.c=2e3"]) == DONE
+    assert sw.Network.load(new).ports == net.ports
+    assert "c = 2000" in new.read_text(encoding="utf-8")
+
+    path.write_text(path.read_text(encoding="utf-8").replace('nodes = ["a"]', 'nodes = ["a", "b"]'), encoding="utf-8")
+    for setting in ([], ["--set", "s.c=2e3"]):
+        capsys.readouterr()
+        assert main(["modes", str(path), *setting]) == WRONG_INPUT
+        assert "coupled.toml, line 5)" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("command", ["check", "run", "latex", "modes", "export"])
 def test_every_command_about_a_model_takes_values(
     command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -56,6 +56,12 @@ def test_every_row_of_the_chain_is_printed() -> None:
     ]
 
 
+def test_a_chain_has_the_ports_of_its_network() -> None:
+    net = sw.Network("shafted", ports=("a", "b"))
+    net.add(sw.Shaft("line", length=1.0, diameter=0.02, model=sw.Lumped(2)), "a", "b")
+    assert net.expanded().ports == ("a", "b")
+
+
 def test_one_spring_is_a_spring() -> None:
     (spring,) = (part for part in train(sw.OneSpring()).expanded().parts if part.name.startswith("line"))
     assert isinstance(spring, sw.Spring)

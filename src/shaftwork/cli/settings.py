@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from copy import copy
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from shaftwork.core.errors import MissingExtraError, ModelFileError, ParameterError
@@ -36,12 +37,11 @@ def with_settings(net: Network, settings: Iterable[str]) -> Network:
         MissingExtraError: a value has a unit, and pint is not installed.
     """
     values = once("--set", (setting(net, text) for text in settings))
-    if not values:
-        return net
-    varied = type(net)(net.name)
+    changed, owners = copy(net), {name.rpartition(".")[0] for name in values}
     for placed in net.netlist().with_values(values).placed:
-        varied.add(placed.part, *placed.nodes)
-    return varied
+        if placed.part.name in owners:
+            changed.replace(placed.part)
+    return changed
 
 
 def setting(net: Network, text: str) -> tuple[str, Any]:

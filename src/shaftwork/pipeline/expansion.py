@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from sympy import Expr
 
@@ -29,7 +30,7 @@ def expanded(netlist: Netlist, graph: CircuitGraph) -> Netlist:
     made: list[Placed] = []
     for item, part in zip(netlist.placed, graph.parts, strict=True):
         made += _chain(item, part, graph)
-    return Netlist(netlist.name, tuple(made))
+    return replace(netlist, placed=tuple(made))
 
 
 def _chain(item: Placed, part: GraphPart, graph: CircuitGraph) -> list[Placed]:
