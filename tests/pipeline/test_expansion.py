@@ -56,6 +56,21 @@ def test_every_row_of_the_chain_is_printed() -> None:
     ]
 
 
+def test_a_chain_within_a_network_within_another_is_joined_to_its_neighbours() -> None:
+    """The array and the chain are the same matrices, so that 1e-9 leaves room for rounding alone."""
+    inner, net = sw.Network("inner", ports=("a",)), sw.Network("outer")
+    inner.add(sw.Shaft("line", length=1.0, diameter=0.02, model=sw.Lumped(2)), "a", "b")
+    inner.add(sw.Inertia("J2", J=1.0), "b")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(inner, "a", name="first")
+    chain = net.expanded()
+    assert chain.nodes == ("a", "first.line 1", "first.b")
+    assert [part.name for part in chain.parts if "line" in part.name] == [
+        *("first.line J a", "first.line J 1", "first.line J first.b", "first.line c a", "first.line c 1")
+    ]
+    np.testing.assert_allclose(chain.modes().frequencies[1:], net.modes().frequencies[1:], rtol=1e-9)
+
+
 def test_a_chain_has_the_ports_of_its_network() -> None:
     net = sw.Network("shafted", ports=("a", "b"))
     net.add(sw.Shaft("line", length=1.0, diameter=0.02, model=sw.Lumped(2)), "a", "b")

@@ -43,7 +43,9 @@ def _chain(item: Placed, part: GraphPart, graph: CircuitGraph) -> list[Placed]:
             f"Shaft '{name}': model={item.part.values['model']!r} is no chain of springs, so it cannot be written out "
             "part by part. Lumped(m) can."
         )
-    names = {number: node.replace(".", " ") for number, node in enumerate(graph.nodes)} | {GROUND: REFERENCE}
+    names = {GROUND: REFERENCE}
+    for number, node in enumerate(graph.nodes):  # its ends keep their names: other parts are there
+        names[number] = node if node in item.nodes else f"{name} {node.removeprefix(f'{name}.')}"
     coefficients = _coefficients(branches, graph)
     joined: dict[tuple[int, int], dict[Kind, float]] = {}
     for branch in branches:
