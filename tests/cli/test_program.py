@@ -95,13 +95,24 @@ def test_check_tells_structure_states_time_constants_and_engine(capsys: pytest.C
         assert word in printed
     # at rest the load holds J2, so that J1 swings alone; in motion both swing against each other
     assert "natural frequencies at rest (load stuck) (1): 4.7348 Hz" in printed
-    assert "natural frequencies in motion (load slipping forward) (1): 5.6768 Hz" in printed
+    assert "natural frequencies in motion (load slipping forward) (1): 5.677 Hz" in printed
     assert main(["check", "shaft-chain"]) == DONE
     printed = capsys.readouterr().out
     assert "natural frequencies at rest (" in printed
     assert "in motion" not in printed
     assert "left out, being zero" in printed
     assert "eliminated stores (2)" in printed
+
+
+def test_check_prints_the_natural_frequencies_of_modes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Damping 0.6: the natural frequency is 10 / 2 pi Hz, and the damped one is 8 / 2 pi = 1.27 Hz."""
+    net = sw.Network("oscillator")
+    net.add(sw.Inertia("J1", J=1.0), "rotor")
+    net.add(sw.Spring("shaft", c=100.0, d=12.0), "rotor", "ground")
+    net.save(tmp_path / "oscillator.toml")
+    for command, words in (("modes", "1.59155"), ("check", "natural frequencies at rest (1): 1.5915 Hz")):
+        assert main([command, str(tmp_path / "oscillator.toml")]) == DONE
+        assert words in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.network import Network
 from shaftwork.pipeline.phases.model import PhasedModel
 from shaftwork.pipeline.phases.names import whole_name
+from shaftwork.results.modes import natural_frequencies
 
 LARGEST_DENSE = 1500
 """States up to which all eigenvalues are computed."""
@@ -79,7 +80,7 @@ def _time_constants(words: str, states: Sequence[str], jacobian: NDArray[np.floa
     eigenvalues: NDArray[np.complex128] = np.linalg.eigvals(jacobian).astype(complex)
     size = np.abs(eigenvalues)
     moving = eigenvalues[size > 1e-9 * size.max(initial=0.0)]
-    swings = np.unique(np.round(np.abs(moving.imag[moving.imag > 1e-9 * np.abs(moving)]) / (2 * np.pi), 12))
+    swings = np.unique(np.round(natural_frequencies(moving[moving.imag > 1e-9 * np.abs(moving)]), 12))
     decays = np.sort(-1 / moving.real[moving.real < -1e-12 * np.abs(moving)])
     if swings.size:
         yield f"natural frequencies {words} ({swings.size}): {_some([f'{f:.5g}' for f in swings])} Hz"

@@ -54,7 +54,7 @@ class Modes:
     @property
     def frequencies(self) -> Array:
         """(k,) natural frequencies |rate| / 2 pi in Hz, ascending; exactly 0 for modes that do not swing."""
-        return np.where(self.rates.imag > 0, np.abs(self.rates), 0.0) / (2 * np.pi)
+        return natural_frequencies(self.rates)
 
     @property
     def damped_frequencies(self) -> Array:
@@ -153,6 +153,11 @@ def find_modes(title: str, slopes: Slopes, count: int | None = None, f_max: floa
     vectors[following] = (slopes.A @ vectors)[following] * (rates != 0) / np.where(rates == 0, 1.0, rates)
     below = np.abs(rates) <= top
     return modes_of(title, slopes, rates[below], vectors[:, below])
+
+
+def natural_frequencies(rates: Complex) -> Array:
+    """|rate| / 2 pi in Hz of each rate in 1/s, and 0 where it does not swing, without an imaginary part above 0."""
+    return np.asarray(np.where(rates.imag > 0, np.abs(rates), 0.0) / (2 * np.pi), dtype=float)
 
 
 def largest_rate(f_max: float | None) -> float:
