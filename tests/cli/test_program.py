@@ -115,6 +115,15 @@ def test_check_prints_the_natural_frequencies_of_modes(tmp_path: Path, capsys: p
         assert words in capsys.readouterr().out
 
 
+def test_check_names_the_engine_of_a_network_without_states(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    net = sw.Network("driven")
+    net.add(sw.SpeedSource("drive", omega=5.0), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.save(tmp_path / "driven.toml")
+    assert main(["check", str(tmp_path / "driven.toml")]) == DONE
+    assert "engine for 10 s: exact, Nothing moves freely" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [

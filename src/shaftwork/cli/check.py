@@ -15,7 +15,7 @@ def run(options: Namespace, say: Say) -> Data:
     net, scene = load(options)
     model, t_end = net.compile(), scene.t_end if scene else FALLBACK_END
     say(structure_report(net, model, t_end))
-    engine, why = model.choose_engine(t_end) if model.states else ("", "nothing is stored, so nothing is integrated")
+    engine, why = model.choose_engine(t_end)
     return {
         "network": net.name,
         "parts": len(model.form.graph.parts),

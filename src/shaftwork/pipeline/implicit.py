@@ -12,7 +12,8 @@ from shaftwork.core.errors import SimulationError, no_value
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import DaeProblem, DenseOutput, Problem, Trajectory
 
-WHY = "Laws at massless nodes determine torque and speed together, so the implicit system is solved."
+IMPLICIT = "Laws at massless nodes determine torque and speed together, so the implicit system is solved."
+PRESCRIBED = "Nothing moves freely; all is prescribed."
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class _NoStates:
         return np.zeros((len(times), 0))
 
 
-def at_rest(problem: Problem, degree: int | None) -> tuple[Trajectory, str, str]:
+def at_rest(problem: Problem, degree: int | None) -> Trajectory:
     """The run of a network without states: everything follows from the sources at every instant.
 
     Args:
@@ -56,26 +57,36 @@ def at_rest(problem: Problem, degree: int | None) -> tuple[Trajectory, str, str]
         times = np.union1d(t, steps)
         if (law := problem.explain(times, np.zeros((len(times), 0)))) is not None:
             raise no_value(*law)
-    return Trajectory(t, np.zeros((len(t), 0)), _NoStates(steps)), "exact", "Nothing moves freely; all is prescribed."
+    return Trajectory(t, np.zeros((len(t), 0)), _NoStates(steps))
 
 
-def solve_loops(bound: BoundArrays, problem: Problem) -> tuple[Trajectory, str, str]:
-    """Solve a problem whose model has algebraic loops: with IDA, or with scipy and Newton's method where it is missing.
+def start_of_loops(bound: BoundArrays, problem: Problem) -> Array:
+    """(loops,) what the laws in algebraic loops start with.
 
     Raises:
-        SimulationError: the loops have no solution at the start, or the engine failed.
+        SimulationError: they have no solution at the start.
     """
     assert bound.loops is not None  # noqa: S101 (the caller asks only then)
-    loops, states = bound.loops, len(problem.x0)
-    start = loops.solve(problem.sides(problem.t0)[1], problem.x0)
+    start = bound.loops.solve(problem.sides(problem.t0)[1], problem.x0)
     if not np.isfinite(start).all():
         names = [bound.program.form.graph.part_of(branch).name for branch in bound.program.form.loop_laws]
         raise SimulationError(
             f"No torque and speed satisfy the laws of {', '.join(names)} at the start (t = {problem.t0:g} s). "
             f"Give their node an inertia, or start nearer to the operating point."
         )
-    if not choice.available("sundials"):
-        return choice.solve(problem, "scipy-radau", WHY)
+    return start
+
+
+def solve_loops(bound: BoundArrays, problem: Problem, start: Array) -> Trajectory:
+    """Solve a problem whose model has algebraic loops with IDA, from `start_of_loops`.
+
+    Raises:
+        MissingExtraError: its library is not installed.
+        SimulationError: the engine failed.
+    """
+    choice.load("sundials")
+    assert bound.loops is not None  # noqa: S101 (the caller asks only then)
+    loops, states = bound.loops, len(problem.x0)
 
     def residual(t: float, z: Array, rate: Array) -> Array:
         x, a = z[:states], z[states:]
@@ -113,4 +124,4 @@ def solve_loops(bound: BoundArrays, problem: Problem) -> tuple[Trajectory, str, 
         )
     )
     loops.start_from(start)
-    return Trajectory(found.t, found.x[:, :states], _States(found.dense, states), found.statistics), "sundials", WHY
+    return Trajectory(found.t, found.x[:, :states], _States(found.dense, states), found.statistics)

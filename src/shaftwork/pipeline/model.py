@@ -36,7 +36,7 @@ from shaftwork.pipeline.arguments import (
     step_limit,
     time_span,
 )
-from shaftwork.pipeline.implicit import at_rest, solve_loops
+from shaftwork.pipeline.implicit import IMPLICIT, PRESCRIBED, at_rest, solve_loops, start_of_loops
 from shaftwork.pipeline.overview import model_overview
 from shaftwork.pipeline.prepared import Prepared, nominal_tolerances, observed
 from shaftwork.pipeline.settled import refuse_moving, warn_of_earlier_levels
@@ -240,38 +240,36 @@ class Model(CompiledModel):
         return self._engine(prepared, self._problem(prepared, x0, demand), "auto")
 
     def _solve(
-        self, prepared: Prepared, problem: Problem, waves: WaveStart | None, engine: str
+        self, prepared: Prepared, problem: Problem, waves: WaveStart | None, asked: str
     ) -> tuple[Trajectory, str, str]:
         """The run, the engine that made it, and why that one."""
-        if self.form.waves:
-            return self._solve_waves(prepared, problem, waves, engine)
-        choice.check(engine)
+        name, why = self._engine(prepared, problem, asked)
+        if name == "wave":
+            from shaftwork.pipeline.waves import solve_waves
+
+            steady = self.degree == 0
+            return solve_waves(prepared.bound, problem, waves, linear=self.linear, steady=steady), name, why
         if not self.states:
-            return at_rest(problem, self.degree)
-        if self.form.loop_laws and engine in ("auto", "sundials"):
-            return solve_loops(prepared.bound, problem)
-        name, why = self._engine(prepared, problem, engine)
-        return choice.solve(problem, name, why, fallback=engine == "auto")
-
-    def _solve_waves(
-        self, prepared: Prepared, problem: Problem, start: WaveStart | None, engine: str
-    ) -> tuple[Trajectory, str, str]:
-        from shaftwork.pipeline.waves import solve_waves
-
+            return at_rest(problem, self.degree), name, why
         if self.form.loop_laws:
-            raise ParameterError(
-                f"'{self.name}' has a travelling wave at a massless node with a nonlinear law. Give the node an "
-                "inertia, or take model=Spectral(16)."
-            )
-        return solve_waves(prepared.bound, problem, start, engine, linear=self.linear, steady=self.degree == 0)
+            start = start_of_loops(prepared.bound, problem)
+            if name == "sundials":
+                return solve_loops(prepared.bound, problem, start), name, why
+        return choice.solve(problem, name, why, fallback=asked == "auto")
 
-    def _engine(self, prepared: Prepared, problem: Problem, engine: str) -> tuple[str, str]:
+    def _engine(self, prepared: Prepared, problem: Problem, asked: str) -> tuple[str, str]:
+        """The engine for a motion, and why."""
         if self.form.waves:
-            from shaftwork.pipeline.waves import WHY
+            from shaftwork.pipeline.waves import engine_of_waves
 
-            return "wave", WHY
-        if engine != "auto":
-            return engine, "asked for"
+            return engine_of_waves(self.form, asked)
+        choice.check(asked)
+        if not self.states:
+            return "exact", PRESCRIBED
+        if asked != "auto":
+            return asked, "asked for"
+        if self.form.loop_laws:
+            return "sundials" if choice.available("sundials") else "scipy-radau", IMPLICIT
         key = (problem.t0, problem.t_end, problem.rtol)
         for run, p, chosen in self._choices:
             if run == key and ((p / SIMILAR < prepared.p) == (prepared.p < p * SIMILAR)).all():

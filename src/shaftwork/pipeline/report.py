@@ -50,9 +50,8 @@ def _lines(net: Network, model: Model, t_end: float) -> Iterator[str]:
     if 0 < len(equations.states) <= LARGEST_DENSE:
         for point in _points(model, equations):
             yield from _time_constants(*point)
-    if equations.states:
-        name, why = model.choose_engine(t_end)
-        yield f"engine for {t_end:g} s: {name}, {why}"
+    name, why = model.choose_engine(t_end)
+    yield f"engine for {t_end:g} s: {name}, {why}"
 
 
 def _points(model: Model, equations: CompiledModel) -> Iterator[tuple[str, Sequence[str], NDArray[np.float64]]]:

@@ -139,32 +139,44 @@ def _is_wave(form: StateForm, part: int) -> bool:
     return any(form.graph.branches[end].part == part for end in form.waves)
 
 
+def engine_of_waves(form: StateForm, asked: str) -> tuple[str, str]:
+    """The engine of a model with lines, and why.
+
+    Raises:
+        ParameterError: another one was asked for, or a nonlinear law is at a massless node.
+    """
+    if form.loop_laws:
+        raise ParameterError(
+            f"'{form.graph.name}' has a travelling wave at a massless node with a nonlinear law. Give the node an "
+            "inertia, or take model=Spectral(16)."
+        )
+    if asked not in ("auto", "wave"):
+        raise ParameterError(
+            f"engine = {asked!r} knows no travelling waves. Take the engine 'auto', or another model of the shaft: "
+            "model=Spectral(16) or Lumped(100)."
+        )
+    return "wave", WHY
+
+
 def solve_waves(
-    bound: BoundArrays, problem: Problem, start: WaveStart | None, engine: str, *, linear: bool, steady: bool
-) -> tuple[Trajectory, str, str]:
+    bound: BoundArrays, problem: Problem, start: WaveStart | None, *, linear: bool, steady: bool
+) -> Trajectory:
     """Solve a problem whose model has lines; the histories of their ends follow the states in the result.
 
     Args:
         bound: the array program.
         problem: states, times and tolerances.
         start: of the lines; None for rest.
-        engine: "auto" or "wave".
         linear: whether the laws are linear with constant coefficients.
         steady: whether nothing depends on time between breakpoints.
 
     Raises:
-        ParameterError: another engine was asked for.
         SimulationError: the engine failed.
 
     Warns:
         AccuracyWarning: bearing friction is too heavy to be lumped.
         NetworkWarning: a line is so short, and beside it something so nonlinear, that the run hardly ends.
     """
-    if engine not in ("auto", "wave"):
-        raise ParameterError(
-            f"engine = {engine!r} knows no travelling waves. Take the engine 'auto', or another model of the shaft: "
-            "model=Spectral(16) or Lumped(100)."
-        )
     system = WaveSystem(bound)
     impedances, delays = system.lines
     _warn_of_friction(bound, impedances)
@@ -197,7 +209,7 @@ def solve_waves(
         )
     )
     x = np.hstack([found.x, found.h])
-    return Trajectory(found.t, x, _StatesAndWaves(found, impedances), found.statistics), "wave", WHY
+    return Trajectory(found.t, x, _StatesAndWaves(found, impedances), found.statistics)
 
 
 def _warn_of_friction(bound: BoundArrays, impedances: Array) -> None:

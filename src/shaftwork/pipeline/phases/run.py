@@ -20,7 +20,7 @@ from shaftwork.core.notices import warn
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import Problem, SeriesError, Trajectory
 from shaftwork.pipeline.arguments import Demand
-from shaftwork.pipeline.implicit import at_rest
+from shaftwork.pipeline.implicit import PRESCRIBED, at_rest
 from shaftwork.pipeline.phases.assemblies import Assembly
 from shaftwork.pipeline.phases.moments import Change, Moment
 from shaftwork.pipeline.phases.passing import Passing, Phase
@@ -34,7 +34,6 @@ from shaftwork.pipeline.phases.starts import refuse_incomplete
 CHATTER = ((200, 1e-9), (3000, 1e-6))
 SELDOM = max(part for _, part in CHATTER)
 TIGHTEST_RTOL = 1e-14
-STILL = "Nothing moves, and what holds is known at every time."
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +121,7 @@ class Run:
         """The engine for the first phase, and why."""
         moment = self.begin(None)
         problem = self._problem(self.demand.span[0], moment)
-        return self._engine(moment, lambda: problem) if problem.x0.size else ("exact", STILL)
+        return self._engine(moment, lambda: problem) if problem.x0.size else ("exact", PRESCRIBED)
 
     def _engine(self, moment: Moment, problem: Callable[[], Problem]) -> tuple[str, str]:
         return self.phases.engine(moment.regime.assembly, moment.regime.modes, problem, self.demand.engine)
@@ -229,7 +228,7 @@ class Run:
         passing = Passing(self.settling, moment, t, self.note, self._suits_heyoka)
         problem, noted, soon = self._problem(t, moment, passing), len(self.changes), [*self._soon]
         if not problem.x0.size:
-            made, _, _ = at_rest(problem, moment.regime.assembly.model.degree)
+            made = at_rest(problem, moment.regime.assembly.model.degree)
             return replace(made, end=(problem.t_end, problem.x0)), passing
         name, why = self._engine(moment, lambda: problem)
         stiff = name != "heyoka"

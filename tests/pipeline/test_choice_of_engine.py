@@ -1,0 +1,55 @@
+"""Which engine a model takes: named before a run as in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+import shaftwork as sw
+from shaftwork.integrate import choice
+
+
+def joined(*parts: sw.Component) -> sw.Network:
+    net = sw.Network("joined")
+    for part in parts:
+        net.add(part, "a")
+    return net
+
+
+def looped() -> sw.Model:
+    """A fan without inertia behind a spring."""
+    net = sw.Network("looped")
+    net.add(sw.Inertia("J", J=2.0), "disc")
+    net.add(sw.Spring("shaft", c=500.0), "disc", "fan")
+    net.add(sw.TorqueSource("fan", tau=-3 * sw.omega - sw.omega**3), "fan")
+    return net.compile(algebraic_loops="solve")
+
+
+CHOICES: dict[str, Callable[[], sw.Model]] = {
+    "nothing stored": lambda: joined(sw.SpeedSource("drive", omega=5.0), sw.Inertia("J", J=1.0)).compile(),
+    "linear": lambda: joined(sw.TorqueSource("motor", tau=5.0), sw.Inertia("J", J=1.0)).compile(),
+    "modes": lambda: joined(
+        sw.TorqueSource("motor", tau=5.0), sw.Inertia("J", J=1.0), sw.CoulombLoad("load", tau=1.0)
+    ).compile(),
+    "wave": lambda: sw.scenes.shaft_step(sw.Wave()).compile(),
+    "loop": looped,
+}
+
+
+@pytest.mark.parametrize("name", CHOICES)
+def test_the_engine_that_is_named_before_a_run_is_that_of_the_run(name: str) -> None:
+    model = CHOICES[name]()
+    sol = model.simulate(0.1)
+    assert model.choose_engine(0.1) == (sol.engine, sol.why)
+
+
+def test_loops_without_sundials_are_solved_by_radau_and_refused_where_it_is_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(choice.ENGINES, "sundials", replace(choice.ENGINES["sundials"], library="not_there"))
+    sol = looped().simulate(0.01, initial={"J.omega": 1.0})
+    assert (sol.engine, "massless nodes" in sol.why) == ("scipy-radau", True)
+    with pytest.raises(sw.MissingExtraError, match="engine='sundials'"):
+        looped().simulate(0.1, engine="sundials")
