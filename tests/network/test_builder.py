@@ -274,3 +274,18 @@ def test_a_law_and_a_table_are_shown_in_short() -> None:
     net.add(sw.TorqueSource("b", tau=-22.4 * sympy.tanh(sw.omega / 0.01)), "rotor")
     assert "tau=Table of 2 points" in repr(net)
     assert "tanh" in repr(net)
+
+
+def test_networks_are_equal_by_name_ports_parts_and_nodes() -> None:
+    assert stage() == stage()
+    assert copy.copy(stage()) == stage()
+    assert stage(3.0) != stage()
+    moved = stage()
+    moved.remove("shaft")
+    moved.add(sw.Spring("shaft", c=1e4, d=2.0), "out", "middle")
+    assert moved != stage()
+    renamed, closed = stage(), stage()
+    renamed.name, closed.ports = "other", ()
+    assert renamed != stage()
+    assert closed != stage()
+    assert stage() != "stage"

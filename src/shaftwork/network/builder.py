@@ -40,6 +40,12 @@ class NetworkBuilder:
         vars(made).update(vars(self), _placed=[*self._placed])
         return made
 
+    def __eq__(self, other: object) -> bool:
+        """Whether name, ports, parts and nodes are equal, in their order; not from which file they come."""
+        return self.netlist() == other.netlist() if isinstance(other, NetworkBuilder) else NotImplemented
+
+    __hash__ = None  # type: ignore[assignment]  # what can be changed must not be found by what it was
+
     @overload
     def add(self, part: C, *nodes: str) -> C: ...
 
