@@ -265,6 +265,17 @@ def test_an_end_of_a_mode_that_the_series_have_hidden_is_told() -> None:
     passing.refuse_missed(next(made.guard for _, made in regime.watched if made.leave.to == "forward"), 1.0, beyond)
 
 
+def test_a_wheel_slips_in_the_way_it_is_pulled_where_the_rounding_of_a_moment_is_not_known() -> None:
+    net = wheel(sw.TorqueSource("pull", tau=3.0), sw.CoulombLoad("load", tau=2.0))
+    settling = Settling(net.compile().phases, {}, (0.0, 10.0))
+    regime = settling.regime(("stuck",))
+    met = next(made.guard for _, made in regime.watched if made.leave.to == "forward")
+    moment = Moment(regime, np.zeros(len(regime.assembly.model.states)))
+    moment, changes = settling.settle(0.0, 0.0, moment, met)
+    assert [(change.before, change.after) for change in changes] == [("stuck", "forward")]
+    assert moment.regime.modes == ("forward",)
+
+
 @pytest.mark.parametrize("engine", ["auto", "sundials", "scipy-radau"])
 def test_a_light_wheel_is_pushed_along_without_a_step_for_each_of_its_transients(engine: str) -> None:
     """Free it is no trouble; in contact it follows within 1e-9 s, and an explicit method would take 2e8 steps.

@@ -153,11 +153,8 @@ class Settling:
     def _at_once(self, moment: Moment, t: float, named: Way) -> list[Way]:
         """The guards that are met at the instant at which one is, in the order of their elements."""
         regime, others = moment.regime, [pair for pair in moment.regime.watched if pair is not named]
-        now, near = (
-            regime.limits(t, moment.x.tolist()),
-            [NEAR * band for band in moment.bands] or [math.inf] * len(others),
-        )
-        if all(pair[1].side * now[pair[1].guard] < -near[pair[1].guard] for pair in others):
+        now, bands = regime.limits(t, moment.x.tolist()), moment.bands
+        if bands and all(made.side * now[made.guard] < -NEAR * bands[made.guard] for _, made in others):
             return [named]
         ways = [pair for _, pair in self._exceeded(moment, t, moment, (), repeats=1)[1]]
         if named not in ways and (not named[1].leave.by_torque or all(pair[1].leave.by_torque for pair in ways)):
