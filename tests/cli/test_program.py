@@ -115,6 +115,26 @@ def test_check_prints_the_natural_frequencies_of_modes(tmp_path: Path, capsys: p
         assert words in capsys.readouterr().out
 
 
+def test_what_is_there_once_is_told_in_the_singular(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A wheel that is stuck until the torque has grown, and one without anything else."""
+    net = sw.Network("wheel")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.save(tmp_path / "bare.toml")
+    assert main(["check", str(tmp_path / "bare.toml")]) == DONE
+    assert "wheel: 1 part, 1 node, 1 branch\n" in capsys.readouterr().out
+    assert main(["modes", str(tmp_path / "bare.toml")]) == DONE
+    assert ": 1 mode\n" in capsys.readouterr().out
+    net.add(sw.CoulombLoad("load", tau=1.0), "a")
+    net.add(sw.TorqueSource("pull", tau=sw.t), "a")
+    net.save(tmp_path / "wheel.toml")
+    assert main(["run", str(tmp_path / "wheel.toml"), "--t-end", "2"]) == DONE
+    printed = capsys.readouterr().out
+    assert " steps, 1 change; energy residual" in printed
+    assert "2 phases, 1 event\n" in printed
+    assert main(["run", str(tmp_path / "wheel.toml"), "--t-end", "0.5"]) == DONE
+    assert "1 phase, 0 events\n" in capsys.readouterr().out
+
+
 def test_check_names_the_engine_of_a_network_without_states(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     net = sw.Network("driven")
     net.add(sw.SpeedSource("drive", omega=5.0), "a")

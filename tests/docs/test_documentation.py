@@ -61,11 +61,11 @@ def test_tables_that_take_minutes_are_what_the_code_makes_of_them(page: Path) ->
     ("old", "new", "agree"),
     [
         (
-            "299 steps, 1 changes; energy residual 2.3e-14 of the work done",
-            "301 steps, 1 changes; energy residual 7e-15 of the work done",
+            "299 steps, 1 change; energy residual 2.3e-14 of the work done",
+            "301 steps, 1 change; energy residual 7e-15 of the work done",
             True,
         ),
-        ("299 steps, 1 changes", "299 steps, 2 changes", False),
+        ("299 steps, 1 change", "299 steps, 2 changes", False),
         ("a residual of 2e-14", "a residual of 3e-14", False),
         ("| a  | b |", "| a | b |", True),
         ("shaft.tau  351.48", "shaft.tau   351.49", False),

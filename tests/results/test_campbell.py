@@ -128,7 +128,7 @@ def test_a_pump_that_sticks_at_rest_has_the_frequencies_of_a_running_one_where_i
     at_rest = net.campbell([10.0, 100.0], 1, at={})
     np.testing.assert_allclose(at_rest.frequencies[:, 0], held, rtol=1e-12)
     assert at_rest.about == "at rest (pump stuck)"
-    assert str(at_rest).startswith("pump drive at rest (pump stuck): 1 crossings from 10 to 100 rad/s")
+    assert str(at_rest).startswith("pump drive at rest (pump stuck): 1 crossing from 10 to 100 rad/s")
 
 
 @pytest.mark.parametrize("build", [_pump, _stiffening, sw.scenes.crane], ids=["friction", "law", "scene"])

@@ -10,6 +10,7 @@ from shaftwork.cli.folder import Folder, write_picture, write_rows
 from shaftwork.cli.models import end_of, load
 from shaftwork.core.domains import DOMAINS
 from shaftwork.core.progress import progress
+from shaftwork.core.screen import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -49,7 +50,7 @@ def run(options: Namespace, say: Say) -> Data:
         say(f"  chosen: {line}")
     signals = wanted or (scene.signals if scene else _worth_seeing(solution))
     say(f"engine {solution.engine}: {solution.why}")
-    counts = ", ".join(f"{count} {name}" for name, count in solution.statistics.items())
+    counts = ", ".join(f"{count} {_word(name, count)}" for name, count in solution.statistics.items())
     say(f"{counts}; energy residual {solution.energy_residual:.1e} of the work done\n")
     say(solution.extremes.table(signals))
     _say_phases(solution, say)
@@ -57,6 +58,11 @@ def run(options: Namespace, say: Say) -> Data:
         with folder.new_files(say) as place:
             _write(solution, signals, place)
     return _data(solution, signals)
+
+
+def _word(name: str, count: int) -> str:
+    """What a statistic counts, "steps", or "step" where there is one."""
+    return name if count != 1 or name == "rhs" else name.removesuffix("s")
 
 
 def _motion(net: Network, t_end: float, wanted: tuple[str, ...], options: Namespace) -> Solution:
@@ -108,7 +114,7 @@ def _say_phases(solution: Solution, say: Say) -> None:
     rows = solution.phases
     if not rows:
         return
-    say(f"\n{'from s':>9} {'to s':>9}  {len(rows)} phases, {len(solution.events)} events")
+    say(f"\n{'from s':>9} {'to s':>9}  {counted(len(rows), 'phase')}, {counted(len(solution.events), 'event')}")
     for number, row in enumerate(rows):
         if not LISTED <= number < len(rows) - LISTED:
             say(f"{row.start:9.4f} {row.end:9.4f}  {row.name}")

@@ -45,5 +45,5 @@ def shorter(text: str) -> str:
 
 
 def counted(number: int, what: str) -> str:
-    """A number and what it counts: "1 node", "2 nodes"."""
-    return f"{number} {what}{'' if number == 1 else 's'}"
+    """A number and what it counts: "1 node", "2 nodes", "2 branches"."""
+    return f"{number} {what}{'' if number == 1 else 'es' if what.endswith('ch') else 's'}"

@@ -12,6 +12,7 @@ from scipy import sparse
 
 from shaftwork.codegen.model import CompiledModel
 from shaftwork.core.errors import SimulationError
+from shaftwork.core.screen import counted
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.network import Network
 from shaftwork.pipeline.phases.model import PhasedModel
@@ -35,7 +36,8 @@ def structure_report(net: Network, model: Model, t_end: float) -> str:
 
 def _lines(net: Network, model: Model, t_end: float) -> Iterator[str]:
     graph = model.form.graph
-    yield f"{net.name}: {len(graph.parts)} parts, {len(graph.nodes)} nodes, {len(graph.branches)} branches"
+    counts = (len(graph.parts), "part"), (len(graph.nodes), "node"), (len(graph.branches), "branch")
+    yield f"{net.name}: {', '.join(counted(number, what) for number, what in counts)}"
     for problem in net.check():
         yield f"  {problem.severity}: {problem}"
     if graph.zeros:

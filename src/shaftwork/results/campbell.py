@@ -13,6 +13,7 @@ from scipy.optimize import linear_sum_assignment
 
 from shaftwork.core.errors import MissingExtraError, ParameterError
 from shaftwork.core.parameters import in_si, numbers_in_si
+from shaftwork.core.screen import counted
 from shaftwork.results.modes import Modes
 from shaftwork.results.observer import Array
 
@@ -67,7 +68,8 @@ class Campbell:
     f_max: float
 
     def __str__(self) -> str:
-        head = f"{self.heading}: {len(self.crossings)} crossings from {self.speeds[0]:g} to {self.speeds[-1]:g} rad/s"
+        crossings = counted(len(self.crossings), "crossing")
+        head = f"{self.heading}: {crossings} from {self.speeds[0]:g} to {self.speeds[-1]:g} rad/s"
         lines = [f"{'rad/s':>12}  {'1/min':>12}  {'order':>6}  {'Hz':>12}  mode"]
         for made in self.crossings:
             turns = made.speed * 30 / np.pi

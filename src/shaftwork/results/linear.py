@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from shaftwork.core.screen import counted
 from shaftwork.results.frequency import FrequencyResponse, frequency_response, unknown_output
 from shaftwork.results.modes import Modes, find_modes
 from shaftwork.results.observer import Array
@@ -143,7 +144,8 @@ class LinearModel:
         return frequency_response(self.title, self.slopes, (input, output), f)
 
     def __repr__(self) -> str:
-        sizes = f"{len(self.states)} states, {len(self.inputs)} inputs, {len(self.outputs)} outputs"
+        pairs = (self.states, "state"), (self.inputs, "input"), (self.outputs, "output")
+        sizes = ", ".join(counted(len(names), word) for names, word in pairs)
         return f"<LinearModel of '{self.title}': {sizes}>"
 
 

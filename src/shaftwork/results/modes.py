@@ -12,6 +12,7 @@ from scipy import sparse
 
 from shaftwork.core.errors import MissingExtraError, ParameterError, no_quantity
 from shaftwork.core.parameters import in_si, whole
+from shaftwork.core.screen import counted
 from shaftwork.results.eigenvalues import eigenmodes
 from shaftwork.results.observer import Array
 from shaftwork.results.slopes import Complex, Motions, Slopes
@@ -89,7 +90,7 @@ class Modes:
         for name, frequency, damping, rate, node in self.table:
             shown = f"{rate.real:z.5g}{rate.imag:+.5g}j" if rate.imag else f"{rate.real:z.5g}"
             lines.append(f"{name:<{width}}  {frequency:>12.6g}  {damping:>z10.4g}  {shown:>26}  {node}")
-        return "\n".join([f"{self.title}: {len(self)} modes", *lines])
+        return "\n".join([f"{self.title}: {counted(len(self), 'mode')}", *lines])
 
     def plot(self, *numbers: int) -> Figure:
         """The speeds of the nodes in each mode, in the order of the network (extra `plot`).

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from shaftwork.core.errors import MissingExtraError, ParameterError
 from shaftwork.core.files import replaced
 from shaftwork.core.parameters import whole
+from shaftwork.core.screen import counted
 from shaftwork.results.observer import Array
 
 if TYPE_CHECKING:
@@ -160,5 +161,5 @@ class Sweep:
         ]
         more = [f"and {len(self) - SHOWN} more"] if len(self) > SHOWN else []
         failed = int(self.failed.sum())
-        counts = f"{self.name}: {len(self)} variants, {int(passed.sum())} passed, {failed} failed"
+        counts = f"{self.name}: {counted(len(self), 'variant')}, {int(passed.sum())} passed, {failed} failed"
         return "\n".join([counts, *lines, *more])
