@@ -43,18 +43,21 @@ def test_a_page_is_what_the_code_makes_of_it(page: Path) -> None:
     for library in ("heyoka", "sksundae", "matplotlib", "pandas", "xarray"):
         pytest.importorskip(library, reason="the examples show what all extras together do")
     text = TEXTS[page.name]
-    made = remade(page, text)
-    different = [
-        (old, new) for old, new in zip(text.splitlines(), made.splitlines(), strict=False) if not same(old, new)
-    ]
-    assert same(text, made), different[:5]
+    assert_same(text, remade(page, text))
 
 
 @pytest.mark.slow
+@pytest.mark.xdist_group("study of stability")
 @pytest.mark.parametrize("page", [page for page in PAGES if any(name in TEXTS[page.name] for name in SLOW)])
 def test_tables_that_take_minutes_are_what_the_code_makes_of_them(page: Path) -> None:
     text = TEXTS[page.name]
-    assert same(text, remade(page, text, slow=True))
+    assert_same(text, remade(page, text, slow=True))
+
+
+def assert_same(text: str, made: str) -> None:
+    """A page is what the code made of it, or the lines that differ are shown."""
+    pairs = zip(text.splitlines(), made.splitlines(), strict=False)
+    assert same(text, made), [(old, new) for old, new in pairs if not same(old, new)][:5]
 
 
 @pytest.mark.parametrize(

@@ -50,7 +50,7 @@ def named_in(message: str) -> list[str]:
 
 
 def is_torque(name: str) -> bool:
-    return name.rpartition(".")[2].partition("_")[0] in ("tau", "f", "i", "phi", "s", "psi")
+    return name.rpartition(".")[2].partition("_")[0] in ("tau", "f", "i", "reaction", "phi", "s", "psi")
 
 
 def assert_met(sol: sw.Solution, initial: Mapping[str, float]) -> None:

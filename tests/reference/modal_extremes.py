@@ -45,8 +45,12 @@ class Oscillations:
 
     @property
     def rounding(self) -> float:
-        """How far rounding may move a value: modes and level are larger than what is left of them at the start."""
-        return 1e-14 * float(abs(self.level) + np.abs(self.weights).sum())
+        """How far rounding may move a value: modes and level are larger than what is left of them at the start.
+
+        Their rates and shapes are rounded too: a speed of 1.6e-8 rad/s ahead of a wave was off by 1e-13 of the sum of its
+        modes, where 50 digits agreed with the motion under test to 4e-11 of that speed.
+        """
+        return 1e-13 * float(abs(self.level) + np.abs(self.weights).sum())
 
     def bend(self, t: Array) -> Array:
         """A bound of the second derivative from each time (k,) on; no mode grows."""
