@@ -175,6 +175,34 @@ def test_the_crane_goes_on_from_the_middle_of_its_motion(end: float) -> None:
     assert [row.name for row in rest.phases[1:]] == [row.name for row in whole.phases if row.start > end]
 
 
+def overspeed(part: sw.Component) -> sw.Network:
+    """A wheel that is driven to 12 rad/s and then held back, with a part that may stop it."""
+    net = sw.Network("overspeed")
+    net.add(sw.TorqueSource("motor", tau=sw.Step(-20.0, start=0.6, before=20.0)), "shaft")
+    net.add(sw.Inertia("J", J=1.0), "shaft")
+    net.add(part, "shaft")
+    return net
+
+
+def went_on(net: sw.Network, t: float, end: float) -> sw.Solution:
+    """The motion from a time on, with all that is stored there."""
+    first = net.simulate(t)
+    return net.simulate(end, t_start=t, initial={name: first[name][-1] for name in first.states})
+
+
+def test_a_brake_that_may_have_come_on_before_is_said_to_be_released_when_a_motion_goes_on() -> None:
+    net = overspeed(sw.Brake("brake", tau=5.0, on=sw.omega - 10))
+    with pytest.warns(sw.AccuracyWarning, match="'brake' begins the motion that goes on at t_start = 1.1 s as 'rele"):
+        went_on(net, 1.1, 1.2)  # at 1.7 rad/s or less
+    went_on(net, 0.55, 0.58)  # at 11 rad/s it is on for certain
+
+
+def test_a_part_that_comes_on_at_a_known_time_goes_on_without_a_word() -> None:
+    net = overspeed(sw.Brake("brake", tau=5.0, t_on=0.3))
+    for t in (0.1, 0.5):
+        assert went_on(net, t, 0.7)["J.omega"][-1] == pytest.approx(net.simulate(0.7)["J.omega"][-1], rel=1e-9)
+
+
 def test_a_motion_that_goes_on_without_all_that_is_stored_is_refused_with_what_is_missing() -> None:
     """The states of one phase lack the twist of the gap: with it in the middle all else would be 6 % off."""
     crane_with_gap = sw.scenes.crane(gap=0.02).compile()

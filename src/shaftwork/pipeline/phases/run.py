@@ -27,7 +27,7 @@ from shaftwork.pipeline.phases.passing import Passing, Phase
 from shaftwork.pipeline.phases.phases import FOLLOWING, Phases
 from shaftwork.pipeline.phases.rejoining import settled
 from shaftwork.pipeline.phases.settling import Settling
-from shaftwork.pipeline.phases.starts import refuse_incomplete
+from shaftwork.pipeline.phases.starts import refuse_incomplete, warn_of_what_may_have_begun
 
 # So many changes of mode, each within this part of the run of the one before, are chatter. Rebounds come ever faster,
 # too, before they end: a thousand of them where nearly all speed is given back.
@@ -114,6 +114,9 @@ class Run:
         else:
             found = begins[0]
         moment, changes = found
+        if initial and start != 0:
+            for element, mode in zip(self.phases.elements, moment.regime.modes, strict=True):
+                warn_of_what_may_have_begun(element.name, element.modes, mode, start)
         self.note(start, changes)
         return moment
 

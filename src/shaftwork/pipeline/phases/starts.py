@@ -6,14 +6,16 @@ import math
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 
-from sympy import Integer, Piecewise, Symbol
+from sympy import Expr, Integer, Piecewise, Symbol
 from sympy.core.relational import Relational
 
 from shaftwork.codegen.code import branchwise, scalar
-from shaftwork.components.branches import ACROSS, INTEGRAL
+from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, readings_in
+from shaftwork.components.laws import line
 from shaftwork.components.laws import t as TIME
-from shaftwork.components.modes import Modes
-from shaftwork.core.errors import ParameterError
+from shaftwork.components.modes import ANEW, Modes
+from shaftwork.core.errors import AccuracyWarning, ParameterError
+from shaftwork.core.notices import warn
 
 
 @lru_cache(maxsize=256)
@@ -64,3 +66,31 @@ def refuse_incomplete(stored: tuple[str, ...], initial: Mapping[str, float], t_s
             f"state, and initial lacks {', '.join(missing)}. Take it from the motion before, "
             "initial={name: sol[name][-1] for name in sol.states}, or give 0.0 for what is at rest."
         )
+
+
+def warn_of_what_may_have_begun(name: str, modes: Modes, mode: str, t_start: float) -> None:
+    """Warn where a motion that goes on begins in a mode that parts leave for good, and not at a time known before.
+
+    So a brake with `on` waits; that it came on before, and `on` is no longer true, no speed and no twist tells.
+
+    Args:
+        name: of the part.
+        modes: of its element.
+        mode: in which the motion begins.
+        t_start: start of the motion, s.
+    """
+    ways = {leave.to for other in modes.options if other.name != mode for leave in other.leaves}
+    leaves = modes[mode].leaves
+    if ways & {mode, ANEW} or not any(leave.to == ANEW and not _at_a_known_time(leave.when) for leave in leaves):
+        return
+    warn(
+        f"'{name}' begins the motion that goes on at t_start = {t_start:g} s as '{modes[mode].words}'. Whether it came "
+        "on before, start values do not tell. If it did, simulate the whole motion in one run from its beginning.",
+        AccuracyWarning,
+    )
+
+
+def _at_a_known_time(when: Expr) -> bool:
+    """Whether a condition comes true at a time that follows from parameters alone."""
+    straight = None if when.has(ACROSS, INTEGRAL, THROUGH) or readings_in(when) else line(when)
+    return straight is not None and bool(straight[0].is_positive)
