@@ -5,6 +5,7 @@ The references are piecewise: each law comes with its own plain function and its
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
@@ -386,3 +387,61 @@ def test_a_time_that_is_listed_twice_is_read_before_and_after() -> None:
     low, high = found.sides(0.5)
     assert found.one_sided(np.array([0.25, 0.5, 0.5, 0.75])).tolist() == [0.25, low, high, 0.75]
     assert found.one_sided(np.array([np.nextafter(0.5, 0), 0.5])).tolist() == [low, high]
+
+
+TOUCHING = {
+    "floor of a sine": (sympy.floor(sympy.sin(3 * sw.t)), 4.0, -(4.0 - 2 * math.pi / 3)),
+    "floor of more": (sympy.floor(2 * sympy.sin(sympy.pi * sw.t)), 4.0, -2.0),
+    "sign": (sympy.sign((sw.t - 1) ** 2 * (sw.t - 2)), 4.0, 0.0),
+}
+"""Laws whose argument touches the next whole number or zero in the middle between two jumps, and their integrals."""
+
+
+@pytest.mark.parametrize("law", TOUCHING)
+@pytest.mark.parametrize("engine", ["auto", "scipy", pytest.param("sundials", marks=pytest.mark.slow)])
+def test_a_threshold_that_is_touched_is_not_passed(law: str, engine: str) -> None:
+    """heyoka read such a law where it touches, and kept the value: 0.19 for -1.9 rad/s."""
+    expression, end, momentum = TOUCHING[law]
+    net = sw.Network("touching")
+    net.add(sw.TorqueSource("T", tau=expression), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.TorqueSource("none", tau=0 * sw.omega**3), "a")
+    # the instants are found to rounding; steps add up to some hundred tolerances
+    assert net.simulate(end, engine=engine)["J.omega"][-1] == pytest.approx(momentum, rel=1e-6, abs=1e-6)
+
+
+def test_a_brake_whose_torque_touches_a_whole_number_takes_what_its_law_says() -> None:
+    net = sw.Network("brake")
+    net.add(sw.TorqueSource("T", tau=20.0), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.Brake("brake", tau=15 * sympy.floor(2 * sympy.cos(3 * sw.t))), "a")
+    assert net.simulate(3.0)["J.omega"][-1] == pytest.approx(60 - 5 * math.pi, rel=1e-7)  # 15 N m while cos > 1/2
+
+
+def test_a_switch_over_the_angle_that_is_touched_is_no_place_where_a_motion_sticks() -> None:
+    """A Table over a crank angle touches its last point in each turn."""
+    net = sw.Network("crank")
+    net.add(sw.TorqueSource("T", tau=sw.Table([-1, 0, 1], [0, 5, 20])(sympy.sin(3 * sw.phi)) + 1 - sw.omega), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    found, other = (net.simulate(4.0, engine=engine)["J.omega"][-1] for engine in ("auto", "scipy"))
+    assert found == pytest.approx(other, rel=1e-6)
+    assert found == pytest.approx(9.14892, rel=1e-5)  # scipy's DOP853 of the same equation by hand
+
+
+@pytest.mark.parametrize("engine", ["auto", "scipy", pytest.param("sundials", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("on", "first"),
+    [
+        (sympy.sin(sympy.pi * sw.t) ** 5000 - 0.5, math.asin(0.5 ** (1 / 5000)) / math.pi),
+        (sympy.exp(-(((sw.t - 2.3456) / 0.02) ** 2)) - 0.5, 2.3456 - 0.02 * math.sqrt(math.log(2))),
+    ],
+    ids=["wave", "bell"],
+)
+def test_no_pulse_that_switches_a_brake_on_is_missed(on: sympy.Expr, first: float, engine: str) -> None:
+    net = sw.Network("brake")
+    net.add(sw.TorqueSource("T", tau=2.0), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.Brake("brake", tau=50.0, on=on), "a")
+    sol = net.simulate(4.0, engine=engine)
+    assert sol.events[0][0] == pytest.approx(first, abs=1e-8)  # of a flank of 1e-4 s a tolerance of 1e-8 is as much
+    assert sol["J.omega"][-1] == 0.0

@@ -123,7 +123,7 @@ def test_a_run_that_chatters_ends_with_the_time_and_what_to_do(engine: str) -> N
         body(-2 * sympy.sign(sw.omega)).simulate(1.0, engine=engine, initial={"J.omega": 1.0})
 
 
-@pytest.mark.parametrize("engine", ["auto", "heyoka"])
+@pytest.mark.parametrize("engine", [pytest.param("auto", marks=pytest.mark.slow), "heyoka"])
 def test_a_motion_that_sticks_is_named_at_the_time_where_it_does(engine: str) -> None:
     with pytest.raises(sw.SimulationError, match=r"failed at t = 0\.5 s.*sticks.*smooth transition.*'J\.omega' = 0 "):
         body(-2 * sympy.sign(sw.omega)).simulate(1.0, engine=engine, initial={"J.omega": 1.0})

@@ -47,8 +47,8 @@ class Oscillations:
     def rounding(self) -> float:
         """How far rounding may move a value: modes and level are larger than what is left of them at the start.
 
-        Their rates and shapes are rounded too: a speed of 1.6e-8 rad/s ahead of a wave was off by 1e-13 of the sum of its
-        modes, where 50 digits agreed with the motion under test to 4e-11 of that speed.
+        Their rates and shapes are rounded too: a speed of 1.6e-8 rad/s ahead of a wave was off by 1e-13 of the sum of
+        its modes, where 50 digits agreed with the motion under test to 4e-11 of that speed.
         """
         return 1e-13 * float(abs(self.level) + np.abs(self.weights).sum())
 

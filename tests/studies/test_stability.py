@@ -42,7 +42,7 @@ def test_what_does_not_run_names_its_reason(study: sw.studies.Stability) -> None
         assert bool(cell.why) or cell.verdict in ("right", "coarse")
         assert cell.verdict not in ("warned", "failed", "unknown")
         if cell.verdict == "too long":
-            assert "3000 steps were not enough" in cell.why
+            assert "3300 steps were not enough" in cell.why
 
 
 @pytest.mark.slow
@@ -232,7 +232,9 @@ def test_the_table_is_written_and_drawn(study: sw.studies.Stability, tmp_path: P
     assert float(rows[0]["error"]) == study.cells[0].error
     pytest.importorskip("matplotlib")
     figure = study.plot()
-    assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == list(dict.fromkeys(cell.case for cell in study.cells))
+    assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == list(
+        dict.fromkeys(cell.case for cell in study.cells)
+    )
 
 
 @pytest.mark.parametrize("engines", [["auto"], ["auto", "exact", "scipy"]], ids=len)

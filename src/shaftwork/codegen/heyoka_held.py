@@ -45,12 +45,12 @@ class HeldParameters:
         self.by_switch = {held.switch: k for k, held in enumerate(self.functions) if held.switch is not None}
         self._variables = list(variables)
 
-    def start(self, t: float, middle: float, x: Array, parameters: Array) -> None:
+    def start(self, t: float, there: float, x: Array, parameters: Array) -> None:
         """Set all of them for a piece of a run.
 
         Args:
             t: its start, s.
-            middle: a time inside it, s, at which those that depend on the time alone are read.
+            there: a time inside it, s, at which those that depend on the time alone are read.
             x: (n,) state at the start.
             parameters: (p,) of the program, up to the held ones at least; changed in place.
         """
@@ -58,7 +58,7 @@ class HeldParameters:
         all_timed = all(held.timed for held in self.functions)
         for _ in self.functions:  # one may be an argument of the next
             before = values.copy()
-            inside = self._arguments(middle, x, parameters)
+            inside = self._arguments(there, x, parameters)
             at_start = inside if all_timed else self._arguments(t, x, parameters)
             for k, held in enumerate(self.functions):
                 values[k] = held.value(*(inside if held.timed else at_start)[k])

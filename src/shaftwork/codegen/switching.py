@@ -168,8 +168,8 @@ def _switches(form: StateForm) -> Iterator[_Switch]:
 
 def _narrow(form: StateForm) -> Iterator[_Switch]:
     """Where laws may have pulses and edges that are narrower than any step."""
-    for part, law, symbols, acts in _laws(form):
-        for argument, far in narrow_places(law) if acts and law.has(TIME) else ():
+    for part, law, symbols, _ in _laws(form):
+        for argument, far in narrow_places(law) if law.has(TIME) else ():
             places = tuple(part.parameters[symbol.name] for symbol in symbols)
             if argument.free_symbols <= {TIME, *symbols}:
                 yield replace(_made(part, argument, (0.0,), symbols, places), far=far)
@@ -177,8 +177,8 @@ def _narrow(form: StateForm) -> Iterator[_Switch]:
 
 def _unsolved(form: StateForm) -> Iterator[_Switch]:
     """Functions of time that are sampled for pulses and edges."""
-    for part, law, symbols, acts in _laws(form):
-        for function in dict.fromkeys(unsolved_places(law, symbols)) if acts and law.has(TIME) else ():
+    for part, law, symbols, _ in _laws(form):
+        for function in dict.fromkeys(unsolved_places(law, symbols)) if law.has(TIME) else ():
             places = tuple(part.parameters[symbol.name] for symbol in symbols)
             yield _made(part, function, (), symbols, places)
 

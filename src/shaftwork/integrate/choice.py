@@ -147,15 +147,18 @@ def solve(
     if name != "heyoka" or not (fallback or engine == "auto"):
         trajectory = _guarded(problem, load(name)(problem), name)
         return trajectory, name, f"{why or reason} {trajectory.remark}".rstrip()
-    from shaftwork.integrate.problem import SeriesError
+    from shaftwork.integrate.problem import SeriesError, StickingError
 
     try:
         return _guarded(problem, load(name)(problem), name), name, why or reason
-    except SeriesError:
+    except SeriesError as error:
+        failed = error
         *tried, last = without_series(problem.max_steps)
     for other, because, steps in tried:
         with suppress(SimulationError):
             return _guarded(problem, load(other)(replace(problem, max_steps=steps)), other), other, because
+    if tried and isinstance(failed, StickingError):
+        raise failed
     return _guarded(problem, load(last[0])(problem), last[0]), *last[:2]
 
 

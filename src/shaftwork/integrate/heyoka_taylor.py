@@ -23,8 +23,8 @@ from shaftwork.integrate.pieces import (
     start_of_piece,
     used_up,
 )
-from shaftwork.integrate.problem import Array, Problem, SeriesError, Trajectory
-from shaftwork.integrate.switches import Watch, keeps_sides, settle
+from shaftwork.integrate.problem import Array, Problem, SeriesError, StickingError, Trajectory
+from shaftwork.integrate.switches import SOMEWHERE, Watch, keeps_sides, settle
 
 # The cost grows only with the logarithm of the tolerance, and a loose one loses events.
 LOOSEST_TOLERANCE, TIGHTEST_TOLERANCE = 1e-10, 1e-15
@@ -107,7 +107,8 @@ class _Run:
         # heyoka keeps no parameters behind the last one that the rows contain
         used = min(integrator.pars.size, self.parameters.size)
         if self.program.held is not None:
-            self.program.held.start(piece.start, (piece.low + piece.high) / 2, self.start, self.parameters)
+            inside = piece.low + SOMEWHERE * (piece.high - piece.low)
+            self.program.held.start(piece.start, inside, self.start, self.parameters)
         integrator.pars[:used] = self.parameters[:used]
         integrator.reset_cooldowns() if integrator.with_events else None
         if self.problem.guards is not None:
@@ -246,8 +247,9 @@ class _Run:
     def _failure(self, piece: Piece, outcome: str, watch: Watch | None) -> SimulationError:
         time, state = self._last_good(piece, watch)
         made = failure(self.problem, "heyoka", time, state, self._reason(outcome, watch))
-        no_number = outcome == "err_nf_state" or (watch is not None and watch.valueless)
-        return SeriesError(*made.args) if no_number else made
+        if watch is not None and watch.reason is not None:
+            return StickingError(*made.args)
+        return SeriesError(*made.args) if outcome == "err_nf_state" else made
 
     def _last_good(self, piece: Piece, watch: Watch | None) -> tuple[float, Array]:
         """Time and state at the end of the last good step of a run that has failed in a piece."""

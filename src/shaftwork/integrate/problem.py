@@ -124,6 +124,10 @@ class SeriesError(SimulationError):
     """
 
 
+class StickingError(SeriesError):
+    """A motion sticks where laws on both sides drive it back, or only touches the place: another engine can tell."""
+
+
 class React(Protocol):
     """How a run goes on past guards; only engines that gain by it ask."""
 

@@ -18,6 +18,8 @@ ROUNDINGS = 256 * float(np.finfo(float).eps)
 # Where in a trial step a switch that starts at zero is looked at: as early as it is not lost in rounding.
 EARLY = (1e-4, 1e-2, 1e-1)
 
+# Where in a piece switches of the time are read: a law that touches its threshold does so in the middle, if anywhere.
+SOMEWHERE = 0.381966
 # Where in a step the sides of the switches are looked at: at no regular places, which a wave might share.
 INSIDE = np.array([0.07, 0.19, 0.31, 0.42, 0.53, 0.61, 0.74, 0.83, 0.91, 1.0])
 
@@ -36,11 +38,11 @@ def settle(program: Any, integrator: Any, horizon: float) -> None:
     first = program.parameter_count
     parameters, signs = integrator.pars[:first], integrator.pars[first : first + len(program.switches)]
     timed = signs * program.timed
-    middle = program.switch_signs(integrator.time + horizon / 2, integrator.state, parameters, timed)
+    inside = program.switch_signs(integrator.time + SOMEWHERE * horizon, integrator.state, parameters, timed)
     if program.all_timed:
-        signs[:] = middle
+        signs[:] = inside
         return
-    signs[:] = program.switch_signs(integrator.time, integrator.state, parameters, middle * program.timed)
+    signs[:] = program.switch_signs(integrator.time, integrator.state, parameters, inside * program.timed)
     if (near := _within_rounding(program, integrator) & ~program.timed).any():
         kept = signs.copy()
         signs[near] = 0.0
@@ -147,8 +149,6 @@ class Watch:
         self.reason: str | None = None
         self.leaves = False
         """Whether a switch that rested at zero has stopped the run."""
-        self.valueless = False
-        """Whether a switch that is no number has stopped it."""
 
     def __call__(self, integrator: Any) -> bool:
         now, state, parameters = integrator.time, integrator.state, integrator.pars
@@ -164,7 +164,7 @@ class Watch:
             return True
         if np.isnan(values).any():
             condition = self._program.conditions[int(np.argmax(np.isnan(values)))]
-            self.reason, self.valueless = f"the condition {condition} is neither true nor false", True
+            self.reason = f"the condition {condition} is neither true nor false"
             self.last_good = now, state.copy()
             return False
         return self._looked_at(integrator, values, signs, inside)

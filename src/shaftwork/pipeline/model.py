@@ -354,9 +354,9 @@ class Model(CompiledModel):
 
         if initial and span[0] != 0:
             warn(
-                f"The motion goes on at t_start = {span[0]:g} s without the waves that were on their way through shafts: "
-                "start values tell of their ends alone, and the torque of a shaft begins as in steady operation. "
-                "Simulate the whole motion in one run, or take another model of the shaft, such as Lumped(20).",
+                f"The motion goes on at t_start = {span[0]:g} s without the waves that were on their way through "
+                "shafts: start values tell of their ends alone, and the torque of a shaft begins as in steady "
+                "operation. Simulate all of it in one run, or take another model of the shaft, such as Lumped(20).",
                 AccuracyWarning,
             )
         given = dict(zip(self.parameters, prepared.p.tolist(), strict=True))

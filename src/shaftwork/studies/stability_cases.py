@@ -76,7 +76,7 @@ class Case:
     models: tuple[ShaftModel, ...] = MODELS
     engines: tuple[str, ...] = ()
     periods: int = 0
-    steps: int = 3000
+    steps: int = 3300
 
     def __post_init__(self) -> None:
         if self.form not in get_args(Form):

@@ -18,7 +18,7 @@ from shaftwork.codegen.timeline import Timeline
 from shaftwork.core.errors import AccuracyWarning, SimulationError
 from shaftwork.core.notices import warn
 from shaftwork.integrate import choice
-from shaftwork.integrate.problem import Problem, SeriesError, Trajectory
+from shaftwork.integrate.problem import Problem, SeriesError, StickingError, Trajectory
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.implicit import PRESCRIBED, at_rest
 from shaftwork.pipeline.phases.assemblies import Assembly
@@ -241,15 +241,19 @@ class Run:
         first = min(most, choice.patience(problem)) if stiff else most
         others = [(name, why, most)] if stiff else choice.without_series(most)
         *tried, (last, last_why, _) = [("heyoka", why, first), *others]
+        sticks: StickingError | None = None
         for engine, because, steps in tried:
             try:
                 return self._solve(replace(problem, max_steps=steps), engine, because), passing
             except SimulationError as error:
+                sticks = error if isinstance(error, StickingError) else sticks
                 if engine == "heyoka" and not stiff and not isinstance(error, SeriesError):
                     raise
             del self.changes[noted:]
             self._soon = [*soon]
             passing = Passing(self.settling, moment, t, self.note)
+        if sticks is not None and len(tried) > 1:
+            raise sticks
         return self._solve(problem, last, last_why), passing
 
     def _solve(self, problem: Problem, name: str, why: str) -> Trajectory:
