@@ -350,15 +350,10 @@ class Model(CompiledModel):
         _, after = self.switching.timeline(prepared.p, *span).sides(span[0])
         if not self.form.waves:
             return initial_state(prepared.bound, {} if initial is None else initial, after), None
-        from shaftwork.pipeline.waves import start_of_waves
+        from shaftwork.pipeline.waves import start_of_waves, warn_of_lost_waves
 
         if initial and span[0] != 0:
-            warn(
-                f"The motion goes on at t_start = {span[0]:g} s without the waves that were on their way through "
-                "shafts: start values tell of their ends alone, and the torque of a shaft begins as in steady "
-                "operation. Simulate all of it in one run, or take another model of the shaft, such as Lumped(20).",
-                AccuracyWarning,
-            )
+            warn_of_lost_waves(span[0])
         given = dict(zip(self.parameters, prepared.p.tolist(), strict=True))
         return start_of_waves(prepared.bound, self._twin.bind(self._twin.vector(given)), initial or {}, after)
 

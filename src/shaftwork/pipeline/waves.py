@@ -87,6 +87,16 @@ def twin(netlist: Netlist) -> Netlist:
     return Netlist(netlist.name, tuple(placed))
 
 
+def warn_of_lost_waves(t_start: float) -> None:
+    """Warn of a motion that goes on at a time in s: its nothing of what is on its way is in its start values."""
+    warn(
+        f"The motion goes on at t_start = {t_start:g} s without the waves that were on their way through shafts: start "
+        "values tell of their ends alone, and the torque of a shaft begins as in steady operation. Simulate all of it "
+        "in one run, or take another model of the shaft, such as Lumped(20).",
+        AccuracyWarning,
+    )
+
+
 def start_of_waves(
     bound: BoundArrays, twin: BoundArrays, given: Mapping[str, float], t0: float
 ) -> tuple[Array, WaveStart]:
