@@ -227,6 +227,62 @@ def test_laws_enter_by_their_slopes_at_the_operating_point(rotor: bool) -> None:
         np.testing.assert_allclose(next(responses), next(responses), rtol=1e-9)
 
 
+def test_a_load_that_sticks_holds_its_end_of_an_exact_shaft() -> None:
+    """A disc on a clamped shaft: J omega = Z cot(omega T), of which rounding is left."""
+    net = sw.Network("stuck")
+    net.add(sw.Inertia("J1", J=0.03), "a")
+    net.add(sw.Shaft("shaft", length=1.0, diameter=0.02, **STEEL), "a", "b")
+    net.add(sw.Inertia("J2", J=0.1), "b")
+    net.add(sw.CoulombLoad("load", tau=10.0), "b")
+    modes = net.modes(exact=True, count=1)
+    assert modes.title == "stuck at rest (load stuck)"
+    wave, polar = np.sqrt(STEEL["shear_modulus"] / STEEL["density"]), np.pi * 0.02**4 / 32
+    omega, impedance = modes.rates[0].imag, polar * np.sqrt(STEEL["density"] * STEEL["shear_modulus"])
+    np.testing.assert_allclose(0.03 * omega * np.tan(omega * 1.0 / wave), impedance, rtol=1e-9)
+    assert abs(modes.rates[0].real) < 1e-9 * omega
+
+
+RUNNING = {"a.omega": 4.0, "b.omega": 4.0, "c.omega": 2.0}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("part", "at", "phase"),
+    [
+        (sw.DryFriction("rub", tau_c=10.0, tau_s=20.0), None, "rub stuck"),
+        (sw.DryFriction("rub", tau_c=10.0, tau_s=20.0, omega_s=3.0), RUNNING, "rub slipping forward"),
+        (sw.Freewheel("wheel"), None, "wheel locked"),
+        (sw.Freewheel("wheel"), {"c.omega": 2.0}, "wheel free"),
+        (sw.Backlash("gap", gap=0.1, c=1e5, d=3.0), {"gap.phi": 0.06}, "gap in contact"),
+        (sw.Backlash("gap", gap=0.1), None, "gap open"),
+        (sw.Brake("brake", tau=10.0, on=1.0), None, "brake locked"),
+        (sw.LossyGear("gear", ratio=2.0, efficiency=0.9), RUNNING, "gear driving forward"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_parts_are_in_the_mode_that_goes_on_at_the_point(part: sw.Component, at: Any, phase: str) -> None:
+    """As with a mesh of 16 pieces, whose error is rounding here; without the mode a stuck load would be a damper."""
+    nets = []
+    for model in (sw.Lumped(6), sw.Spectral(16)):
+        net = sw.Network("train")
+        net.add(sw.TorqueSource("motor", tau=3.0), "b")
+        net.add(sw.Inertia("J1", J=20.0), "a")
+        net.add(sw.Shaft("shaft", length=6.0, diameter=0.14, model=model), "a", "b")
+        net.add(sw.Inertia("J2", J=90.0), "b")
+        net.add(part, "b", "c")
+        net.add(sw.Inertia("J3", J=9.0), "c")
+        nets.append(net)
+    exact, mesh = nets[0].modes(at, exact=True, f_max=300.0), nets[1].modes(at, f_max=300.0)
+    assert exact.title == mesh.title
+    assert exact.title.endswith(f"({phase})")
+    _assert_equal_rates(exact, mesh)
+    f = np.array([1.0, 30.0, 250.0])
+    responses = (
+        net.frequency_response("motor.tau", "J3.omega", f, at=at, exact=net is nets[0]).values for net in nets
+    )
+    np.testing.assert_allclose(next(responses), next(responses), rtol=1e-9, atol=1e-15)
+
+
 @pytest.mark.slow
 def test_a_motion_with_waves_is_a_point() -> None:
     net = _crane(sw.Wave())
@@ -293,7 +349,7 @@ def test_the_point_of_a_motion_is_its_end_in_time_too() -> None:
     sol = net.simulate(0.01, initial={"rotor.omega": 5.0})
     end = {name: float(sol[name][-1]) for name in ("rotor.omega", "load.omega")}
     for t, time in ((None, 0.01), (0.002, 0.002)):
-        found, wanted = net.modes(sol, 3, t=t), net.modes(end, 3, t=time)
+        found, wanted = net.modes(sol.at([0.01]), 3, t=t), net.modes(end, 3, t=time)
         np.testing.assert_allclose(found.rates, wanted.rates, rtol=1e-9)
 
 

@@ -14,15 +14,16 @@ REMEDY = "Take another model of the shaft, such as Lumped(20) or Spectral(8)"
 
 
 def with_one_law(netlist: Netlist, graph: CircuitGraph) -> Netlist:
-    """The network with the laws of all modes in one, for the parts that have several.
+    """The network with the laws of all modes in one, for the parts that have several and of which none is chosen.
 
     Raises:
         ParameterError: what a part does in its modes cannot be one law: a freewheel, a rigid gap.
     """
-    modal = [part.name for part in graph.parts if part.modes]
+    free = {item.part.name for item in netlist.placed if not item.choices}
+    modal = [part.name for part in graph.parts if part.modes and part.name in free]
     made = netlist.with_choices(dict.fromkeys(modal, ALL_IN_ONE))
     for part in build_graph(made).parts if modal else ():
-        if _joins(part, rubs=False) and not part.branches:
+        if part.name in free and _joins(part, rubs=False) and not part.branches:
             raise ParameterError(
                 f"{title(part.component)} changes its mode, which travelling waves do not follow. {REMEDY}."
             )

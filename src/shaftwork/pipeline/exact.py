@@ -14,7 +14,7 @@ from shaftwork.codegen.linear import Linearization
 from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.recovery import History
 from shaftwork.codegen.start_values import initial_state
-from shaftwork.components.modes import ALL_IN_ONE
+from shaftwork.components.modes import ALL_IN_ONE, Choice
 from shaftwork.components.shaft_models import MOST_SPECTRAL, OneSpring, Rigid, Spectral, Wave
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import AccuracyWarning, NetworkWarning, ParameterError
@@ -27,6 +27,7 @@ from shaftwork.pipeline.analysis import (
     Point,
     SmallMotions,
     Time,
+    about,
     input_names,
     moment_of,
     near,
@@ -34,6 +35,8 @@ from shaftwork.pipeline.analysis import (
     titled,
 )
 from shaftwork.pipeline.model import Model
+from shaftwork.pipeline.phases.assemblies import ModeNames
+from shaftwork.pipeline.phases.model import PhasedModel
 from shaftwork.results.exact import ExactModel, ExactSlopes
 from shaftwork.results.exact_lines import ExactLines
 from shaftwork.results.modes import Modes, find_modes
@@ -57,6 +60,8 @@ def small_motions(model: Model, compiled: Compile, *, every: bool) -> SmallMotio
         every: whether all its shafts are exact, or those alone that are waves.
     """
     shafts = exact_shafts(model.netlist, every=every)
+    if shafts and isinstance(model, PhasedModel):
+        return ExactPhases(model, compiled, shafts).near
     if shafts:
         return ExactNetwork(model, compiled, shafts).near
     return lambda at, t, inputs: model.linearize(at, inputs=inputs, t=t)
@@ -99,19 +104,18 @@ class ExactNetwork:
         return self._with({name: dataclasses.replace(shaft, **lossless) for name, shaft in self._shafts.items()})
 
     def _with(self, shafts: Mapping[str, Shaft]) -> Model:
-        """The network with shafts replaced, and the laws of all modes in one, as beside waves.
+        """The network with shafts replaced, in the modes that are chosen; beside waves, with the laws of all in one.
 
         Its warnings are those of the network itself, already given.
         """
-        modal = any(part.modes for part in self._model.form.graph.parts)
-        if not shafts and not modal:
+        if not shafts:
             return self._model
-        choices = ALL_IN_ONE if modal else ()
+        choices = ALL_IN_ONE if self._model.form.waves else ()
         placed = tuple(
-            dataclasses.replace(item, part=shafts.get(item.part.name, item.part), choices=choices)
+            dataclasses.replace(item, part=shafts.get(item.part.name, item.part), choices=item.choices or choices)
             for item in self._model.netlist.placed
         )
-        with muted(NetworkWarning, *((AccuracyWarning,) if self._model.form.waves else ())):
+        with muted(NetworkWarning, AccuracyWarning):
             return self._compiled(Netlist(self._model.name, placed))
 
     @cached_property
@@ -143,15 +147,26 @@ class ExactNetwork:
             t, at = time if t is None else t, _values_of(at, self.lines.names)
         p = self._own.vector()
         time, x = operating_point(self._own, p, at, t, self._own.settled(p))
-        values = self._read(time, x)
-        names, title = (
-            input_names(self._own, inputs),
-            titled(self._model.name, near(self._own, given, time)),
-        )
+        return self.around(time, x, inputs, titled(self._model.name, near(self._own, given, time)))
+
+    def around(self, time: float, x: Array, inputs: Names, title: str) -> ExactModel:
+        """The network near a point that is known.
+
+        Args:
+            time: at which laws are read, s.
+            x: (n,) the states of the network with meshes in place of waves.
+            inputs: names; None for all sources.
+            title: what is linearised.
+
+        Raises:
+            SignalError: there is no such input.
+            SimulationError: a law has no finite slope at the point.
+        """
+        values, names = self._read(time, x), input_names(self._own, inputs)
         slopes = ExactSlopes(
             open=self._opened(values, time, names, History(self._own.bind(), np.array([time]), x[None, :])),
             lines=self.lines,
-            meshed=Linearization(self._own, p, x, time, ()),
+            meshed=Linearization(self._own, self._own.vector(), x, time, ()),
             profiles=ModelObserver(self._model.form, self._model.bind).profiles,
             lengths=tuple(p["length"] for p in self._values),
         )
@@ -209,6 +224,45 @@ class ExactNetwork:
         shafts = zip(self._shafts.items(), degrees, strict=True)
         changed = {name: dataclasses.replace(shaft, model=Spectral(degree)) for (name, shaft), degree in shafts}
         return self._meshes(degrees, lambda: self._with(changed))
+
+
+class ExactPhases:
+    """A network whose parts change their mode, with some shafts exact; compiled once for each phase.
+
+    Args:
+        model: the network as it is.
+        compiled: makes the model of a changed netlist.
+        shafts: the exact ones, by name, in the order of the network; none of them is a wave.
+    """
+
+    def __init__(self, model: PhasedModel, compiled: Compile, shafts: Mapping[str, Shaft]) -> None:
+        self._model, self._compiled, self._shafts = model, compiled, shafts
+        self._networks = Kept[ModeNames, ExactNetwork](MESHES)
+
+    def near(self, at: Point, t: Time = None, inputs: Names = ()) -> ExactModel:
+        """The network near a point, in the modes that go on there; arguments as for `Model.linearize`.
+
+        Raises:
+            SignalError: there is no such input.
+            SimulationError: a law has no finite slope at the point.
+        """
+        time, moment = self._model.point({}, at, t)
+        modes = moment.regime.modes
+        network = self._networks(modes, lambda: ExactNetwork(self._in(modes), self._compiled, self._shafts))
+        title = titled(self._model.name, about(self._model, at, time), self._model.words(moment))
+        return network.around(time, moment.x, inputs, title)
+
+    def _in(self, modes: ModeNames) -> Model:
+        """The network in one phase."""
+        phases, chosen = self._model.phases, dict[str, tuple[Choice, ...]]()
+        netlist = phases.assembly(modes).model.netlist
+        forms = {item.part.name: iter(item.choices) for item in netlist.placed}
+        for element, name in zip(phases.elements, modes, strict=True):
+            owner = element.part.name
+            choice = dataclasses.replace(next(forms[owner]), value=element.modes[name].value)
+            chosen[owner] = (*chosen.get(owner, ()), choice)
+        with muted(NetworkWarning):
+            return self._compiled(netlist.with_choices(chosen))
 
 
 def _values_of(motion: Solution, shafts: tuple[str, ...]) -> dict[str, float]:

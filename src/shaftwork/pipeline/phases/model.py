@@ -155,7 +155,7 @@ class PhasedModel(Model):
             SimulationError: no modes go together there.
         """
         demand = Demand((0.0, 1.0), 1e-8, None, None, "auto", 1, None)
-        return self._words(Run(self.phases, {}, demand).begin(None))
+        return self.words(Run(self.phases, {}, demand).begin(None))
 
     def _choice(self, demand: Demand) -> tuple[str, str]:
         return Run(self.phases, {}, demand).choose()
@@ -182,7 +182,7 @@ class PhasedModel(Model):
                 return settling.held(moment, when)
         raise SimulationError(
             f"No steady operation was found: after {MOST_CHANGES} changes of its modes '{self.name}' still goes on, "
-            f"with {self._words(moment)}. Give a start near the operating point."
+            f"with {self.words(moment)}. Give a start near the operating point."
         )
 
     def point(self, values: Mapping[str, float], at: Point, t: Time) -> tuple[float, Moment]:
@@ -215,10 +215,10 @@ class PhasedModel(Model):
         model = moment.regime.assembly.model
         slopes = Linearization(model, moment.regime.p, moment.x, time, input_names(model, inputs))
         named = None if outputs is None else (outputs,) if isinstance(outputs, str) else tuple(outputs)
-        title = titled(self.name, about(model, at, time), self._words(moment))
+        title = titled(self.name, about(model, at, time), self.words(moment))
         return linear_model(title, slopes, named, moment.x, time)
 
-    def _words(self, moment: Moment) -> str:
+    def words(self, moment: Moment) -> str:
         """The phase of a moment, "gap open, brake locked"."""
         pairs = zip(self.phases.elements, moment.regime.modes, strict=True)
         return ", ".join(f"{element.name} {element.modes[name].words}" for element, name in pairs)
