@@ -277,9 +277,7 @@ def test_parts_are_in_the_mode_that_goes_on_at_the_point(part: sw.Component, at:
     assert exact.title.endswith(f"({phase})")
     _assert_equal_rates(exact, mesh)
     f = np.array([1.0, 30.0, 250.0])
-    responses = (
-        net.frequency_response("motor.tau", "J3.omega", f, at=at, exact=net is nets[0]).values for net in nets
-    )
+    responses = (net.frequency_response("motor.tau", "J3.omega", f, at=at, exact=net is nets[0]).values for net in nets)
     np.testing.assert_allclose(next(responses), next(responses), rtol=1e-9, atol=1e-15)
 
 
