@@ -419,3 +419,19 @@ def test_a_clutch_to_a_swinging_speed_gives_way_though_that_speed_bends_the_othe
     twist = a * omega / (k**2 - omega**2) * (math.cos(omega * t) - math.cos(k * t))
     assert c * twist + J1 * a * omega * math.cos(omega * t) == pytest.approx(most, rel=1e-8)
     assert sol["clutch.tau"][-1] == pytest.approx(most, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "engine", ["scipy", *(pytest.param(name, marks=pytest.mark.slow) for name in ("scipy-radau", "sundials", "heyoka"))]
+)
+def test_a_stribeck_friction_between_two_wheels_breaks_away_with_every_engine(engine: str) -> None:
+    """It breaks away without acceleration: DOP853 and Radau cut a step at the top of the fall of its torque for ever."""
+    net = sw.Network("stick and slip")
+    net.add(sw.TorqueSource("T", tau=20 * sympy.sin(30 * sw.t) + 15 * sympy.sin(7 * sw.t)), "a")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.DryFriction("friction", tau_c=8.0, tau_s=12.0, omega_s=0.2, d=0.1), "a", "b")
+    net.add(sw.Inertia("J2", J=2.0), "b")
+    net.add(sw.Spring("spring", c=300.0, d=0.4), "b", "ground")
+    sol = net.simulate(0.4, engine=engine, t_eval=2)
+    # stuck until the torque on J1 less what J2 takes of it is 12 N m; the times are of four engines
+    assert [time for time, *_ in sol.events] == pytest.approx([0.028085166, 0.167445, 0.202162], rel=3e-6)

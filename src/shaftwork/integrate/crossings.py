@@ -96,6 +96,8 @@ class Crossings:
         stands = end - time <= max(BEARABLE / PAST * past, self._clearance)
         target = end if stands else time + max(past, self._clearance / 2)
         if again and not stands:
+            # what breaks away begins without acceleration: for many such steps rounding keeps it where it starts
+            self._rests[column] += look.values[0, column] == 0
             return self._settled(start, end, target)
         near = abs(look.values[0, column]) <= LEFT * band[column]
         self._rests[column], self._within = (self._rests[column] + 1, self._within + 1) if near else (0, 0)
