@@ -425,7 +425,7 @@ def test_a_clutch_to_a_swinging_speed_gives_way_though_that_speed_bends_the_othe
     "engine", ["scipy", *(pytest.param(name, marks=pytest.mark.slow) for name in ("scipy-radau", "sundials", "heyoka"))]
 )
 def test_a_stribeck_friction_between_two_wheels_breaks_away_with_every_engine(engine: str) -> None:
-    """It breaks away without acceleration: DOP853 and Radau cut a step at the top of the fall of its torque for ever."""
+    """It breaks away without acceleration: DOP853 and Radau cut each step where its torque is largest."""
     net = sw.Network("stick and slip")
     net.add(sw.TorqueSource("T", tau=20 * sympy.sin(30 * sw.t) + 15 * sympy.sin(7 * sw.t)), "a")
     net.add(sw.Inertia("J1", J=1.0), "a")
