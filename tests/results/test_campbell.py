@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from typing import Any
 
 import numpy as np
@@ -189,6 +190,28 @@ def test_titles_name_the_time_at_which_laws_that_depend_on_it_are_read() -> None
     )
     net.add(sw.Brake("brake", tau=1.0, t_on=7.0), "b")
     assert net.modes(t=2.0).title == "ramp at rest, laws at t = 2 s (brake released)"
+
+
+@pytest.mark.parametrize("parts", [(), (sw.Brake("brake", tau=10.0, t_on=30.0),)], ids=["", "brake"])
+def test_the_time_of_a_steady_state_is_that_of_the_point(parts: tuple[sw.Component, ...]) -> None:
+    """A damping that grows by the second, 0.1 t: 0.2 at 2 s, and 0.8 at 8 s, where the last breakpoint is past."""
+    net = sw.Network("ageing")
+    net.add(sw.TorqueSource("motor", tau=sw.Table([0.0, 7.0], [1.0, 1.0])), "a")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.TorqueSource("bearing", tau=-0.1 * sw.t * sw.omega), "a")
+    for part in parts:
+        net.add(part, "a")
+    model = net.compile()
+    steady = model.steady_state(t=2.0)
+    assert steady["J1.omega"] == pytest.approx(5.0)
+    for point in (steady, pickle.loads(pickle.dumps(steady))):  # noqa: S301 (our own)
+        linear = model.linearize(point)
+        assert linear.t == 2.0
+        assert linear.A[0, 0] == pytest.approx(-0.2)
+        assert net.modes(point).rates[0] == pytest.approx(-0.2)
+        assert "laws at t = 2 s" in net.modes(point).title
+        assert abs(net.frequency_response("motor.tau", "J1.omega", 1e-6, at=point).values[0]) == pytest.approx(5.0)
+    assert model.linearize(steady, t=4.0).A[0, 0] == pytest.approx(-0.4)
 
 
 def test_titles_name_no_time_where_no_law_depends_on_it() -> None:

@@ -16,6 +16,7 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import briefly, in_si
 from shaftwork.network.templates import Kind
 from shaftwork.network.wording import listed
+from shaftwork.pipeline.settled import SteadyState
 from shaftwork.results import campbell as diagram
 from shaftwork.results.exact import ExactModel
 from shaftwork.results.linear import LinearModel, linear_model
@@ -43,7 +44,7 @@ def linearized(
         model: the compiled model.
         p: parameter vector.
         at: speeds, twists and torques at the point, what is not named at rest; or a motion at one time; None for rest.
-        t: time at which the laws are read, s; None for that of the motion, or else `settled`.
+        t: time at which the laws are read, s; None for that of the motion or steady state, or else `settled`.
         settled: a time after which no law switches any more, s.
         inputs: names; None for all sources.
         outputs: names; None for the states.
@@ -100,7 +101,8 @@ def operating_point(model: CompiledModel, p: Array, at: Point, t: Time, settled:
     if isinstance(at, Solution):
         time, x = moment_of(at, tuple(state.name for state in model.form.states))
         return time if t is None else in_si("t", t, "s"), x
-    time = settled if t is None else in_si("t", t, "s")
+    usual = at.t if isinstance(at, SteadyState) else settled
+    time = usual if t is None else in_si("t", t, "s")
     return time, initial_state(model.bind(p), at if at is not None else {}, time)
 
 

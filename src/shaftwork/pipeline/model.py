@@ -39,7 +39,7 @@ from shaftwork.pipeline.arguments import (
 from shaftwork.pipeline.implicit import IMPLICIT, PRESCRIBED, at_rest, solve_loops, start_of_loops
 from shaftwork.pipeline.overview import model_overview
 from shaftwork.pipeline.prepared import Prepared, nominal_tolerances, observed
-from shaftwork.pipeline.settled import refuse_moving, warn_of_earlier_levels
+from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels
 from shaftwork.pipeline.sizes import in_its_size
 from shaftwork.pipeline.stored import Rebuild, Repetition, call_of, model_again, remember
 from shaftwork.reduction.form import StateForm
@@ -167,8 +167,8 @@ class Model(CompiledModel):
         *,
         initial: Mapping[str, float] | None = None,
         parameters: Mapping[str, float] | None = None,
-    ) -> dict[str, float]:
-        """The steady operation that the drive runs to, as start values for `simulate`.
+    ) -> SteadyState:
+        """The steady operation that the drive runs to, as start values for `simulate` and as a point for `linearize`.
 
         Args:
             t: time at which the sources are read; by default after their last breakpoint, with a warning where they
@@ -185,7 +185,7 @@ class Model(CompiledModel):
             return self._variant(values).steady_state(time, initial=initial)
         return self._steady(values, time, initial)
 
-    def _steady(self, values: Mapping[str, float], t: float, initial: Given) -> dict[str, float]:
+    def _steady(self, values: Mapping[str, float], t: float, initial: Given) -> SteadyState:
         if self.form.waves:
             return self._twin.steady_state(t, initial=initial, parameters=values)
         prepared = self.prepare(self.vector(values) if values else self.defaults)
@@ -196,7 +196,7 @@ class Model(CompiledModel):
         x = steady_state(prepared.bound, start, when)
         if not math.isfinite(t):
             warn_of_earlier_levels(prepared.bound, x, when, self.switching)
-        return dict(zip(self.states, x.tolist(), strict=True))
+        return SteadyState(dict(zip(self.states, x.tolist(), strict=True)), when)
 
     def linearize(
         self, at: Point = None, *, inputs: Names = None, outputs: Names = None, t: Time = None, parameters: Given = None
@@ -207,8 +207,8 @@ class Model(CompiledModel):
             at: `steady_state()`, speeds, twists and torques by name, or a motion at one time; by default rest.
             inputs: what sources give, "motor.tau", "drive.omega"; by default all of it.
             outputs: any quantities; by default the states.
-            t: time at which laws are read, s; by default that of the motion, or after their last breakpoint; of parts
-                that change their mode, at rest, 0.
+            t: time at which laws are read, s; by default that of the motion or of the steady state, or after their last
+                breakpoint; of parts that change their mode, at rest, 0.
             parameters: values that differ from the network's.
 
         Raises:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -27,6 +27,19 @@ NAMED = 3
 """Laws that a message shows."""
 MIDDLE = (1.0, 1.0 + SAME, 1.0)
 """Of a level that lasts its middle is named."""
+
+
+class SteadyState(dict[str, float]):
+    """A steady operation: start values by name, with the time in s at which its laws were read.
+
+    Args:
+        values: "part.quantity" to value in SI.
+        t: the time.
+    """
+
+    def __init__(self, values: Mapping[str, float], t: float) -> None:
+        super().__init__(values)
+        self.t = t
 
 
 def refuse_moving(bound: BoundArrays, t: float, switching: Switching) -> None:

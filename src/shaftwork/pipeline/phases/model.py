@@ -37,7 +37,7 @@ from shaftwork.pipeline.phases.phases import Phases
 from shaftwork.pipeline.phases.run import Run
 from shaftwork.pipeline.phases.settling import Settling
 from shaftwork.pipeline.phases.solution import solution
-from shaftwork.pipeline.settled import refuse_moving, warn_of_earlier_levels
+from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels
 from shaftwork.pipeline.sizes import in_its_size
 from shaftwork.reduction.form import StateForm
 from shaftwork.results.linear import LinearModel, linear_model
@@ -160,7 +160,7 @@ class PhasedModel(Model):
     def _choice(self, demand: Demand) -> tuple[str, str]:
         return Run(self.phases, {}, demand).choose()
 
-    def _steady(self, values: Mapping[str, float], t: float, initial: Given) -> dict[str, float]:
+    def _steady(self, values: Mapping[str, float], t: float, initial: Given) -> SteadyState:
         """Steady states of one set of equations after another, until no mode changes there."""
         first = self.phases.assembly(self.phases.first)
         when = t if math.isfinite(t) else first.model.settled(first.vector(values, {}))
@@ -179,7 +179,7 @@ class PhasedModel(Model):
                 if not math.isfinite(t):
                     assembly = moment.regime.assembly
                     warn_of_earlier_levels(assembly.bound(moment.regime.p), moment.x, when, assembly.model.switching)
-                return settling.held(moment, when)
+                return SteadyState(settling.held(moment, when), when)
         raise SimulationError(
             f"No steady operation was found: after {MOST_CHANGES} changes of its modes '{self.name}' still goes on, "
             f"with {self.words(moment)}. Give a start near the operating point."
