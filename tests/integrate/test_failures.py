@@ -12,6 +12,7 @@ from scipy import sparse
 from shaftwork.codegen.heyoka import build
 from shaftwork.core.errors import MissingExtraError, ParameterError, SimulationError
 from shaftwork.integrate import choice
+from shaftwork.integrate.engines import available
 from shaftwork.integrate.problem import Problem
 
 NUMERIC = ["scipy", "scipy-radau", "sundials"]
@@ -111,6 +112,6 @@ def test_an_unknown_engine_is_answered_with_the_list(oscillator):
 @pytest.mark.parametrize(("engine", "extra"), [("heyoka", "fast"), ("sundials", "stiff")])
 def test_a_missing_library_is_answered_with_its_extra(oscillator, monkeypatch, engine, extra):
     monkeypatch.setattr("importlib.util.find_spec", lambda _name: None)
-    assert not choice.available(engine)
+    assert not available(engine)
     with pytest.raises(MissingExtraError, match=rf"shaftwork\[{extra}\]"):
         choice.solve(oscillator.problem, engine)

@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 
 import shaftwork as sw
 from shaftwork.core.errors import AccuracyWarning
-from shaftwork.integrate.choice import ENGINES, available
+from shaftwork.integrate.engines import ENGINES, available
 from tests.properties.examples import share_of_examples
 
 STIFFNESS, TORQUE, PERIODS = 1000.0, 10.0, 3.0

@@ -10,8 +10,8 @@ import sympy
 from scipy.integrate import solve_ivp
 
 import shaftwork as sw
-from shaftwork.integrate import choice
 from shaftwork.integrate.crossings import Crossings
+from shaftwork.integrate.engines import available
 from shaftwork.integrate.pieces import pieces
 from shaftwork.integrate.problem import Problem
 
@@ -136,7 +136,7 @@ MOTIONS = {
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_every_engine_follows_a_motion_through_its_switches(motion: str, engine: str) -> None:
     """The gap is closed at 2.52 s for 8 ms in the midst of a free flight, where every method takes longer steps."""
-    if not choice.available(engine):
+    if not available(engine):
         pytest.skip(f"{engine} is not installed")
     if (motion, engine) == ("gap", "banded"):  # a part with modes, which this engine does not follow, and says so
         with pytest.raises(sw.ParameterError, match="gap"):
@@ -210,7 +210,7 @@ RESTS = {
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("rest", RESTS)
 def test_a_motion_that_comes_to_rest_on_a_switch_goes_on(rest: str, engine: str) -> None:
-    if not choice.available(engine):
+    if not available(engine):
         pytest.skip(f"{engine} is not installed")
     law, place = RESTS[rest]
     sol = body(law).simulate(200.0, engine=engine, rtol=1e-6, initial={"J.omega": 2.0})

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 import shaftwork as sw
-from shaftwork.integrate import choice
+from shaftwork.integrate.engines import ENGINES
 
 
 def joined(*parts: sw.Component) -> sw.Network:
@@ -48,8 +48,31 @@ def test_the_engine_that_is_named_before_a_run_is_that_of_the_run(name: str) -> 
 def test_loops_without_sundials_are_solved_by_radau_and_refused_where_it_is_asked_for(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setitem(choice.ENGINES, "sundials", replace(choice.ENGINES["sundials"], library="not_there"))
+    monkeypatch.setitem(ENGINES, "sundials", replace(ENGINES["sundials"], library="not_there"))
     sol = looped().simulate(0.01, initial={"J.omega": 1.0})
     assert (sol.engine, "massless nodes" in sol.why) == ("scipy-radau", True)
     with pytest.raises(sw.MissingExtraError, match="engine='sundials'"):
         looped().simulate(0.1, engine="sundials")
+
+
+@pytest.mark.parametrize(("engine", "finest"), [("banded", "1e-11"), ("scipy", "2.2e-14"), ("sundials", "1.8e-15")])
+def test_an_engine_that_is_asked_for_says_where_it_cannot_keep_a_tolerance(engine: str, finest: str) -> None:
+    pytest.importorskip("sksundae")
+    model = sw.scenes.shaft_chain(m=3).compile()
+    with pytest.warns(
+        sw.AccuracyWarning, match=f"finer than the engine '{engine}' can keep: .* with {finest}. Ask for"
+    ):
+        sol = model.simulate(1e-4, engine=engine, rtol=1e-15)
+    assert (
+        sol.why
+        == f"asked for. rtol = 1e-15 is finer than the engine '{engine}' can keep: the run is made with {finest}."
+    )
+    assert model.simulate(1e-4, engine=engine, rtol=1e-10).why == "asked for"
+
+
+def test_an_engine_that_auto_takes_says_it_where_it_says_why() -> None:
+    waves, exact = CHOICES["wave"](), CHOICES["linear"]()
+    assert waves.simulate(1e-3, rtol=1e-13).why.endswith(
+        "together. rtol = 1e-13 is finer than the engine 'wave' can keep: the run is made with 1e-12."
+    )
+    assert "finer" not in exact.simulate(1e-3, rtol=1e-15).why

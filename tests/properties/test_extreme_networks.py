@@ -25,7 +25,7 @@ pytest.importorskip("flint")
 COUNT = int(os.environ.get("SHAFTWORK_EXTREMES", max(20, settings().max_examples // 5)))
 # Engines that step give up early: a motion that rings 1e12 times has no end for them.
 LIMITS = {"banded": 3000, "scipy-radau": 400, "sundials": 20_000, "heyoka": 5000, "scipy": 5000}
-ENGINES = ("auto", "exact", *(name for name in LIMITS if sw.integrate.choice.available(name)))
+ENGINES = ("auto", "exact", *(name for name in LIMITS if sw.integrate.engines.available(name)))
 
 
 def verdicts(engine: str, count: int) -> dict[int, str]:

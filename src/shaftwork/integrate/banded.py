@@ -18,6 +18,7 @@ from shaftwork.integrate.banded_matrix import ShiftedMatrix
 from shaftwork.integrate.banded_method import ShiftedCollocation, shifted_collocation
 from shaftwork.integrate.banded_stages import LinearStages, NewtonStages, Stages, StepStart, shifted
 from shaftwork.integrate.crossings import Crossings
+from shaftwork.integrate.engines import ENGINES
 from shaftwork.integrate.pieces import (
     Pace,
     Piece,
@@ -31,8 +32,6 @@ from shaftwork.integrate.pieces import (
 from shaftwork.integrate.problem import Array, Problem, Trajectory
 
 STAGES = 6
-# Rounding in the stage equations allows no tighter tolerance.
-TIGHTEST_RTOL = 1e-11
 # A step grows at least by the first factor, because its factors are made anew, and at most by the second.
 WORTH, GROW = 1.5, 8.0
 SAFETY, SHRINK, NEWTON_SHRINK = 0.9, 0.1, 0.25
@@ -172,7 +171,7 @@ class _Run:
         self.steps: list[_Step] = []
         self.ends: list[Array] = []
         self.rejected = 0
-        self._rtol, self._pace = max(problem.rtol, TIGHTEST_RTOL), Pace(problem)
+        self._rtol, self._pace = max(problem.rtol, ENGINES["banded"].finest), Pace(problem)
 
     def scale(self, x: Array) -> Array:
         """The tolerance (n,) of each state."""

@@ -1,61 +1,18 @@
-"""The engines by name, and which one suits a problem."""
+"""Which engine suits a problem."""
 
 from __future__ import annotations
 
 import importlib
-import importlib.util
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from shaftwork.core.errors import MissingExtraError, ParameterError, SimulationError
+from shaftwork.integrate.engines import ADAMS, ENGINES, INNER
 from shaftwork.integrate.problem import Engine, Problem, Trajectory
 
 # Why another engine goes on where heyoka stopped.
 NOT_ANALYTIC = "A law has no Taylor series where the motion passes (a square root at zero), so {} is taken."
 
-
-@dataclass(frozen=True)
-class EngineEntry:
-    """Where an engine lives.
-
-    Args:
-        function: "module:function".
-        purpose: what it is for, half a sentence.
-        library: module it needs beyond numpy and scipy, or None.
-        distribution: name of that library for pip.
-        extra: the extra that brings it.
-        options: keyword arguments of the function.
-    """
-
-    function: str
-    purpose: str
-    library: str | None = None
-    distribution: str = ""
-    extra: str = ""
-    options: tuple[tuple[str, str], ...] = ()
-
-    @property
-    def installed(self) -> bool:
-        """Whether the library it needs can be imported."""
-        return self.library is None or importlib.util.find_spec(self.library) is not None
-
-
-ENGINES: dict[str, EngineEntry] = {
-    "exact": EngineEntry("shaftwork.integrate.exact:solve", "linear systems, without a step error"),
-    "heyoka": EngineEntry(
-        "shaftwork.integrate.heyoka_taylor:solve", "smooth and piecewise laws, compiled", "heyoka", "heyoka", "fast"
-    ),
-    "sundials": EngineEntry(
-        "shaftwork.integrate.sundials:solve", "stiff systems", "sksundae", "scikit-sundae", "stiff"
-    ),
-    "scipy": EngineEntry("shaftwork.integrate.scipy_ivp:solve", "everything that is not stiff"),
-    "scipy-radau": EngineEntry("shaftwork.integrate.scipy_ivp:solve", "stiff systems", options=(("method", "Radau"),)),
-    "banded": EngineEntry("shaftwork.integrate.banded:solve", "long chains, linear or stiff"),
-}
-
-# Another method of an engine, which a run chooses by itself.
-ADAMS = "sundials-adams"
-_INNER = {ADAMS: replace(ENGINES["sundials"], options=(("method", "Adams"),))}
 
 # The exact engine is taken up to this estimate of its time; an adaptive one may then be the faster. On a damped chain
 # the banded engine is: 0.3 s at 1400 states and rtol 1e-8, where the exact one takes 4 s.
@@ -117,11 +74,6 @@ def is_stiff(problem: Problem) -> bool:
 def patience(problem: Problem) -> int:
     """Steps of heyoka that cost as much as a transient of an implicit engine: a stiff phase may be over by then."""
     return int(TRANSIENT_STEPS * CVODE_STEP / (HEYOKA_STEP_PER_STATE * problem.x0.size))
-
-
-def available(name: str) -> bool:
-    """Whether the engine of this name can be used here."""
-    return ENGINES[name].installed
 
 
 def solve(
@@ -199,9 +151,9 @@ def load(name: str) -> Engine:
         ParameterError: no engine has this name.
         MissingExtraError: the engine's library is not installed.
     """
-    if name not in _INNER:
+    if name not in INNER:
         check(name)
-    entry = _INNER.get(name) or ENGINES[name]
+    entry = INNER.get(name) or ENGINES[name]
     if not entry.installed:
         raise MissingExtraError(entry.distribution, entry.extra, f"engine={name!r}")
     module, function = entry.function.split(":")

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from shaftwork.core.errors import MissingExtraError, SimulationError
+from shaftwork.integrate.engines import ENGINES
 from shaftwork.integrate.heyoka_recorders import GUARD, GridRecorder, SegmentRecorder
 from shaftwork.integrate.pieces import (
     Piece,
@@ -27,7 +28,7 @@ from shaftwork.integrate.problem import Array, Problem, SeriesError, StickingErr
 from shaftwork.integrate.switches import SOMEWHERE, Watch, keeps_sides, settle
 
 # The cost grows only with the logarithm of the tolerance, and a loose one loses events.
-LOOSEST_TOLERANCE, TIGHTEST_TOLERANCE = 1e-10, 1e-15
+LOOSEST_TOLERANCE = 1e-10
 
 # The series of a first step must satisfy the equations to this part of the state and its change; each trial that does
 # not is followed by one of a quarter of its length.
@@ -80,7 +81,7 @@ def solve(problem: Problem) -> Trajectory:
 
 
 def _tolerance(problem: Problem) -> float:
-    return min(max(problem.rtol, TIGHTEST_TOLERANCE), LOOSEST_TOLERANCE) * problem.overall
+    return min(max(problem.rtol, ENGINES["heyoka"].finest), LOOSEST_TOLERANCE) * problem.overall
 
 
 class _Run:

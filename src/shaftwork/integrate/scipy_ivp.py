@@ -12,6 +12,7 @@ from scipy.integrate import DOP853, OdeSolution, Radau
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.cancellation import cancellation
 from shaftwork.integrate.crossings import Crossings
+from shaftwork.integrate.engines import ENGINES
 from shaftwork.integrate.guards import LEAST, SHORTER, GuardWatch
 from shaftwork.integrate.pieces import (
     GuardedFunctions,
@@ -32,8 +33,7 @@ Method = Literal["DOP853", "Radau"]
 
 METHODS: dict[str, Any] = {"DOP853": DOP853, "Radau": Radau}
 
-# Below this relative tolerance scipy's methods only warn and clip, so it is clipped here without the warning.
-TIGHTEST_RTOL = 100 * np.finfo(float).eps
+FINEST = ENGINES["scipy"].finest
 
 # A run is made again where the torques of dampers may be off by more than the first factor times the tolerance. On the
 # edge of stability errors are some 50 times as large as the tolerance that is asked for, hence the second.
@@ -78,7 +78,7 @@ def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
         few = slice(None) if problem.guards is None else [0, -1]  # of many short runs, each tells a little
         factor = cancellation(problem, times[few], states[few])
         if BEARABLE < factor < 1 / np.finfo(float).eps:  # it is beyond all bounds where nothing has moved yet
-            share = max(1 / (EDGE * factor), TIGHTEST_RTOL / problem.rtol)
+            share = max(1 / (EDGE * factor), FINEST / problem.rtol)
             tight = tightened(problem, share)
             decay = rates(problem).decay
             again = _march(tight, method, longest=STABLE / decay if decay > 0 else np.inf)
@@ -200,7 +200,7 @@ def _rows(dense: Callable[[Array], Array]) -> Callable[[Array], Array]:
 
 
 def _solver(problem: Problem, piece: Piece, x: Array, method: Method, guard: GuardedFunctions, longest: float) -> Any:
-    options: dict[str, Any] = {"rtol": max(problem.rtol, TIGHTEST_RTOL), "atol": problem.atol, "max_step": longest}
+    options: dict[str, Any] = {"rtol": max(problem.rtol, FINEST), "atol": problem.atol, "max_step": longest}
     if method != "DOP853" and problem.jacobian is not None:
         options["jac"] = guard.jacobian
     return METHODS[method](guard.rhs, piece.start, x, piece.end, **options)

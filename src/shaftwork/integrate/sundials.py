@@ -16,6 +16,7 @@ from shaftwork.core.notices import FILTERS
 from shaftwork.core.quiet import unprinted
 from shaftwork.integrate.chebyshev import Polynomial, points
 from shaftwork.integrate.crossings import Crossings
+from shaftwork.integrate.engines import ENGINES
 from shaftwork.integrate.guards import CLEARANCE, LEAST, SHORTER, GuardWatch, share_of_tolerance
 from shaftwork.integrate.pieces import (
     GuardedFunctions,
@@ -40,8 +41,9 @@ DEGREES = {"BDF": 5, "Adams": 12}
 # matrix, which costs more than the factorisation saves.
 LARGEST_DENSE = 100
 # A run up to a guard is made again where this part of its tolerance would not do, and where it is not as tight already:
-# absolute tolerances of small twists may be that tight. A relative one near the rounding of numbers SUNDIALS refuses.
-ENOUGH, TIGHTEST_ATOL, TIGHTEST_RTOL = 0.5, 1e-17, 8 * float(np.finfo(float).eps)
+# absolute tolerances of small twists may be that tight.
+ENOUGH, TIGHTEST_ATOL = 0.5, 1e-17
+FINEST = ENGINES["sundials"].finest
 
 
 @dataclass(frozen=True)
@@ -152,7 +154,7 @@ def _open_cvode(problem: Problem, piece: Piece, x: Array, method: Method, patter
     def rhs(t: float, y: Array, derivative: Array) -> None:
         derivative[:] = guard.rhs(t, y)
 
-    options: dict[str, Any] = {"method": method, "rtol": max(problem.rtol, TIGHTEST_RTOL), "atol": problem.atol}
+    options: dict[str, Any] = {"method": method, "rtol": max(problem.rtol, FINEST), "atol": problem.atol}
     if problem.jacobian is not None:
         options |= _linear_solver(guard, piece, x, pattern)
     least = CLEARANCE * float(np.spacing(abs(piece.start)))
@@ -199,7 +201,7 @@ def _open_ida(problem: DaeProblem, piece: Piece, x: Array) -> _Opened:
 
     solver = IDA(
         residual,
-        rtol=max(problem.rtol, TIGHTEST_RTOL),
+        rtol=max(problem.rtol, FINEST),
         atol=problem.atol,
         algebraic_idx=list(problem.algebraic),
         calc_initcond="yp0",

@@ -18,13 +18,14 @@ from shaftwork.codegen.start_values import initial_state
 from shaftwork.codegen.switching import Switching
 from shaftwork.codegen.valueless import rough, without_value
 from shaftwork.core.callbacks import Told
-from shaftwork.core.errors import AccuracyWarning, CompileError, ParameterError
+from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.core.kept import Kept
-from shaftwork.core.notices import warn
 from shaftwork.core.parameters import in_si
 from shaftwork.integrate import choice
+from shaftwork.integrate.engines import available
 from shaftwork.integrate.problem import Fractions, LinearInputs, Problem, Trajectory
 from shaftwork.network.netlist import Netlist
+from shaftwork.pipeline.accuracy import with_accuracy
 from shaftwork.pipeline.arguments import (
     Demand,
     OutputTimes,
@@ -133,9 +134,7 @@ class Model(CompiledModel):
         told = Told(progress)
         demand = Demand(span, *asked, told if progress else None)
         made = dict(zip(self.parameters, self.defaults.tolist(), strict=True)) | values
-        motion = told.of(lambda: self._motion(values, initial, demand))
-        if motion.caveat:
-            warn(motion.caveat, AccuracyWarning)
+        motion = with_accuracy(told.of(lambda: self._motion(values, initial, demand)), demand)
         again = Repetition(self._rebuild, self.netlist, call_of(motion, demand, values, initial), self)
         return replace(motion, parameters=made, initial=dict(initial or {}), rtol=demand.rtol, again=again)
 
@@ -269,7 +268,7 @@ class Model(CompiledModel):
         if asked != "auto":
             return asked, "asked for"
         if self.form.loop_laws:
-            return "sundials" if choice.available("sundials") else "scipy-radau", IMPLICIT
+            return "sundials" if available("sundials") else "scipy-radau", IMPLICIT
         key = (problem.t0, problem.t_end, problem.rtol)
         for run, p, chosen in self._choices:
             if run == key and ((p / SIMILAR < prepared.p) == (prepared.p < p * SIMILAR)).all():
@@ -326,7 +325,7 @@ class Model(CompiledModel):
     @cached_property
     def _program(self) -> Any:
         """The heyoka program, where there are rows, heyoka is installed and knows every function in them."""
-        if self.rows is None or not choice.available("heyoka"):
+        if self.rows is None or not available("heyoka"):
             return None
         from shaftwork.codegen.heyoka import build
         from shaftwork.components.laws import t as time

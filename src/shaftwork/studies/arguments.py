@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from shaftwork.components.shaft_models import ShaftModel
 from shaftwork.core.errors import ParameterError
-from shaftwork.integrate.choice import ENGINES
+from shaftwork.integrate.engines import ENGINES
 
 NAMES = ("auto", *ENGINES, "wave")
 """What an engine may be called in a study."""

@@ -16,7 +16,7 @@ import numpy as np
 from shaftwork.components.shaft_models import ShaftModel, Wave
 from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError
 from shaftwork.core.files import replaced
-from shaftwork.integrate.choice import ENGINES, available
+from shaftwork.integrate.engines import ENGINES, available
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.prepared import NOMINAL
 from shaftwork.results.observer import Array

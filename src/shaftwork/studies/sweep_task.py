@@ -22,7 +22,7 @@ from shaftwork.core.errors import (
     no_quantity,
 )
 from shaftwork.core.notices import muted
-from shaftwork.integrate.choice import available
+from shaftwork.integrate.engines import available
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.network import Network
 from shaftwork.results.fatigue import SNLine

@@ -10,12 +10,12 @@ import numpy as np
 
 from shaftwork.core.errors import AccuracyWarning
 from shaftwork.core.notices import warn
+from shaftwork.integrate.engines import WAVE
 from shaftwork.integrate.lossless.collocation import STAGES
 from shaftwork.integrate.lossless.lattice import ROUNDING, Lattice
 from shaftwork.integrate.lossless.leaps import Far, Leaps
 from shaftwork.integrate.lossless.lines import DelayProblem, DelayTrajectory
 from shaftwork.integrate.lossless.panel_maps import Matrices, panel_map
-from shaftwork.integrate.lossless.scales import TIGHTEST_RTOL
 
 # Delays are whole multiples of a part of the shortest one, up to rounding, and no longer than so many of them.
 MOST_PARTS, MOST_PERIODS = 12, 64
@@ -46,7 +46,7 @@ def solve(problem: DelayProblem) -> DelayTrajectory | None:
     pattern = _first_pattern(problem, period)
     matrices, twice = Matrices.of(problem), 2 * np.repeat(problem.impedances, 2)
     map_of = cache(lambda length: panel_map(matrices, twice, length * period))
-    rtol = max(problem.rtol, TIGHTEST_RTOL)
+    rtol = max(problem.rtol, WAVE.finest)
     # A beginning shows which panels are too long; a short motion shows it as fast.
     resolved = (problem.t_end - problem.t0) / period * len(pattern) < SHORT
     while True:

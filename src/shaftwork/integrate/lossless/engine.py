@@ -8,11 +8,12 @@ import math
 import numpy as np
 
 from shaftwork.core.errors import SimulationError
+from shaftwork.integrate.engines import WAVE
 from shaftwork.integrate.lossless import commensurate
 from shaftwork.integrate.lossless.collocation import GAUSS, LEFT, RADAU, RIGHT, Scheme
 from shaftwork.integrate.lossless.lines import DelayProblem, DelayTrajectory, Lines, past_of
 from shaftwork.integrate.lossless.panels import History
-from shaftwork.integrate.lossless.scales import RESOLVED, TIGHTEST_RTOL, Scales
+from shaftwork.integrate.lossless.scales import RESOLVED, Scales
 from shaftwork.integrate.lossless.stages import Stages
 from shaftwork.integrate.lossless.waveforms import Panels, trajectory
 from shaftwork.integrate.pieces import failure, pieces, start_of_piece
@@ -62,7 +63,7 @@ class _March:
     def __init__(self, problem: DelayProblem) -> None:
         self._problem = problem
         self._lines = Lines.of(problem.delays)
-        self._rtol = max(problem.rtol, TIGHTEST_RTOL)
+        self._rtol = max(problem.rtol, WAVE.finest)
         self._shortest = min(self._lines.delays)
         grain = math.ulp(max(abs(problem.t0), abs(problem.t_end)))
         self._merge = max(8 * grain, 1e-4 * self._rtol * self._shortest)

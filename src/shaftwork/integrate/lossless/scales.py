@@ -9,8 +9,6 @@ from shaftwork.integrate.problem import Array
 
 # The part of the tolerance that what a panel leaves out may take.
 RESOLVED = 0.1
-# Coefficients of rounded numbers do not decay below this part of the largest.
-TIGHTEST_RTOL = 1e-12
 # A line whose waves are weaker than this part of the strongest, in the root of their power, is resolved no better.
 IDLE = 1e-3
 # The scale follows what has grown by more than this factor.

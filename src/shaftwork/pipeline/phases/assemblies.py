@@ -27,7 +27,7 @@ from shaftwork.components.modes import Leave, Mode, Modes
 from shaftwork.components.pieces import pieces_degree
 from shaftwork.core.errors import CompileError, no_value
 from shaftwork.core.kept import Kept
-from shaftwork.integrate.choice import available
+from shaftwork.integrate.engines import available
 from shaftwork.integrate.problem import Guards, Problem
 from shaftwork.network.graph import GraphPart
 from shaftwork.pipeline.phases.rates import rates_of

@@ -10,6 +10,7 @@ from shaftwork.core.errors import NetworkError, NetworkWarning, ParameterError
 from shaftwork.core.kept import Kept
 from shaftwork.core.notices import muted
 from shaftwork.integrate import choice
+from shaftwork.integrate.engines import ADAMS, available
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.phases.assemblies import Assembly, ModeNames, elements_of
@@ -25,9 +26,9 @@ FOLLOWING = {
     "scipy": (1 / 30, 1e-7),
     "scipy-radau": (1 / 30, 1e-7),
     "sundials": (1 / 300, 1e-8),
-    choice.ADAMS: (1 / 100, 1e-8),
+    ADAMS: (1 / 100, 1e-8),
 }
-_ENGINES = ", ".join(name for name in FOLLOWING if name != choice.ADAMS)
+_ENGINES = ", ".join(name for name in FOLLOWING if name != ADAMS)
 
 
 class Phases:
@@ -107,7 +108,7 @@ class Phases:
             if asked != "sundials":
                 return asked, "asked for"
             if key not in self._engines:
-                adams = choice.ADAMS, "asked for; the motion is not stiff, so Adams' formulas are taken."
+                adams = ADAMS, "asked for; the motion is not stiff, so Adams' formulas are taken."
                 self._engines[key] = (asked, "asked for") if choice.is_stiff(problem()) else adams
             return self._engines[key]
         if key not in self._engines:
@@ -116,7 +117,7 @@ class Phases:
                 return next(iter(easy.values()))
             name, why = choice.choose(problem())
             if name not in FOLLOWING:  # that of long chains
-                name = "sundials" if choice.available("sundials") else "scipy-radau"
+                name = "sundials" if available("sundials") else "scipy-radau"
             if name == "heyoka":
                 easy |= dict.fromkeys(enumerate(modes), (name, why))
             self._engines[key] = name, why

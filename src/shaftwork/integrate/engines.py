@@ -1,0 +1,78 @@
+"""The engines by name: where each lives, what it needs and how fine a tolerance it keeps."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True)
+class EngineEntry:
+    """Where an engine lives.
+
+    Args:
+        function: "module:function".
+        purpose: what it is for, half a sentence.
+        library: module it needs beyond numpy and scipy, or None.
+        distribution: name of that library for pip.
+        extra: the extra that brings it.
+        options: keyword arguments of the function.
+        finest: relative tolerance below which it takes none; 0 where it has no step error.
+    """
+
+    function: str
+    purpose: str
+    library: str | None = None
+    distribution: str = ""
+    extra: str = ""
+    options: tuple[tuple[str, str], ...] = ()
+    finest: float = 0.0
+
+    @property
+    def installed(self) -> bool:
+        """Whether the library it needs can be imported."""
+        return self.library is None or importlib.util.find_spec(self.library) is not None
+
+
+# Below these tolerances scipy's methods only warn, SUNDIALS refuses (near the rounding of numbers), the rounding in the
+# stage equations of the banded engine is larger, and so is that of coefficients of rounded numbers on a wave.
+EPS = sys.float_info.epsilon
+_SCIPY = EngineEntry("shaftwork.integrate.scipy_ivp:solve", "everything that is not stiff", finest=100 * EPS)
+WAVE = EngineEntry("shaftwork.integrate.lossless.engine:solve", "travelling waves", finest=1e-12)
+"""The engine of networks with waves, which no others can take."""
+
+ENGINES: dict[str, EngineEntry] = {
+    "exact": EngineEntry("shaftwork.integrate.exact:solve", "linear systems, without a step error"),
+    "heyoka": EngineEntry(
+        "shaftwork.integrate.heyoka_taylor:solve",
+        "smooth and piecewise laws, compiled",
+        "heyoka",
+        "heyoka",
+        "fast",
+        finest=1e-15,
+    ),
+    "sundials": EngineEntry(
+        "shaftwork.integrate.sundials:solve", "stiff systems", "sksundae", "scikit-sundae", "stiff", finest=8 * EPS
+    ),
+    "scipy": _SCIPY,
+    "scipy-radau": replace(_SCIPY, purpose="stiff systems", options=(("method", "Radau"),)),
+    "banded": EngineEntry("shaftwork.integrate.banded:solve", "long chains, linear or stiff", finest=1e-11),
+}
+
+# Another method of an engine, which a run chooses by itself.
+ADAMS = "sundials-adams"
+INNER = {ADAMS: replace(ENGINES["sundials"], options=(("method", "Adams"),))}
+
+
+def available(name: str) -> bool:
+    """Whether the engine of this name can be used here."""
+    return ENGINES[name].installed
+
+
+def too_fine(name: str, rtol: float) -> str:
+    """What is to be said of a tolerance that is finer than the finest of an engine; empty where nothing is."""
+    finest = ENGINES.get(name, WAVE).finest
+    if rtol >= finest:
+        return ""
+    return f"rtol = {rtol:.2g} is finer than the engine {name!r} can keep: the run is made with {finest:.2g}."
