@@ -135,3 +135,34 @@ def test_without_torque_an_undamped_gap_comes_to_rest_at_a_flank(start: float, c
     assert abs(found["gap.phi"]) == pytest.approx(0.005, rel=1e-6)
     assert abs(found["J1.omega"]) < 1e-6 * 0.01
     assert found["J2.omega"] == 0.0
+
+
+def stopped(*parts: tuple[sw.Component, str]) -> sw.Model:
+    """A spring between two inertias, and what is given at their nodes."""
+    net = sw.Network("stopped")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.Spring("shaft", c=1e5, d=10.0), "a", "b")
+    net.add(sw.Inertia("J2", J=50.0), "b")
+    for part, node in parts:
+        net.add(part, node)
+    return net.compile()
+
+
+def test_torques_between_what_sticks_are_said_to_be_one_of_many() -> None:
+    """A brake at the one end, a conveyor that rubs on its slope at the other: each holds what the spring has."""
+    conveyor = sw.Conveyor("belt", m=1000.0, radius=0.5, friction=0.3, incline=0.35), "b"
+    model = stopped((sw.Brake("brake", tau=1e4), "a"), conveyor)
+    with pytest.warns(sw.NetworkWarning, match=r"'brake', 'belt' can hold within a range.*simulate\(\.\.\.\)"):
+        steady = model.steady_state()
+    at_rest = model.simulate(10.0)["shaft.tau_c"][-1]
+    assert abs(at_rest - steady["shaft.tau_c"]) > 100.0  # N m: the brake holds 10 kN m
+    again = model.simulate(1.0, initial=steady)["shaft.tau_c"]
+    assert again[-1] == pytest.approx(steady["shaft.tau_c"], rel=1e-9)  # it does last
+
+
+def test_torques_that_only_one_equilibrium_has_warn_of_nothing() -> None:
+    """A source turns against what sticks, or what slips: warnings are errors here."""
+    load = sw.CoulombLoad("load", tau=3.0), "b"
+    assert stopped((sw.TorqueSource("motor", tau=2.0), "a"), load).steady_state()["shaft.tau_c"] == pytest.approx(2.0)
+    slips = stopped((sw.TorqueSource("motor", tau=5.0 - sw.omega), "a"), load).steady_state()
+    assert slips["J2.omega"] == pytest.approx(2.0)

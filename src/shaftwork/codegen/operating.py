@@ -18,6 +18,8 @@ JUMP = 1e-12
 """A law jumps where so short a step, s, still leaves a defect: the flank of a damped gap, which the drive runs onto."""
 DEFECT = 0.3
 """A step on that way is taken when its equation is left with less than this fraction of the rates."""
+SLOW = 1e-12
+"""What changes with less than this fraction of the fastest rate stays; rounding is four digits below."""
 STANDSTILL = 1e-6
 """A steady state has been reached when the last step changed the states by no more than this fraction."""
 
@@ -97,6 +99,17 @@ def energy_weights(bound: BoundArrays) -> Array:
             np.ones(len(form.integrals)),
         ]
     )
+
+
+def lasting(bound: BoundArrays, x: Array, disturbed: Array, t: float) -> Array:
+    """(n,) what a disturbance (n,) of a steady state (n,) leaves for ever: one long step of implicit Euler."""
+    weights = energy_weights(bound)
+    scaled = sparse.diags_array(weights) @ bound.jacobian(t, x) @ sparse.diags_array(1 / weights)
+    slow = SLOW * (float(abs(scaled).max()) if scaled.nnz else 0.0)
+    if not slow:
+        return disturbed
+    identity = sparse.eye_array(len(x), format="csc")
+    return np.asarray(_solve(sparse.csc_array(slow * identity - scaled), slow * weights * disturbed) / weights)
 
 
 def _solve(matrix: sparse.csc_array, right: Array) -> Array:

@@ -171,7 +171,7 @@ class Model(CompiledModel):
 
         Args:
             t: time at which the sources are read; by default after their last breakpoint, with a warning where they
-                had another level before.
+                had another level before, or where what sticks can hold other torques too.
             initial: where the search starts; by default at rest.
             parameters: values that differ from the network's.
 

@@ -37,7 +37,7 @@ from shaftwork.pipeline.phases.phases import Phases
 from shaftwork.pipeline.phases.run import Run
 from shaftwork.pipeline.phases.settling import Settling
 from shaftwork.pipeline.phases.solution import solution
-from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels
+from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels, warn_of_held_torques
 from shaftwork.pipeline.sizes import in_its_size
 from shaftwork.reduction.form import StateForm
 from shaftwork.results.linear import LinearModel, linear_model
@@ -179,6 +179,7 @@ class PhasedModel(Model):
                 if not math.isfinite(t):
                     assembly = moment.regime.assembly
                     warn_of_earlier_levels(assembly.bound(moment.regime.p), moment.x, when, assembly.model.switching)
+                warn_of_held_torques(moment.regime, self.phases.elements, moment.x, when)
                 return SteadyState(settling.held(moment, when), when)
         raise SimulationError(
             f"No steady operation was found: after {MOST_CHANGES} changes of its modes '{self.name}' still goes on, "
