@@ -84,6 +84,15 @@ def test_every_command_about_a_model_takes_values(
     assert "There is no parameter 'J1.K'. Inertia 'J1' has: J1.J." in capsys.readouterr().err
 
 
+def test_a_part_without_parameters_is_said_to_have_none(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    net = sw.Network("one way")
+    net.add(sw.Inertia("J1", J=1.0), "rotor")
+    net.add(sw.Freewheel("backstop"), "rotor", "ground")
+    net.save(tmp_path / "one way.toml")
+    assert main(["check", str(tmp_path / "one way.toml"), "--set", "backstop.x=1"]) == WRONG_INPUT
+    assert "There is no parameter 'backstop.x'. Freewheel 'backstop' has no parameters." in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("setting", "words"),
     [

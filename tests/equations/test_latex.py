@@ -16,7 +16,9 @@ from sympy import Heaviside
 from shaftwork.components import base
 from shaftwork.components.branches import Branch, ThroughLaw
 from shaftwork.components.electrical import Resistor, VoltageSource
+from shaftwork.components.friction import Brake
 from shaftwork.components.laws import omega
+from shaftwork.components.loads import Conveyor
 from shaftwork.components.machines import DCMachine
 from shaftwork.components.rotation import Damper, Inertia, Spring
 from shaftwork.components.shaft_models import CentralDifference, Lumped, ShaftModel, Wave
@@ -356,7 +358,20 @@ def test_a_document_says_why_it_has_no_second_order_form() -> None:
     with pytest.raises(CompileError) as reason:
         equations.latex(form="second-order")
     section = equations.document().partition(r"\section{Second-order form}")[2].partition(r"\section")[0]
-    assert section.strip() == str(reason.value)
+    assert str(reason.value) == f"{section.strip()} Take form='state'."  # the hint is for whoever wrote the call
+    assert section.strip().endswith(".")
+
+
+def test_a_nomenclature_names_the_parameter_and_a_remark_its_marks_outside_formulas() -> None:
+    net = NetworkBuilder("stop")
+    net.add(Inertia("J", J=50.0), "a")
+    net.add(Brake("brake", tau=1e4), "a")
+    net.add(Conveyor("belt", m=1000.0, radius=0.5, friction=0.3, incline=0.35), "a")
+    text = equations_of(net).document()
+    for row in (r"$r_{\mathrm{belt}}$ & radius of the drum &", r"$\delta_{\mathrm{belt}}$ & incline of the belt &"):
+        assert row in text
+    remarks = text.partition(r"\section{Remarks}")[2]
+    assert r"$\mathrm{brake.t\_rise}$, $\mathrm{brake.t\_lag}$, belt.d" in remarks
 
 
 @pytest.mark.parametrize("arguments", [(), (0,), (1,)])

@@ -179,7 +179,8 @@ def parameter_of(net: Network, name: str) -> tuple[Component, Parameter]:
         raise ParameterError(f"There is no part '{owner}'. The parts are: {_some([made.name for made in net.parts])}.")
     if parameter not in part.declared:
         listed = _some([f"{owner}.{key}" for key in part.declared])
-        raise ParameterError(f"There is no parameter '{name}'. {type(part).__name__} '{owner}' has: {listed}.")
+        there = f"has: {listed}" if part.declared else "has no parameters"
+        raise ParameterError(f"There is no parameter '{name}'. {type(part).__name__} '{owner}' {there}.")
     return part, part.declared[parameter]
 
 

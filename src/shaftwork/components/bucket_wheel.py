@@ -101,7 +101,7 @@ class BucketWheelLoad(Component):
     Source: Marinkovic 2012, (9)-(11), algorithm of 6 steps, table 1.
     """
 
-    radius: float = parameter("m", "of the cutting edges", above=0, latex="R")
+    radius: float = parameter("m", "radius of the cutting edges", above=0, latex="R")
     edge: float = parameter("m", "mean length of an edge in the soil", at_least=0, latex="l")
     ratio: float = parameter("1", "node speed over wheel speed", nonzero=True, default=1.0, latex="i")
     alpha: float = parameter(

@@ -132,7 +132,7 @@ class CraneTravel(Resistance):
     """
 
     m: float = parameter("kg", "mass of crane and load together", at_least=0, latex=r"m_\Sigma")
-    diameter: float = parameter("m", "of the wheels on the rail", above=0, latex="D")
+    diameter: float = parameter("m", "diameter of the wheels on the rail", above=0, latex="D")
     w: float = parameter("1", "specific resistance of friction, see `wheel_friction`", at_least=0)
     kappa: float = parameter("1", "resistance of wheels that run askew", at_least=0, default=0.0, latex=r"\kappa")
     omega_s: float = rounding()
@@ -179,9 +179,9 @@ class Hoist(Resistance):
     """
 
     m: float = parameter("kg", "mass of the load and its tackle", at_least=0)
-    radius: float = parameter("m", "of the drum", above=0, latex="r")
+    radius: float = parameter("m", "radius of the drum", above=0, latex="r")
     ratio: float = parameter("1", "node speed over drum speed", above=0, default=1.0, latex="i")
-    efficiency: float = parameter("1", "from the node to the load", above=0, at_most=1, default=1.0, latex=r"\eta")
+    efficiency: float = parameter("1", "efficiency from node to load", above=0, at_most=1, default=1.0, latex=r"\eta")
     omega_s: float = rounding()
 
     def derived(self, p: Any) -> Iterator[Derived]:
@@ -250,9 +250,9 @@ class Conveyor(Resistance):
     """
 
     m: float = parameter("kg", "mass on the belt and of the belt", at_least=0)
-    radius: float = parameter("m", "of the drum", above=0, latex="r")
+    radius: float = parameter("m", "radius of the drum", above=0, latex="r")
     friction: float = parameter("1", "coefficient of friction of the idlers", at_least=0, latex=r"\mu")
-    incline: float = parameter("rad", "of the belt", at_least=-1.57, at_most=1.57, default=0.0, latex=r"\delta")
+    incline: float = parameter("rad", "incline of the belt", at_least=-1.57, at_most=1.57, default=0.0, latex=r"\delta")
     d: float = parameter("N*s/m", "drag per belt speed", at_least=0, default=0.0)
     omega_s: float = rounding()
 

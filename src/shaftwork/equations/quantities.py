@@ -23,6 +23,8 @@ from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import branch_name, integral_name
 
 Ends = tuple[int, int]
+INSTEAD = " Take form='state'."
+"""How an error about the second-order form ends; a document, which has the state form, leaves it out."""
 
 
 def running_number(label: str) -> str:
@@ -45,10 +47,10 @@ def refuse_controlled(graph: CircuitGraph) -> None:
     for branch in graph.branches:
         if branch.template.through:
             part = graph.parts[branch.part].name
-            raise CompileError(f"'{part}' loses a part of the torque that it passes on. Take form='state'.")
+            raise CompileError(f"'{part}' loses a part of the torque that it passes on.{INSTEAD}")
         if branch.template.reads:
             part = graph.parts[branch.part].name
-            raise CompileError(f"A law of '{part}' reads other quantities than its own speed. Take form='state'.")
+            raise CompileError(f"A law of '{part}' reads other quantities than its own speed.{INSTEAD}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ from shaftwork.equations.blocks import Block, Blocks
 from shaftwork.equations.nomenclature import nomenclature
 from shaftwork.equations.notation import without_marks
 from shaftwork.equations.printing import aligned
+from shaftwork.equations.quantities import INSTEAD
 from shaftwork.equations.series import shortened
 from shaftwork.equations.spelling import in_text
 
@@ -136,7 +137,7 @@ def _second_order(blocks: Blocks) -> str:
     try:
         return section(blocks.second_order())
     except CompileError as reason:
-        return in_text(str(reason))
+        return in_text(str(reason).removesuffix(INSTEAD))
 
 
 def section(blocks: Iterable[Block]) -> str:

@@ -17,7 +17,7 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import jumps, slope
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import CompileError
-from shaftwork.equations.quantities import Quantities, rate_of, refuse_controlled
+from shaftwork.equations.quantities import INSTEAD, Quantities, rate_of, refuse_controlled
 from shaftwork.network.graph import GROUND, CircuitGraph
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.gains import Number, add, divide, simplified
@@ -85,7 +85,7 @@ def second_order(graph: CircuitGraph) -> SecondOrder:
     if electrical:
         raise CompileError(
             f"The second-order form is for mechanical networks, but '{graph.name}' has the electrical nodes "
-            f"{', '.join(electrical[:6])}{', ...' if len(electrical) > 6 else ''}. Take form='state'."
+            f"{', '.join(electrical[:6])}{', ...' if len(electrical) > 6 else ''}.{INSTEAD}"
         )
     refuse_controlled(graph)
     return _Writer(graph).made()

@@ -32,6 +32,7 @@ GREEK = (
 """Greek letters that are control words of LaTeX."""
 PLAIN = re.compile(f"[A-Za-z0-9.,:;()'=/!?+*{ACCENTED}-]*")
 """Words that are printed outside formulas as they are."""
+MARKS = ".,:;!?"
 STRETCH = re.compile(f"(?P<accented>[{ACCENTED}]+)|(?P<raised>[{SUPERSCRIPTS}]+)|(?P<other>.)", re.DOTALL)
 """What is escaped in one go."""
 ALLOWED = re.compile(
@@ -95,5 +96,10 @@ def _spaced(kept: str) -> str:
 
 def in_text(text: str) -> str:
     """Any text outside formulas: words with signs that LaTeX reads otherwise are escaped."""
-    words = text.split(" ")
-    return " ".join(word if PLAIN.fullmatch(word) else f"$\\mathrm{{{escaped(word)}}}$" for word in words)
+    return " ".join(map(_word_in_text, text.split(" ")))
+
+
+def _word_in_text(word: str) -> str:
+    """A word with the marks that end it behind the formula, if it is one."""
+    name = word.rstrip(MARKS)
+    return word if PLAIN.fullmatch(word) else f"$\\mathrm{{{escaped(name)}}}${word[len(name) :]}"
