@@ -129,9 +129,8 @@ def warn_of_held_torques(regime: Regime, elements: Sequence[Element], x: Array, 
     if not (holding and x.size):
         return
     bound = regime.assembly.bound(regime.p)
-    disturbed = np.random.default_rng(0).uniform(1.0, 2.0, x.size) / energy_weights(
-        bound
-    )  # no state makes up for another
+    shares = np.random.default_rng(0).uniform(1.0, 2.0, x.size)  # no state makes up for another
+    disturbed = shares / energy_weights(bound)
     left = lasting(bound, x, disturbed, when)
     now, soon, late = (np.array(regime.limits(when, (x + change).tolist())) for change in (0 * x, disturbed, left))
     moves = np.abs(late - now) > LEFT * np.abs(soon - now).max()
