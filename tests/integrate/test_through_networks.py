@@ -222,3 +222,16 @@ def test_an_angle_that_is_brought_back_into_one_turn_begins_anew(angle: sympy.Ex
     assert sol.energy_residual < 1e-5
     with pytest.raises(sw.SimulationError, match="heyoka compiles small networks"):
         body(3 + angle).simulate(3.0, engine="heyoka")
+
+
+@pytest.mark.parametrize("engine", ["auto", "scipy"])
+def test_a_triangular_wave_has_its_corners(engine: str) -> None:
+    """As a law of time and of the angle, against the triangle in pieces."""
+    folded = sympy.Piecewise((sw.phi, sw.phi < sympy.pi / 2), (sympy.pi - sw.phi, True))
+    laws = (2 + sympy.asin(sympy.sin(sw.phi)), 2 + folded)
+    wave, pieces = (body(law).simulate(1.5, angles=["J"], engine=engine, rtol=1e-9) for law in laws)
+    assert np.pi / 2 < pieces["J.phi"][-1] < 3 * np.pi / 2  # past the first corner, before the second
+    assert wave["J.omega"] == pytest.approx(pieces["J.omega"], rel=1e-7)  # of 4 rad/s
+    for law, end in ((sympy.asin(sympy.sin(sw.t)), 0.0), (sympy.acos(sympy.cos(sw.t)), 10 * np.pi**2)):
+        sol = body(law).simulate(20 * np.pi, engine=engine)  # ten periods
+        assert sol["J.omega"][-1] == pytest.approx(end, abs=1e-8)

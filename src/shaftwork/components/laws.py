@@ -155,6 +155,10 @@ def switches_of(node: sympy.Basic) -> Iterable[tuple[sympy.Expr, Sequence[float]
             return [(sympy.cos(node.args[0]), (0.0,))]
         case sympy.cot() | sympy.csc():
             return [(sympy.sin(node.args[0]), (0.0,))]
+        case sympy.asin(args=(sympy.sin() as wave,)) | sympy.acos(args=(sympy.sin() as wave,)):
+            return [(sympy.cos(wave.args[0]), (0.0,))]  # a triangular wave
+        case sympy.asin(args=(sympy.cos() as wave,)) | sympy.acos(args=(sympy.cos() as wave,)):
+            return [(sympy.sin(wave.args[0]), (0.0,))]
         case sympy.floor() | SmoothNoise():
             # a sine changes sign at every whole number, and no list of levels would have an end
             return [(sympy.sin(sympy.pi * node.args[0]), (0.0,))]
