@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.util
 import os
 import signal
-import zlib
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -43,23 +42,8 @@ settings.register_profile(
 settings.load_profile("random networks")
 
 
-# "2/3" runs the second third of the tests alone: the slow ones take longer than checks may.
-SHARE = os.environ.get("SHAFTWORK_SHARE", "1/1")
-
-
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Random networks run without the coverage tool: it would double their time, and other tests reach every line."""
     for item in items:
         if getattr(getattr(item, "function", None), "is_hypothesis_test", False):
             item.add_marker("no_cover")
-    number, shares = map(int, SHARE.split("/"))
-    others = [item for item in items if zlib.crc32(_together(item).encode()) % shares != number - 1]
-    if others:
-        config.hook.pytest_deselected(items=others)
-        items[:] = [item for item in items if item not in set(others)]
-
-
-def _together(item: pytest.Item) -> str:
-    """What tests of one share have in common: the group that shares what takes minutes to make, or their own name."""
-    group = item.get_closest_marker("xdist_group")
-    return str(group.args[0]) if group else item.nodeid
