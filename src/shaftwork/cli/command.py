@@ -57,6 +57,23 @@ def solver_options(parser: ArgumentParser) -> None:
     )
 
 
+def start_options(parser: ArgumentParser) -> None:
+    """The options that say how a motion starts."""
+    parser.add_argument(
+        "--initial",
+        metavar="PART.QUANTITY=X",
+        action="append",
+        default=[],
+        help="start value of a speed, twist or torque, in SI or with its unit: J1.omega=8.5, 'J1.omega=80 rpm'; all "
+        "else is at rest; as often as needed",
+    )
+    parser.add_argument(
+        "--steady",
+        action="store_true",
+        help="start in the steady state at t = 0 instead of at rest; --initial then gives other values to some of it",
+    )
+
+
 def point_options(parser: ArgumentParser, besides: str = "") -> None:
     """The options that say about which point a network is linearised, and how many modes are wanted."""
     parser.add_argument(

@@ -10,6 +10,7 @@ from shaftwork.cli.settings import point, with_settings
 from shaftwork.core.errors import ModelFileError, ParameterError
 
 if TYPE_CHECKING:
+    from shaftwork.pipeline.model import Model
     from shaftwork.pipeline.network import Network
     from shaftwork.scenes.catalog import Scene
 
@@ -41,6 +42,17 @@ def end_of(options: Namespace, scene: Scene | None) -> float:
 
     end = options.t_end if options.t_end is not None else scene.t_end if scene else FALLBACK_END
     return time_span(0.0, end)[1]
+
+
+def start_of(options: Namespace, model: Model) -> dict[str, float] | None:
+    """The start values of a motion: of the steady state at t = 0 where that is wanted, with those given; None for rest.
+
+    Raises:
+        ParameterError: a start value is none.
+        SimulationError: there is no steady state.
+    """
+    given = point(options.initial, option="--initial")
+    return {**model.steady_state(t=0.0), **given} if options.steady else given or None
 
 
 def point_of(options: Namespace, net: Network) -> dict[str, float] | None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from shaftwork.cli.command import Command, Data, Say, end_option, folder_option, solver_options
+from shaftwork.cli.command import Command, Data, Say, end_option, folder_option, solver_options, start_options
 from shaftwork.cli.folder import Folder, write_picture, write_rows
-from shaftwork.cli.models import end_of, load
+from shaftwork.cli.models import end_of, load, start_of
 from shaftwork.core.domains import DOMAINS
 from shaftwork.core.progress import progress
 from shaftwork.core.screen import counted
@@ -32,6 +32,7 @@ def arguments(parser: ArgumentParser) -> None:
     folder_option(parser, "plots and CSV")
     end_option(parser, "that of the scene, else 10")
     solver_options(parser)
+    start_options(parser)
     parser.add_argument(
         "--signals", metavar="NAME,...", action="append", default=[], help="quantities to show, such as shaft.tau"
     )
@@ -48,6 +49,8 @@ def run(options: Namespace, say: Say) -> Data:
     say(f"{net.name}: {t_end:g} s of motion{f' ({scene.source})' if scene else unset}")
     for line in scene.chosen if scene else ():
         say(f"  chosen: {line}")
+    if start := [*(["the steady state at t = 0 s"] if options.steady else []), *options.initial]:
+        say(f"  start: {', '.join(start)}")
     signals = wanted or (scene.signals if scene else _worth_seeing(solution))
     say(f"engine {solution.engine}: {solution.why}")
     counts = ", ".join(f"{count} {_word(name, count)}" for name, count in solution.statistics.items())
@@ -76,9 +79,11 @@ def _motion(net: Network, t_end: float, wanted: tuple[str, ...], options: Namesp
                 reached = max(reached, t)
                 show(t, net.name)
 
-            model = net.compile(angles=_angles(net, wanted))
+            started = tuple(name.strip() for name, _, _ in (text.partition("=") for text in options.initial))
+            model = net.compile(angles=_angles(net, (*wanted, *started)))
             _refuse_unknown(model, wanted)
-            return model.simulate(t_end, rtol=options.rtol, engine=options.engine, progress=report)
+            start = start_of(options, model)
+            return model.simulate(t_end, rtol=options.rtol, engine=options.engine, initial=start, progress=report)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"the motion had come to t = {reached:.4g} of {t_end:g} s") from None
 
@@ -152,6 +157,7 @@ def _data(solution: Solution, signals: Sequence[str]) -> Data:
     return {
         "network": solution.name,
         "t_end": solution.steps[-1],
+        "start": dict(zip(solution.states, solution.x[0], strict=True)),
         "engine": solution.engine,
         "why": solution.why,
         "statistics": solution.statistics,

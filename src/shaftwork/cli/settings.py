@@ -113,22 +113,23 @@ def follows_speed(text: str) -> bool:
     return _OF_SPEED.fullmatch(named(text, "--at", "J1.omega=n")[1]) is not None
 
 
-def point(texts: Iterable[str], n: float | None = None) -> dict[str, Any]:
+def point(texts: Iterable[str], n: float | None = None, option: str = "--at") -> dict[str, Any]:
     """Quantities and their values, each written as name=value: a number in SI, or one with its unit.
 
     Args:
-        texts: of `--at`.
+        texts: of the option.
         n: speed in rad/s, where values may be multiples of it.
+        option: its name.
 
     Raises:
         ParameterError: one is none, or is there twice.
         MissingExtraError: a value has a unit, and pint is not installed.
     """
-    return once("--at", (_of_point(text, n) for text in texts))
+    return once(option, (_of_point(text, n, option) for text in texts))
 
 
-def _of_point(text: str, n: float | None) -> tuple[str, Any]:
-    name, written = named(text, "--at", "J1.omega=100")
+def _of_point(text: str, n: float | None, option: str) -> tuple[str, Any]:
+    name, written = named(text, option, "J1.omega=100")
     multiple = None if n is None else _OF_SPEED.fullmatch(written)
     if n is not None and multiple and (divisor := float(multiple[3] or 1)):
         return name, float(f"{multiple[1]}{multiple[2] or 1}") * n / divisor

@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from argparse import ArgumentParser, Namespace
 
-from shaftwork.cli.command import Command, Data, Say, end_option, folder_option, solver_options
+from shaftwork.cli.command import Command, Data, Say, end_option, folder_option, solver_options, start_options
 from shaftwork.cli.folder import Folder, write_picture
 from shaftwork.cli.models import end_of, load
-from shaftwork.cli.settings import varied
+from shaftwork.cli.settings import point, varied
 from shaftwork.core.errors import ParameterError
 
 FILES = ("sweep.csv", "sweep.png")
@@ -25,6 +25,7 @@ def arguments(parser: ArgumentParser) -> None:
     )
     end_option(parser, "that of the scene, else 10")
     solver_options(parser)
+    start_options(parser)
     parser.add_argument("--processes", metavar="N", type=int, help="how many (default: as many as there are cores)")
     parser.add_argument(
         "--store", metavar="FILE", help="keeps what is done; the same command goes on where it was stopped"
@@ -47,6 +48,8 @@ def run(options: Namespace, say: Say) -> Data:
             require=_limits(options.require),
             rtol=options.rtol,
             engine=options.engine,
+            initial=point(options.initial, option="--initial"),
+            steady=options.steady,
             processes=options.processes,
             store=options.store,
         )

@@ -48,6 +48,7 @@ def sweep(
     rtol: float = 1e-8,
     engine: str = "auto",
     initial: Mapping[str, float] | None = None,
+    steady: bool = False,
     t_eval: OutputTimes = None,
     processes: int | None = None,
     store: str | Path | None = None,
@@ -73,6 +74,7 @@ def sweep(
             0.001 rad/s.
         engine: as in `Model.simulate`.
         initial: start values, as there.
+        steady: whether each variant starts in its own steady state at t = 0, of which `initial` changes some values.
         t_eval: output times of the solutions that functions get, as there; names measure the motion, not the outputs.
         processes: how many; by default as many as there are cores, where the sweep takes long enough. Variants side by
             side are divided only then: in the seconds that a process needs to start, 50 000 are done.
@@ -90,7 +92,7 @@ def sweep(
     _, end = time_span(0.0, t_end)
     options = _options(readers, rtol, engine, initial, t_eval)
     count = _count(processes)
-    task = Task(net, columns, readers, _lines(sn, readers), end, options)
+    task = Task(net, columns, readers, _lines(sn, readers), end, options, steady)
     worker = Worker(task)
     with nullcontext() if store is None else Store(store, task) as kept:
         values, reasons, left = _run(task, worker, count, kept)

@@ -52,6 +52,7 @@ class Task:
         sn: S-N lines by quantity.
         t_end: end of the motions, s.
         options: of `Model.simulate`.
+        steady: whether each variant starts in its own steady state at t = 0.
     """
 
     network: Network
@@ -60,6 +61,7 @@ class Task:
     sn: Mapping[str, SNLine]
     t_end: float
     options: Mapping[str, Any]
+    steady: bool = False
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
@@ -125,6 +127,7 @@ class Worker:
             "a measure is a function of a whole solution": len(read) < len(task.measures),
             f"engine = '{options['engine']}' was asked for": options["engine"] not in ("auto", "heyoka"),
             "start values are given": bool(options["initial"]),
+            "each variant starts in its own steady state": task.steady,
             "heyoka is not installed (extra 'fast')": not available("heyoka"),
         }
         self.why = next((reason for reason, holds in reasons.items() if holds), "")
@@ -189,8 +192,12 @@ class Worker:
     def _alone(self, variant: int) -> tuple[Array, str]:
         """Measures of one variant, and why it failed."""
         task, nothing = self._task, np.full(len(self._task.measures), np.nan)
+        parameters, options = task.values(variant), dict(task.options)
         try:
-            solution = self._model.simulate(task.t_end, parameters=task.values(variant), **task.options)
+            if task.steady:
+                start = self._model.steady_state(t=0.0, parameters=parameters)
+                options["initial"] = {**start, **(options["initial"] or {})}
+            solution = self._model.simulate(task.t_end, parameters=parameters, **options)
         except ShaftworkError as error:
             return nothing, _first_line(error)
         values = []
