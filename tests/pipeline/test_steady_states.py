@@ -166,3 +166,19 @@ def test_torques_that_only_one_equilibrium_has_warn_of_nothing() -> None:
     assert stopped((sw.TorqueSource("motor", tau=2.0), "a"), load).steady_state()["shaft.tau_c"] == pytest.approx(2.0)
     slips = stopped((sw.TorqueSource("motor", tau=5.0 - sw.omega), "a"), load).steady_state()
     assert slips["J2.omega"] == pytest.approx(2.0)
+
+
+def test_a_motion_that_starts_in_the_steady_state_of_a_brake_can_be_read_all_along() -> None:
+    """The first step of heyoka is a trial there, whose end met a stop on the way: the second run ended with it."""
+    net = sw.Network("hoist")
+    net.add(sw.Inertia("rotor", J=400.0), "shaft")
+    net.add(sw.Brake("brake", tau=2e5, t_on=0.0), "shaft")
+    net.add(sw.Drum("drum", radius=0.4), "shaft", "top")
+    net.add(sw.TranslationalSpring("rope", c=5e6, d=2e4), "top", "hook")
+    net.add(sw.Mass("load", m=20e3), "hook")
+    net.add(sw.ForceSource("weight", f=-196200.0), "hook")
+    model = net.compile()
+    for t_end in (0.3, 1.0, 10.0):
+        solution = model.simulate(t_end, initial=model.steady_state(t=0.0))
+        assert solution.max("rope.f") == pytest.approx(196200.0, rel=1e-9)
+        assert solution.min("rope.f") == pytest.approx(196200.0, rel=1e-9)

@@ -81,8 +81,13 @@ class SegmentRecorder:
 
 
 def _outcome(outcome: Any, watch: Watch | None, *, arrived: bool) -> str:
-    """Name of heyoka's outcome; a watch that stops the very last step has stopped the run only if it has a reason."""
+    """Name of heyoka's outcome; a watch that stops the very last step has stopped the run only if it has a reason.
+
+    A run that has come to a stop on its way with its last step has met the limit of its steps, not its end.
+    """
     failed = watch is not None and watch.reason is not None
     if int(outcome) > FIRST_OUTCOME and not failed:
         return GUARD
-    return "time_limit" if arrived and not failed else str(outcome.name)
+    if arrived and not failed:
+        return "time_limit"
+    return "step_limit" if outcome.name == "time_limit" else str(outcome.name)
