@@ -223,7 +223,7 @@ def _title(task: Task) -> dict[str, str | int]:
     table = hashlib.sha256()
     for name, column in task.columns.items():
         table.update(name.encode() + np.ascontiguousarray(column).tobytes())
-    options = (task.options | ({"steady": True} if task.steady else {})).items()
+    options = {**task.options, **({"steady": True} if task.steady else {})}.items()
     parts = "\n".join(repr(placed) for placed in task.network.netlist().placed)
     return {
         "format": FORMAT,
