@@ -57,6 +57,62 @@ def test_a_model_of_a_shaft_and_a_law_are_set_as_in_a_model_file(
     assert '"2*sin(t)"' in new.read_text(encoding="utf-8")
 
 
+@pytest.mark.parametrize(
+    ("written", "value"),
+    [
+        ("drive.n_sync=1500 1/min", 1500.0),
+        ("drive.n_sync=1500/min", 1500.0),
+        ("drive.n_sync=25 1/s", 1500.0),
+        ("drive.n_sync=1500 min**-1", 1500.0),
+        ("drive.n_sync=1500 min^-1", 1500.0),
+        ("drive.n_sync=1500 rpm", 1500.0),
+        ("drive.f_n=50 1/s", 50.0),
+        ("drive.f_n=3000/min", 50.0),
+        ("drive.f=50 1/s", 50.0),
+        ("drive.efficiency=94 %", 0.94),
+        ("drive.efficiency=94%", 0.94),
+        ("J.J=3 kg*m**2", 3.0),
+        ("J.J=3e4 kg*cm**2", 3.0),
+    ],
+)
+def test_a_value_takes_every_unit_that_a_message_or_a_table_of_the_pages_names(
+    written: str, value: float, tmp_path: Path
+) -> None:
+    pytest.importorskip("pint")
+    motors(tmp_path)
+    assert main(["export", str(tmp_path / "motors.toml"), str(tmp_path / "new.toml"), "--set", written]) == DONE
+    owner, _, parameter = written.partition("=")[0].partition(".")
+    (part,) = (part for part in sw.Network.load(tmp_path / "new.toml").parts if part.name == owner)
+    assert getattr(part, parameter) == pytest.approx(value, rel=1e-12)
+
+
+def motors(folder: Path) -> str:
+    net = sw.Network("motors")
+    net.add(sw.FrequencyDrive("drive", tau_k=20.0, s_k=0.1, n_sync=1000, f=sw.t), "a")
+    net.add(sw.TableMotor("motor", curve=5.0), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.save(folder / "motors.toml")
+    return str(folder / "motors.toml")
+
+
+@pytest.mark.parametrize("written", ["Table([0, 1500], [100, 0])", "{ x = [0, 1500], y = [100.0, 0.0] }"])
+def test_a_curve_is_set_as_in_a_model_file(written: str, tmp_path: Path) -> None:
+    """In both forms of a table, on the command line and in the file, it is over the speed, not over time."""
+    path, curve = motors(tmp_path), sw.Table([0.0, 1500.0], [100.0, 0.0])
+    assert main(["export", path, str(tmp_path / "new.toml"), "--set", f"motor.curve={written}"]) == DONE
+    in_file = written if written.startswith("{") else f'"{written}"'
+    text = Path(path).read_text(encoding="utf-8").replace("curve = 5.0", f"curve = {in_file}")
+    (tmp_path / "written.toml").write_text(text, encoding="utf-8")
+    for name in ("new", "written"):
+        assert sw.Network.load(tmp_path / f"{name}.toml").parts[1].curve == curve
+
+
+def test_a_law_of_time_is_a_table_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = model(tmp_path)
+    assert main(["export", path, "--set", "pull.tau={ x = [0, 1], y = [0, 5] }"]) == DONE
+    assert "tau = { x = [0.0, 1.0], y = [0.0, 5.0] }" in capsys.readouterr().out
+
+
 def test_a_network_with_other_values_has_its_ports_and_its_places_in_the_file(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -110,6 +166,11 @@ def test_a_part_without_parameters_is_said_to_have_none(tmp_path: Path, capsys: 
         ("J1.J=3 kg*9**9**9*m**2", "units with * / and powers of one digit"),
         ("J1.J=3 kg" + "*m" * 99, "units with * / and powers of one digit"),
         ("J1.J=3 m" + "m" * 80 + "!", "units with * / and powers of one digit"),
+        ("J1.J=1/2", "J1.J=1/2: give a number in kg*m^2 (moment of inertia), or with a unit"),
+        ("pull.tau={ x = [0, 1] }", "Write a table as { x = [0.0, 1.0], y = [0.0, 5.0] }"),
+        ("pull.tau={ x = [0, 1], y = [0", "Write a table as { x = [0.0, 1.0], y = [0.0, 5.0] }"),
+        ("pull.tau={ x = [0, 1], y = [0, 'a'] }", "Tables hold numbers alone"),
+        ("pull.tau={ x = [1, 0], y = [0, 1] }", "x must increase strictly"),
         ("line.model=Lumps(3)", "line.model=Lumps(3): model of Shaft 'line' is none"),
         ("pull.tau=sine(t)", "pull.tau=sine(t): "),
     ],

@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 Item = TypeVar("Item")
 
-_QUANTITY = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\W\d].*)")
-"""A number and a unit behind it; no law reads so."""
+_QUANTITY = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?:(%)|(?:\s1)?\s*(/\s*[^\W\d].*)|([^\W\d].*))")
+"""A number and a unit behind it: 3 kg, 94 %, 1500 1/min or 1500/min."""
 _OF_SPEED = re.compile(r"(-?)(?:(\d+\.?\d*|\.\d+)\s*\*\s*)?n(?:\s*/\s*(\d+\.?\d*|\.\d+))?")
 """A multiple of the speed n of a diagram: n, -n, 2*n, n/3, 2*n/3."""
-_UNIT = re.compile(r"(?:[^\W\d]\w*+|[*/() ·]|(?:\*\*|\^) *[-+]?\d(?:\.\d+)?(?! *(?:\*\*|\^)))*+")
+_UNIT = re.compile(r"(?:[^\W\d]\w*+|(?:\*\*|\^) *[-+]?\d(?:\.\d+)?(?! *(?:\*\*|\^))|[*/() ·])*+")
 """Names of units, their products and quotients, and powers of one digit: the reader behind computes any other number,
 of any size."""
 MOST_CHARACTERS = 100
@@ -193,17 +193,17 @@ def _value(name: str, declared: Parameter, text: str) -> Any:
         return float(text)
     except ValueError:
         pass
-    if _QUANTITY.fullmatch(text.strip()):
-        return _quantity(name, text)
-    if not declared.law:
-        raise ParameterError(f"{name}={text}: give a number in {declared.unit} ({declared.meaning}), or with a unit.")
-    from shaftwork.network.expressions import parse
+    why = f"give a number in {declared.unit} ({declared.meaning}), or with a unit."
+    if declared.law:
+        from shaftwork.network.storage import law_of
 
-    try:
-        law = parse(text)
-    except ModelFileError as error:
-        raise ParameterError(f"{name}={text}: {error}") from None
-    return law if law.free_symbols else float(law)
+        try:
+            return law_of(name.rpartition(".")[2], text)
+        except ModelFileError as error:
+            why = str(error)
+    if _QUANTITY.fullmatch(text.strip()):  # no law reads so
+        return _quantity(name, text)
+    raise ParameterError(f"{name}={text}: {why}")
 
 
 def _quantity(name: str, text: str) -> Any:
@@ -212,13 +212,14 @@ def _quantity(name: str, text: str) -> Any:
     except ImportError:
         raise MissingExtraError("pint", "units", f"{name}={text} with a unit") from None
     number = _QUANTITY.fullmatch(text.strip())
-    if number is None or len(text) > MOST_CHARACTERS or not _UNIT.fullmatch(number[2]):
+    unit = "" if number is None else "percent" if number[2] else number[3] or number[4]
+    if number is None or len(text) > MOST_CHARACTERS or not _UNIT.fullmatch(unit):
         raise ParameterError(
             f"{name}={text[:MOST_CHARACTERS]} is no number with a unit. Write the number, then units with * / and "
             "powers of one digit, such as '3 kg*m**2'."
         )
     try:
-        return application_registry.Quantity(text)
+        return application_registry.Quantity(f"{number[1]} {unit}")
     except Exception as error:  # noqa: BLE001 (pint raises what its tokeniser does, too)
         raise ParameterError(f"{name}={text} is no number with a unit: {error}.") from None
 

@@ -10,6 +10,7 @@ from typing import Any
 from sympy import Expr
 
 from shaftwork.components import REGISTRY, Component, Table
+from shaftwork.components.tables import Interpolation
 from shaftwork.core.errors import ModelFileError, ParameterError
 from shaftwork.core.files import replaced
 from shaftwork.network import expressions, textfile
@@ -65,6 +66,24 @@ def read_netlist(path: str | Path) -> Netlist:
         return Netlist(model.name, tuple(_placed(part, str(path)) for part in model.parts), model.ports)
     except ModelFileError as error:
         raise ModelFileError(f"{path}: {error}") from None
+
+
+def law_of(key: str, text: str) -> float | Expr | Table:
+    """The law that a text means: a number, an expression, or a table alone, whose argument the part chooses.
+
+    Args:
+        key: name of the parameter.
+        text: an expression, or a table `{ x = [...], y = [...] }`.
+
+    Raises:
+        ModelFileError: it is none.
+    """
+    if text.lstrip().startswith("{"):
+        return textfile.read_table(key, text)
+    law = parse(text)
+    if isinstance(law, Interpolation) and text.rstrip().endswith("])"):  # without an argument of its own
+        return law.table
+    return law if law.free_symbols else float(law)
 
 
 def _path_of(path: str | Path) -> Path:
@@ -157,8 +176,7 @@ def _read(part: PartText, cls: type[Component], name: str, value: Any) -> Any:
         reason = f"{name} = {reprlib.repr(value)} must be a {unit} ({declared.meaning}), written without quotes"
         raise _fault(part, name, f"{reason} and without a unit, such as {name} = 1.0.")
     try:
-        law = parse(value)
-        return law if law.free_symbols else float(law)
+        return law_of(name, value)
     except ModelFileError as error:
         raise _fault(part, name, f"{name}: {error}") from None
 

@@ -23,6 +23,7 @@ import os
 import re
 import tomllib
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -128,6 +129,21 @@ def read(source: str | os.PathLike[str]) -> ModelText:
         return _model(text, is_file=not isinstance(source, str))
     except ModelFileError as error:
         raise ModelFileError(f"{title}: {error}") from None
+
+
+def read_table(key: str, text: str) -> Table:
+    """The table `{ x = [...], y = [...] }` in a text, as it stands behind a key of a file.
+
+    Raises:
+        ModelFileError: there is none.
+    """
+    line, values = f"{key} = {text}", dict[str, Any]()
+    with suppress(ModelFileError):  # which would tell of parts
+        _part_lines(line)
+        values = _tables(line)
+    if list(values) != [key] or not isinstance(values[key], dict):
+        raise ModelFileError(f"{key} is {_shown(text)}. Write a table as {{ x = [0.0, 1.0], y = [0.0, 5.0] }}.")
+    return _table(key, values[key])
 
 
 def is_name(value: Any) -> bool:
