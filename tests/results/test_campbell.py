@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import pickle
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import shaftwork as sw
 
@@ -217,3 +220,131 @@ def test_the_time_of_a_steady_state_is_that_of_the_point(parts: tuple[sw.Compone
 def test_titles_name_no_time_where_no_law_depends_on_it() -> None:
     assert sw.scenes.crane_start().modes().title == "crane start at rest (load stuck)"
     assert sw.scenes.ship_line().modes().title == "ship line"
+
+
+def test_a_load_that_sticks_at_rest_leaves_the_modes_of_the_running_train() -> None:
+    """lambda^2 - 1.5 c lambda + 11/36 c^2 = 0; at n = 0 the pump is clamped, and nothing is drawn across to that."""
+    c = 25000.0
+    net = sw.Network("pump")
+    net.add(sw.KlossMotor("motor", tau_k=3000, s_k=0.1, n_sync=1500), "m")
+    net.add(sw.Inertia("JM", J=6.0), "m")
+    net.add(sw.Spring("l1", c=c), "m", "c")
+    net.add(sw.Inertia("JC", J=2.0), "c")
+    net.add(sw.Spring("l2", c=c), "c", "p")
+    net.add(sw.Inertia("JP", J=3.0), "p")
+    net.add(sw.CoulombLoad("pump", tau=100), "p")
+    running = np.sqrt(np.sort(np.roots([1.0, -(1 / 6 + 2 / 2 + 1 / 3) * c, 11 / 36 * c**2]))) / (2 * np.pi)
+    diagram = net.campbell(
+        np.linspace(0.0, 157.08, 7), orders=3, at=lambda n: dict.fromkeys(("JM.omega", "JC.omega", "JP.omega"), n)
+    )
+    assert diagram.modes == tuple(f"mode {k} (pump {how})" for how in ("stuck", "slipping forward") for k in (1, 2))
+    np.testing.assert_allclose([made.frequency for made in diagram.crossings], running, rtol=1e-3)  # beside a motor
+    assert [made.mode for made in diagram.crossings] == list(diagram.modes[2:])
+    np.testing.assert_array_equal(diagram.frequencies[0, 2:], 0.0)
+    np.testing.assert_array_equal(diagram.frequencies[1:, :2], 0.0)
+    above = net.campbell(
+        np.linspace(1.0, 157.08, 7), orders=3, at=lambda n: dict.fromkeys(("JM.omega", "JC.omega", "JP.omega"), n)
+    )
+    assert above.modes == ("mode 1", "mode 2")
+    np.testing.assert_allclose(
+        [made.speed for made in diagram.crossings], [made.speed for made in above.crossings], rtol=1e-9
+    )
+
+
+@settings(max_examples=12, deadline=None)
+@given(data=st.data())
+def test_crossings_of_trains_that_stick_in_a_part_of_the_range_are_those_of_each_phase(data: st.DataObject) -> None:
+    """Each load is held up to a speed of its own: what orders meet are the frequencies of the train at that speed."""
+    count = data.draw(st.integers(2, 4))
+    size = st.floats(0.5, 8.0)
+    net, starts = sw.Network("train"), {}
+    for k in range(count):
+        net.add(sw.Inertia(f"J{k}", J=data.draw(size)), f"n{k}")
+        if k:
+            net.add(sw.Spring(f"s{k}", c=1e4 * data.draw(size)), f"n{k - 1}", f"n{k}")
+        if data.draw(st.booleans()):
+            net.add(sw.CoulombLoad(f"load{k}", tau=data.draw(size)), f"n{k}")
+            starts[k] = data.draw(st.sampled_from([0.0, 30.0, 71.0]))
+
+    def at(n: float) -> dict[str, float]:
+        return {f"J{k}.omega": max(n - starts.get(k, 0.0), 0.0) for k in range(count)}
+
+    orders = (1, 3)
+    diagram = net.campbell(np.linspace(0.0, 150.0, data.draw(st.integers(2, 9))), orders, at=at)
+    for made in diagram.crossings:
+        natural = net.modes(at(made.speed)).frequencies
+        assert np.abs(natural - made.order * made.speed / (2 * np.pi)).min() <= 1e-9 * made.frequency
+    edges = [0.0, *sorted({30.0, 71.0} & set(starts.values())), 150.0]
+    wanted = [
+        (speed, order)
+        for low, high in pairwise(edges)
+        for frequency in net.modes(at((low + high) / 2)).frequencies
+        for order in orders
+        if frequency > 0 and low < (speed := 2 * np.pi * float(frequency) / order) <= high
+    ]
+    found = [(made.speed, made.order) for made in diagram.crossings]
+    np.testing.assert_allclose(found, sorted(wanted), rtol=1e-9)
+
+
+def test_modes_that_cross_keep_their_names_and_their_meetings() -> None:
+    """Two discs apart, one on a spring that stiffens with the speed: its frequency passes that of the other."""
+    net = _stiffening()
+    net.add(sw.Inertia("other", J=1.0), "o")
+    net.add(sw.Spring("s", c=400.0), "o", "wall")
+    net.add(sw.Ground("frame"), "wall")
+    diagram = net.campbell(np.linspace(1.0, 60.0, 8), 1, at=lambda n: {"spring.phi": n})
+    constant, rising = (diagram.frequencies[:, k] * 2 * np.pi for k in (1, 0))
+    np.testing.assert_allclose(constant, 20.0, rtol=1e-12)
+    np.testing.assert_allclose(rising, np.sqrt((900 + diagram.speeds**2) / 4), rtol=1e-12)
+    found = [(made.mode, made.speed) for made in diagram.crossings]
+    assert [name for name, _ in found] == ["mode 1", "mode 2"]
+    np.testing.assert_allclose([speed for _, speed in found], [np.sqrt(300.0), 20.0], rtol=1e-10)
+
+
+def test_a_jump_of_the_frequencies_is_no_crossing() -> None:
+    """A spring that is stiffer from a twist of 20 rad on: order 1 passes between 10 and 40 rad/s, meeting neither."""
+    net = sw.Network("two springs")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    stiff = sw.Table([0.0, 20.0, 40.0], [0.0, 20.0 * 100.0, 20.0 * 100.0 + 20.0 * 1600.0])
+    net.add(sw.TorqueSource("spring", tau=-stiff(sw.phi)), "a")
+    diagram = net.campbell([12.0, 35.0], 1, at=lambda n: {"spring.phi": n})
+    np.testing.assert_allclose(2 * np.pi * diagram.frequencies[:, 0], [10.0, 40.0], rtol=1e-6)
+    assert not diagram.crossings
+
+
+def test_the_axis_ends_above_the_highest_mode_unless_an_end_is_given() -> None:
+    pytest.importorskip("matplotlib")
+    diagram = _two_masses().campbell([0.0, 157.0], 48)
+    assert max(diagram.frequencies[0]) < diagram.plot().axes[0].get_ylim()[1] < 1.3 * max(diagram.frequencies[0])
+    assert [made.order for made in diagram.crossings] == [48]
+    given = _two_masses().campbell([0.0, 157.0], 48, f_max=500.0)
+    assert given.plot().axes[0].get_ylim()[1] == 500.0
+
+
+def test_the_titles_of_pictures_are_whole() -> None:
+    """Points of long names and many phases would run out of the picture on both sides."""
+    pytest.importorskip("matplotlib")
+    net = sw.Network("the drive of the conveyor between the stockyard and the second crusher of the plant")
+    names = [f"inertia of section {k}" for k in range(1, 4)]
+    for k, name in enumerate(names):
+        net.add(sw.Inertia(name, J=1.0), f"n{k}")
+        net.add(sw.CoulombLoad(f"idlers of section {k}", tau=5.0), f"n{k}")
+        if k:
+            net.add(sw.Spring(f"belt {k}", c=1e4), f"n{k - 1}", f"n{k}")
+    net.add(sw.TorqueSource("motor of the head drum", tau=0.0), "n0")
+    point = {f"{name}.omega": 20.0 for name in names}
+    drawn = [
+        net.campbell([10.0, 50.0], at=lambda n: dict.fromkeys(point, n)),
+        net.modes(point),
+        net.frequency_response("motor of the head drum.tau", "belt 1.tau", [1.0, 10.0, 50.0], point),
+        net.simulate(0.1, initial=point),
+    ]
+    for figure in (record.plot() for record in drawn):
+        figure.draw_without_rendering()
+        axes = figure.axes[0]
+        for text in (figure._suptitle, axes.title):
+            if text.get_text():
+                box = text.get_window_extent()
+                assert box.x0 >= 0
+                assert box.x1 <= figure.bbox.width
+                assert box.y1 <= figure.bbox.height

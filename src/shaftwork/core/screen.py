@@ -8,6 +8,8 @@ from itertools import islice
 
 LINES, COLUMNS = 25, 100
 """Size of the screen."""
+CHARACTER = 0.55 / 72
+"""Mean width of a character of one point of size, in: of the type of pictures."""
 
 
 def on_one_screen(title: str, lines: Iterable[str], count: int) -> str:
@@ -42,6 +44,17 @@ def named(title: str, names: Sequence[str], most: int = 3) -> list[str]:
 def shorter(text: str) -> str:
     """A line that fits the screen."""
     return text if len(text) <= COLUMNS else f"{text[: COLUMNS - 3]}..."
+
+
+def in_lines(title: str, width: float, size: float = 12.0) -> str:
+    """The title of a picture in as many lines as it needs.
+
+    Args:
+        title: the text.
+        width: of the picture, in.
+        size: of the type, pt.
+    """
+    return textwrap.fill(title, int(width / (CHARACTER * size)), break_on_hyphens=False)
 
 
 def counted(number: int, what: str) -> str:

@@ -29,8 +29,6 @@ Names = str | Sequence[str] | None
 Time = float | None
 SmallMotions = Callable[[Point, Time, Names], LinearModel | ExactModel]
 """From a point, a time and names of inputs to the network near that point."""
-BEYOND = 1.2
-"""Modes without number are followed up to so many times the end of a diagram."""
 NAMED = 4
 """Values of a point that a title names."""
 
@@ -132,9 +130,10 @@ def campbell(
     if at is None:
         _refuse_no_point(model)
 
-    def modes(speed: float, top: float) -> Modes:
-        model = small_motions(at(speed) if callable(at) else at, None, ())
-        return model.modes(count, None if isinstance(model, LinearModel) or count is not None else BEYOND * top)
+    def modes(speed: float, f_max: float) -> tuple[Modes, str]:
+        near = small_motions(at(speed) if callable(at) else at, None, ())
+        limit = None if isinstance(near, LinearModel) or count is not None else f_max
+        return near.modes(count, limit), near.phase
 
     name = model.form.graph.name
     return diagram.campbell(name, modes, speeds, orders, f_max, constant=not callable(at))

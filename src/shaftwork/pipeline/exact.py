@@ -149,7 +149,7 @@ class ExactNetwork:
         time, x = operating_point(self._own, p, at, t, self._own.settled(p))
         return self.around(time, x, inputs, titled(self._model.name, near(self._own, given, time)))
 
-    def around(self, time: float, x: Array, inputs: Names, title: str) -> ExactModel:
+    def around(self, time: float, x: Array, inputs: Names, title: str, phase: str = "") -> ExactModel:
         """The network near a point that is known.
 
         Args:
@@ -157,6 +157,7 @@ class ExactNetwork:
             x: (n,) the states of the network with meshes in place of waves.
             inputs: names; None for all sources.
             title: what is linearised.
+            phase: the modes of its parts there, in words.
 
         Raises:
             SignalError: there is no such input.
@@ -170,7 +171,7 @@ class ExactNetwork:
             profiles=ModelObserver(self._model.form, self._model.bind).profiles,
             lengths=tuple(p["length"] for p in self._values),
         )
-        return ExactModel(title, slopes, partial(self._starts, values, time))
+        return ExactModel(title, slopes, partial(self._starts, values, time), phase)
 
     def _read(self, time: float, x: Array) -> dict[str, float]:
         """The states of the open network at the point, and speeds and torques of the ends of the shafts."""
@@ -249,8 +250,9 @@ class ExactPhases:
         time, moment = self._model.point({}, at, t)
         modes = moment.regime.modes
         network = self._networks(modes, lambda: ExactNetwork(self._in(modes), self._compiled, self._shafts))
-        title = titled(self._model.name, about(self._model, at, time), self._model.words(moment))
-        return network.around(time, moment.x, inputs, title)
+        phase = self._model.words(moment)
+        title = titled(self._model.name, about(self._model, at, time), phase)
+        return network.around(time, moment.x, inputs, title, phase)
 
     def _in(self, modes: ModeNames) -> Model:
         """The network in one phase."""

@@ -5,23 +5,22 @@ from __future__ import annotations
 import reprlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from shaftwork.core.errors import MissingExtraError, ParameterError
 from shaftwork.core.parameters import in_si, numbers_in_si
-from shaftwork.core.screen import counted
+from shaftwork.core.screen import counted, in_lines
 from shaftwork.results.modes import Modes
+from shaftwork.results.modes_over_speed import BEYOND, Meeting, OverSpeed, Swinging, differing, numbered
 from shaftwork.results.observer import Array
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-REFINED = 1e-12
-ITERATIONS = 50
+HEADROOM = 1.15
+"""The frequency axis ends so many times above the highest mode, where nobody says where."""
 LAWS = ", laws at t = "
 """Before the time at which laws are read, in what a title says of the point."""
 
@@ -52,8 +51,9 @@ class Campbell:
         about: what it is linearised about, in words; empty where it is linear.
         speeds: (k,) rad/s, ascending.
         orders: excitations per turn.
-        modes: names of the modes that swing at some speed.
-        frequencies: (k, modes) natural frequencies, Hz; 0 where a mode does not swing.
+        modes: names of the modes that swing at some speed; where the network has several phases, each has its modes,
+            "mode 1 (pump stuck)".
+        frequencies: (k, modes) natural frequencies, Hz; 0 where a mode does not swing, or belongs to another phase.
         crossings: by ascending speed.
         f_max: end of the frequency axis, Hz.
     """
@@ -92,7 +92,7 @@ class Campbell:
 
 def campbell(
     title: str,
-    modes_at: Callable[[float, float], Modes],
+    modes_at: Callable[[float, float], tuple[Modes, str]],
     speeds: Any,
     orders: Any,
     f_max: float | None,
@@ -101,15 +101,17 @@ def campbell(
 ) -> Campbell:
     """The interference diagram of a network.
 
-    Law: a crossing is a speed n with f(n) = order n / 2 pi, found between two of the speeds and refined until it no
-    longer changes.
+    Law: a crossing is a speed n with f(n) = order n / 2 pi, f a natural frequency at n itself. It is sought between
+    two of the speeds, in each phase of the network for itself, and refined until it no longer changes.
 
     Args:
         title: of the network, with which those of the modes begin.
-        modes_at: the modes at a speed in rad/s, those up to a frequency in Hz at least.
+        modes_at: from a speed in rad/s and a frequency in Hz to the modes there, up to that frequency at least, and
+            the phase that they belong to.
         speeds: (k,) rad/s, ascending.
         orders: excitations per turn, each above 0.
-        f_max: highest frequency of interest, Hz; by default the highest order at the highest speed.
+        f_max: highest frequency of interest, Hz; by default the highest order at the highest speed. The axis then ends
+            above the highest mode.
         constant: whether the modes are the same at all speeds.
 
     Raises:
@@ -117,30 +119,50 @@ def campbell(
     """
     n, lines = _ascending(speeds), _orders(orders)
     top = float(max(lines) * n[-1] / (2 * np.pi)) if f_max is None else in_si("f_max", f_max, "Hz", above=0)
-
-    def modes(speed: float) -> Modes:
-        return modes_at(speed, top)
-
-    found = [modes(float(n[0]))] * len(n) if constant else [modes(float(speed)) for speed in n]
-    rates, names = _tracked(found)
-    table = np.where(rates.imag > 0, np.abs(rates), 0.0) / (2 * np.pi)
-    shown = np.array(((table > 0) & (table <= top)).any(axis=0))
-    table, kept = table[:, shown], tuple(name for name, show in zip(names, shown, strict=True) if show)
-    crossings = [
-        Crossing(speed, order, kept[mode], float(order * speed / (2 * np.pi)))
-        for mode in range(len(kept))
-        for order in lines
-        for speed in _meeting(modes, n, table[:, mode], order, constant=constant)
-    ]
+    network = OverSpeed(lambda speed: modes_at(speed, BEYOND * top), top)
+    found = [network.at(float(n[0]))] * len(n) if constant else [network.at(float(speed)) for speed in n]
+    meetings = _constant(found[0], n, lines) if constant else network.meetings(n, lines)
+    names = _names(network, [*found, *(met.at for met in meetings)])
+    crossings = (
+        Crossing(met.speed, met.order, names[met.at.speed][met.rank], float(met.order * met.speed / (2 * np.pi)))
+        for met in meetings
+    )
     inside = sorted(
         (made for made in crossings if made.frequency <= top), key=lambda made: (made.speed, made.order, made.frequency)
     )
-    return Campbell(title, _about(title, found), n, lines, kept, table, tuple(inside), top)
+    rows = [dict(zip(names[point.speed], point.frequencies.tolist(), strict=True)) for point in found]
+    shown = tuple(dict.fromkeys(name for row in rows for name, frequency in row.items() if frequency <= top))
+    table = np.array([[row.get(name, 0.0) for name in shown] for row in rows]).reshape(len(n), len(shown))
+    end = min(top, HEADROOM * float(table.max())) if f_max is None and table.any() else top
+    return Campbell(title, _about(title, found), n, lines, shown, table, tuple(inside), end)
 
 
-def _about(title: str, found: Sequence[Modes]) -> str:
+def _constant(point: Swinging, n: Array, orders: Sequence[float]) -> list[Meeting]:
+    """Where orders meet modes that are the same at all speeds."""
+    met = (
+        Meeting(2 * np.pi * frequency / order, point, order, rank)
+        for order in orders
+        for rank, frequency in enumerate(point.frequencies.tolist())
+    )
+    return [made for made in met if n[0] <= made.speed <= n[-1]]
+
+
+def _names(network: OverSpeed, shown: Sequence[Swinging]) -> dict[float, list[str]]:
+    """The name of each mode by speed: its number, with its phase in words where several phases are shown."""
+    words = differing(tuple(dict.fromkeys(point.phase for point in shown)))
+    numbers = numbered(sorted(network.points.values(), key=lambda point: point.speed))
+    return {
+        point.speed: [
+            f"mode {number + 1}" + (f" ({words[point.phase]})" if len(words) > 1 else "")
+            for number in numbers[point.speed]
+        ]
+        for point in shown
+    }
+
+
+def _about(title: str, found: Sequence[Swinging]) -> str:
     """The point of all modes, or those of the first and the last."""
-    first, last = (modes.title.removeprefix(title).strip() for modes in (found[0], found[-1]))
+    first, last = (point.title.removeprefix(title).strip() for point in (found[0], found[-1]))
     if first == last:
         return first
     point, _, time = first.partition(LAWS)
@@ -173,59 +195,6 @@ def _orders(orders: Any) -> tuple[float, ...]:
     return tuple(in_si("orders", order, above=0) for order in listed)
 
 
-def _tracked(found: Sequence[Modes]) -> tuple[Any, tuple[str, ...]]:
-    """(k, modes) rates, each column one mode followed from speed to speed by its nearest rate; 0 where it is absent.
-
-    The distance of two rates counts as a fraction of both, so that a mode that leaves at an end of the diagram moves no
-    other.
-    """
-    size = max(len(modes) for modes in found)
-    tracks = [np.pad(modes.rates, (0, size - len(modes))) for modes in found]
-    for k, (before, after) in enumerate(pairwise(tracks)):
-        if before is not after:
-            sizes = np.abs(before)[:, None] + np.abs(after)[None, :]
-            distances = np.abs(before[:, None] - after[None, :]) / np.where(sizes > 0, sizes, 1.0)
-            _, order = linear_sum_assignment(distances)
-            tracks[k + 1] = after[order]
-    names = next(modes for modes in found if len(modes) == size).names
-    return np.array(tracks), names
-
-
-def _meeting(
-    modes_at: Callable[[float], Modes], n: Array, frequency: Array, order: float, *, constant: bool
-) -> list[float]:
-    """The speeds at which an order meets one natural frequency."""
-    if constant:
-        speed = 2 * np.pi * float(frequency[0]) / order
-        return [speed] if n[0] <= speed <= n[-1] else []
-    gap = frequency - order * n / (2 * np.pi)
-    swings = frequency > 0
-    met: list[float] = []
-    for k in range(len(n) - 1):
-        if not (swings[k] and swings[k + 1]) or gap[k] * gap[k + 1] > 0 or gap[k + 1] == 0:
-            continue
-        start = float(n[k] - gap[k] * (n[k + 1] - n[k]) / (gap[k + 1] - gap[k]))
-        met.append(_refined(modes_at, start, order, (float(n[k]), float(n[k + 1]))))
-    if swings[-1] and gap[-1] == 0:
-        met.append(float(n[-1]))
-    return met
-
-
-def _refined(modes_at: Callable[[float], Modes], start: float, order: float, between: tuple[float, float]) -> float:
-    """The meeting of an order with the natural frequency nearest to it, from a start that interpolation gave."""
-    speed = start
-    for _ in range(ITERATIONS):
-        found = modes_at(speed).frequencies
-        line = order * speed / (2 * np.pi)
-        new = 2 * np.pi * float(found[np.abs(found - line).argmin()]) / order
-        if not between[0] <= new <= between[1]:
-            return start
-        if abs(new - speed) <= REFINED * abs(speed):
-            return new
-        speed = new
-    return start
-
-
 def _diagram(diagram: Campbell) -> Figure:
     try:
         from matplotlib.figure import Figure
@@ -235,7 +204,10 @@ def _diagram(diagram: Campbell) -> Figure:
     axis = figure.subplots()
     turns = 30 / np.pi
     for name, column in zip(diagram.modes, diagram.frequencies.T, strict=True):
-        axis.plot(diagram.speeds * turns, np.where(column > 0, column, np.nan), linewidth=1.4, label=name)
+        swings = column > 0
+        beside = np.append(swings[1:], False) | np.append(False, swings[:-1])
+        shown, alone = np.where(swings, column, np.nan), np.flatnonzero(swings & ~beside).tolist()
+        axis.plot(diagram.speeds * turns, shown, linewidth=1.4, label=name, marker="o", ms=3, markevery=alone)
     for order in diagram.orders:
         end = min(float(diagram.speeds[-1]), 2 * np.pi * diagram.f_max / order)
         axis.plot([0, end * turns], [0, order * end / (2 * np.pi)], color="0.5", linewidth=0.8)
@@ -244,7 +216,7 @@ def _diagram(diagram: Campbell) -> Figure:
             (end * turns, order * end / (2 * np.pi)),
             color="0.3",
             fontsize=8,
-            xytext=(3, 1),
+            xytext=(3, -10),
             textcoords="offset points",
         )
     axis.plot(
@@ -256,8 +228,8 @@ def _diagram(diagram: Campbell) -> Figure:
     axis.set_ylabel("f in Hz")
     axis.grid(alpha=0.3)
     if diagram.modes:
-        axis.legend(loc="upper left", frameon=False, fontsize=8)
-    figure.suptitle(f"{diagram.title}: natural frequencies and orders")
+        axis.legend(loc="best", framealpha=0.8, edgecolor="none", fontsize=8)
+    figure.suptitle(in_lines(f"{diagram.title}: natural frequencies and orders", 9.0))
     if diagram.about:
-        axis.set_title(f"linearised {diagram.about}", fontsize=9)
+        axis.set_title(in_lines(f"linearised {diagram.about}", 8.0, size=9.0), fontsize=9)
     return figure

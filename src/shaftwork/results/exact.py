@@ -170,11 +170,13 @@ class ExactModel:
         title: of the network.
         slopes: the network near the point.
         starts: the modes of the network with meshes that are right up to a rate.
+        phase: the modes of its parts at the point, "gap open, load stuck"; empty where none has several.
     """
 
     title: str
     slopes: ExactSlopes
     starts: Starts
+    phase: str = ""
 
     def modes(self, count: int | None = None, f_max: float | None = None) -> Modes:
         """Frequencies, damping and shapes of the free motions.

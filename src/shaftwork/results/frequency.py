@@ -14,6 +14,7 @@ from scipy.sparse.linalg import splu
 
 from shaftwork.core.errors import MissingExtraError, ParameterError, SignalError
 from shaftwork.core.parameters import numbers_in_si
+from shaftwork.core.screen import in_lines
 from shaftwork.results.observer import Array
 from shaftwork.results.slopes import Complex, Motions, Slopes
 
@@ -301,7 +302,7 @@ def _bode(response: FrequencyResponse) -> Figure:
         axis.grid(alpha=0.3, which="both")
         for f_infinite in response.infinite:
             axis.axvline(f_infinite, color="0.5", linestyle=":", linewidth=1.0)
-    figure.suptitle(response.title)
+    figure.suptitle(in_lines(response.title, 9.0))
     return figure
 
 

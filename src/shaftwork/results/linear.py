@@ -41,6 +41,7 @@ class LinearModel:
         point: value of each state at the point.
         t: time at which the laws are read, s.
         slopes: the network near the point.
+        phase: the modes of its parts at the point, "gap open, load stuck"; empty where none has several.
     """
 
     title: str
@@ -50,6 +51,7 @@ class LinearModel:
     point: Mapping[str, float]
     t: float
     slopes: Slopes
+    phase: str = ""
 
     @property
     def A(self) -> Any:
@@ -149,7 +151,9 @@ class LinearModel:
         return f"<LinearModel of '{self.title}': {sizes}>"
 
 
-def linear_model(title: str, slopes: Slopes, outputs: tuple[str, ...] | None, x: Array, t: float) -> LinearModel:
+def linear_model(
+    title: str, slopes: Slopes, outputs: tuple[str, ...] | None, x: Array, t: float, phase: str = ""
+) -> LinearModel:
     """The record of a network near a point.
 
     Args:
@@ -158,6 +162,7 @@ def linear_model(title: str, slopes: Slopes, outputs: tuple[str, ...] | None, x:
         outputs: names of the outputs; None for the states.
         x: (n,) the states at the point.
         t: time at which the laws are read, s.
+        phase: the modes of its parts there, in words.
 
     Raises:
         SignalError: there is no such output.
@@ -167,7 +172,7 @@ def linear_model(title: str, slopes: Slopes, outputs: tuple[str, ...] | None, x:
         if name not in slopes.units and name not in slopes.states:
             raise unknown_output(title, slopes, name)
     point = dict(zip(slopes.states, x.tolist(), strict=True))
-    return LinearModel(title, slopes.states, slopes.inputs, names, point, t, slopes)
+    return LinearModel(title, slopes.states, slopes.inputs, names, point, t, slopes, phase)
 
 
 def _plain(matrix: Any) -> Any:

@@ -12,7 +12,7 @@ from scipy import sparse
 
 from shaftwork.core.errors import MissingExtraError, ParameterError, no_quantity
 from shaftwork.core.parameters import in_si, whole
-from shaftwork.core.screen import counted
+from shaftwork.core.screen import counted, in_lines
 from shaftwork.results.eigenvalues import eigenmodes
 from shaftwork.results.observer import Array
 from shaftwork.results.slopes import Complex, Motions, Slopes
@@ -290,7 +290,7 @@ def _plot(modes: Modes, numbers: tuple[int, ...]) -> Figure:
     named = [(place, name) for place, name in named if "." not in name]  # those inside a part speak for themselves
     shown = named[:: max(1, -(-len(named) // LABELS))]
     axes[-1].set_xticks([place for place, _ in shown], [name for _, name in shown], rotation=45)
-    figure.suptitle(f"{modes.title}: speeds of the nodes")
+    figure.suptitle(in_lines(f"{modes.title}: speeds of the nodes", 9.0))
     return figure
 
 

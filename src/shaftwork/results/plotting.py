@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shaftwork.core.errors import MissingExtraError
+from shaftwork.core.screen import in_lines
 from shaftwork.results.course import course
 from shaftwork.results.observer import Array
 
@@ -66,7 +67,7 @@ def plot_signals(solution: Solution, names: tuple[str, ...]) -> Figure:
         _draw_phases(axes[-1], solution, parts)
     axes[-1].set_xlabel("t in s")
     axes[-1].set_xlim(solution.steps[0], solution.steps[-1])
-    figure.suptitle(solution.name)
+    figure.suptitle(in_lines(solution.name, 9.0))
     figure.align_ylabels()
     return figure
 

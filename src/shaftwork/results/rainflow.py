@@ -9,6 +9,7 @@ import numpy as np
 
 from shaftwork.core.errors import MissingExtraError, ParameterError
 from shaftwork.core.parameters import in_si, whole
+from shaftwork.core.screen import in_lines
 from shaftwork.results.course import Read
 from shaftwork.results.observer import Array
 from shaftwork.results.turning import TurningPoints, turning_points
@@ -187,5 +188,5 @@ def _picture(cycles: Rainflow, bins: int | tuple[int, int]) -> Figure:
     right.set_ylim(bottom=0.0)
     right.set_xlabel("cycles")
     right.grid(alpha=0.3)
-    figure.suptitle(f"{cycles.title}: {cycles.name}")
+    figure.suptitle(in_lines(f"{cycles.title}: {cycles.name}", 11.0))
     return figure

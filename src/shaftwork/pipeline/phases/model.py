@@ -216,8 +216,9 @@ class PhasedModel(Model):
         model = moment.regime.assembly.model
         slopes = Linearization(model, moment.regime.p, moment.x, time, input_names(model, inputs))
         named = None if outputs is None else (outputs,) if isinstance(outputs, str) else tuple(outputs)
-        title = titled(self.name, about(model, at, time), self.words(moment))
-        return linear_model(title, slopes, named, moment.x, time)
+        phase = self.words(moment)
+        title = titled(self.name, about(model, at, time), phase)
+        return linear_model(title, slopes, named, moment.x, time, phase)
 
     def words(self, moment: Moment) -> str:
         """The phase of a moment, "gap open, brake locked"."""
