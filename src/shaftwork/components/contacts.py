@@ -21,8 +21,8 @@ def _stiffness(unit: str = "N*m/rad", meaning: str = "torsional stiffness") -> A
     return parameter(unit, f"{meaning} in contact, by default rigid", above=0, default=None)
 
 
-def _damping(unit: str = "N*m*s/rad") -> Any:
-    return parameter(unit, "damping in contact", at_least=0, default=0.0)
+def _damping(unit: str = "N*m*s/rad", meaning: str = "damping in contact") -> Any:
+    return parameter(unit, meaning, at_least=0, default=0.0)
 
 
 def _restitution() -> Any:
@@ -60,26 +60,28 @@ def _modes(upper: Any, lower: Any, p: Any, rest: Any, twist: str = "phi") -> Mod
     return _elastic(above, below, _torques(upper, lower, p))
 
 
-def _elastic(above: Any, below: Any, torques: tuple[Any, Any]) -> Modes:
-    """In contact the flank springs back; it never pulls."""
+def _elastic(
+    above: Any, below: Any, torques: tuple[Any, Any], contact: str = "in contact", free: str = "open"
+) -> Modes:
+    """In contact the flank springs back; it never pulls. The last two are the words for the modes."""
     forward, backward = torques
     begins, modes, inside = [], [], true
     if above is not None:
         begins.append(Leave(above, "forward"))
         inside &= above <= 0
         modes += [
-            Mode("forward", (Leave(-forward, "parted forward"),), 1.0, starts=above > 0, says="in contact"),
+            Mode("forward", (Leave(-forward, "parted forward"),), 1.0, starts=above > 0, says=contact),
             # beyond the limit, but the flank springs back more slowly than the other moves away
-            Mode("parted forward", (Leave(forward, "forward"), Leave(-above, "open")), starts=NEVER, says="open"),
+            Mode("parted forward", (Leave(forward, "forward"), Leave(-above, "open")), starts=NEVER, says=free),
         ]
     if below is not None:
         begins.append(Leave(below, "backward"))
         inside &= below <= 0
         modes += [
-            Mode("backward", (Leave(backward, "parted backward"),), -1.0, starts=below > 0, says="in contact backward"),
-            Mode("parted backward", (Leave(-backward, "backward"), Leave(-below, "open")), starts=NEVER, says="open"),
+            Mode("backward", (Leave(backward, "parted backward"),), -1.0, starts=below > 0, says=f"{contact} backward"),
+            Mode("parted backward", (Leave(-backward, "backward"), Leave(-below, "open")), starts=NEVER, says=free),
         ]
-    return Modes((Mode("open", tuple(begins), starts=inside), *modes))
+    return Modes((Mode("open", tuple(begins), starts=inside, says=free), *modes))
 
 
 def _rigid(above: Any, below: Any, rebound: tuple[Any, Any], twist: str) -> Modes:
@@ -177,6 +179,29 @@ class TranslationalBacklash(Component):
 
     def branches(self, p: Any) -> Iterator[Branch]:
         yield from _branches(p.gap / 2, -p.gap / 2, p, "s")
+
+
+@component
+class Rope(Component):
+    """A massless rope, chain or belt between two nodes: it pulls, and hangs slack instead of pushing.
+
+    Law: f = max(0, c s + d v) where s > 0, and 0 else, with s the way and v the speed of node a against node b: s is
+    the stretch, negative where the rope hangs slack, and 0 at the start unless it is given. It is a `Backlash` without
+    a gap on one side alone: the damper acts while the rope is stretched, and never pushes. A stretched rope stores
+    c s^2 / 2. Modes: slack, taut.
+    """
+
+    c: float = parameter("N/m", "stiffness", above=0)
+    d: float = _damping("N*s/m", "internal damping, while taut")
+
+    role: ClassVar[Role] = "loss"
+    ports: ClassVar = (Port("a", TRANSLATION), Port("b", TRANSLATION))
+
+    def modes(self, p: Any) -> Iterator[Modes]:
+        yield _elastic(INTEGRAL, None, _torques(Integer(0), None, p), "taut", "slack")
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        yield from _branches(Integer(0), None, p)
 
 
 @component

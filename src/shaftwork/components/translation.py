@@ -29,7 +29,7 @@ class Mass(Component):
 
 @component
 class TranslationalSpring(Component):
-    """A massless rope, rod or spring with internal damping beside it.
+    """A massless rod or spring with internal damping beside it. It pushes as it pulls; what only pulls is a `Rope`.
 
     Law: f = f_c + d v_rel, d(f_c)/dt = c v_rel. Analogue: an inductor 1/c beside a conductance d.
     """
