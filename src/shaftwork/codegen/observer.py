@@ -176,12 +176,8 @@ class ModelObserver:
         """
         if not self._lines:
             return {}
-        if not isinstance(dense, Carrying):
-            raise SignalError(
-                "The energy of a wave is on its way, and one instant does not tell it. Read it of a motion."
-            )
         held: dict[str, Array] = {}
-        for part, column in zip(self._lines, dense.held(t).T, strict=True):
+        for part, column in zip(self._lines, _carrying(dense).held(t).T, strict=True):
             held[part.name] = held.get(part.name, 0.0) + column
         return held
 
@@ -205,7 +201,7 @@ class ModelObserver:
         """(k, places) a quantity along a part by its name in `profiles`."""
         part, profile = self._profiles[name]
         if profile.lines:
-            return along_lines(self._bind(), part, profile, t, dense)
+            return along_lines(self._bind(), part, profile, t, _carrying(dense))
         return self._read(t, x, lambda history: history.profile(part, profile))
 
     def impacts(self, dense: Dense) -> tuple[Impact, ...]:
@@ -234,6 +230,19 @@ class ModelObserver:
         parts = (part for part in self._graph.parts if part.component.role != "source" or self._stores(part))
         stored = {part.name: history.stored(part) for part in parts}
         return stored | {name: stored[name] + held for name, held in self._in_waves(t, dense).items()}
+
+    def held(self, t: float, x: Array) -> dict[str, float]:
+        """All that is stored at a time in s with the states (n,), by name."""
+        stores = Stores(self._form)
+        return stores.at_once(self._bind, self.read_at(t), x)
+
+    def read_at(self, t: float) -> float:
+        """When inputs are read at a time in s: after what jumps there, or at the end of a run before it."""
+        return self._instants.sides(t)[1]
+
+    def modes_at(self, t: float) -> dict[str, str]:  # noqa: ARG002
+        """No part changes its mode."""
+        return {}
 
     def _stores(self, part: GraphPart) -> bool:
         templates = (self._graph.branches[k].template for k in part.branches)
@@ -271,6 +280,17 @@ class ModelObserver:
         made, p = known[name].component, self._bind().p
         places = known[name].parameters
         return made.changed(**{key: float(p[places[key]]) for key in made.declared if key in places})
+
+
+def _carrying(dense: Dense | None) -> Carrying:
+    """The motion, which knows the waves on their way.
+
+    Raises:
+        SignalError: there is none.
+    """
+    if not isinstance(dense, Carrying):
+        raise SignalError("A wave is on its way, and one instant does not tell it. Read it of a motion.")
+    return dense
 
 
 def _unit(signal: Signal) -> str:

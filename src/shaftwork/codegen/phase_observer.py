@@ -30,6 +30,7 @@ class Stretch:
         instants: at which inputs jump.
         dense: the motion, in the states of the equations; None where it has none.
         states: their names.
+        modes: of every element.
     """
 
     start: float
@@ -40,6 +41,7 @@ class Stretch:
     instants: Timeline
     dense: Callable[[Array], Array]
     states: tuple[str, ...]
+    modes: Mapping[str, str]
 
 
 class Stretches:
@@ -74,6 +76,10 @@ class Stretches:
             places = np.flatnonzero(np.isin(index, numbers))
             yield tuple(self[number] for number in numbers), places
 
+    def at(self, t: float) -> Stretch:
+        """The phase at a time in s; of a time between two the later one."""
+        return self[max(int(np.searchsorted(self.starts, t, side="right")) - 1, 0)]
+
     def dense(self, t: Array) -> Array:
         """(k, stores) all that is stored at times (k,)."""
         t = np.atleast_1d(np.asarray(t, dtype=float))
@@ -81,7 +87,8 @@ class Stretches:
         index = np.clip(np.searchsorted(self.starts, t, side="right") - 1, 0, None)
         for number in np.unique(index).tolist():
             stretch, places = self[number], np.flatnonzero(index == number)
-            made[places] = stretch.stores.of(stretch.bind, t[places], stretch.dense(t[places]))
+            read_at = stretch.instants.one_sided(t[places])
+            made[places] = stretch.stores.of(stretch.bind, read_at, stretch.dense(t[places]))
         return made
 
 
@@ -155,6 +162,18 @@ class PhaseObserver:
         """Lost power and supplied power by part."""
         lost = self._by_part(t, x, lambda observer, times, states: observer.powers(times, states)[0])
         return lost, self._by_part(t, x, lambda observer, times, states: observer.powers(times, states)[1])
+
+    def held(self, t: float, x: Array) -> dict[str, float]:  # noqa: ARG002
+        """All that is stored, by name, which is what the states (n,) of a motion through phases are."""
+        return dict(zip(self._names, x.tolist(), strict=True))
+
+    def read_at(self, t: float) -> float:
+        """When inputs are read at a time in s, as in one phase."""
+        return self._stretches.at(t).observer.read_at(t)
+
+    def modes_at(self, t: float) -> dict[str, str]:
+        """The mode of every element at a time in s."""
+        return dict(self._stretches.at(t).modes)
 
     def part(self, name: str) -> Component:
         """A component of the network, with the parameter values of this motion."""

@@ -71,6 +71,11 @@ class Stores:
         states = x[:, : len(self._states)]  # waves may follow them
         return states @ self._loop_map(bind().part) if self.by_loops else self._recovered(bind(), t, x)
 
+    def at_once(self, bind: Callable[[], BoundArrays], t: float, x: Array) -> dict[str, float]:
+        """All that is stored at one time in s with the states (n,), by name; without full matrices."""
+        values = x[self._columns] if -1 not in self._columns else self._recovered(bind(), np.array([t]), x[None, :])[0]
+        return dict(zip(self.names, values.tolist(), strict=True))
+
     def _loop_map(self, part: LinearPart) -> Array:
         """(n, stores) what the states are multiplied by; the last one is kept."""
         if self._map is None or self._map[0] is not part:

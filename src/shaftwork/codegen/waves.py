@@ -11,7 +11,6 @@ import numpy as np
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.code import scalar
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.recovery import History
 from shaftwork.components.base import Profile
 from shaftwork.network.graph import GraphPart
 from shaftwork.network.templates import BranchTemplate
@@ -36,6 +35,10 @@ class Carrying(Protocol):
 
     def held(self, times: Array) -> Array:
         """(k, lines) energy in J that is on its way in each line at times (k,)."""
+        ...
+
+    def leaving(self, times: Array) -> Array:
+        """(k, ends) the waves 2 Z v + h in N m that leave the ends at times (k,), also before the start."""
         ...
 
 
@@ -82,38 +85,18 @@ def _line(template: BranchTemplate) -> Callable[..., Sequence[float]]:
     return scalar(template.symbols, template.line or ())
 
 
-def along_lines(bound: BoundArrays, part: GraphPart, profile: Profile, t: Array, dense: Dense) -> Array:
+def along_lines(bound: BoundArrays, part: GraphPart, profile: Profile, t: Array, dense: Carrying) -> Array:
     """(k, places) torque or speed along a part that is made of lines.
 
     Law: tau = (f - g) / 2, omega = (f + g) / (2 Z), with f and g the waves that have left the two ends and come by.
     """
-    lines = dict(zip(bound.program.form.waves[::2], zip(*WaveSystem(bound).lines, strict=True), strict=True))
+    ends, (impedances, delays) = bound.program.form.waves, WaveSystem(bound).lines
     labels = {bound.program.form.graph.branches[k].template.label: k for k in part.branches}
     made = np.empty((len(t), len(profile.lines)))
     for place, (label, share) in enumerate(profile.lines):
-        first = labels[f"{label}_a" if f"{label}_a" in labels else f"{label}_middle"]
-        second = labels[f"{label}_b" if f"{label}_b" in labels else f"{label}_middle"]
-        impedance, delay = lines[first]
-        f = _leaving(bound, (first, second), impedance, delay, t - share * delay, dense)
-        g = _leaving(bound, (second, first), impedance, delay, t - (1 - share) * delay, dense)
+        first = ends.index(labels[f"{label}_a" if f"{label}_a" in labels else f"{label}_middle"])
+        impedance, delay = float(impedances[first // 2]), float(delays[first // 2])
+        f = dense.leaving(t - share * delay)[:, first]
+        g = dense.leaving(t - (1 - share) * delay)[:, first + 1]
         made[:, place] = (f - g) / 2 if profile.kind == "through" else (f + g) / (2 * impedance)
     return made
-
-
-def _leaving(
-    bound: BoundArrays, ends: tuple[int, int], impedance: float, delay: float, times: Array, dense: Dense
-) -> Array:
-    """The wave that leaves the first of a line's ends at some times: 2 Z v + h.
-
-    Before the start it is a straight line in time, and arrives at the second end within the first delay.
-    """
-    start = dense.steps[0]
-    inside = np.maximum(times, start)
-    order = np.argsort(inside, kind="stable")
-    history = History(bound, inside[order], dense(inside[order]))
-    values = np.empty(len(times))
-    values[order] = 2 * impedance * history.across[ends[0]] + history.through[ends[0]]
-    marks = start + np.array([0.25, 0.5]) * min(delay, dense.steps[-1] - start)
-    early, late = -History(bound, marks, dense(marks)).through[ends[1]]
-    before = early + (late - early) / (marks[1] - marks[0]) * (times + delay - marks[0])
-    return np.where(times >= start, values, before)

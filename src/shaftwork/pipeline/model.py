@@ -37,18 +37,20 @@ from shaftwork.pipeline.arguments import (
     step_limit,
     time_span,
 )
+from shaftwork.pipeline.ending import ending_of, refuse_motion, time_of_start
 from shaftwork.pipeline.implicit import IMPLICIT, PRESCRIBED, at_rest, solve_loops, start_of_loops
 from shaftwork.pipeline.overview import model_overview
 from shaftwork.pipeline.prepared import Prepared, nominal_tolerances, observed
 from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels
 from shaftwork.pipeline.sizes import in_its_size
+from shaftwork.pipeline.start import start_of
 from shaftwork.pipeline.stored import Rebuild, Repetition, call_of, model_again, remember
 from shaftwork.reduction.form import StateForm
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.analysis import Given, Names, Point, Time
-    from shaftwork.pipeline.waves import WaveStart
+    from shaftwork.pipeline.waves import CarriedWaves, WaveStart
     from shaftwork.results.linear import LinearModel
 
 VARIANTS = 8
@@ -89,12 +91,12 @@ class Model(CompiledModel):
         self,
         t_end: float,
         *,
-        t_start: float = 0.0,
+        t_start: float | None = None,
         rtol: float = 1e-8,
         atol: float | Sequence[float] | None = None,
         t_eval: OutputTimes = None,
         engine: EngineName = "auto",
-        initial: Mapping[str, float] | None = None,
+        initial: Mapping[str, float] | Solution | None = None,
         parameters: Mapping[str, float] | None = None,
         max_steps: int = 10_000_000,
         progress: Callable[[float], None] | None = None,
@@ -104,13 +106,17 @@ class Model(CompiledModel):
 
         Args:
             t_end: end of the motion, s.
-            t_start: its start, s.
+            t_start: its start, s; by default 0, or where the motion before ended.
             rtol: relative tolerance.
             atol: absolute tolerance, one for all states or one for each; by default rtol times a small speed, and
                 times the torque that belongs to it.
             t_eval: output times, or their number (by default 1001 over the run), or "steps" for the engine's own.
             engine: "auto" takes the best one and says why in `Solution.why`.
-            initial: start values of speeds ("J1.omega"), twists ("shaft.phi_rel") or torques; the rest is zero.
+            initial: start values of speeds ("J1.omega"), twists ("shaft.phi_rel") or torques; the rest is zero. Or a
+                motion of the same network: it goes on from its last output time with all that is stored (speeds of
+                inertias, torques of springs, angles), the modes of its parts and the waves on their way. Other parameters
+                than it had change none of these, but what new ratios force at once, as an impact does; a part begins
+                anew where they say in which mode it starts; a `Wave` must keep its impedance and delay.
             parameters: values that differ from the network's, "part.parameter" to value in SI; nothing is recompiled
                 unless a value changes the structure (a damping that was exactly zero).
             max_steps: give up after this many steps.
@@ -119,12 +125,15 @@ class Model(CompiledModel):
             angles: parts whose angle is to be read; what is recorded was chosen in `Network.compile`.
 
         Raises:
-            ParameterError: an argument is out of its range.
+            ParameterError: an argument is out of its range, or `initial` a motion of another network.
             SimulationError: the integration failed; says when, in which state and why.
             MissingExtraError: the engine asked for is not installed.
         """
         refuse_unrecorded(self.form, (angles,) if isinstance(angles, str) else tuple(angles))
         values = self._checked_all(parameters)
+        if isinstance(initial, Solution):
+            initial = ending_of(initial, self.form.graph)
+        t_start = time_of_start(t_start, initial)
         if self._changes_structure(values):
             options: dict[str, Any] = {"t_start": t_start, "rtol": rtol, "atol": atol, "t_eval": t_eval}
             options |= {"engine": engine, "initial": initial, "max_steps": max_steps, "progress": progress}
@@ -143,7 +152,7 @@ class Model(CompiledModel):
         return in_its_size(self.form, prepared, demand, lambda made: self._run(prepared, initial, made))
 
     def _run(self, prepared: Prepared, initial: Given, demand: Demand) -> Solution:
-        x0, waves = self.start(prepared, initial, demand.span)
+        x0, waves = start_of(self, prepared, initial, demand.span)
         problem = self._problem(prepared, x0, demand)
         trajectory, name, why = self._solve(prepared, problem, waves, demand.engine)
         instants = self.switching.timeline(prepared.p, *demand.span)
@@ -178,6 +187,7 @@ class Model(CompiledModel):
         Raises:
             SimulationError: nothing comes to rest or to a steady speed.
         """
+        refuse_motion(initial, "steady_state")
         values = self._checked_all(parameters)
         time = t if isinstance(t, float) and t == math.inf else in_si("t", t, "s")
         if self._changes_structure(values):
@@ -186,7 +196,7 @@ class Model(CompiledModel):
 
     def _steady(self, values: Mapping[str, float], t: float, initial: Given) -> SteadyState:
         if self.form.waves:
-            return self._twin.steady_state(t, initial=initial, parameters=values)
+            return self.twin.steady_state(t, initial=initial, parameters=values)
         prepared = self.prepare(self.vector(values) if values else self.defaults)
         when = t if math.isfinite(t) else self.settled(prepared.p)
         start = initial_state(prepared.bound, initial or {}, when)
@@ -235,11 +245,11 @@ class Model(CompiledModel):
 
     def _choice(self, demand: Demand) -> tuple[str, str]:
         prepared = self.prepare(self.defaults)
-        x0, _ = self.start(prepared, None, demand.span)
+        x0, _ = start_of(self, prepared, None, demand.span)
         return self._engine(prepared, self._problem(prepared, x0, demand), "auto")
 
     def _solve(
-        self, prepared: Prepared, problem: Problem, waves: WaveStart | None, asked: str
+        self, prepared: Prepared, problem: Problem, waves: WaveStart | CarriedWaves | None, asked: str
     ) -> tuple[Trajectory, str, str]:
         """The run, the engine that made it, and why that one."""
         name, why = self._engine(prepared, problem, asked)
@@ -340,24 +350,8 @@ class Model(CompiledModel):
         """What switches because of the time alone."""
         return Switching(self.form)
 
-    def start(
-        self, prepared: Prepared, initial: Mapping[str, float] | None, span: tuple[float, float]
-    ) -> tuple[Array, WaveStart | None]:
-        """The states at the start, and the waves where they are not at rest."""
-        if initial is None and not self.form.has_impulses:
-            return np.zeros(len(self.states)), None
-        _, after = self.switching.timeline(prepared.p, *span).sides(span[0])
-        if not self.form.waves:
-            return initial_state(prepared.bound, {} if initial is None else initial, after), None
-        from shaftwork.pipeline.waves import start_of_waves, warn_of_lost_waves
-
-        if initial and span[0] != 0:
-            warn_of_lost_waves(span[0])
-        given = dict(zip(self.parameters, prepared.p.tolist(), strict=True))
-        return start_of_waves(prepared.bound, self._twin.bind(self._twin.vector(given)), initial or {}, after)
-
     @cached_property
-    def _twin(self) -> Model:
+    def twin(self) -> Model:
         """The network with springs in place of its waves: it stands and turns steadily as they do."""
         from shaftwork.pipeline.waves import twin
 

@@ -13,6 +13,7 @@ from weakref import WeakValueDictionary
 from shaftwork.core.errors import AccuracyWarning, NetworkWarning
 from shaftwork.core.notices import muted
 from shaftwork.network.netlist import Netlist
+from shaftwork.pipeline.ending import Ending
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.arguments import Demand
@@ -56,7 +57,7 @@ def call_of(
         "engine": demand.engine if motion.phases else motion.engine,
         "max_steps": demand.max_steps,
         "parameters": dict(values),
-        "initial": None if initial is None else dict(initial),
+        "initial": initial if initial is None or isinstance(initial, Ending) else dict(initial),
     }
 
 

@@ -22,8 +22,10 @@ from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import AccuracyWarning, NetworkWarning, ParameterError
 from shaftwork.core.notices import warn
 from shaftwork.core.times import just_after
+from shaftwork.integrate.lossless.collocation import POWERS
 from shaftwork.integrate.lossless.engine import solve
-from shaftwork.integrate.lossless.lines import DelayProblem, DelayTrajectory
+from shaftwork.integrate.lossless.lines import DelayProblem, DelayTrajectory, Past, past_of
+from shaftwork.integrate.lossless.waveforms import Polynomials
 from shaftwork.integrate.problem import Problem, Trajectory
 from shaftwork.network.netlist import Netlist
 from shaftwork.network.templates import Kind
@@ -32,6 +34,8 @@ from shaftwork.reduction.form import StateForm
 WHY = "Shafts are travelling waves, so states and delays are solved together."
 LIGHT = 0.1
 """Lumped bearing friction is light up to this fraction of the impedance: the torques are right to about 0.5 %."""
+SAME = 1e-12
+"""Impedances and delays that differ by less than this fraction are the same: another machine rounds otherwise."""
 MANY_PANELS = 2e5
 """A march of so many panels takes minutes."""
 
@@ -42,11 +46,15 @@ class _StatesAndWaves:
 
     Args:
         found: by the engine.
+        before: what left the ends before the start.
         impedances: (lines,) in N m s.
+        lines: by shaft.
     """
 
     found: DelayTrajectory
+    before: Past
     impedances: Array
+    lines: Mapping[str, Array]
 
     @property
     def steps(self) -> Array:
@@ -59,6 +67,26 @@ class _StatesAndWaves:
         """(k, lines) energy in J in each line at times (k,): the waves f and g in it hold (f^2 + g^2) / (4 Z)."""
         squares = self.found.squares(times)
         return np.asarray((squares[:, ::2] + squares[:, 1::2]) / (4 * self.impedances))
+
+    def leaving(self, times: Array) -> Array:
+        """(k, ends) the waves 2 Z v + h in N m that leave the ends at times (k,), also before the start."""
+        start, past = self.steps[0], self.before
+        h, v = self.found.waves(np.maximum(times, start))
+        before = Polynomials(past.starts, past.lengths, past.waves @ POWERS, 0.0)(np.minimum(times, start))
+        return np.where((times < start)[:, None], before, 2 * np.repeat(self.impedances, 2) * v + h)
+
+
+@dataclass(frozen=True)
+class CarriedWaves:
+    """What is on its way in lines where a motion ended.
+
+    Args:
+        past: what has left their ends.
+        lines: by shaft (2, lines), impedances in N m s and delays in s.
+    """
+
+    past: Past
+    lines: Mapping[str, Array]
 
 
 @dataclass(frozen=True)
@@ -87,12 +115,27 @@ def twin(netlist: Netlist) -> Netlist:
     return Netlist(netlist.name, tuple(placed))
 
 
-def warn_of_lost_waves(t_start: float) -> None:
-    """Warn of a motion that goes on at a time in s: its nothing of what is on its way is in its start values."""
+def on_their_way(dense: object, t: float) -> CarriedWaves | None:
+    """The waves on their way at a time in s of a motion with this dense output; None where leaps do not know them."""
+    if not isinstance(dense, _StatesAndWaves) or dense.found.past is None:
+        return None
+    return CarriedWaves(dense.found.past(t), dense.lines)
+
+
+def warn_of_lost_waves(t_start: float, *, in_leaps: bool = False) -> None:
+    """Warn of a motion that goes on at a time in s without what was on its way.
+
+    Args:
+        t_start: the time, s.
+        in_leaps: whether the motion before is known and has leapt through its waves; else only start values are.
+    """
+    why, remedy = "start values tell of their ends alone", "Give the motion itself, initial=sol"
+    if in_leaps:
+        why, remedy = "a long run leaps from one output time to the next", "Simulate it with t_eval='steps'"
     warn(
-        f"The motion goes on at t_start = {t_start:g} s without the waves that were on their way through shafts: start "
-        "values tell of their ends alone, and the torque of a shaft begins as in steady operation. Simulate all of it "
-        "in one run, or take another model of the shaft, such as Lumped(20).",
+        f"The motion goes on at t_start = {t_start:g} s without the waves that were on their way through shafts: "
+        f"{why}, and the torque of a shaft begins as in steady operation. {remedy}; or simulate all of it in one run, "
+        "or take another model of the shaft, such as Lumped(20).",
         AccuracyWarning,
     )
 
@@ -169,18 +212,19 @@ def engine_of_waves(form: StateForm, asked: str) -> tuple[str, str]:
 
 
 def solve_waves(
-    bound: BoundArrays, problem: Problem, start: WaveStart | None, *, linear: bool, steady: bool
+    bound: BoundArrays, problem: Problem, start: WaveStart | CarriedWaves | None, *, linear: bool, steady: bool
 ) -> Trajectory:
     """Solve a problem whose model has lines; the histories of their ends follow the states in the result.
 
     Args:
         bound: the array program.
         problem: states, times and tolerances.
-        start: of the lines; None for rest.
+        start: of the lines, or what is on its way in them; None for rest.
         linear: whether the laws are linear with constant coefficients.
         steady: whether nothing depends on time between breakpoints.
 
     Raises:
+        ParameterError: the waves are those of a line with another impedance or delay.
         SimulationError: the engine failed.
 
     Warns:
@@ -189,37 +233,63 @@ def solve_waves(
     """
     system = WaveSystem(bound)
     impedances, delays = system.lines
+    carried = start if isinstance(start, CarriedWaves) else None
+    if carried is not None:
+        _refuse_other_lines(_lines_by_shaft(bound, system), carried.lines)
     _warn_of_friction(bound, impedances)
     if not linear:
         _warn_of_short_lines(bound, delays, problem.t_end - problem.t0)
-    found = solve(
-        DelayProblem(
-            rhs=system.rhs,
-            speeds=system.speeds,
-            jacobian=system.jacobian,
-            delays=delays,
-            impedances=impedances,
-            x0=problem.x0,
-            t0=problem.t0,
-            t_end=problem.t_end,
-            names=problem.names,
-            atol=problem.atol,
-            rtol=problem.rtol,
-            breakpoints=problem.breakpoints,
-            jump=problem.jump,
-            sides=problem.sides,
-            t_eval=problem.t_eval,
-            explain=problem.explain,
-            max_steps=problem.max_steps,
-            progress=problem.progress,
-            linear=linear,
-            steady=steady,
-            speeds0=None if start is None else start.speeds,
-            torque0=None if start is None else start.torques,
-        )
+    delayed = DelayProblem(
+        rhs=system.rhs,
+        speeds=system.speeds,
+        jacobian=system.jacobian,
+        delays=delays,
+        impedances=impedances,
+        x0=problem.x0,
+        t0=problem.t0,
+        t_end=problem.t_end,
+        names=problem.names,
+        atol=problem.atol,
+        rtol=problem.rtol,
+        breakpoints=problem.breakpoints,
+        jump=problem.jump,
+        sides=problem.sides,
+        t_eval=problem.t_eval,
+        explain=problem.explain,
+        max_steps=problem.max_steps,
+        progress=problem.progress,
+        linear=linear,
+        steady=steady,
+        speeds0=start.speeds if isinstance(start, WaveStart) else None,
+        torque0=start.torques if isinstance(start, WaveStart) else None,
+        past=None if carried is None else carried.past,
     )
+    found = solve(delayed)
     x = np.hstack([found.x, found.h])
-    return Trajectory(found.t, x, _StatesAndWaves(found, impedances), found.statistics)
+    dense = _StatesAndWaves(found, past_of(delayed), impedances, _lines_by_shaft(bound, system))
+    return Trajectory(found.t, x, dense, found.statistics)
+
+
+def _lines_by_shaft(bound: BoundArrays, system: WaveSystem) -> dict[str, Array]:
+    """Impedances and delays (2, lines) of each shaft."""
+    form, lines = bound.program.form, np.array(system.lines)
+    owners = [form.graph.part_of(end).name for end in form.waves[::2]]
+    return {name: lines[:, [owner == name for owner in owners]] for name in dict.fromkeys(owners)}
+
+
+def _refuse_other_lines(lines: Mapping[str, Array], before: Mapping[str, Array]) -> None:
+    """Refuse lines by shaft that are not those in which waves are on their way.
+
+    Raises:
+        ParameterError: names the shaft.
+    """
+    for name, now in lines.items():
+        if now.shape != before[name].shape or not np.allclose(now, before[name], rtol=SAME, atol=0.0):
+            raise ParameterError(
+                f"Shaft '{name}' has another impedance, delay or friction than in the motion that goes on, and waves "
+                "are on their way through it. Keep them as they were, or begin with start values, "
+                "initial={name: sol[name][-1] for name in sol.states}, which leave the waves out."
+            )
 
 
 def _warn_of_friction(bound: BoundArrays, impedances: Array) -> None:

@@ -50,6 +50,18 @@ class Observer(Protocol):
         """By part, at times t (k,) with states x (k, n): lost power in W, supplied power in W."""
         ...
 
+    def held(self, t: float, x: Array) -> dict[str, float]:
+        """All that is stored at a time in s with the states (n,), by name: speeds, torques of springs, angles."""
+        ...
+
+    def read_at(self, t: float) -> float:
+        """When inputs are read at a time in s: after what jumps there, or at the end of a run before it."""
+        ...
+
+    def modes_at(self, t: float) -> dict[str, str]:
+        """The mode of every element that changes its mode, at a time in s."""
+        ...
+
     @property
     def wiring(self) -> Mapping[str, str]:
         """By part, what it is, where it is, and what is no number of it."""

@@ -11,11 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from shaftwork.core.errors import ParameterError
+from shaftwork.core.errors import NetworkWarning, ParameterError
+from shaftwork.core.notices import muted
 from shaftwork.core.parameters import whole, without_unit
 from shaftwork.core.progress import progress
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import OutputTimes, checked_parameter, relative_tolerance, time_span
+from shaftwork.pipeline.ending import ending_of, refuse_motion, time_of_start
 from shaftwork.pipeline.network import Network, network_of
 from shaftwork.results.fatigue import SNLine
 from shaftwork.results.measures import Measure
@@ -47,7 +49,7 @@ def sweep(
     sn: SNLine | Mapping[str, SNLine] | None = None,
     rtol: float = 1e-8,
     engine: str = "auto",
-    initial: Mapping[str, float] | None = None,
+    initial: Mapping[str, float] | Solution | None = None,
     steady: bool = False,
     t_eval: OutputTimes = None,
     processes: int | None = None,
@@ -73,7 +75,7 @@ def sweep(
         rtol: relative tolerance of a step; the absolute one beside it is `rtol` times the size of a state at a speed of
             0.001 rad/s.
         engine: as in `Model.simulate`.
-        initial: start values, as there.
+        initial: start values, or a motion that each variant goes on from, as there.
         steady: whether each variant starts in its own steady state at t = 0, of which `initial` changes some values.
         t_eval: output times of the solutions that functions get, as there; names measure the motion, not the outputs.
         processes: how many; by default as many as there are cores, where the sweep takes long enough. Variants side by
@@ -87,9 +89,14 @@ def sweep(
         SignalError: a measure is of a quantity that does not exist.
     """
     columns = _columns(network_of(net).netlist(), parameters, samples)
+    if steady:
+        refuse_motion(initial, "sweep(steady=True)")
+    if isinstance(initial, Solution):
+        with muted(NetworkWarning):  # compilation warns
+            initial = ending_of(initial, net.graph())
     readers = _readers(measures, columns)
     limits = _limits(require, readers)
-    _, end = time_span(0.0, t_end)
+    _, end = time_span(time_of_start(None, initial), t_end)
     options = _options(readers, rtol, engine, initial, t_eval)
     count = _count(processes)
     task = Task(net, columns, readers, _lines(sn, readers), end, options, steady)

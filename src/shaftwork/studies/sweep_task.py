@@ -24,6 +24,7 @@ from shaftwork.core.errors import (
 from shaftwork.core.notices import muted
 from shaftwork.integrate.engines import available
 from shaftwork.network.netlist import Netlist
+from shaftwork.pipeline.ending import Ending
 from shaftwork.pipeline.network import Network
 from shaftwork.results.fatigue import SNLine
 from shaftwork.results.measures import Measure
@@ -115,7 +116,8 @@ class Worker:
         if not isinstance(initial, Mapping):
             raise ParameterError(f"initial = {initial!r} must map quantities to values, such as {{'J1.omega': 3.0}}.")
         read = [reader.quantity for reader in self._task.measures.values() if isinstance(reader, Measure)]
-        for quantity in (*read, *map(str, initial)):
+        given = () if isinstance(initial, Ending) else map(str, initial)
+        for quantity in (*read, *given):
             if quantity not in {**observer.units, **observer.profiles}:
                 raise no_quantity(quantity, self._model.name, observer.units)
 

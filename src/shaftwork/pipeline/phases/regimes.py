@@ -11,8 +11,10 @@ from sympy import Integer
 from shaftwork.codegen.elements import Array
 from shaftwork.components.branches import INTEGRAL
 from shaftwork.core.errors import NetworkError, ParameterError
+from shaftwork.pipeline.ending import Ending
 from shaftwork.pipeline.phases.assemblies import Element, ModeNames
 from shaftwork.pipeline.phases.moments import Moment, Regime
+from shaftwork.pipeline.phases.starts import begins_anew
 from shaftwork.reduction.cancelling import jamming
 
 if TYPE_CHECKING:
@@ -79,6 +81,28 @@ class Regimes:
         """
         new = self.regime(modes)
         return Moment(new, new.assembly.stores.states(new.assembly.bound(new.p), t, held))
+
+    def resumed(self, ending: Ending) -> Moment:
+        """The moment at which another motion ended, in its modes.
+
+        An element begins anew, as at a start, where a parameter has changed that says in which mode it starts.
+
+        Raises:
+            ParameterError: something is stored that it did not store, or a twist lies beyond a rigid limit.
+        """
+        first, elements, t = self._phases.first, self._phases.elements, ending.read
+        loose = self.regime(first)
+        ending.refuse_lacking(loose.assembly.stores.names)
+        parameters = dict(zip(loose.assembly.model.parameters, loose.p.tolist(), strict=True))
+        changed = ending.changed(parameters) - {element.number for element in elements}
+        apart = self.taking(first, t, ending)
+        if changed:
+            refuse_beyond(loose, elements, t, apart.x)
+        anew = [begins_anew(e.part.name, e.modes, ending.modes.get(e.name), changed) for e in elements]
+        fresh = loose.assembly.first_modes(t, apart.x, loose.p) if any(anew) else first
+        triples = zip(anew, fresh, elements, strict=True)
+        modes = tuple(name if begins else ending.modes[e.name] for begins, name, e in triples)
+        return self.taking(modes if self.possible(modes) else first, t, ending)
 
     def changed(self, moment: Moment, t: float, modes: ModeNames) -> Moment:
         """The same instant in other modes: all that is stored goes over.

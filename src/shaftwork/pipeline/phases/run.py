@@ -20,6 +20,7 @@ from shaftwork.core.notices import warn
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import Problem, SeriesError, StickingError, Trajectory
 from shaftwork.pipeline.arguments import Demand
+from shaftwork.pipeline.ending import Ending
 from shaftwork.pipeline.implicit import PRESCRIBED, at_rest
 from shaftwork.pipeline.phases.assemblies import Assembly
 from shaftwork.pipeline.phases.moments import Change, Moment
@@ -28,6 +29,7 @@ from shaftwork.pipeline.phases.phases import FOLLOWING, Phases
 from shaftwork.pipeline.phases.rejoining import settled
 from shaftwork.pipeline.phases.settling import Settling
 from shaftwork.pipeline.phases.starts import refuse_incomplete, warn_of_what_may_have_begun
+from shaftwork.pipeline.start import start_of
 
 # So many changes of mode, each within this part of the run of the one before, are chatter. Rebounds come ever faster,
 # too, before they end: a thousand of them where nearly all speed is given back.
@@ -101,12 +103,14 @@ class Run:
     def begin(self, initial: Mapping[str, float] | None) -> Moment:
         """The states and modes at the start."""
         start, begins = self.demand.span[0], self._known.begins
-        if initial is not None or not begins:
+        if isinstance(initial, Ending):
+            found = self._resumed(initial)
+        elif initial is not None or not begins:
             assembly = self.phases.assembly(self.phases.first)
             p = self.settling.regime(self.phases.first).p
             if isinstance(initial, Mapping) and initial and start != 0:
                 refuse_incomplete(assembly.stores.names, initial, start)
-            x, _ = assembly.model.start(assembly.prepared(p), initial, self.demand.span)
+            x, _ = start_of(assembly.model, assembly.prepared(p), initial, self.demand.span)
             after = self.timeline(assembly, p).sides(start)[1]
             found = self.settling.settle(start, after, self.settling.started(after, x), None)
             if initial is None:
@@ -114,11 +118,21 @@ class Run:
         else:
             found = begins[0]
         moment, changes = found
-        if initial and start != 0:
+        if initial and start != 0 and not isinstance(initial, Ending):
             for element, mode in zip(self.phases.elements, moment.regime.modes, strict=True):
                 warn_of_what_may_have_begun(element.name, element.modes, mode, start)
         self.note(start, changes)
         return moment
+
+    def _resumed(self, ending: Ending) -> tuple[Moment, list[Change]]:
+        """The states and modes in which another motion ended, and what changes at that instant."""
+        start = self.demand.span[0]
+        moment, changes = self.settling.resumed(ending), list[Change]()
+        after = self._instants(moment).sides(start)[1]
+        if after != ending.read and moment.regime.assembly.model.form.has_impulses:
+            moment, changes, _ = self.settling.jumped(start, moment, ending.read, after)
+        moment, further = settled(self.settling, start, after, moment, None)
+        return moment, [*changes, *further]
 
     def choose(self) -> tuple[str, str]:
         """The engine for the first phase, and why."""

@@ -43,7 +43,7 @@ class Settling:
     def __init__(self, phases: Phases, values: Mapping[str, float], span: tuple[float, float]) -> None:
         self._phases, self.elements = phases, phases.elements
         self._regimes = Regimes(phases, values)
-        self.regime, self.held = self._regimes.regime, self._regimes.held
+        self.regime, self.held, self.resumed = self._regimes.regime, self._regimes.held, self._regimes.resumed
         self._ahead = AHEAD_OF_RUN * (span[1] - span[0])
         self.tick = ROUNDINGS * math.ulp(max(map(abs, span)))
         """How far in s rounding moves the time."""

@@ -24,7 +24,7 @@ def solution(run: Run, name: str) -> Solution:
     return Solution(
         name=name,
         t=np.concatenate([span.trajectory.t for span in run.spans]),
-        x=np.concatenate([_stored(span, names) for span in run.spans]),
+        x=np.concatenate([_stored(run, span, names) for span in run.spans]),
         states=names,
         engine=run.engine,
         why=run.why,
@@ -36,7 +36,7 @@ def solution(run: Run, name: str) -> Solution:
     )
 
 
-def _stored(span: Span, names: tuple[str, ...]) -> Array:
+def _stored(run: Run, span: Span, names: tuple[str, ...]) -> Array:
     """(k, stores) all that is stored at the output times of a span."""
     t, states = span.trajectory.t, span.trajectory.x[:, : len(span.assembly.model.states)]
     if not t.size:
@@ -45,11 +45,12 @@ def _stored(span: Span, names: tuple[str, ...]) -> Array:
     if stores.by_loops:
         return stores.of(lambda: span.assembly.bound(span.phases[0].p), t, states)
     starts = np.array([phase.start for phase in span.phases])
+    read_at = run.timeline(span.assembly, span.phases[0].p).one_sided(t)
     made = np.empty((t.size, len(names)))
     index = np.clip(np.searchsorted(starts, t, side="right") - 1, 0, None)
     for number in np.unique(index).tolist():
         here = index == number
-        made[here] = stores.of(partial(span.assembly.bound, span.phases[number].p), t[here], states[here])
+        made[here] = stores.of(partial(span.assembly.bound, span.phases[number].p), read_at[here], states[here])
     return made
 
 
@@ -89,6 +90,7 @@ def _stretch(run: Run, span: Span, phase: Phase) -> Stretch:
         instants=instants,
         dense=lambda times: dense(times)[:, :size],
         states=states,
+        modes=dict(zip((element.name for element in run.phases.elements), phase.modes, strict=True)),
     )
 
 

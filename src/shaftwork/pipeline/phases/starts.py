@@ -46,6 +46,21 @@ def starts_of(modes: Modes, symbols: tuple[Symbol, ...]) -> Callable[..., list[f
     return starts
 
 
+def begins_anew(part: str, modes: Modes, mode: str | None, changed: frozenset[str]) -> bool:
+    """Whether an element cannot go on in the mode in which another motion ended.
+
+    Args:
+        part: its name.
+        modes: of the element.
+        mode: in which the motion ended; None where it had none.
+        changed: parameters, "part.parameter", that are others from now on.
+    """
+    limits = (leave.when for each in modes.options for leave in each.leaves if leave.rebound is not None)
+    decisive = {*conditional(modes), *(symbol for when in limits for symbol in when.free_symbols)}
+    known = any(each.name == mode for each in modes.options)
+    return not known or any(f"{part}.{symbol.name}" in changed for symbol in decisive)
+
+
 def refuse_incomplete(stored: tuple[str, ...], initial: Mapping[str, float], t_start: float) -> None:
     """Refuse start values of a motion that goes on, t_start != 0, where they leave out what is stored.
 
@@ -64,7 +79,7 @@ def refuse_incomplete(stored: tuple[str, ...], initial: Mapping[str, float], t_s
         raise ParameterError(
             f"A motion that goes on at t_start = {t_start:g} s needs all that is stored, in whatever phase it is a "
             f"state, and initial lacks {', '.join(missing)}. Take it from the motion before, "
-            "initial={name: sol[name][-1] for name in sol.states}, or give 0.0 for what is at rest."
+            "initial=sol, or give 0.0 for what is at rest."
         )
 
 
@@ -85,7 +100,7 @@ def warn_of_what_may_have_begun(name: str, modes: Modes, mode: str, t_start: flo
         return
     warn(
         f"'{name}' begins the motion that goes on at t_start = {t_start:g} s as '{modes[mode].words}'. Whether it came "
-        "on before, start values do not tell. If it did, simulate the whole motion in one run from its beginning.",
+        "on before, start values do not tell. Give the motion itself, initial=sol.",
         AccuracyWarning,
     )
 

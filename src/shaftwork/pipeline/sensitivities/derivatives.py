@@ -15,6 +15,7 @@ from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import ParameterError, SimulationError
 from shaftwork.pipeline.analysis import Given, Point, Time, operating_point
 from shaftwork.pipeline.arguments import relative_tolerance, time_span
+from shaftwork.pipeline.ending import refuse_motion
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.model import PhasedModel
 from shaftwork.pipeline.sensitivities.differentiable import rows_of, smooth_parameters
@@ -123,6 +124,7 @@ def motion_sensitivities(
         SignalError: there is no such quantity.
         SimulationError: there is no derivative; says what comes together or is only touched, and when.
     """
+    refuse_motion(initial, "motion_sensitivities")
     span, tolerance = time_span(0.0, t_end), relative_tolerance(rtol)
     states = {state.name for state in model.form.states}
     if unknown := [name for name in initial or {} if name not in states]:

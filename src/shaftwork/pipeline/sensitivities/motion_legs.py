@@ -20,6 +20,7 @@ from shaftwork.pipeline.phases.phases import Phases
 from shaftwork.pipeline.phases.run import Run, Span
 from shaftwork.pipeline.phases.solution import solution
 from shaftwork.pipeline.sensitivities.legs import Leg
+from shaftwork.pipeline.start import start_of
 from shaftwork.results.solution import Solution
 
 MOST_STEPS = 10_000_000
@@ -72,7 +73,7 @@ def _start(run: Run, initial: Given) -> Leg:
     phases, span = run.phases, run.demand.span
     assembly = phases.assembly(phases.first)
     p = assembly.vector({}, phases.numbers(phases.first))
-    x, _ = assembly.model.start(assembly.prepared(p), initial, span)
+    x, _ = start_of(assembly.model, assembly.prepared(p), initial, span)
     after = run.timeline(assembly, p).sides(span[0])[1]
     return Leg(
         start=span[0],

@@ -11,6 +11,7 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.pipeline.analysis import Given
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.model import PhasedModel
+from shaftwork.pipeline.start import start_of
 
 SHIFT = 1e-3
 """By this part a parameter is made smaller."""
@@ -61,8 +62,8 @@ def _start(
 ) -> tuple[tuple[str, ...], Array]:
     """The states by name, and where they start, in the equations in which nothing is joined."""
     if not isinstance(model, PhasedModel):
-        return tuple(model.states), model.start(model.prepare(model.vector(values)), initial, span)[0]
+        return tuple(model.states), start_of(model, model.prepare(model.vector(values)), initial, span)[0]
     phases = model.phases
     assembly = phases.assembly(phases.first)
     p = assembly.vector(values, phases.numbers(phases.first))
-    return tuple(assembly.model.states), assembly.model.start(assembly.prepared(p), initial, span)[0]
+    return tuple(assembly.model.states), start_of(assembly.model, assembly.prepared(p), initial, span)[0]

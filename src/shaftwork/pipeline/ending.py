@@ -1,0 +1,130 @@
+"""Where a motion ended, so that another one goes on there as if there had been no end."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from shaftwork.core.errors import ParameterError
+from shaftwork.core.parameters import in_si
+from shaftwork.network.wording import listed
+from shaftwork.pipeline.beside_waves import waving
+from shaftwork.results.solution import Solution
+
+if TYPE_CHECKING:
+    from shaftwork.network.graph import CircuitGraph
+    from shaftwork.pipeline.waves import CarriedWaves
+
+SAME_TIME = 1e-12
+"""Times that differ by less than this fraction are one: units are converted."""
+NAMED = 3
+"""Parts of another network that a message names."""
+
+
+class Ending(dict[str, float]):
+    """All that a motion hands over at its last output time: start values by name, and what they do not tell.
+
+    Args:
+        stored: the speed of every inertia, the torque of every spring, every angle, in SI.
+        t: the time, s.
+        read: the time at which inputs are read, s: at the end of a run before whatever jumps there.
+        modes: of every element that changes its mode.
+        parameters: of the motion, "part.parameter" to value in SI, where it is not zero.
+        waves: on their way through shafts; None where there are none, or a run in leaps does not know them.
+    """
+
+    def __init__(
+        self,
+        stored: Mapping[str, float],
+        t: float,
+        read: float,
+        modes: Mapping[str, str],
+        parameters: Mapping[str, float],
+        waves: CarriedWaves | None,
+    ) -> None:
+        super().__init__(stored)
+        self.t, self.read, self.modes, self.parameters, self.waves = t, read, dict(modes), dict(parameters), waves
+
+    def __bool__(self) -> bool:
+        return True  # waves may be all that goes on
+
+    def __repr__(self) -> str:
+        beside = f"t={self.t!r}, modes={self.modes}, parameters={self.parameters}, waves={self.waves!r}"
+        return f"Ending({super().__repr__()}, {beside})"
+
+    def changed(self, parameters: Mapping[str, float]) -> frozenset[str]:
+        """The names of the parameters that are others from now on."""
+        names = {**self.parameters, **parameters}
+        return frozenset(name for name in names if self.parameters.get(name, 0.0) != parameters.get(name, 0.0))
+
+    def refuse_lacking(self, names: Iterable[str]) -> None:
+        """Refuse to go on where something is stored that the motion did not store.
+
+        Raises:
+            ParameterError: names what is missing.
+        """
+        if missing := tuple(name for name in names if name not in self):
+            raise ParameterError(
+                f"initial is a motion that does not tell {listed(missing)}, stored here: it was simulated without some "
+                "angles=..., or with a zero in place of a value. Simulate it as this one; or give all start values by "
+                "name, initial={name: sol[name][-1] for name in sol.states} and those."
+            )
+
+
+def ending_of(motion: Solution, graph: CircuitGraph) -> Ending:
+    """Where a motion ended: at its last output time.
+
+    Args:
+        motion: of the same network, whose parameters may have had other values.
+        graph: of the network.
+
+    Raises:
+        ParameterError: it is a motion of another network; names what differs.
+    """
+    here, there = graph.wiring, motion.observer.wiring
+    names = dict.fromkeys((*here, *there))
+    if other := [name for name in names if here.get(name) != there.get(name)]:
+        told = [f"'{n}' is {there.get(n, 'not there')} instead of {here.get(n, 'not there')}" for n in other[:NAMED]]
+        more = f" and {len(other) - NAMED} more" if len(other) > NAMED else ""
+        raise ParameterError(
+            f"initial is a motion of '{motion.name}', which is another network than '{graph.name}': "
+            f"{', '.join(told)}{more}. Give a motion of the same network; numbers of its parts may differ."
+        )
+    t, x = float(motion.t[-1]), motion.x[-1]
+    waves = None
+    if waving(graph):
+        from shaftwork.pipeline.waves import on_their_way
+
+        waves = on_their_way(motion.dense, t)
+    observer = motion.observer
+    return Ending(observer.held(t, x), t, observer.read_at(t), observer.modes_at(t), motion.parameters, waves)
+
+
+def time_of_start(t_start: Any, initial: Any) -> Any:
+    """The start of a motion, s: 0 by default, and the end of the motion that goes on.
+
+    Raises:
+        ParameterError: another time is given than that at which the motion ended.
+    """
+    if not isinstance(initial, Ending):
+        return 0.0 if t_start is None else t_start
+    if t_start is not None and not math.isclose(in_si("t_start", t_start, "s"), initial.t, rel_tol=SAME_TIME):
+        raise ParameterError(
+            f"t_start = {t_start} is not the time at which the motion ended that goes on, {initial.t:.9g} s. Leave "
+            "t_start out; initial=sol.at([t]) goes on from a time t within the motion."
+        )
+    return initial.t
+
+
+def refuse_motion(initial: Any, what: str) -> None:
+    """Refuse a motion where start values by name are wanted.
+
+    Raises:
+        ParameterError: it is one.
+    """
+    if isinstance(initial, Solution):
+        raise ParameterError(
+            f"{what} takes start values by name, not a motion. Give those of its end, "
+            "initial={name: sol[name][-1] for name in sol.states}."
+        )
