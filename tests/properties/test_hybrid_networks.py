@@ -201,6 +201,23 @@ def test_engines_agree_in_the_end_and_in_the_events(train: Train) -> None:
 
 
 @pytest.mark.slow
+@given(trains(most=5), st.floats(0.01, 0.99))
+@share_of_examples(0.2)
+def test_a_motion_that_is_cut_and_goes_on_is_the_whole_motion(train: Train, share: float) -> None:
+    """Cut at a time of its own, and at the time of an event."""
+    whole = moved(train)
+    if len(whole.events) > MOST_EVENTS:
+        return
+    model, speeds = train.compiled(), [f"{part.name}.omega" for part in train.parts if part.type == "Inertia"]
+    for cut in (share * train.t_end, *(event[0] for event in whole.events[1:2])):
+        times = np.linspace(cut, train.t_end, 20)
+        rest = model.simulate(train.t_end, rtol=RTOL, initial=whole.at([cut])).at(times[1:])
+        for name in speeds:
+            expected = whole.at(times[1:])[name]
+            np.testing.assert_allclose(rest[name], expected, rtol=0, atol=AGREE * max(1.0, np.abs(whole[name]).max()))
+
+
+@pytest.mark.slow
 @given(trains(most=5))
 @share_of_examples(0.1)
 def test_energy_goes_to_the_parts_that_lose_it_and_none_is_left_over(train: Train) -> None:

@@ -114,9 +114,9 @@ class Model(CompiledModel):
             engine: "auto" takes the best one and says why in `Solution.why`.
             initial: start values of speeds ("J1.omega"), twists ("shaft.phi_rel") or torques; the rest is zero. Or a
                 motion of the same network: it goes on from its last output time with all that is stored (speeds of
-                inertias, torques of springs, angles), the modes of its parts and the waves on their way. Other parameters
-                than it had change none of these, but what new ratios force at once, as an impact does; a part begins
-                anew where they say in which mode it starts; a `Wave` must keep its impedance and delay.
+                inertias, torques of springs, angles), the modes of its parts and the waves on their way. Parameters
+                other than its own change none of these, but for what new ratios force at once, as an impact does; a
+                part begins anew where they say in which mode it starts; a `Wave` must keep its impedance and delay.
             parameters: values that differ from the network's, "part.parameter" to value in SI; nothing is recompiled
                 unless a value changes the structure (a damping that was exactly zero).
             max_steps: give up after this many steps.
