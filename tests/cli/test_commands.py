@@ -164,6 +164,32 @@ def test_a_diagram_without_its_point_names_options_that_work(
     assert main(["campbell", "crane-start", "--n-max", "3000", *point]) == DONE
 
 
+def test_the_options_that_a_refused_diagram_names_give_that_of_the_running_drive(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Word for word: the inertias at both ends of a shaft, and nothing inside it."""
+    net = sw.Network("pump")
+    net.add(sw.TableMotor("motor", curve=sw.Table([0, 1400, 1500], [200, 250, 0])), "m")
+    net.add(sw.Inertia("JM", J=0.5), "m")
+    shaft = {"length": 2.0, "diameter": 0.04, "density": 7900.0, "shear_modulus": 77.5e9}
+    net.add(sw.Shaft("line", **shaft, model=sw.Lumped(4)), "m", "p")
+    net.add(sw.Inertia("JP", J=0.8), "p")
+    net.add(sw.PumpLoad("pump", tau_n=100, n_n=1450), "p")
+    path = tmp_path / "pump.toml"
+    net.save(path)
+    arguments = ["campbell", str(path), "--n-max", "1500", "--orders", "3", "--f-max", "60"]
+    assert main(arguments) == WRONG_INPUT
+    message = capsys.readouterr().err
+    assert "--at JM.omega=n --at JP.omega=n;" in message
+    assert "lambda" not in message
+    assert main([*arguments, "--at", "JM.omega=n", "--at", "JP.omega=n", "--json"]) == DONE
+    (crossing,) = json.loads(capsys.readouterr().out)["crossings"]
+    point = {"JM.omega": crossing["speed"], "JP.omega": crossing["speed"]}
+    assert crossing["frequency"] == pytest.approx(net.modes(point, f_max=60.0).frequencies[-1], rel=1e-9)
+    assert main([*arguments, "--at", "JM.omega=n"]) == DONE
+    assert "warning: The point of 'pump' gives some speeds and leaves 'JP.omega' at 0" in capsys.readouterr().err
+
+
 @pytest.mark.slow
 def test_a_diagram_may_have_a_point_for_each_speed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A spring that stiffens with the twist, and a gear in between: n at the motor is n / 2 behind it."""

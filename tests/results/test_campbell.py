@@ -348,3 +348,72 @@ def test_the_titles_of_pictures_are_whole() -> None:
                 assert box.x0 >= 0
                 assert box.x1 <= figure.bbox.width
                 assert box.y1 <= figure.bbox.height
+
+
+def _pump_behind_a_shaft() -> sw.Network:
+    net = sw.Network("pump")
+    net.add(sw.TableMotor("motor", curve=sw.Table([0, 1400, 1500, 1600], [200, 250, 0, -250])), "m")
+    net.add(sw.Inertia("JM", J=0.5), "m")
+    shaft = {"length": 2.0, "diameter": 0.04, "density": 7900.0, "shear_modulus": 77.5e9}
+    net.add(sw.Shaft("line", **shaft, model=sw.Lumped(20)), "m", "p")
+    net.add(sw.Inertia("JP", J=0.8), "p")
+    net.add(sw.PumpLoad("pump", tau_n=100, n_n=1450), "p")
+    return net
+
+
+def test_the_point_that_a_refused_diagram_names_is_that_of_the_running_drive() -> None:
+    """The inertias at both ends of a shaft; what turns inside it follows them."""
+    net = _pump_behind_a_shaft()
+    with pytest.raises(sw.ParameterError) as refused:
+        net.campbell([0.0, 100.0])
+    assert "at=lambda n: {'JM.omega': n, 'JP.omega': n};" in str(refused.value)
+    assert "--at" not in str(refused.value)
+    diagram = net.campbell([0.0, 100.0], 3, f_max=60.0, at=lambda n: {"JM.omega": n, "JP.omega": n})
+    everywhere = {name: 100.0 for name in net.compile().states if "omega" in name}
+    (running,) = (f for f in net.modes(everywhere).frequencies if 0 < f < 60)
+    assert [made.mode for made in diagram.crossings] == ["mode 1 (pump slipping forward)"]
+    assert diagram.crossings[0].frequency == pytest.approx(running, rel=1e-3)  # the pump's curve at another speed
+
+
+def test_the_point_that_a_refused_diagram_names_follows_gears_and_drums() -> None:
+    net = sw.Network("hoist")
+    net.add(sw.KlossMotor("motor", tau_k=600.0, s_k=0.1, n_sync=1500), "m")
+    net.add(sw.Inertia("JM", J=1.0), "m")
+    net.add(sw.Spring("coupling", c=1e5), "m", "g")
+    net.add(sw.Inertia("JG", J=0.1), "g")
+    net.add(sw.Backlash("lash", c=1e6, gap=0.01), "g", "h")
+    net.add(sw.Inertia("JH", J=0.05), "h")
+    net.add(sw.LossyGear("gear", ratio=124, efficiency=0.94), "h", "d")
+    net.add(sw.Drum("drum", radius=0.4), "d", "r")
+    net.add(sw.TranslationalSpring("rope", c=4e6), "r", "l")
+    net.add(sw.Mass("load", m=2e4), "l")
+    with pytest.raises(sw.ParameterError) as refused:
+        net.campbell([0.0, 100.0])
+    assert "{'JM.omega': n, 'JG.omega': n, 'JH.omega': n, 'load.v': n/310};" in str(refused.value)
+
+
+def test_a_point_that_leaves_a_load_at_rest_is_noticed_once() -> None:
+    net = _pump_behind_a_shaft()
+    said = "leaves 'JP.omega' at 0, where 'pump' depends on it"
+    with pytest.warns(sw.NetworkWarning, match=said) as caught:
+        net.campbell([0.0, 50.0, 100.0], f_max=60.0, at=lambda n: {"JM.omega": n, "line.omega_1": n})
+    assert len(caught) == 1
+    with pytest.warns(sw.NetworkWarning, match=said):
+        net.compile().linearize({"JM.omega": 10.0})
+    with pytest.warns(sw.NetworkWarning, match=said):
+        net.modes({"JM.omega": 10.0}, exact=True, f_max=60.0)
+    assert net.modes({"JM.omega": 10.0, "JP.omega": 0.0}).title.endswith("(pump stuck)")  # meant so
+    assert net.modes({"line.tau": 10.0}).title.endswith("(pump stuck)")
+
+
+def test_a_point_may_leave_out_what_follows_the_speeds_given() -> None:
+    """Behind a rigid gear, and where nothing depends on the speed but linear parts."""
+    net = sw.Network("geared")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.Gear("gear", ratio=3.0), "a", "b")
+    net.add(sw.Inertia("J2", J=2.0), "b")
+    net.add(sw.CoulombLoad("load", tau=2.0), "b")
+    net.add(sw.Spring("s", c=1e4, d=1.0), "b", "c")
+    net.add(sw.Inertia("J3", J=2.0), "c")
+    net.add(sw.ViscousLoad("bearing", d=0.1), "c")
+    assert net.modes({"J1.omega": 6.0}).title == "geared at J1.omega = 6 (load slipping forward)"

@@ -163,11 +163,8 @@ class Inputs:
     @property
     def linear(self) -> bool:
         """Whether every input is linear in all that it reads, with constant slopes."""
-        for template in (made.made_of.template for made in self._groups):
-            reads = (ACROSS, INTEGRAL, *template.reads)
-            if any(slope(template.law, read).has(*reads, TIME) for read in reads) or jumps(template.law, *reads):
-                return False
-        return True
+        templates = (made.made_of.template for made in self._groups)
+        return all(is_linear(made.law, (ACROSS, INTEGRAL, *made.reads)) for made in templates)
 
     @property
     def switching(self) -> bool:
@@ -216,6 +213,11 @@ class Inputs:
                 if function is not None:
                     result[group.inputs] = function(t, *_read(group, y, x, p))
         return result
+
+
+def is_linear(law: Expr, reads: Sequence[Symbol]) -> bool:
+    """Whether a law is linear in what it reads, with constant slopes."""
+    return not (any(slope(law, read).has(*reads, TIME) for read in reads) or jumps(law, *reads))
 
 
 def _read(group: _Group, y: Array, x: Array, p: Array) -> tuple[Any, ...]:

@@ -99,6 +99,10 @@ class GivenSpeeds:
         follows = _is_nothing(states, self.states)[..., 3] & _is_nothing(others, self.others)[..., 1:].all(axis=-1)
         return np.where(follows, states[..., 0] + others[..., 0], rest + states[..., 1])
 
+    def left(self, read: Read) -> Any:
+        """Whether speeds are at rest for want of start values."""
+        return ~_is_nothing(read(self.states), self.states)[..., 3] & (self.of(read) == 0)
+
     def move(self, read: Read) -> Any:
         """Whether start values have a part in speeds."""
         return ~_is_nothing(read(self.states), self.states)[..., 2]

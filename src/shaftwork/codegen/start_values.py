@@ -111,6 +111,17 @@ class Start:
         """Which speeds the start values give, those inside shafts included."""
         return self._names.readings.given_speeds(self.states, self._rest, self._fixed, self._prescribed)
 
+    @property
+    def nodes_left(self) -> frozenset[int]:
+        """The nodes with a store whose speed is at rest for want of a start value, where other speeds are given."""
+        graph, form = self._bound.program.form.graph, self._bound.program.form
+        if not self.states[self._of_kind[True]].any():
+            return frozenset()
+        left = self.given_speeds.left(lambda history: history.potentials)
+        stores = (graph.branches[k] for k in (*form.across_states, *form.dependent_across))
+        nodes = {end for branch in stores for end in (branch.plus, branch.minus) if end >= 0}
+        return frozenset(nodes.intersection(np.flatnonzero(left).tolist()))
+
     def _meet_all(self) -> None:
         names, values = self._names, self._values
         shafts = {name: names.shafts[name] for name in values if name in names.shafts}

@@ -92,13 +92,22 @@ def speeds_inside(form: StateForm, ends: EndSpeeds) -> dict[int, float]:
     """For each state that is a speed inside a shaft, what lies on the straight line between those of its ends."""
     owner = {form.graph.branches[branch].plus: k for k, branch in enumerate(form.across_states)}
     found: dict[int, float] = {}
+    for nodes, places in _along(form):
+        first, last = ends.of(nodes[0], nodes[-1])
+        for node, share in zip(nodes[1:-1], places[1:-1], strict=True):
+            if node in owner:
+                found[owner[node]] = first + share * (last - first)
+    return found
+
+
+def inner_nodes(form: StateForm) -> frozenset[int]:
+    """The nodes inside shafts of several elements."""
+    return frozenset(node for nodes, _ in _along(form) for node in nodes[1:-1])
+
+
+def _along(form: StateForm) -> Iterator[tuple[list[int], tuple[float, ...]]]:
+    """The nodes along each shaft of several elements, and their places in m."""
     for part in form.graph.parts:
         for profile in part.component.profiles().values():
-            if profile.kind != "across" or profile.lines or len(profile.of) <= 2:
-                continue
-            nodes = [part.nodes[name] for ((_, name),) in profile.of]
-            first, last = ends.of(nodes[0], nodes[-1])
-            for node, share in zip(nodes[1:-1], profile.places[1:-1], strict=True):
-                if node in owner:
-                    found[owner[node]] = first + share * (last - first)
-    return found
+            if profile.kind == "across" and not profile.lines and len(profile.of) > 2:
+                yield [part.nodes[name] for ((_, name),) in profile.of], profile.places

@@ -14,6 +14,7 @@ FILTERS = threading.RLock()
 """To be held around `warnings.catch_warnings`, whose filters are of all threads: if two overlap, one stays for good."""
 
 _muted: ContextVar[tuple[type[Warning], ...]] = ContextVar("muted", default=())
+_said: ContextVar[set[str] | None] = ContextVar("said", default=None)
 
 
 def warn(message: str, category: type[Warning]) -> None:
@@ -23,8 +24,11 @@ def warn(message: str, category: type[Warning]) -> None:
         message: what is worth knowing.
         category: kind of warning.
     """
-    if issubclass(category, _muted.get()):
+    said = _said.get()
+    if issubclass(category, _muted.get()) or (said is not None and message in said):
         return
+    if said is not None:
+        said.add(message)
     level, frame = 1, sys._getframe()  # noqa: SLF001 (what `warnings` itself counts by)
     while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == PACKAGE:
         level, frame = level + 1, frame.f_back
@@ -43,3 +47,13 @@ def muted(*categories: type[Warning]) -> Iterator[None]:
         yield
     finally:
         _muted.reset(before)
+
+
+@contextmanager
+def once() -> Iterator[None]:
+    """This thread's `warn` gives each message once meanwhile, of whatever is computed again and again."""
+    before = _said.set(set())
+    try:
+        yield
+    finally:
+        _said.reset(before)

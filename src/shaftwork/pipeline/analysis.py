@@ -10,12 +10,15 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.linear import Linearization, source_inputs
 from shaftwork.codegen.model import CompiledModel
-from shaftwork.codegen.start_values import initial_state
+from shaftwork.codegen.start_values import Start, initial_state
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ParameterError
+from shaftwork.core.hints import hint
+from shaftwork.core.notices import once
 from shaftwork.core.parameters import briefly, in_si
 from shaftwork.network.templates import Kind
 from shaftwork.network.wording import listed
+from shaftwork.pipeline.point_speeds import as_multiple, speeds_to_give, warn_of_speeds_left
 from shaftwork.pipeline.settled import SteadyState
 from shaftwork.results import campbell as diagram
 from shaftwork.results.exact import ExactModel
@@ -101,7 +104,12 @@ def operating_point(model: CompiledModel, p: Array, at: Point, t: Time, settled:
         return time if t is None else in_si("t", t, "s"), x
     usual = at.t if isinstance(at, SteadyState) else settled
     time = usual if t is None else in_si("t", t, "s")
-    return time, initial_state(model.bind(p), at if at is not None else {}, time)
+    bound = model.bind(p)
+    if isinstance(at, SteadyState) or not isinstance(at, Mapping):
+        return time, initial_state(bound, at if at is not None else {}, time)
+    start = Start(bound, at, time)
+    warn_of_speeds_left(start, model.form)
+    return time, start.states
 
 
 def campbell(
@@ -136,7 +144,8 @@ def campbell(
         return near.modes(count, limit), near.phase
 
     name = model.form.graph.name
-    return diagram.campbell(name, modes, speeds, orders, f_max, constant=not callable(at))
+    with once():
+        return diagram.campbell(name, modes, speeds, orders, f_max, constant=not callable(at))
 
 
 def _refuse_no_point(model: CompiledModel) -> None:
@@ -153,13 +162,19 @@ def _refuse_no_point(model: CompiledModel) -> None:
         part.name for part in graph.parts if any(graph.branches[k].template.kind is Kind.LAW for k in part.branches)
     )
     parts = listed(tuple(dict.fromkeys((*modal, *laws))))
-    speeds = [state.name for state in model.form.states if state.kind == "across"][:2] or ["J1.omega"]
-    turning = ", ".join(f"'{name}': n" for name in speeds)
+    speeds = {name: as_multiple(ratio) for name, ratio in speeds_to_give(model).items()} or {"J1.omega": "n"}
+    turning = ", ".join(f"'{name}': {value}" for name, value in speeds.items())
+    options = " ".join(f"--at {name}={value}" for name, value in speeds.items())
+    first = next(iter(speeds))
     raise ParameterError(
-        f"campbell() of '{graph.name}' needs a point: how it swings depends on how it runs ({parts}). Give the speeds "
-        f"of all inertias where the exciting shaft turns at n rad/s, at=lambda n: {{{turning}}}; or one point for "
-        "all speeds, such as at=model.steady_state(), or at={} for rest. On the command line: "
-        f"{' '.join(f'--at {name}=n' for name in speeds)}; or --steady, or --at {speeds[0]}=0 for rest."
+        f"A Campbell diagram of '{graph.name}' needs a point: how it swings depends on how it runs ({parts}). Give the "
+        "speeds of all inertias where the exciting shaft turns at n rad/s (here those where it is that of "
+        f"'{first}'), "
+        + hint(
+            f"at=lambda n: {{{turning}}}; or one point for all speeds, such as at=model.steady_state(), or at={{}} for "
+            "rest.",
+            f"{options}; or one point for all speeds: --steady, or --at {first}=0 for rest.",
+        )
     )
 
 
