@@ -94,7 +94,9 @@ def test_a_torque_between_two_nodes_acts_on_both() -> None:
 
 
 def test_an_input_moves_the_signal_of_its_own_part() -> None:
-    linear = _nonlinear().compile().linearize({"J1.omega": 8.0}, inputs="motor.tau", outputs="motor.tau")
+    linear = (
+        _nonlinear().compile().linearize({"J1.omega": 8.0, "J2.omega": 8.0}, inputs="motor.tau", outputs="motor.tau")
+    )
     assert linear.D[0, 0] == pytest.approx(1.0, abs=1e-15)
     assert linear.C[0, 0] < 0.0  # the torque of the motor falls with its speed
 
