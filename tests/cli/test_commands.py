@@ -387,3 +387,70 @@ def test_a_comparison_that_is_interrupted_has_told_what_was_done(
     assert lines[-2] == "Lumped(m=5) on scipy: 10 ms, end torques to 0.001"
     assert lines[-1] == "shaftwork: interrupted: 1 models are done, as told above; nothing was written"
     assert list(tmp_path.iterdir()) == []
+
+
+def _ageing(tmp_path: Path) -> str:
+    """A drive whose damping and torque follow tables: 0.1 t N m s until 30 s, 1 N m and half of it from 15 s on."""
+    net = sw.Network("ageing")
+    net.add(sw.TorqueSource("motor", tau=sw.Table([0.0, 14.0, 15.0, 30.0], [1.0, 1.0, 0.5, 0.5])), "a")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.TorqueSource("bearing", tau=-sw.Table([0.0, 30.0], [0.1, 3.1])(sw.t) * sw.omega), "a")
+    net.add(sw.Spring("shaft", c=100.0), "a", "b")
+    net.add(sw.Inertia("J2", J=1.0), "b")
+    path = tmp_path / "ageing.toml"
+    net.save(path)
+    return str(path)
+
+
+def test_modes_and_diagrams_read_laws_at_the_time_that_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = _ageing(tmp_path)
+    net = sw.Network.load(path)
+    for options, t in (((), 31.0), (("--t", "9"), 9.0)):
+        assert main(["modes", path, "--json", *options]) == DONE
+        found = json.loads(capsys.readouterr().out)
+        assert found["network"] == f"ageing at rest, laws at t = {t:g} s"
+        assert [mode["rate_real"] for mode in found["modes"]] == pytest.approx(net.modes(t=t).rates.real.tolist())
+        point = ("--at", "J1.omega=n", "--at", "J2.omega=n", "--n-max", "1000", "--json")
+        assert main(["campbell", path, *point, *options]) == DONE
+        crossings = json.loads(capsys.readouterr().out)["crossings"]
+        wanted = net.campbell(
+            np.linspace(0.0, 100 * np.pi / 3, 61), at=lambda n: {"J1.omega": n, "J2.omega": n}, t=t
+        ).crossings
+        assert [made["speed"] for made in crossings] == pytest.approx([made.speed for made in wanted], rel=1e-9)
+        assert crossings
+
+
+def test_a_warning_about_the_time_of_a_steady_state_names_options_that_work(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = _ageing(tmp_path)
+    assert main(["modes", path, "--steady"]) == DONE
+    warning = next(line for line in capsys.readouterr().err.splitlines() if line.startswith("warning"))
+    offered = warning.partition("Name the time that is meant, ")[2].rstrip(".").split(" or ")
+    assert offered[0] == "--t 31"
+    assert "steady_state(t=" not in warning
+    for option in offered:
+        assert main(["modes", path, "--steady", *option.split()]) == DONE
+        shown = capsys.readouterr()
+        assert shown.err == ""
+        assert f"laws at t = {option.split()[1]} s" in shown.out
+
+
+def test_a_message_names_options_on_the_command_line_and_calls_in_python(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    net = sw.Network("falling")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.TorqueSource("weight", tau=-1.0), "a")
+    net.add(sw.CoulombLoad("seal", tau=0.1), "a")
+    path = tmp_path / "falling.toml"
+    net.save(path)
+    with pytest.raises(sw.SimulationError) as failed:
+        net.compile().steady_state()
+    assert "steady_state(initial={'J1.omega': ...})" in str(failed.value)
+    assert main(["modes", str(path), "--steady"]) == FAILED
+    message = capsys.readouterr().err
+    assert "--at J1.omega=..." in message
+    assert "initial=" not in message

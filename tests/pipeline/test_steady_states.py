@@ -182,3 +182,26 @@ def test_a_motion_that_starts_in_the_steady_state_of_a_brake_can_be_read_all_alo
         solution = model.simulate(t_end, initial=model.steady_state(t=0.0))
         assert solution.max("rope.f") == pytest.approx(196200.0, rel=1e-9)
         assert solution.min("rope.f") == pytest.approx(196200.0, rel=1e-9)
+
+
+def test_a_hoist_that_runs_away_from_rest_names_the_start_that_finds_its_steady_state() -> None:
+    """From rest the load of 20 t overhauls the motor at full frequency; near its speed the motor holds it."""
+    net = sw.Network("hoist")
+    net.add(sw.FrequencyDrive("drive", tau_k=1200, s_k=0.1, n_sync=1500), "m")
+    net.add(sw.Brake("brake", tau=900.0, t_on=8.0), "m")
+    net.add(sw.Inertia("JM", J=1.0), "m")
+    net.add(sw.Spring("coupling", c=1e5, d=10.0), "m", "g")
+    net.add(sw.Inertia("JG", J=0.1), "g")
+    net.add(sw.Backlash("lash", c=1e6, gap=0.01, d=50.0), "g", "h")
+    net.add(sw.Inertia("JH", J=0.05), "h")
+    net.add(sw.LossyGear("gear", ratio=124, efficiency=0.94), "h", "d")
+    net.add(sw.Drum("drum", radius=0.4), "d", "r")
+    net.add(sw.TranslationalSpring("rope", c=4e6), "r", "l")
+    net.add(sw.Mass("load", m=2e4), "l")
+    net.add(sw.ForceSource("weight", f=-196.2e3), "l")
+    model = net.compile()
+    with pytest.raises(sw.SimulationError, match=r"steady_state\(initial=\{'JM.omega': \.\.\.\}\)"):
+        model.steady_state(t=6.0)
+    steady = model.steady_state(t=6.0, initial={"JM.omega": 155.0})
+    assert steady["load.v"] == pytest.approx(steady["JM.omega"] * 0.4 / 124, rel=1e-9)
+    assert 150.0 < steady["JM.omega"] < 157.0

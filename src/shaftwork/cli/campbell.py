@@ -40,7 +40,8 @@ def run(options: Namespace, say: Say) -> Data:
     speeds = np.linspace(options.n_min, options.n_max, SPEEDS) * math.pi / 30
     moves = any(map(follows_speed, options.at)) and not options.steady
     at = partial(point, options.at) if moves else point_of(options, net)
-    diagram = net.campbell(speeds, options.orders, options.f_max, at=at, count=options.count, exact=options.exact)
+    wanted = {"count": options.count, "exact": options.exact, "t": options.t}
+    diagram = net.campbell(speeds, options.orders, options.f_max, at=at, **wanted)
     say(str(diagram))
     rows = [
         (made.speed * 30 / math.pi, made.speed, made.order, made.frequency, made.mode) for made in diagram.crossings

@@ -84,6 +84,9 @@ def point_options(parser: ArgumentParser, besides: str = "") -> None:
         help=f"a speed, twist or torque of the point, in SI or with its unit: J1.omega=8.5, 'J1.omega=80 rpm'{besides}",
     )
     parser.add_argument("--steady", action="store_true", help="about the steady operation instead of rest")
+    parser.add_argument(
+        "--t", metavar="S", type=float, help="time in s at which laws are read (default: after their last change)"
+    )
     parser.add_argument("--count", metavar="N", type=int, help="modes wanted, the lowest (default: all)")
     parser.add_argument("--f-max", metavar="HZ", type=float, help="highest frequency in Hz")
     parser.add_argument("--exact", action="store_true", help="shafts as they are, without a mesh")

@@ -64,4 +64,7 @@ def point_of(options: Namespace, net: Network) -> dict[str, float] | None:
     """
     if options.steady and options.at:
         raise ParameterError("--steady and --at both name a point. Leave out one of them.")
-    return net.compile().steady_state() if options.steady else point(options.at) or None
+    if options.steady:
+        model = net.compile()
+        return model.steady_state() if options.t is None else model.steady_state(t=options.t)
+    return point(options.at) or None

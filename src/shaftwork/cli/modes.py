@@ -21,7 +21,7 @@ def run(options: Namespace, say: Say) -> Data:
     """Natural frequencies, damping and shapes."""
     net, _ = load(options)
     folder = Folder(options.out, ("modes.csv", "modes.png"), options.line) if options.out else None
-    modes = net.modes(point_of(options, net), options.count, f_max=options.f_max, exact=options.exact)
+    modes = net.modes(point_of(options, net), options.count, f_max=options.f_max, exact=options.exact, t=options.t)
     say(str(modes))
     rows = [(name, f, damping, rate.real, rate.imag, node) for name, f, damping, rate, node in modes.table]
     if folder:

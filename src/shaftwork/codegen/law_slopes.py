@@ -14,6 +14,7 @@ from shaftwork.codegen.elements import Array
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.slopes import jumps
 from shaftwork.core.errors import SimulationError
+from shaftwork.core.hints import hint
 
 NEARBY = 1e-9
 """A law is looked at so far to both sides of the point, as a fraction of it, to see whether it jumps there."""
@@ -89,6 +90,5 @@ def _laws_of(bound: BoundArrays, places: Sequence[int] | NDArray[np.intp]) -> st
 
 
 def _elsewhere(t: float) -> str:
-    return (
-        f"Name another point, such as at=model.steady_state() (the laws are read at t = {t:g} s; t=... names a time)."
-    )
+    another, time = hint("at=model.steady_state()", "--steady"), hint("t=...", "--t S")
+    return f"Name another point, such as {another} (the laws are read at t = {t:g} s; {time} names a time)."

@@ -10,7 +10,10 @@ from scipy.sparse.linalg import MatrixRankWarning, lsqr, splu
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
+from shaftwork.codegen.wound_shafts import inner_nodes, node_of, speed_at
 from shaftwork.core.errors import SimulationError
+from shaftwork.core.hints import hint
+from shaftwork.reduction.form import StateForm
 
 SMALLEST_STEP = 1e-6
 """First step of the way to a steady state, s."""
@@ -74,7 +77,19 @@ def steady_state(
     worst = int(np.argmax(np.abs(weights * rate)))
     raise SimulationError(
         f"No steady state was found: '{names[worst]}' still changes by {rate[worst]:.3g} per second at {x[worst]:.6g}. "
-        f"Does something hold the speed (a load, a damper, a motor's curve)? Give a start near the operating point."
+        f"Does something hold the speed (a load, a damper, a motor's curve)? {another_start(bound.program.form)}"
+    )
+
+
+def another_start(form: StateForm) -> str:
+    """Where a steady state may be found if the way from rest leads to none, in words."""
+    nodes = (node_of(form, branch) for branch in form.across_states)
+    inside = inner_nodes(form)
+    name = next((speed_at(form, node) for node in nodes if node not in inside), "J1.omega")
+    return hint(
+        "By default the search starts at rest, where the load may overhaul the motor: give a start near the operating "
+        f"point, steady_state(initial={{'{name}': ...}}).",
+        f"The search starts at rest, where the load may overhaul the motor: name the speeds instead, --at {name}=...",
     )
 
 

@@ -16,6 +16,7 @@ from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.recovery import History
 from shaftwork.codegen.wound_shafts import wound_shafts
 from shaftwork.core.errors import SignalError
+from shaftwork.core.hints import hint
 from shaftwork.core.parameters import in_si
 from shaftwork.network.graph import GraphPart
 from shaftwork.reduction.form import store_name
@@ -186,5 +187,7 @@ def _potential(node: int, history: History) -> Array:
 
 
 def _in_words(names: Sequence[str]) -> str:
+    if not names:
+        return "Nothing here is stored that could be given."
     listed = ", ".join(f"'{name}': ..." for name in names)
-    return f"Give initial={{{listed}}}." if listed else "Nothing here is stored that could be given."
+    return f"Give {hint(f'initial={{{listed}}}', ' '.join(f'--at {name}=...' for name in names))}."

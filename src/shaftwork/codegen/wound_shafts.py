@@ -15,7 +15,7 @@ from shaftwork.codegen.recovery import History
 from shaftwork.components.base import Profile
 from shaftwork.network.graph import GraphPart
 from shaftwork.network.templates import Kind
-from shaftwork.reduction.form import StateForm
+from shaftwork.reduction.form import StateForm, store_name
 
 
 @dataclass(frozen=True)
@@ -103,6 +103,20 @@ def speeds_inside(form: StateForm, ends: EndSpeeds) -> dict[int, float]:
 def inner_nodes(form: StateForm) -> frozenset[int]:
     """The nodes inside shafts of several elements."""
     return frozenset(node for nodes, _ in _along(form) for node in nodes[1:-1])
+
+
+def node_of(form: StateForm, branch: int) -> int:
+    """The node of an across store."""
+    return max(form.graph.branches[branch].plus, form.graph.branches[branch].minus)
+
+
+def speed_at(form: StateForm, node: int) -> str:
+    """The name of the speed of a node with stores: of an inertia, or where a shaft alone ends, of the node."""
+    graph, inside = form.graph, inner_nodes(form)
+    for branch in (*form.across_states, *form.dependent_across):
+        if node_of(form, branch) == node and inside.isdisjoint(graph.part_of(branch).nodes.values()):
+            return store_name(graph, graph.branches[branch])
+    return f"{graph.nodes[node]}.{graph.domains[node].across.name}"
 
 
 def _along(form: StateForm) -> Iterator[tuple[list[int], tuple[float, ...]]]:

@@ -120,6 +120,7 @@ def campbell(
     f_max: float | None,
     at: Point | Callable[[float], Point],
     count: int | None,
+    t: Time,
 ) -> diagram.Campbell:
     """The interference diagram, linearised at one point or, where `at` is a function of speed, at each.
 
@@ -131,6 +132,7 @@ def campbell(
         f_max: highest frequency of interest, Hz.
         at: the point, or the point as a function of the speed.
         count: the modes wanted.
+        t: time at which laws are read, s.
 
     Raises:
         ParameterError: speeds or orders are not what they must be, or no point is given and it matters.
@@ -139,7 +141,7 @@ def campbell(
         _refuse_no_point(model)
 
     def modes(speed: float, f_max: float) -> tuple[Modes, str]:
-        near = small_motions(at(speed) if callable(at) else at, None, ())
+        near = small_motions(at(speed) if callable(at) else at, t, ())
         limit = None if isinstance(near, LinearModel) or count is not None else f_max
         return near.modes(count, limit), near.phase
 

@@ -223,6 +223,7 @@ class Network(NetworkBuilder):
         at: Point | Callable[[float], Point] = None,
         count: int | None = None,
         exact: bool = False,
+        t: Time = None,
     ) -> Campbell:
         """Natural frequencies and excitation orders over the speed of a shaft, and where they meet.
 
@@ -234,11 +235,12 @@ class Network(NetworkBuilder):
                 otherwise where it runs, by laws that are not linear or modes of its parts, must be given one.
             count: the modes wanted, those of smallest |rate|; by default all.
             exact: every shaft but a rigid one and one spring is taken as it is, without a mesh; a wave always is.
+            t: time at which laws are read, s; by default as for `Model.linearize`.
         """
         from shaftwork.pipeline.analysis import campbell
 
         model = self.compile()
-        return campbell(model, self._small_motions(model, exact=exact), speeds, orders, f_max, at, count)
+        return campbell(model, self._small_motions(model, exact=exact), speeds, orders, f_max, at, count, t)
 
     @staticmethod
     def _small_motions(model: Model, *, exact: bool) -> SmallMotions:

@@ -11,7 +11,7 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.inputs import is_linear
 from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.start_values import Start
-from shaftwork.codegen.wound_shafts import inner_nodes
+from shaftwork.codegen.wound_shafts import inner_nodes, node_of, speed_at
 from shaftwork.components.branches import ACROSS
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import NetworkWarning
@@ -20,7 +20,7 @@ from shaftwork.core.notices import warn
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.templates import Kind
 from shaftwork.network.wording import listed
-from shaftwork.reduction.form import StateForm, store_name
+from shaftwork.reduction.form import StateForm
 
 SAME = 1e-9
 """Ratios that differ by less are equal, and a speed below this part of the largest is none."""
@@ -35,23 +35,10 @@ def speeds_to_give(model: CompiledModel) -> Mapping[str, float]:
     form, ratios = model.form, _ratios(model)
     inside, names = inner_nodes(form), dict[str, float]()
     for k, branch in enumerate(form.across_states):
-        node = _node(form, branch)
+        node = node_of(form, branch)
         if node not in inside and form.graph.domains[node] is not ELECTRICAL:
-            names[_speed(form, node)] = float(ratios[k])
+            names[speed_at(form, node)] = float(ratios[k])
     return names
-
-
-def _node(form: StateForm, branch: int) -> int:
-    return max(form.graph.branches[branch].plus, form.graph.branches[branch].minus)
-
-
-def _speed(form: StateForm, node: int) -> str:
-    """The name of the speed of a node with stores: of an inertia, or where a shaft alone ends, of the node."""
-    graph, inside = form.graph, inner_nodes(form)
-    for branch in (*form.across_states, *form.dependent_across):
-        if _node(form, branch) == node and inside.isdisjoint(graph.part_of(branch).nodes.values()):
-            return store_name(graph, graph.branches[branch])
-    return f"{graph.nodes[node]}.{graph.domains[node].across.name}"
 
 
 def _ratios(model: CompiledModel) -> Array:
@@ -97,7 +84,7 @@ def warn_of_speeds_left(start: Start, form: StateForm) -> None:
     }
     if not parts:
         return
-    speeds = tuple(dict.fromkeys(_speed(form, node) for node in parts.values()))
+    speeds = tuple(dict.fromkeys(speed_at(form, node) for node in parts.values()))
     example = hint(
         "at={..., " + ", ".join(f"'{name}': ..." for name in speeds) + "}",
         " ".join(f"--at {name}=..." for name in speeds),

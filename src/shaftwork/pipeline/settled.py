@@ -16,6 +16,7 @@ from shaftwork.codegen.valueless import in_words
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.errors import NetworkWarning, SimulationError
+from shaftwork.core.hints import hint
 from shaftwork.core.notices import warn
 from shaftwork.network.templates import Kind
 from shaftwork.network.wording import listed
@@ -67,7 +68,7 @@ def refuse_moving(bound: BoundArrays, t: float, switching: Switching) -> None:
     raise SimulationError(
         f"steady_state() of '{graph.name}' finds no time from which on all laws stay as they are: {shown} "
         f"{'changes' if len(laws) == 1 else 'change'} with time. Name the time at which laws are to be read, "
-        f"steady_state(t=...), a late one where they level off{noise}."
+        f"{hint('steady_state(t=...)', '--t S')}, a late one where they level off{noise}."
     )
 
 
@@ -105,7 +106,9 @@ def warn_of_earlier_levels(bound: BoundArrays, x: Array, when: float, switching:
         warn(
             f"steady_state() of '{bound.program.form.graph.name}' reads its laws after their last change, at "
             f"t = {when:.6g} s, and they were others before: {said}. Name the time that is meant, "
-            f"steady_state(t={when:.6g}) or steady_state(t={other:.6g}).",
+            + hint(
+                f"steady_state(t={when:.6g}) or steady_state(t={other:.6g}).", f"--t {when:.6g} or --t {other:.6g}."
+            ),
             NetworkWarning,
         )
 

@@ -17,6 +17,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigs, splu
 
 from shaftwork.core.errors import ParameterError, SimulationError
+from shaftwork.core.hints import hint
 from shaftwork.results.observer import Array
 from shaftwork.results.slopes import Complex
 
@@ -66,7 +67,8 @@ def _connected(matrix: Any, count: int | None) -> tuple[Complex, Complex]:
         return _all(matrix.toarray(), lossless=lossless)
     if count is None:
         raise ParameterError(
-            f"All modes of {size} connected states are more than anyone reads. Ask for the lowest: modes(count=20)."
+            f"All modes of {size} connected states are more than anyone reads. Ask for the lowest: "
+            f"{hint('modes(count=20)', '--count 20')}."
         )
     return _lowest(sparse.csc_array(matrix), count, lossless=lossless)
 

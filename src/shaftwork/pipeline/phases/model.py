@@ -13,7 +13,7 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.linear import Linearization
 from shaftwork.codegen.model import CompiledModel, Cost
-from shaftwork.codegen.operating import steady_state
+from shaftwork.codegen.operating import another_start, steady_state
 from shaftwork.codegen.start_values import initial_state
 from shaftwork.core.errors import CompileError, SimulationError
 from shaftwork.core.parameters import in_si
@@ -183,7 +183,7 @@ class PhasedModel(Model):
                 return SteadyState(settling.held(moment, when), when)
         raise SimulationError(
             f"No steady operation was found: after {MOST_CHANGES} changes of its modes '{self.name}' still goes on, "
-            f"with {self.words(moment)}. Give a start near the operating point."
+            f"with {self.words(moment)}. {another_start(self.form)}"
         )
 
     def point(self, values: Mapping[str, float], at: Point, t: Time) -> tuple[float, Moment]:
