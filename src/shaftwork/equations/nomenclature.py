@@ -4,16 +4,26 @@ from __future__ import annotations
 
 import re
 from collections.abc import Container, Iterator, Mapping, Sequence
+from itertools import zip_longest
 from typing import TYPE_CHECKING
 
+from sympy import Basic
+
+from shaftwork.components.tables import Table
 from shaftwork.equations.notation import INDEX_CLOSES, INDEX_OPENS, Letter, split_index, without_marks
-from shaftwork.equations.printing import printed_number
+from shaftwork.equations.printing import Writer, printed_number
 from shaftwork.equations.series import Numbers, listed, replaced, series_in
 from shaftwork.equations.spelling import in_text
+from shaftwork.network.effective import effective
 
 if TYPE_CHECKING:  # the records print themselves through this module
     from shaftwork.equations.records import Equations
 
+LAWS = "Formula, or points of a table, over $t$ in s if nothing else is said"
+ALL_DIGITS = 15
+"""Of the points of tables, which may lie close together."""
+POINTS = 40
+"""Of a table in one row: rows do not run over pages."""
 UNITS = {"1": "--", "ohm": r"$\Omega$"}
 Cells = tuple[str, ...]
 
@@ -21,7 +31,10 @@ Cells = tuple[str, ...]
 def nomenclature(
     equations: Equations, used: Container[str], noted: Mapping[str, str], besides: Sequence[Cells] = ()
 ) -> str:
-    """The table of the variables that equations contain, and that of the parameters.
+    """The tables of the variables that equations contain, of the parameters, and of the laws that are given.
+
+    Left out are parameters that have no effect. Laws stand there with all points of their tables, of which formulas
+    show some, and also where the phase has another one.
 
     Args:
         equations: what knows all letters.
@@ -30,6 +43,7 @@ def nomenclature(
         besides: rows before them, of quantities that belong to no part.
     """
     names, values = equations.symbol_names, equations.values
+    read = effective(equations.form.graph)
     variables = [
         (_formula(names[letter.name]), _meaning(letter, noted), _owner(letter), unit(letter.unit))
         for letter in equations.letters
@@ -44,13 +58,34 @@ def nomenclature(
             unit(letter.unit),
         )
         for letter in equations.letters
-        if letter.parameter
+        if letter.parameter and (letter.name in read or letter.name not in equations.form.graph.parameters)
     ]
     tables = (
         table(_columns(48, 40, 38, 21), ("Variable", "Meaning", "Of", "Unit"), (*besides, *variables)),
         table(_columns(34, 38, 30, 21, 20), ("Parameter", "Meaning", "Of", "Value", "Unit"), parameters),
+        table(_columns(34, 24, 68, 20), ("Law", "Of", LAWS, "Unit"), [*_laws(equations)]),
     )
     return "\n".join(filter(None, tables))
+
+
+def _laws(equations: Equations) -> Iterator[Cells]:
+    """Rows of the laws that are given as tables or formulas."""
+    writer = Writer({}, (), (), {})
+    for part in equations.form.graph.parts:
+        for name, declared in part.component.declared.items():
+            law, _ = declared.magnitude(getattr(part.component, name))
+            if not (declared.law and isinstance(law, Basic)):
+                continue
+            cells = [] if isinstance(law, Table) else [_formula(writer.latex(law))]
+            for curve in sorted(law.atoms(Table), key=str):
+                points = [
+                    rf"${printed_number(x, ALL_DIGITS)} \mapsto {printed_number(y, ALL_DIGITS)}$"
+                    for x, y in zip(curve.xs, curve.ys, strict=True)
+                ]
+                cells += [", ".join(points[first : first + POINTS]) for first in range(0, len(points), POINTS)]
+            heads = [(in_text(declared.meaning), breakable(part.name), unit(declared.unit))]
+            for (meaning, owner, measure), cell in zip_longest(heads, cells, fillvalue=("", "", "")):
+                yield meaning, owner, str(cell), measure
 
 
 def _formula(latex: str) -> str:

@@ -14,7 +14,7 @@ from shaftwork.core.domains import ELECTRICAL, Quantity
 from shaftwork.core.parameters import Parameter
 from shaftwork.equations.quantities import Quantities, running_number
 from shaftwork.equations.spelling import GREEK, chosen_subscript, escaped
-from shaftwork.network.graph import GraphPart
+from shaftwork.network.graph import GraphBranch, GraphPart
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
 
@@ -182,9 +182,12 @@ def _quantity_letters(form: StateForm, quantities: Quantities) -> Iterator[tuple
             pair.part,
             replace(letter, base=sign + letter.base, meaning=f"{letter.meaning} across" if sign else letter.meaning),
         )
+    holding = {branch.part for branch in graph.branches if branch.terms and _numbered(quantities, branch)}
     for flow in quantities.flows:
         quantity, several = quantities.domain((flow.plus, flow.minus)).through, len(flow.branches) > 1
-        yield flow.part, _letter(quantities.through(flow), quantity, flow.label)
+        letter = _letter(quantities.through(flow), quantity, flow.label)
+        beside = flow.part in holding and flow.label.isdecimal()
+        yield flow.part, replace(letter, meaning=f"{letter.meaning} of its law") if beside else letter
         for index in flow.branches:
             template = graph.branches[index].template
             if several and template.kind is Kind.THROUGH_STORE:
@@ -203,13 +206,20 @@ def _quantity_letters(form: StateForm, quantities: Quantities) -> Iterator[tuple
         if branch.terms:
             quantity = quantities.multiplier_quantity(branch.index)
             label = quantities.multiplier_label(branch.index)
-            yield branch.part, _letter(quantities.multiplier(branch.index), quantity, label)
+            letter = _letter(quantities.multiplier(branch.index), quantity, label)
+            holds = branch.part in holding and _numbered(quantities, branch)
+            yield branch.part, replace(letter, meaning=f"{letter.meaning} that holds it") if holds else letter
     for state in form.states:
         if state.kind == "integral":
             branch = graph.branches[state.branch]
             quantity = quantities.domain((branch.plus, branch.minus)).integral
             label = state.name.rsplit(".", 1)[1].removeprefix(quantity.name).removeprefix("_")
             yield branch.part, _letter(quantities.integral(branch.index), quantity, label)
+
+
+def _numbered(quantities: Quantities, joint: GraphBranch) -> bool:
+    """Whether a number alone tells the torque of a joint from others of its part."""
+    return quantities.multiplier_label(joint.index).isdecimal()
 
 
 def _node_letters(quantities: Quantities) -> Iterator[tuple[int, Letter]]:

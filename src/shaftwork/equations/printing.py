@@ -85,9 +85,9 @@ class _Printer(LatexPrinter):  # type: ignore[misc]
         return text if exp is None else rf"{text}^{{{exp}}}"
 
 
-def printed_number(value: float) -> str:
+def printed_number(value: float, digits: int = DIGITS) -> str:
     """A number with sensible digits, a power of ten where it is very large or small."""
-    mantissa, _, exponent = f"{value:.{DIGITS}g}".partition("e")
+    mantissa, _, exponent = f"{value:.{digits}g}".partition("e")
     return rf"{mantissa} \cdot 10^{{{int(exponent)}}}" if exponent else mantissa
 
 
