@@ -205,6 +205,16 @@ def test_check_says_where_the_slopes_at_rest_are_not_finite(
     assert "time constants at rest: none, since J.omega has no finite slope there" in capsys.readouterr().out
 
 
+def test_check_reads_slopes_at_rest_at_the_start(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A brake that gets stronger: after 10 ms it has twice the damping."""
+    net = sw.Network("braked")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.TorqueSource("brake", tau=-(1 + 100 * sw.t) * sw.omega), "a")
+    net.save(tmp_path / "braked.toml")
+    assert main(["check", str(tmp_path / "braked.toml")]) == DONE
+    assert "time constants at rest: 1 s to 1 s" in capsys.readouterr().out
+
+
 def test_an_unforeseen_error_ends_with_1_and_one_line(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

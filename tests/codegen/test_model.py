@@ -27,6 +27,17 @@ def test_a_small_model_is_unrolled_and_a_large_one_is_not() -> None:
     assert large.cost().form == "array"
 
 
+def test_array_code_multiplies_and_adds_once_for_each_entry_of_its_matrices() -> None:
+    """And reads what its laws need by such a matrix: each load the speed of its node."""
+    net = _chain(40)
+    before = net.compile().cost().operations
+    for k in range(0, 40, 2):
+        net.add(sw.TorqueSource(f"load{k}", tau=-(sw.omega**3)), f"n{k}")
+    after = net.compile().cost().operations
+    gained = {name: number - before.get(name, 0) for name, number in after.items()}
+    assert gained == {"mul": 40, "add": 40, "law": 20}  # one to read each speed and one for each torque
+
+
 def test_unrolled_code_shares_common_terms() -> None:
     """The torque of every damped spring stands in two rows, but is computed once."""
     model = _chain(2).compile()

@@ -114,6 +114,13 @@ def test_a_quartic_that_turns_once_more_is_warned_of_with_the_speed(n_s: float) 
     assert told[0].filename == __file__
 
 
+def test_the_quartic_of_a_slow_motor_is_warned_of_as_well() -> None:
+    """At a thousandth of the speeds, all below 1 1/min, the curve has the same shape."""
+    slow = EXCAVATOR | {name: EXCAVATOR[name] / 1000 for name in ("n_sync", "n_n")}
+    with pytest.warns(sw.NetworkWarning, match="turns once more at 0"):
+        sw.CageMotor("m", **slow, n_s=0.7)
+
+
 @pytest.mark.parametrize("ratio", [1.0, -4.0])
 def test_a_cage_motor_is_continuous_and_finite_at_every_speed(ratio: float) -> None:
     """Backwards it gives its locked-rotor torque, above the synchronous speed it brakes with at most -tau_k."""

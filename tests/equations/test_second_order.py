@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import Any
+
 import pytest
 from sympy import cancel
 
 import shaftwork as sw
+from shaftwork.components import REGISTRY
+from shaftwork.components.branches import Branch, across_of
 from shaftwork.core.errors import CompileError
 from shaftwork.equations.second_order import second_order
 from tests.equations.networks import MECHANICAL, dc_drive, graph_of
@@ -50,3 +55,23 @@ def test_a_row_of_a_large_network_names_every_torque_at_its_node() -> None:
 def test_an_electrical_network_has_no_second_order_form() -> None:
     with pytest.raises(CompileError, match=r"electrical nodes p, M\.resistor"):
         second_order(graph_of(dc_drive()))
+
+
+def test_a_law_that_reads_other_quantities_of_its_part_has_no_second_order_form_and_is_named() -> None:
+    @sw.component
+    class Follower(sw.Component):
+        gain: float = sw.parameter("N*m*s/rad", "torque on b over the speed of a")
+        ports = (sw.Port("a"), sw.Port("b"))
+
+        def branches(self, p: Any) -> Iterator[Branch]:
+            yield sw.ThroughLaw(p.gain * across_of("a"), ("b", None))
+
+    try:
+        net = sw.Network("led")
+        net.add(sw.Inertia("J1", J=1.0), "a")
+        net.add(Follower("follower", gain=2.0), "a", "b")
+        net.add(sw.Inertia("J2", J=1.0), "b")
+        with pytest.raises(CompileError, match="A law of 'follower' reads other quantities than its own speed"):
+            net.equations().latex("second-order")
+    finally:
+        del REGISTRY["Follower"]

@@ -217,6 +217,12 @@ def test_what_is_not_there_is_answered_with_what_is(change: str) -> None:
         net.remove("zzz") if change == "remove" else net.replace(sw.Inertia("zzz", J=1.0))
 
 
+def test_what_is_no_component_replaces_none() -> None:
+    net = flat()
+    with pytest.raises(sw.ShaftworkError, match=r"replace\(\) takes a component such as .*, not 'J1'"):
+        net.replace("J1")  # type: ignore[type-var]
+
+
 def long_chain(count: int) -> sw.Network:
     net = sw.Network("chain")
     net.add(sw.KlossMotor("motor", tau_k=9.6, s_k=0.25, n_sync=3000), "n0")

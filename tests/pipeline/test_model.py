@@ -381,6 +381,25 @@ def test_the_cost_counts_operations_and_leaving_out_saves_them() -> None:
     assert chain.entries == 2 * (2 * 99)
 
 
+def test_a_model_says_whether_it_is_linear() -> None:
+    net = sw.Network("pushed")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.TorqueSource("push", tau=1.0), "a")
+    assert str(net.compile()).splitlines()[0].endswith(", linear")
+    net.add(sw.TorqueSource("fan", tau=-(sw.omega**3)), "a")
+    assert str(net.compile()).splitlines()[0].endswith(", nonlinear")
+
+
+def test_a_title_that_just_fits_the_screen_is_not_cut() -> None:
+    """100 columns, with what follows the name."""
+    for length, end in ((100, "linear"), (101, "...")):
+        net = sw.Network("x" * (length - len("Model of '': 1 state, 1 parameter, linear")))
+        net.add(sw.Inertia("J", J=1.0), "a")
+        title = str(net.compile()).splitlines()[0]
+        assert len(title) == 100
+        assert title.endswith(end)
+
+
 def test_the_generated_code_reads_like_the_equations() -> None:
     source = crane().compile().scalar.source
     assert "tanh" in source

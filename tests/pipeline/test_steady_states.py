@@ -43,6 +43,12 @@ def test_a_table_with_another_level_before_its_end_warns_with_both_times() -> No
         assert torque(model, t=11.0) == pytest.approx(0.8e6, rel=1e-9)
 
 
+def test_levels_of_a_small_torque_warn_with_the_same_times() -> None:
+    small = sw.Table([0.0, 2.0, 20.0, 30.0, 40.0], [0.0, 0.8e-3, 0.8e-3, 0.7e-3, 0.7e-3])
+    with pytest.warns(sw.NetworkWarning, match=r"gives -0.0007 N m and gave -0.0008 N m at t = 11 s"):
+        torque(drive(small).compile())
+
+
 @pytest.mark.parametrize(
     ("law", "words"),
     [

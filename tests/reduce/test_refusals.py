@@ -182,6 +182,15 @@ def test_gears_round_a_loop_must_agree_in_ratio_and_losses() -> None:
     assert "'other' closes a loop of gears round which ratios or losses differ" in refused(net, drives={"other": "a"})
 
 
+@pytest.mark.filterwarnings("ignore:locked gear loop")
+def test_a_planetary_gear_must_agree_with_gears_between_all_its_members() -> None:
+    """omega_sun + 2 omega_ring = 3 omega_carrier: with a sun thrice as fast as ring and carrier they would all rest."""
+    net = base()
+    net.add(sw.Gear("other", ratio=3.0), "a", "c")
+    net.add(sw.PlanetaryGear("planets", ratio=2.0), "a", "c", "b")
+    assert "'planets' closes a loop of gears round which ratios or losses differ" in refused(net)
+
+
 def test_a_lossy_gear_in_a_loop_is_refused_with_the_reason() -> None:
     net = base(gear=sw.LossyGear("lossy", ratio=3.0, efficiency=0.9))
     net.add(sw.Gear("other", ratio=3.0), "a", "c")

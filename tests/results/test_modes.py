@@ -267,6 +267,7 @@ def test_the_picture_shows_the_modes_asked_for() -> None:
     pytest.importorskip("matplotlib")
     modes = _chain(5).modes()
     figure = modes.plot(1, 2)
+    assert figure.get_suptitle() == "chain: speeds of the nodes"
     assert [axis.get_title(loc="left").split(":")[0] for axis in figure.axes] == ["mode 1", "mode 2"]
     np.testing.assert_allclose(figure.axes[0].lines[0].get_ydata()[0], 1.0)
     with pytest.raises(sw.ParameterError, match="There is no mode 9"):

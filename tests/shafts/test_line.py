@@ -24,6 +24,13 @@ def test_a_wire_is_as_soft_as_the_fourth_power_of_its_diameter() -> None:
     assert wire.inertia == pytest.approx(1e-12 * SHAFT.inertia, rel=1e-14)
 
 
+def test_a_shaft_of_jelly_is_as_soft_as_its_material() -> None:
+    jelly = Section.of_geometry(1.0, 0.02, density=7900.0, shear_modulus=77.5e-4)
+    assert jelly.stiffness == pytest.approx(1e-13 * SHAFT.stiffness, rel=1e-14)
+    with pytest.raises(ParameterError, match=r"shear_modulus of a section \(Pa\) must be above 0,"):
+        Section.of_geometry(1.0, 0.02, density=7900.0, shear_modulus=0.0)
+
+
 def test_delay_and_impedance_are_those_of_the_material() -> None:
     # Popenda 2019, (15): v = (G / rho)^0.5; Z = J' v. Square roots and products: a few roundings.
     speed = math.sqrt(77.5e9 / 7900)
