@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
+import sympy
 
 import shaftwork as sw
 from shaftwork.integrate.engines import ENGINES
@@ -76,3 +77,43 @@ def test_an_engine_that_auto_takes_says_it_where_it_says_why() -> None:
         "together. rtol = 1e-13 is finer than the engine 'wave' can keep: the run is made with 1e-12."
     )
     assert "finer" not in exact.simulate(1e-3, rtol=1e-15).why
+
+
+@pytest.mark.parametrize("frequency", [sw.Table([0.0, 1.0], [0.7, 0.7]), sw.Table([0.0, 0.5, 1.0], [0.7, 20.0, 5.0])])
+@pytest.mark.parametrize(
+    "part",
+    [
+        sw.Backlash("coupling", gap=0.008, c=4e5, d=50.0),
+        sw.Clutch("coupling", tau=sw.Table([0.0, 0.4, 0.6, 1.0], [900.0, 900.0, 0.0, 0.0])),
+    ],
+    ids=lambda part: repr(part)[:60],
+)
+def test_the_engine_that_is_announced_runs_a_drive_by_a_frequency_past_changes_of_mode(
+    part: sw.Component, frequency: sw.Table
+) -> None:
+    """The law has a quotient by the frequency, so the series are compared with the equations: with those in force."""
+    pytest.importorskip("heyoka")
+    net = sw.Network("drive by a frequency")
+    net.add(sw.FrequencyDrive("motor", tau_k=2000.0, s_k=0.08, n_sync=1500, f=frequency), "a")
+    net.add(sw.Inertia("J1", J=3.0), "a")
+    net.add(part, "a", "b")
+    net.add(sw.Inertia("J2", J=0.2), "b")
+    net.add(sw.TorqueSource("load", tau=-600.0), "b")
+    model = net.compile()
+    sol = model.simulate(1.0)
+    assert (sol.engine, sol.why) == model.choose_engine(1.0)
+    assert sol.engine == "heyoka"
+    other = model.simulate(1.0, engine="scipy", rtol=1e-10)
+    assert len(sol.events) == len(other.events) > 0
+    assert sol.max("coupling.tau") == pytest.approx(float(other.max("coupling.tau")), rel=1e-6)
+
+
+def test_another_engine_says_what_was_in_the_way_of_the_series() -> None:
+    pytest.importorskip("heyoka")
+    net = sw.Network("rough")
+    net.add(sw.TorqueSource("pull", tau=sympy.sqrt(sw.t)), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    sol = net.simulate(1.0)
+    assert sol.engine == "scipy"
+    assert "after t = 0 s a law, or one of its derivatives, is not finite" in sol.why
+    assert sol["J.omega"][-1] == pytest.approx(2 / 3, rel=1e-6)

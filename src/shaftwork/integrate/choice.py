@@ -8,10 +8,11 @@ from dataclasses import replace
 
 from shaftwork.core.errors import MissingExtraError, ParameterError, SimulationError
 from shaftwork.integrate.engines import ADAMS, ENGINES, INNER
-from shaftwork.integrate.problem import Engine, Problem, Trajectory
+from shaftwork.integrate.problem import Engine, Problem, SeriesError, StickingError, Trajectory
 
 # Why another engine goes on where heyoka stopped.
-NOT_ANALYTIC = "A law has no Taylor series where the motion passes (a square root at zero), so {} is taken."
+NO_SERIES = "There is no Taylor series of the whole motion: {}. So {} is taken."
+IN_WORDS = {"scipy": "scipy's DOP853", "sundials": "the implicit CVODE"}
 
 
 # The exact engine is taken up to this estimate of its time; an adaptive one may then be the faster. On a damped chain
@@ -99,27 +100,30 @@ def solve(
     if name != "heyoka" or not (fallback or engine == "auto"):
         trajectory = _guarded(problem, load(name)(problem), name)
         return trajectory, name, f"{why or reason} {trajectory.remark}".rstrip()
-    from shaftwork.integrate.problem import SeriesError, StickingError
-
     try:
         return _guarded(problem, load(name)(problem), name), name, why or reason
     except SeriesError as error:
         failed = error
-        *tried, last = without_series(problem.max_steps)
-    for other, because, steps in tried:
+        *tried, (last, _) = without_series(problem.max_steps)
+    for other, steps in tried:
         with suppress(SimulationError):
-            return _guarded(problem, load(other)(replace(problem, max_steps=steps)), other), other, because
+            trajectory = _guarded(problem, load(other)(replace(problem, max_steps=steps)), other)
+            return trajectory, other, no_series(failed, other)
     if tried and isinstance(failed, StickingError):
         raise failed
-    return _guarded(problem, load(last[0])(problem), last[0]), *last[:2]
+    return _guarded(problem, load(last)(problem), last), last, no_series(failed, last)
 
 
-def without_series(most: int) -> list[tuple[str, str, int]]:
-    """The engines that are tried one after another where heyoka cannot go on: name, why, and most steps."""
-    scipy, cvode = NOT_ANALYTIC.format("scipy's DOP853"), NOT_ANALYTIC.format("the implicit CVODE")
+def without_series(most: int) -> list[tuple[str, int]]:
+    """The engines that are tried one after another where heyoka cannot go on: name and most steps."""
     if not ENGINES["sundials"].installed:
-        return [("scipy", scipy, most)]
-    return [("scipy", scipy, min(most, LONG_FOR_SCIPY)), ("sundials", cvode, most), ("scipy", scipy, most)]
+        return [("scipy", most)]
+    return [("scipy", min(most, LONG_FOR_SCIPY)), ("sundials", most), ("scipy", most)]
+
+
+def no_series(failed: SeriesError, name: str) -> str:
+    """Why another engine is taken where heyoka cannot go on."""
+    return NO_SERIES.format(failed.found, IN_WORDS[name])
 
 
 def _guarded(problem: Problem, trajectory: Trajectory, name: str) -> Trajectory:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from itertools import pairwise
@@ -37,6 +38,7 @@ FIRST_DEFECT, FIRST_TRIALS, SHORTER = 1e-8, 30, 0.25
 # Where in a step a series is compared with the equations, as parts of the step: not at its end, where a law may jump.
 INSIDE = (0.5, 0.9)
 
+Rates = Callable[[float, Array], Array]
 # From (integrator, step callback, step limit, longest step) to (outcome, its name, steps taken); called again after an
 # interruption. It returns to Python after some steps each, which changes them by rounding alone.
 Advance = Callable[[Any, Watch | None, int, float], tuple[Any, str, int]]
@@ -97,8 +99,8 @@ class _Run:
         self.steps = 0
         self.met: int | None = None
         """The guard that ended the run."""
-        self.reactions = 0
-        """Guards met before, past which it went on."""
+        self.reactions: list[tuple[float, Callable[[], Rates]]] = []
+        """Times in s of guards past which it went on, and what makes the equations that hold from there on."""
 
     def piece(self, piece: Piece, advance: Advance) -> None:
         """Bring the run to the end of a piece; `advance` records what it passes."""
@@ -176,10 +178,10 @@ class _Run:
         if self.problem.react is None:
             return False
         integrator = self.integrator
-        reaction = self.problem.react(self.reactions, met, integrator.time, integrator.state)
+        reaction = self.problem.react(len(self.reactions), met, integrator.time, integrator.state)
         if reaction is None:
             return False
-        self.reactions += 1
+        self.reactions.append((integrator.time, reaction.equations))
         integrator.pars[: reaction.p.size] = reaction.p
         self._guard(reaction.sides, reaction.offsets)
         self.program.weigh(integrator)
@@ -210,7 +212,7 @@ class _Run:
 
     def _satisfied(self, piece: Piece, start: float, elapsed: float) -> bool:
         """Whether the series of the last step satisfies the equations at a time inside it."""
-        return _satisfied(self.problem, piece, self.integrator.tc, start, elapsed, np.zeros_like(self.start))
+        return _satisfied(self.problem, self.problem.rhs, piece, self.integrator.tc, start, elapsed, 0.0)
 
     def verify(self, piece: Piece, segments: Sequence[Any]) -> None:
         """Refuse series that have passed a root or a pole of a law, and gone on otherwise than the law.
@@ -222,12 +224,16 @@ class _Run:
             return
         # near a root of zero slope a series is poor in steps so short that it moves nothing
         sizes = np.max([np.abs(segment.tcs[:, :, 0]).max(axis=0) for segment in segments], axis=0)
+        changes, rhs, past = [time for time, _ in self.reactions], self.problem.rhs, 0
         for segment in segments:
             for (start, end), terms in zip(pairwise(segment.times), segment.tcs, strict=True):
+                if (now := bisect_right(changes, start)) > past:
+                    rhs, past = self.reactions[now - 1][1](), now
                 for part in INSIDE:
-                    if not _satisfied(self.problem, piece, terms, start, part * (end - start), sizes):
+                    if not _satisfied(self.problem, rhs, piece, terms, start, part * (end - start), sizes):
                         reason = f"up to t = {end:.9g} s a law has a root or a pole that a Taylor series does not show"
-                        raise SeriesError(*failure(self.problem, "heyoka", start, terms[:, 0], reason).args)
+                        made = failure(self.problem, "heyoka", start, terms[:, 0], reason)
+                        raise SeriesError(str(made), reason)
 
     def _watch(self, piece: Piece) -> Watch | None:
         """Set the signs of the switches; what has to look after them, where the motion may change them."""
@@ -249,8 +255,9 @@ class _Run:
         time, state = self._last_good(piece, watch)
         made = failure(self.problem, "heyoka", time, state, self._reason(outcome, watch))
         if watch is not None and watch.reason is not None:
-            return StickingError(*made.args)
-        return SeriesError(*made.args) if outcome == "err_nf_state" else made
+            return StickingError(str(made), watch.reason.partition(", because")[0])
+        found = f"after t = {time:.9g} s a law, or one of its derivatives, is not finite, as a root's at zero"
+        return SeriesError(str(made), found) if outcome == "err_nf_state" else made
 
     def _last_good(self, piece: Piece, watch: Watch | None) -> tuple[float, Array]:
         """Time and state at the end of the last good step of a run that has failed in a piece."""
@@ -276,13 +283,15 @@ class _Run:
         return f"heyoka stopped with the outcome {outcome!r}"
 
 
-def _satisfied(problem: Problem, piece: Piece, terms: Array, start: float, elapsed: float, sizes: Array) -> bool:
-    """Whether a series (n, orders) from a start in s satisfies the equations after some time; `sizes` are of states."""
+def _satisfied(
+    problem: Problem, rhs: Rates, piece: Piece, terms: Array, start: float, elapsed: float, sizes: Array | float
+) -> bool:
+    """Whether a series (n, orders) from a start in s satisfies equations after some time; `sizes` are of states."""
     orders = np.arange(terms.shape[1])
     state = terms @ elapsed**orders
     slope = terms[:, 1:] @ (orders[1:] * elapsed ** orders[:-1])
     with np.errstate(all="ignore"):
-        defect = elapsed * np.abs(problem.rhs(piece.inside(start + elapsed), state) - slope)
+        defect = elapsed * np.abs(rhs(piece.inside(start + elapsed), state) - slope)
     moved = np.maximum(np.abs(state), sizes) + elapsed * np.abs(slope)
     return bool((defect <= FIRST_DEFECT * moved + problem.atol).all())
 

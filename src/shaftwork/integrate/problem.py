@@ -104,11 +104,13 @@ class Reaction(NamedTuple):
         p: (p,) parameters from there on.
         sides: (m,) of the guards.
         offsets: (m,) of the guards.
+        equations: makes the right-hand side from there on.
     """
 
     p: Array
     sides: Array
     offsets: Sequence[float]
+    equations: Callable[[], Callable[[float, Array], Array]]
 
 
 # An engine with a tolerance may be off by this many times of it, 1e-6 at the usual one: errors add up over its steps.
@@ -121,7 +123,15 @@ class SeriesError(SimulationError):
     """A Taylor series does not show the motion, and another engine may go on.
 
     Its terms are not finite, where the motion runs away or a law is not smooth, sqrt at 0; or it has hidden a guard.
+
+    Args:
+        message: of the error.
+        found: what is in the way, without the next step.
     """
+
+    def __init__(self, message: str, found: str = "a law is not smooth where the motion passes") -> None:
+        super().__init__(message)
+        self.found = found
 
 
 class StickingError(SeriesError):

@@ -269,30 +269,23 @@ class Assembly:
         Its states are those of the model and, behind them, the integrals of the guards in `clocks`.
         """
         p, modes, x = moment.regime.p, moment.regime.modes, moment.x
-        guards, bound, (rates, known) = self.guards(p), partial(self.bound, p), self._rates(p)
+        guards, bound, (_, known) = self.guards(p), partial(self.bound, p), self._rates(p)
         clocks, size = list(self.clocks), x.size
         owners = {made.guard: k for (k, _), found in self._watched.items() for made in found} if clocks else {}
         found = guards if not clocks else lambda t, y: guards(t, y[:, :size])
         now = np.abs(moment.regime.limits(span[0], x.tolist()))
         watch = Guards(found, self.sides(modes), np.array(moment.bands), now)
 
-        def rhs(t: float, y: Array) -> Array:
-            return rates(t, y)
-
         def jacobian(t: float, y: Array) -> Any:
             return bound().jacobian(t, y)
 
         if clocks:
 
-            def rhs(t: float, y: Array) -> Array:
-                wound = CLOCK * guards(np.array([t]), y[None, :size])[0, clocks]
-                return np.concatenate([rates(t, y[:size]) if size else np.empty(0), wound])
-
             def jacobian(t: float, y: Array) -> Any:
                 return sparse.block_diag((bound().jacobian(t, y[:size]), sparse.csc_array((len(clocks),) * 2)), "csc")
 
         return Problem(
-            rhs=rhs,
+            rhs=self.right_side(p),
             jacobian=jacobian if size else None,
             x0=np.concatenate([x, np.zeros(len(clocks))]),
             t0=span[0],
@@ -307,6 +300,18 @@ class Assembly:
             rough=lambda t, y: self._rough(p, modes, t, y[:, :size]),
             found=known,
         )
+
+    def right_side(self, p: Array) -> Callable[[float, Array], Array]:
+        """The rates of the states and, behind them, of the clocks."""
+        (rates, _), guards, clocks, size = self._rates(p), self.guards(p), list(self.clocks), len(self.model.states)
+        if not clocks:
+            return rates
+
+        def rhs(t: float, y: Array) -> Array:
+            wound = CLOCK * guards(np.array([t]), y[None, :size])[0, clocks]
+            return np.concatenate([rates(t, y[:size]) if size else np.empty(0), wound])
+
+        return rhs
 
     def without_value(self, p: Array, modes: ModeNames, times: Array, states: Array) -> tuple[float, str] | None:
         """The first time at which a law or a guard of the modes has no value, and which one."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -105,7 +106,7 @@ class Passing:
         self.moment = moment
         self._note(t, changes)
         self.phases.append(Phase(t, regime.modes, regime.p))
-        reaction = Reaction(regime.p, regime.sides, moment.bands)
+        reaction = Reaction(regime.p, regime.sides, moment.bands, partial(regime.assembly.right_side, regime.p))
         self._reactions.append(reaction)
         return reaction
 
@@ -144,10 +145,11 @@ class Passing:
             k = made.guard
             if k != met and min(made.side * now[k], made.side * before[k]) > bands[k]:
                 element = self._settling.elements[number]
-                raise SeriesError(
-                    f"The heyoka engine has not seen that '{element.name}' ceased to be "
-                    f"{element.modes[regime.modes[number]].words} before t = {t:.9g} s. Take engine='scipy'."
+                words = (
+                    f"'{element.name}' ceased to be {element.modes[regime.modes[number]].words} before t = {t:.9g} s"
                 )
+                found = f"{words}, and the series of heyoka have not shown it"
+                raise SeriesError(f"The heyoka engine has not seen that {words}. Take engine='scipy'.", found)
 
     def _direct(self, met: int, t: float, x: Array) -> tuple[Moment, list[Change]] | None:
         """The modes that follow by this guard alone, or None where it takes more to tell.

@@ -253,13 +253,16 @@ class Run:
             return self._solve(problem, name, why), passing
         most = problem.max_steps
         first = min(most, choice.patience(problem)) if stiff else most
-        others = [(name, why, most)] if stiff else choice.without_series(most)
-        *tried, (last, last_why, _) = [("heyoka", why, first), *others]
+        others = [(name, most)] if stiff else choice.without_series(most)
+        *tried, (last, _) = [("heyoka", first), *others]
         sticks: StickingError | None = None
-        for engine, because, steps in tried:
+        failed: SeriesError | None = None
+        for engine, steps in tried:
             try:
+                because = why if failed is None else choice.no_series(failed, engine)
                 return self._solve(replace(problem, max_steps=steps), engine, because), passing
             except SimulationError as error:
+                failed = error if isinstance(error, SeriesError) and not stiff else failed
                 sticks = error if isinstance(error, StickingError) else sticks
                 if engine == "heyoka" and not stiff and not isinstance(error, SeriesError):
                     raise
@@ -268,7 +271,7 @@ class Run:
             passing = Passing(self.settling, moment, t, self.note)
         if sticks is not None and len(tried) > 1:
             raise sticks
-        return self._solve(problem, last, last_why), passing
+        return self._solve(problem, last, why if failed is None else choice.no_series(failed, last)), passing
 
     def _solve(self, problem: Problem, name: str, why: str) -> Trajectory:
         share, loosest = FOLLOWING[name]
