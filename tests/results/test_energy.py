@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 from collections.abc import Iterator
 
 import numpy as np
@@ -234,3 +235,26 @@ def test_what_changes_its_mode_at_the_instant_of_a_jump_is_not_charged_with_it()
     assert energy.lost_in["switch"] == 0.0
     assert energy.supplied_by["u"] == pytest.approx(5.0**2 / 2 + 5.0**2 / 2 * 0.5, rel=1e-12)
     assert energy.residual < CLOSE
+
+
+@pytest.mark.no_cover
+def test_the_memory_of_a_balance_does_not_grow_with_the_number_of_steps() -> None:
+    net = sw.Network("chain")
+    net.add(sw.TorqueSource("pull", tau=1.0), "n0")
+    net.add(sw.Inertia("J0", J=1.0), "n0")
+    for k in range(20):
+        net.add(sw.Spring(f"c{k}", c=4e6, d=0.1), f"n{k}", f"n{k + 1}")
+        net.add(sw.Inertia(f"J{k + 1}", J=1.0), f"n{k + 1}")
+    net.add(Stiffening("anchor", c=10.0, c3=400.0), "n20", "frame")
+    net.add(sw.Ground("earth"), "frame")
+    model = net.compile()
+    steps, peaks = [], []
+    for t_end in (1.0, 4.0):
+        sol = model.simulate(t_end, engine="heyoka")
+        tracemalloc.start()
+        assert sol.energy_residual < CLOSE
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+        steps.append(len(sol.steps))
+    assert steps[1] > 3.5 * steps[0]
+    assert peaks[1] < 1.5 * peaks[0]

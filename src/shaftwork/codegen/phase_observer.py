@@ -156,12 +156,19 @@ class PhaseObserver:
 
     def stored(self, t: Array, x: Array, dense: Dense) -> dict[str, Array]:
         """Stored energy by part."""
-        return self._by_part(t, x, lambda observer, times, states: observer.stored(times, states, dense))
+        made: dict[str, Array] = {}
+        for observer, places, times, states in self._pieces(t, x):
+            _fill(made, observer.stored(times, states, dense), places, len(t))
+        return made
 
     def powers(self, t: Array, x: Array) -> tuple[dict[str, Array], dict[str, Array]]:
         """Lost power and supplied power by part."""
-        lost = self._by_part(t, x, lambda observer, times, states: observer.powers(times, states)[0])
-        return lost, self._by_part(t, x, lambda observer, times, states: observer.powers(times, states)[1])
+        lost: dict[str, Array] = {}
+        supplied: dict[str, Array] = {}
+        for observer, places, times, states in self._pieces(t, x):
+            for made, powers in zip((lost, supplied), observer.powers(times, states), strict=True):
+                _fill(made, powers, places, len(t))
+        return lost, supplied
 
     def held(self, t: float, x: Array) -> dict[str, float]:  # noqa: ARG002
         """All that is stored, by name, which is what the states (n,) of a motion through phases are."""
@@ -179,15 +186,6 @@ class PhaseObserver:
         """A component of the network, with the parameter values of this motion."""
         return self._first.part(name)
 
-    def _by_part(
-        self, t: Array, x: Array, read: Callable[[ModelObserver, Array, Array], dict[str, Array]]
-    ) -> dict[str, Array]:
-        made: dict[str, Array] = {}
-        for observer, places, times, states in self._pieces(t, x):
-            for name, values in read(observer, times, states).items():
-                made.setdefault(name, np.zeros(len(t)))[places] = values
-        return made
-
     def _pieces(self, t: Array, x: Array) -> Iterator[tuple[ModelObserver, Index, Array, Array]]:
         names = self._names
         for stretches, places in self._stretches.groups(t):
@@ -203,3 +201,9 @@ class PhaseObserver:
         for k in np.flatnonzero(alone).tolist():
             times[k] = instants.sides(float(times[k]))[0]
         return times
+
+
+def _fill(made: dict[str, Array], found: Mapping[str, Array], places: Index, count: int) -> None:
+    """Put what is known of parts at some places of `count` times to the rest of it."""
+    for name, values in found.items():
+        made.setdefault(name, np.zeros(count))[places] = values

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from shaftwork.results.observer import Array
+from shaftwork.results.observer import Array, blocks
 from shaftwork.results.quadrature import NODES, SHARE, Panels
 
 Read = Callable[[Array], Array]
@@ -155,8 +155,10 @@ def _noise(read: Read, panels: Panels) -> Array:
 
 def _may_hold_extremes(values: Array, low: float | None = None, high: float | None = None) -> Mask:
     """(p,) whether a quantity may be lower or higher there than its lowest or highest value known; from (p, 8)."""
-    there = values @ _VALUES_THERE.T
-    bottom, top = there.min(axis=1), there.max(axis=1)
+    bottom, top = np.empty(len(values)), np.empty(len(values))
+    for block in blocks(len(values), len(LOOKS)):
+        there = values[block] @ _VALUES_THERE.T
+        bottom[block], top[block] = there.min(axis=1), there.max(axis=1)
     room = 0.5 * (top - bottom) * (_BETWEEN - 1.0) + _missed(values)
     least, most = values.min() if low is None else low, values.max() if high is None else high
     return np.asarray((bottom - room <= least) | (top + room >= most))

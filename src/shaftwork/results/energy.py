@@ -10,14 +10,17 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
-from shaftwork.results.observer import Array, Dense, Observer
+from shaftwork.results.observer import Array, Dense, Observer, blocks
 
-NODES = 12
-"""Gauss points in one panel."""
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
+"""Gauss points in one panel, from -1 to 1, and their weights."""
 TIGHT = 1e-13
-"""The panels are halved until the work changes by less than this fraction."""
+"""A panel is halved until its work changes by less than this fraction of the mean work of a step."""
 HALVINGS = 7
+NOISE, FALLS = 1e-11, 0.75
+"""Changes below the first fraction are noise where halving leaves more than this share of them."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +65,9 @@ class EnergyBalance:
 
 
 def energy_balance(observer: Observer, dense: Dense, steps: Array) -> EnergyBalance:
-    """Integrate the powers over every step with Gauss' formula, on panels halved until the work no longer changes.
+    """Integrate the powers over every step with Gauss' formula, on panels halved until their work no longer changes.
+
+    The run is read in blocks of steps, so that the memory that it takes does not grow with the number of steps.
 
     Args:
         observer: of the model.
@@ -71,15 +76,7 @@ def energy_balance(observer: Observer, dense: Dense, steps: Array) -> EnergyBala
     """
     before, after = _stored_on_both_sides(observer, dense, steps)
     impulses, hits, given = _impulses(observer.impacts(dense), steps, after - before)
-    panels = 1
-    found = _integrate(observer, dense, steps, panels)
-    for _ in range(HALVINGS):
-        panels *= 2
-        finer = _integrate(observer, dense, steps, panels)
-        change = np.abs(finer.supplied - found.supplied).max() + np.abs(finer.lost - found.lost).max()
-        found = finer
-        if change <= TIGHT * max(found.work, float(np.abs(found.lost).max())):
-            break
+    found = _Work(observer, dense, steps)
     lost_in = dict(found.lost_in)
     for part, energy in hits:
         lost_in[part] = lost_in.get(part, 0.0) + float(energy.sum())
@@ -120,43 +117,132 @@ def _impulses(
 
 def _stored_on_both_sides(observer: Observer, dense: Dense, steps: Array) -> tuple[Array, Array]:
     """Stored energy just before and at every time of `steps`; they differ where an input's jump is an impulse."""
-    # a time that is listed twice is read before what jumps there, and then after it
-    pairs = np.column_stack([np.nextafter(steps, steps[0]), steps])
-    stored = _total(observer.stored(np.repeat(steps, 2), dense(pairs.ravel()), dense), 2 * len(steps))
-    return stored[::2], stored[1::2]
+    before, after = np.empty(len(steps)), np.empty(len(steps))
+    # a time that is listed twice is read before what jumps there, and then after it: both belong to one block
+    firsts = np.flatnonzero(np.append(True, np.diff(steps) != 0))
+    ends = np.append(firsts[1:], len(steps))
+    for block in blocks(len(firsts), 2 * _width(observer, dense, steps)):
+        places = slice(firsts[block][0], ends[block][-1])
+        times = steps[places]
+        pairs = np.column_stack([np.nextafter(times, steps[0]), times])
+        stored = _total(observer.stored(np.repeat(times, 2), dense(pairs.ravel()), dense), 2 * len(times))
+        before[places], after[places] = stored[::2], stored[1::2]
+    return before, after
 
 
-@dataclass(frozen=True)
+def _width(observer: Observer, dense: Dense, steps: Array) -> int:
+    """Numbers that are read at one time: states, and powers lost and supplied."""
+    return int(dense(steps[:1]).shape[1]) + 2 * len(observer.wiring)
+
+
 class _Work:
-    """What went through the parts: running sums (s,), and totals by part."""
+    """What goes through the parts: running sums (s,), and totals by part.
 
-    supplied: Array
-    lost: Array
-    work: float
-    lost_in: Mapping[str, float]
-    supplied_by: Mapping[str, float]
+    Args:
+        observer: of the model.
+        dense: the motion.
+        steps: (s,) times.
+    """
+
+    def __init__(self, observer: Observer, dense: Dense, steps: Array) -> None:
+        self._observer, self._dense = observer, dense
+        self._rows = _width(observer, dense, steps) * len(NODES)
+        self._by_step = np.zeros((2, len(steps) - 1))
+        self._clear()
+        panels = _Panels(np.arange(len(steps) - 1), steps[:-1], np.diff(steps))
+        for block in blocks(len(panels.step), self._rows):
+            self._add(panels.taken(block), *self._powers(panels.taken(block)))
+        whole, self._each = self._by_step.copy(), max(self.work, float(np.abs(self.lost).max())) / len(steps)
+        self._clear()
+        self._settle(panels, whole, np.full(len(panels.step), np.inf), HALVINGS)
+
+    def _clear(self) -> None:
+        self._by_step[:] = 0.0
+        self.work, self.lost_in, self.supplied_by = 0.0, dict[str, float](), dict[str, float]()
+
+    @property
+    def lost(self) -> Array:
+        """(s,) heat since the start, J."""
+        return np.append(0.0, np.cumsum(self._by_step[0]))
+
+    @property
+    def supplied(self) -> Array:
+        """(s,) work of the sources since the start, J."""
+        return np.append(0.0, np.cumsum(self._by_step[1]))
+
+    def _powers(self, panels: _Panels) -> tuple[dict[str, Array], dict[str, Array]]:
+        """(p, 12) lost and supplied power by part at the nodes of panels."""
+        times = panels.times.ravel()
+        lost, supplied = self._observer.powers(times, self._dense(times))
+        shape = panels.times.shape
+        first, second = ({name: power.reshape(shape) for name, power in made.items()} for made in (lost, supplied))
+        return first, second
+
+    def _settle(self, panels: _Panels, whole: Array, before: Array, halvings: int) -> None:
+        """Add the work of panels; of each the halves, and theirs in turn where the work still changes by that.
+
+        Args:
+            panels: p of them.
+            whole: (2, p) lost and supplied work of each by its own nodes, J.
+            before: (p,) by how much the work of that changed which each is a half of, J.
+            halvings: so many at most.
+        """
+        for block in blocks(len(panels.step), 2 * self._rows):
+            halves = panels.taken(block).halved()
+            powers = self._powers(halves)
+            parts = np.stack([halves.integrals(_total(made, halves.times.shape)) for made in powers])
+            change = np.abs(parts.reshape(2, -1, 2).sum(axis=2) - whole[:, block]).sum(axis=0)
+            noisy = (change > FALLS * before[block]) & (change <= NOISE * self._each)
+            still = (change > TIGHT * self._each) & ~noisy if halvings > 1 else np.zeros(len(change), dtype=bool)
+            open_ = np.repeat(still, 2)
+            self._add(halves.taken(~open_), *({name: power[~open_] for name, power in made.items()} for made in powers))
+            if still.any():
+                self._settle(halves.taken(open_), parts[:, open_], np.repeat(change, 2)[open_], halvings - 1)
+
+    def _add(self, panels: _Panels, lost: Mapping[str, Array], supplied: Mapping[str, Array]) -> None:
+        """Add the work of panels from the powers (p, 12) at their nodes."""
+        for row, powers, totals in ((0, lost, self.lost_in), (1, supplied, self.supplied_by)):
+            for name, power in powers.items():
+                work = panels.integrals(power)
+                np.add.at(self._by_step[row], panels.step, work)
+                totals[name] = totals.get(name, 0.0) + float(work.sum())
+        self.work += sum(float(panels.integrals(np.abs(power)).sum()) for power in supplied.values())
 
 
-def _integrate(observer: Observer, dense: Dense, steps: Array, panels: int) -> _Work:
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
-    edges = (steps[:-1, None] + np.diff(steps)[:, None] * np.linspace(0, 1, panels + 1)[:-1]).ravel()
-    half = np.repeat(np.diff(steps) / panels / 2, panels)
-    times = (edges[:, None] + half[:, None] * (nodes + 1)).ravel()
-    lost, supplied = observer.powers(times, dense(times))
-    weight = (half[:, None] * weights).ravel()
+@dataclass(frozen=True, eq=False)
+class _Panels:
+    """Parts of steps, ascending.
 
-    def running(power: Array) -> Array:
-        by_step = (power * weight).reshape(len(steps) - 1, -1).sum(axis=1)
-        return np.concatenate([[0.0], np.cumsum(by_step)])
+    Args:
+        step: (p,) numbers of their steps.
+        start: (p,) s.
+        length: (p,) s.
+    """
 
-    return _Work(
-        supplied=running(_total(supplied, len(times))),
-        lost=running(_total(lost, len(times))),
-        work=float(sum((np.abs(power) @ weight for power in supplied.values()), start=0.0)),
-        lost_in={name: float(power @ weight) for name, power in lost.items()},
-        supplied_by={name: float(power @ weight) for name, power in supplied.items()},
-    )
+    step: NDArray[np.intp]
+    start: Array
+    length: Array
+
+    @property
+    def times(self) -> Array:
+        """(p, 12) nodes of Gauss' formula, s."""
+        times: Array = self.start[:, None] + self.length[:, None] * (NODES + 1) / 2
+        return times
+
+    def integrals(self, values: Array) -> Array:
+        """(p,) over each of values (p, 12) at the nodes."""
+        return np.asarray(values @ WEIGHTS * self.length / 2)
+
+    def halved(self) -> _Panels:
+        """Two for each."""
+        start, half = np.repeat(self.start, 2), np.repeat(self.length / 2, 2)
+        start[1::2] += half[1::2]
+        return _Panels(np.repeat(self.step, 2), start, half)
+
+    def taken(self, which: slice | NDArray[np.bool_]) -> _Panels:
+        """Some of them."""
+        return _Panels(self.step[which], self.start[which], self.length[which])
 
 
-def _total(by_part: dict[str, Array], size: int) -> Array:
-    return np.asarray(sum(by_part.values(), start=np.zeros(size)))
+def _total(by_part: Mapping[str, Array], shape: int | tuple[int, ...]) -> Array:
+    return np.asarray(sum(by_part.values(), start=np.zeros(shape)))

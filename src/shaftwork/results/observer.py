@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+AT_ONCE = 4_000_000
+"""Numbers that are read of a motion at once, 32 MB."""
+
+
+def blocks(count: int, width: int) -> Iterator[slice]:
+    """Places 0 to `count` in blocks, of as many as are read at once where each holds `width` numbers."""
+    rows = max(1, AT_ONCE // max(1, width))
+    return (slice(first, min(first + rows, count)) for first in range(0, count, rows))
 
 
 class Observer(Protocol):

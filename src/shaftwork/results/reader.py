@@ -7,13 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shaftwork.results.course import Read
-from shaftwork.results.observer import Array
+from shaftwork.results.observer import Array, blocks
 
 if TYPE_CHECKING:
     from shaftwork.results.solution import Solution
-
-AT_ONCE = 4_000_000
-"""States by times that are read at once, 32 MB."""
 
 
 class Reader:
@@ -25,7 +22,6 @@ class Reader:
 
     def __init__(self, solution: Solution) -> None:
         self._solution = solution
-        self._rows = max(1, AT_ONCE // max(1, len(solution.states)))
         self._last: Solution | None = None
         self._along: tuple[Solution, str, Array] | None = None
 
@@ -33,8 +29,8 @@ class Reader:
         """A quantity by its name, of one that is read along a part that at a place, by its number."""
 
         def read(times: Array) -> Array:
-            blocks = (times[first : first + self._rows] for first in range(0, len(times), self._rows))
-            return np.concatenate([self._values(self._at(block), name, place) for block in blocks])
+            parts = blocks(len(times), len(self._solution.states))
+            return np.concatenate([self._values(self._at(times[block]), name, place) for block in parts])
 
         return read
 
