@@ -23,6 +23,13 @@ from shaftwork.components.tables import Table
         Piecewise((omega, Abs(omega) < 1), (omega**3 * sign(omega), True)),
         Table([0, 1, 3], [0, 5, -1])(Abs(omega)),
         sympy.exp(-Abs(omega)),
+        sympy.asin(sympy.sin(3 * omega)),
+        sympy.acos(1 - 2 * sympy.sin(2 * omega) ** 2),
+        sympy.acos(sympy.cos(omega**2)) * omega,
+        sqrt(omega**2 - 2 * omega + 1) ** 3,
+        sqrt(0.09 * omega**2 - 0.06 * omega + 0.01),
+        sqrt(2 - 2 * sympy.cos(omega) * sympy.cos(2 * omega) - 2 * sympy.sin(omega) * sympy.sin(2 * omega)),
+        (omega - 2) * sqrt(Abs(omega - 2)),
     ],
     ids=str,
 )
@@ -33,6 +40,28 @@ def test_the_slope_is_the_limit_of_the_difference_quotient(law: sympy.Expr) -> N
         above, below = (float(law.subs(omega, speed + side)) for side in (1e-6, -1e-6))
         # central differences: 1e-12 of the third derivative and 1e-16 / 1e-6 of rounding
         assert float(found.subs(omega, speed)) == pytest.approx((above - below) / 2e-6, rel=1e-7, abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("law", "corner", "after"),
+    [
+        (sympy.asin(sympy.sin(omega)), sympy.pi / 2, -1.0),
+        (sympy.acos(sympy.cos(4 * omega)), 0, 4.0),
+        (sympy.asin(sympy.cos(4 * omega)), 0, -4.0),
+        (sympy.acos(1 - 2 * sympy.sin(2 * omega) ** 2), 0, 4.0),
+        (sqrt(omega**2 - 2 * omega + 1), 1, 1.0),
+        (sqrt(2 - 2 * sympy.cos(4 * omega)), 0, 4.0),
+        (omega * sqrt(Abs(omega)), 0, 0.0),
+        ((3 - omega) * Abs(omega - 3) ** 0.3, 3, 0.0),
+    ],
+    ids=str,
+)
+def test_the_slope_is_exact_on_both_sides_of_a_corner(law: sympy.Expr, corner: sympy.Expr, after: float) -> None:
+    found = sympy.lambdify(omega, slope(law, omega), "math")
+    place = float(corner)
+    assert found(place + 1e-12) == pytest.approx(after, abs=1e-3)
+    assert found(place - 1e-12) == pytest.approx(-after, abs=1e-3)
+    assert abs(found(place)) <= abs(after) + 1e-3
 
 
 def test_a_step_of_time_has_no_slope() -> None:

@@ -159,8 +159,9 @@ class History:
         return self._power(part, (k for k in part.branches if branches[k].template.kind is Kind.CONDUCTANCE))
 
     def _power(self, part: GraphPart, branches: Iterable[int]) -> Array:
-        powers = (self.acted_on(part, k) * self.through[k] for k in branches)
-        return np.asarray(sum(powers, start=np.zeros(len(self.t))))
+        with np.errstate(invalid="ignore"):  # 0 times an infinite torque: what reads it takes the limit
+            powers = (self.acted_on(part, k) * self.through[k] for k in branches)
+            return np.asarray(sum(powers, start=np.zeros(len(self.t))))
 
     def acted_on(self, part: GraphPart, index: int) -> Array:
         """(k,) what a branch's through variable acts on: their product is the power that the branch takes in."""

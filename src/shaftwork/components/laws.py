@@ -10,7 +10,7 @@ from typing import Any
 import sympy
 from sympy.core.relational import Relational
 
-from shaftwork.components import noise
+from shaftwork.components import noise, roots
 from shaftwork.components.branches import ACROSS, INTEGRAL, readings_in
 from shaftwork.components.noise import SmoothNoise
 from shaftwork.components.tables import TABLE_FUNCTIONS, Table, interpolate, interpolation_slope
@@ -155,10 +155,10 @@ def switches_of(node: sympy.Basic) -> Iterable[tuple[sympy.Expr, Sequence[float]
             return [(sympy.cos(node.args[0]), (0.0,))]
         case sympy.cot() | sympy.csc():
             return [(sympy.sin(node.args[0]), (0.0,))]
-        case sympy.asin(args=(sympy.sin() as wave,)) | sympy.acos(args=(sympy.sin() as wave,)):
-            return [(sympy.cos(wave.args[0]), (0.0,))]  # a triangular wave
-        case sympy.asin(args=(sympy.cos() as wave,)) | sympy.acos(args=(sympy.cos() as wave,)):
-            return [(sympy.sin(wave.args[0]), (0.0,))]
+        case sympy.asin() | sympy.acos() if (corner := roots.complement(node)) is not None:
+            return [(corner, (0.0,))]  # of asin(sin(x)), a triangular wave, cos(x)
+        case sympy.Pow() if roots.is_root(node) and (root := roots.square_root(node.base)) is not None:
+            return [(root, (0.0,))]
         case sympy.floor() | SmoothNoise():
             # a sine changes sign at every whole number, and no list of levels would have an end
             return [(sympy.sin(sympy.pi * node.args[0]), (0.0,))]

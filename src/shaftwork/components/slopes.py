@@ -10,6 +10,8 @@ from sympy import (
     Heaviside,
     Max,
     Min,
+    Mul,
+    Pow,
     Symbol,
     acos,
     acot,
@@ -34,6 +36,7 @@ from sympy import (
 )
 from sympy.core.relational import Relational
 
+from shaftwork.components import roots
 from shaftwork.components.tables import InterpolationSlope
 
 STEPS = (sign, Heaviside, Relational, InterpolationSlope, floor, ceiling)
@@ -56,13 +59,17 @@ def slope(expression: Expr, symbol: Symbol) -> Expr:
 
     Law: d sign(x) / dx = d Heaviside(x) / dx = d floor(x) / dx = 0, d |x| / dx = sign(x); sympy's `diff` has DiracDelta
     for the first and, where it does not know x as real, derivatives of its real part for the last. A jump has no slope:
-    in time it is a breakpoint, in a state the law jumps there and the derivative says nothing about it.
+    in time it is a breakpoint, in a state the law jumps there and the derivative says nothing about it. At a corner,
+    that of asin(sin x) or of the root of a square, sympy's is 0/0, and this one is finite.
 
     Args:
         expression: a law.
         symbol: what to differentiate by.
     """
-    kinks = expression.atoms(sign, Heaviside, Abs, floor)
+    expression = roots.unrooted(expression)
+    kinks = expression.atoms(sign, Heaviside, Abs, floor) | {
+        node for node in expression.atoms(asin, acos) if roots.folded(node)
+    }
     # whether one is real sympy finds out by expanding an argument of which it does not know it: for ever, of a power
     doubtful = {node for node in expression.atoms(sinh, cosh, tanh) if not node.args[0].is_extended_real}
     if not kinks | doubtful:
@@ -70,14 +77,41 @@ def slope(expression: Expr, symbol: Symbol) -> Expr:
     held = {node: Dummy(real=True) for node in kinks | doubtful}
     smooth = expression.xreplace(held)  # from the outside in: what is inside a kink is not seen
     total = smooth.diff(symbol)
-    for node in expression.atoms(Abs):
-        inner = node.args[0]
-        total += smooth.diff(held[node]) * sign(inner) * slope(inner, symbol)
+    for node in (one for one in held if isinstance(one, Abs | asin | acos)):
+        if (outer := smooth.diff(held[node])) != 0:
+            total += outer * _slope_of_kink(node, symbol)
     for node in doubtful:
         if (inner := slope(node.args[0], symbol)) != 0 and (outer := smooth.diff(held[node])) != 0:
             total += outer * node.fdiff(1) * inner
     made: Expr = total.xreplace({dummy: node for node, dummy in held.items()})
-    return made
+    return made.replace(_is_at_rest, _together) if made.has(Abs) else made
+
+
+def _slope_of_kink(node: Expr, symbol: Symbol) -> Expr:
+    inner = node.args[0]
+    if isinstance(node, Abs):
+        return sign(inner) * slope(inner, symbol)
+    by = roots.complement(node)
+    assert by is not None  # noqa: S101 (only such nodes are asked for)
+    return sign(by) * roots.turning(node, by, slope(inner, symbol), slope(by, symbol))
+
+
+def _is_at_rest(node: Expr) -> bool:
+    """Whether a product is 0 times infinity where a speed is zero: u sign(u) |u|^-0.5, as the slope of u |u|^0.5 is."""
+    return isinstance(node, Mul) and any(isinstance(f, Pow) and isinstance(f.base, Abs) for f in node.args)
+
+
+def _together(product: Expr) -> Expr:
+    """The same with u sign(u) as |u|, which shares its power with that of the speed."""
+    factors = list(product.args)
+    for turned in [factor for factor in factors if isinstance(factor, sign)]:
+        inner = turned.args[0]
+        for factor, way in ((inner, 1), (-inner, -1)):
+            if factor in factors and turned in factors:
+                factors.remove(factor)
+                factors.remove(turned)
+                factors += [way, Abs(inner)]
+    return Mul(*factors)
 
 
 def jumps(expression: Expr, *symbols: Symbol) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from operator import itemgetter
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -102,7 +103,11 @@ class Extremes(Mapping[str, tuple[Extreme, Extreme]]):
         rows = []
         for number, place in enumerate(places) if places else ((None, None),):
             quantity: Course = course(solution.reader.quantity(name, number), solution.steps)
-            low, high = (Extreme(value + 0.0, t, name, unit, place) for t, value in quantity.extremes())
+            unbounded = solution.reader.unbounded.get((name, number), {}).items()
+            infinite = [(t, value) for t, value in unbounded if np.isinf(value)]
+            lowest, highest = quantity.extremes()
+            found = min((lowest, *infinite), key=itemgetter(1)), max((highest, *infinite), key=itemgetter(1))
+            low, high = (Extreme(value + 0.0, t, name, unit, place) for t, value in found)
             rows.append(Row(low, high, quantity.mean, quantity.end))
         least, most = (min(row.least for row in rows), max(row.most for row in rows))
         worst = int(np.argmax([abs(row.mean) for row in rows]))

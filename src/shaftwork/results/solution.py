@@ -19,6 +19,7 @@ from shaftwork.results.energy import EnergyBalance, energy_balance
 from shaftwork.results.extremes import Extreme, Extremes
 from shaftwork.results.fatigue import Damage, SNLine
 from shaftwork.results.life import damage_of, damages, load_cycles
+from shaftwork.results.limits import beside
 from shaftwork.results.observer import Array, Dense, Observer
 from shaftwork.results.rainflow import SMALLEST, Rainflow
 from shaftwork.results.reader import Reader
@@ -152,14 +153,39 @@ class Solution:
     def __getitem__(self, name: str) -> Array:
         """(k,) a quantity at the output times, such as "shaft.tau"; (k, places) one along a shaft, see `places`.
 
+        Where it has no value at a time, as 0/0, it is what the quantity goes to on the side of the next step; an
+        `AccuracyWarning` says where it goes to nothing finite.
+
         Raises:
             SignalError: there is no such quantity; the message lists what the part has.
         """
         if isinstance(name, str) and name in self.states:
             return self.x[:, self.states.index(name)].copy()
+        values = self._computed(name, self.t, self.x)
+        missing = ~np.isfinite(values)
+        if missing.any():
+            rows = missing.reshape(len(self.t), -1).any(axis=1)
+            limit, _ = beside(lambda at: self._computed(name, at, self.dense(at)), self.t[rows], self.steps)
+            values[rows] = np.where(missing[rows] & np.isfinite(limit), limit, values[rows])
+            self._warn_of_missing(name, values)
+        return values
+
+    def _computed(self, name: str, t: Array, x: Array) -> Array:
+        """A quantity at times (k,) with states (k, n) as it is computed, which may be 0/0."""
         if isinstance(name, str) and name in self.observer.profiles:
-            return self.observer.profile(name, self.t, self.x, self.dense)
-        return self.observer.signal(self._known(name), self.t, self.x, self.dense)
+            return self.observer.profile(name, t, x, self.dense)
+        return self.observer.signal(self._known(name), t, x, self.dense)
+
+    def _warn_of_missing(self, name: str, values: Array) -> None:
+        """Say where a quantity has no finite value."""
+        missing = ~np.isfinite(values).reshape(len(self.t), -1).all(axis=1)
+        if missing.any():
+            warn(
+                f"'{name}' of '{self.name}' has no finite value at t = {self.t[missing][0]:.6g} s, as where the slope "
+                "of a law, sqrt(t) at t = 0, is infinite. Its extremes hold it where it is infinite, its mean and "
+                "cycles the values beside it. Give the law a finite slope there.",
+                AccuracyWarning,
+            )
 
     @property
     def places(self) -> Mapping[str, Array]:
