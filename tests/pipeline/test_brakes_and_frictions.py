@@ -354,8 +354,24 @@ def test_a_torque_of_constant_power_has_a_pole_at_rest_where_a_brake_beside_it_n
 )
 def test_a_time_off_that_is_not_later_than_the_time_on_is_refused(part: Any, never: str, t_off: float) -> None:
     given = {} if part is sw.Switch else {"tau": 1.0}
-    with pytest.raises(sw.ParameterError, match=f"never {never}"):
+    with pytest.raises(sw.ParameterError, match=f"never {never}") as caught:
         part("part", t_on=3.0, t_off=t_off, **given)
+    two = "up to 1 s and again from 3 s, give two parts: one with t_off = 1 alone, one with t_on = 3 alone."
+    assert str(caught.value).endswith(two) == (t_off == 1.0)
+
+
+def test_two_brakes_are_one_that_opens_and_closes_again_and_say_so() -> None:
+    """J w' = 300 N m while both are open; the second stops it with 600 N m."""
+    net = wheel(sw.TorqueSource("load", tau=300.0), sw.Brake("holding", tau=900.0, t_off=0.5))
+    net.add(sw.Brake("closing", tau=900.0, t_on=2.0), "wheel")
+    sol = net.simulate(5.0)
+    assert [row.name for row in sol.phases] == [
+        "holding locked, closing released",
+        "holding released, closing released",
+        "holding released, closing slipping forward",
+        "holding released, closing locked",
+    ]
+    assert [row.start for row in sol.phases] == pytest.approx([0.0, 0.5, 2.0, 2.75], abs=1e-9)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -125,7 +125,9 @@ class Brake(Component):
     Law: on from t_on, or from when `on` rises above zero, to t_off. While slipping the torque is sign(omega) tau, with
     tau constant; rising along a straight line over t_rise; or as tau (1 - exp(-(t - t_on) / t_lag)). While locked
     omega = 0 exactly, and the torque is whatever holds, up to tau in size. Any other course of tau is a law of time,
-    speed or angle; where it falls below zero the torque is zero, max(0, tau), since what rubs cannot drive.
+    speed or angle; where it falls below zero the torque is zero, max(0, tau), since what rubs cannot drive. A brake
+    whose tau is zero is called slipping all the same: one that opens and closes again is two, one up to t_off and one
+    from t_on, each released while it is off.
     Modes: released, slipping forward or backward, locked. Source: Marinkovic 2012, (4)-(6).
     """
 

@@ -64,7 +64,11 @@ def refuse_no_time_on(part: Component, does: str = "gives torque") -> None:
     """
     start, end = number_of(part, "t_on"), number_of(part, "t_off")
     if start is not None and end is not None and end <= start:
+        twice = (
+            f" Where it is to be on up to {end:g} s and again from {start:g} s, give two parts: one with "
+            f"t_off = {end:g} alone, one with t_on = {start:g} alone."
+        )
         raise ParameterError(
             f"{type(part).__name__} '{part.name}': t_off = {end:g} s is not later than t_on = {start:g} s, so that it "
-            f"never {does}. Give t_off > t_on, or leave one of them out."
+            f"never {does}. Give t_off > t_on, or leave one of them out.{twice if 0 < end < start else ''}"
         )
