@@ -6,10 +6,10 @@ import re
 
 import pytest
 import sympy
-from beds import bed_of, registered
 
 import shaftwork as sw
 from shaftwork.network.effective import effective
+from tests.beds import bed_of, registered
 
 FREQUENCY = sw.Table([0.0, 0.5, 2.0, 6.0, 8.0, 30.0], [0.7, 0.7, 10.0, 10.25, 0.7, 0.7])
 BRAKE = sw.Table([0.0, 0.3, 0.4, 8.0, 8.2, 30.0], [2e5, 2e5, 0.0, 0.0, 2e5, 1.9e5])
