@@ -211,3 +211,24 @@ def test_a_hoist_that_runs_away_from_rest_names_the_start_that_finds_its_steady_
     steady = model.steady_state(t=6.0, initial={"JM.omega": 155.0})
     assert steady["load.v"] == pytest.approx(steady["JM.omega"] * 0.4 / 124, rel=1e-9)
     assert 150.0 < steady["JM.omega"] < 157.0
+
+
+@pytest.mark.parametrize(
+    ("load", "speed"),
+    [
+        (0.2 * sw.omega * sympy.sqrt(sympy.Abs(sw.omega)), 25 ** (2 / 3)),
+        (0.2 * sw.omega * sympy.Abs(sw.omega) ** 0.1, 25 ** (1 / 1.1)),
+        (0.2 * sympy.sign(sw.omega) * sympy.sqrt(sympy.Abs(sw.omega)), 625.0),
+        (1 + sympy.sign(sw.omega - 3) * sympy.Abs(sw.omega - 3) ** 0.3, 3 + 4 ** (1 / 0.3)),
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("way", [1, -1])
+def test_a_load_with_a_broken_power_of_the_speed_has_a_steady_state_from_rest(
+    load: Any, speed: float, way: int
+) -> None:
+    """Its slope at rest is 0 times infinity, or infinite."""
+    net = sw.Network("fan")
+    net.add(sw.TorqueSource("m", tau=way * (5 - load).subs(sw.omega, way * sw.omega)), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    assert net.compile().steady_state()["J.omega"] == pytest.approx(way * speed)

@@ -19,10 +19,14 @@ SMALLEST_STEP = 1e-6
 """First step of the way to a steady state, s."""
 JUMP = 1e-12
 """A law jumps where so short a step, s, still leaves a defect: the flank of a damped gap, which the drive runs onto."""
+SHORTEST = 1e-200
+"""No step, s, is shorter: a law that is nowhere finite on the way leaves none."""
 DEFECT = 0.3
 """A step on that way is taken when its equation is left with less than this fraction of the rates."""
 SLOW = 1e-12
 """What changes with less than this fraction of the fastest rate stays; rounding is four digits below."""
+NEARBY = (1e-9, 1e-7)
+"""So far on the way, in s, a law is asked for its slope where it has none."""
 STANDSTILL = 1e-6
 """A steady state has been reached when the last step changed the states by no more than this fraction."""
 
@@ -57,11 +61,13 @@ def steady_state(
     identity = sparse.eye_array(len(x), format="csc")
     for _ in range(limit):
         floor = np.linalg.norm(weights * x) / weights * (np.finfo(float).eps / tolerance)
-        size = np.abs(bound.part.A) @ (np.abs(x) + floor) + np.abs(bound.part.B) @ np.abs(bound.values(t, x)[1])
+        slopes = _slopes(bound, t, x, rate)
+        size = np.abs(bound.part.A) @ np.abs(x) + np.abs(bound.part.B) @ np.abs(bound.values(t, x)[1])
+        size += np.maximum(np.abs(bound.part.A) @ floor, np.abs(slopes) @ floor)
         settled = np.linalg.norm(step) <= STANDSTILL * np.linalg.norm(x)  # a drive that runs away is not steady
         if settled and (np.abs(rate) <= tolerance * (size + np.finfo(float).tiny)).all():
             return x
-        trial = _solve(sparse.csc_array(identity / h - bound.jacobian(t, x)), rate)
+        trial = _solve(sparse.csc_array(identity / h - slopes), rate)
         new = bound.rhs(t, x + trial)
         defect = np.linalg.norm(weights * (trial / h - new)) / max(
             np.linalg.norm(weights * rate), np.linalg.norm(weights * size) * tolerance, np.finfo(float).tiny
@@ -70,6 +76,8 @@ def steady_state(
         is_right = defect < DEFECT or (h < JUMP and np.isfinite(defect))
         if not is_right or (over and h > SMALLEST_STEP):
             h = h / 4
+            if h < SHORTEST:
+                break
             continue
         if over and ends is not None:
             return _just_beyond(x, trial, ends)
@@ -91,6 +99,16 @@ def another_start(form: StateForm) -> str:
         f"point, steady_state(initial={{'{name}': ...}}).",
         f"The search starts at rest, where the load may overhaul the motor: name the speeds instead, --at {name}=...",
     )
+
+
+def _slopes(bound: BoundArrays, t: float, x: Array, rate: Array) -> sparse.csc_array:
+    """The Jacobian; where a law has no finite slope, as |omega|^0.5 at rest, that a little farther on the way."""
+    for step in (0.0, *NEARBY):
+        made = sparse.csc_array(bound.jacobian(t, x + step * rate))
+        if np.isfinite(made.data).all():
+            return made
+    made.data[~np.isfinite(made.data)] = 0.0  # an explicit step of Euler, which the defect judges
+    return made
 
 
 def _just_beyond(x: Array, step: Array, ends: Callable[[Array], bool]) -> Array:
