@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+import shaftwork as sw
+
 ROOT = Path(__file__).parents[2]
 SETTINGS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 CI = (ROOT / ".ci/run").read_text(encoding="utf-8")
@@ -55,3 +57,9 @@ def test_random_examples_run_without_the_coverage_tool() -> None:
         text=True,
     )
     assert "1 passed" in run.stdout, run.stdout + run.stderr
+
+
+@pytest.mark.parametrize("name", ["reduce", "scenes", "sizing", "studies"])
+def test_a_sub_package_is_loaded_when_it_is_first_asked_for(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(sw, name, raising=False)  # as no import had been yet
+    assert getattr(sw, name).__name__ == f"shaftwork.{name}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 import os
 import subprocess
@@ -203,6 +204,16 @@ def test_check_says_where_the_slopes_at_rest_are_not_finite(
     net.save(tmp_path / "steep.toml")
     assert main(["check", str(tmp_path / "steep.toml")]) == DONE
     assert "time constants at rest: none, since J.omega has no finite slope there" in capsys.readouterr().out
+
+
+def test_what_a_terminal_cannot_show_is_written_as_an_escape(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    net = sw.Network("Förderband")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.save(tmp_path / "belt.toml")
+    raw = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(raw, encoding="ascii", write_through=True))
+    assert main(["check", str(tmp_path / "belt.toml")]) == DONE
+    assert rb"F\xf6rderband" in raw.getvalue()
 
 
 def test_check_reads_slopes_at_rest_at_the_start(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

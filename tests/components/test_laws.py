@@ -15,6 +15,8 @@ import sympy
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from shaftwork.components import laws
+from shaftwork.components.branches import ACROSS, HISTORY, INTEGRAL, THROUGH
 from shaftwork.components.laws import (
     SYMBOLS,
     Ramp,
@@ -263,3 +265,9 @@ def test_the_symbols_are_real_and_bear_their_names() -> None:
     assert [symbol.name for symbol in SYMBOLS] == ["t", "omega", "phi", "v", "s", "u", "psi"]
     assert all(symbol.is_real for symbol in SYMBOLS)
     assert phi == sympy.Symbol("phi", real=True)
+
+
+@pytest.mark.parametrize("symbol", [*laws.SYMBOLS, ACROSS, INTEGRAL, THROUGH, HISTORY], ids=str)
+def test_laws_are_written_over_the_real_numbers(symbol: sympy.Symbol) -> None:
+    assert sympy.sqrt(symbol**2) == sympy.Abs(symbol)
+    assert sympy.diff(sympy.Abs(symbol), symbol) == sympy.sign(symbol)

@@ -73,3 +73,10 @@ def test_a_large_stiff_chain_uses_the_sparse_jacobian():
     run, reference = sundials.solve(problem), exact.solve(problem)
     assert asked
     assert np.abs(run.x - reference.x).max() < 1e-6 * np.abs(reference.x).max()
+
+
+def test_steps_are_counted_alike_with_and_without_output_times():
+    free = sundials.solve_dae(loop(t_eval=None))
+    asked = sundials.solve_dae(loop())
+    assert asked.statistics["steps"] == asked.steps.size - 1
+    assert asked.statistics["steps"] == pytest.approx(free.statistics["steps"], rel=0.2)

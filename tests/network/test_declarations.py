@@ -94,6 +94,12 @@ def test_the_declarations_that_are_spoilt_below_are_sound(record: Any) -> None:
     assert not any("odd" in problem.parts and problem.kind == "component" for problem in problems), problems
 
 
+def test_a_mode_that_leads_to_none_there_is_is_named_with_those_there_are() -> None:
+    modes = (sw.Mode("open", (sw.Leave(sw.ACROSS - 1, "ajar"),)), sw.Mode("shut", value=1.0, starts=NEVER))
+    (problem,) = (one for one in net_with(sw.Modes(modes, ("a", "b"))).check() if one.severity == "error")
+    assert "a mode leads to 'ajar', which is none of: open, shut" in problem.message
+
+
 def _run_unless_refused(net: sw.Network) -> None:
     """Check a network, and run it where it has no errors; anything but an error of the package's passes."""
     if any(problem.severity == "error" for problem in net.check()):

@@ -74,6 +74,25 @@ def test_a_part_of_ones_own_says_how_it_scales() -> None:
         del REGISTRY["Lever"]
 
 
+def test_a_part_of_ones_own_scales_by_its_units_where_it_says_nothing_else() -> None:
+    """A row of bearings, by friction per metre, takes the square of the ratio as a damper does."""
+
+    @sw.component
+    class Bearings(sw.Component):
+        d: float = sw.parameter("N*s/rad", "friction per metre")
+        length: float = sw.parameter("m", "length of the row")
+        ports = (sw.Port("a"),)
+
+        def branches(self, p: Any) -> Any:
+            yield sw.ThroughLaw(p.d * p.length * sw.ACROSS)
+
+    try:
+        part = seen(Bearings, Scale(2.5, 0.5)).placed.part
+        assert (part.d, part.length) == (2.5**2 * 0.5, 1.0)
+    finally:
+        del REGISTRY["Bearings"]
+
+
 def base(*, gear: sw.Component | None = None) -> sw.Network:
     net = sw.Network("train")
     net.add(sw.TorqueSource("motor", tau=1.0), "a")

@@ -107,6 +107,7 @@ def test_the_picture_has_a_line_for_each_mode_and_order_and_a_dot_for_each_cross
     assert len(axis.lines) == 1 + 3 + 1
     assert len(axis.lines[-1].get_xdata()) == len(diagram.crossings)
     np.testing.assert_allclose(axis.lines[-1].get_xdata(), [made.speed * 30 / np.pi for made in diagram.crossings])
+    np.testing.assert_allclose(axis.get_xlim(), [0.0, 100.0 * 30 / np.pi])
 
 
 def _pump(friction: float = 5.0) -> sw.Network:

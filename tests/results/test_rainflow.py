@@ -237,7 +237,9 @@ def test_the_matrix_and_the_spectrum_hold_every_cycle() -> None:
     assert counted([1.0, 1.0]).equivalent(5.0) == 0.0
     left, right, _ = found.plot().axes
     assert (left.get_ylabel(), right.get_xlabel()) == ("range in N m", "cycles")
-    assert str(found).splitlines()[0].startswith(f"x in 'history': {found.count.sum():g} cycles in 299 s")
+    head, _, *rows, rest = str(found).splitlines()
+    assert head.startswith(f"x in 'history': {found.count.sum():g} cycles in 299 s")
+    assert rest == f"and {len(found) - len(rows)} smaller"
 
 
 @pytest.fixture(scope="module")

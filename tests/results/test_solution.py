@@ -197,3 +197,13 @@ def test_a_wrong_name_is_answered_with_what_the_part_has(name: str, words: str) 
             read()
         assert f"No quantity '{name}' in 'two masses" in str(caught.value)
         assert words.removesuffix(".") in str(caught.value)
+
+
+def test_a_part_is_read_with_the_values_of_its_motion_and_one_that_is_none_is_named() -> None:
+    net = sw.Network("one")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.TorqueSource("motor", tau=1.0), "a")
+    sol = net.compile().simulate(0.1, parameters={"J1.J": 3.0})
+    assert sol.observer.part("J1").J == 3.0
+    with pytest.raises(sw.SignalError, match=r"There is no part 'J9' in 'one'\. There are: J1, motor"):
+        sol.observer.part("J9")

@@ -266,3 +266,12 @@ def test_what_is_no_path_of_a_catalogue_is_refused() -> None:
     for ask in (lambda: sw.sizing.catalogue(5), lambda: sw.sizing.choose(made, 3)):  # type: ignore[arg-type]
         with pytest.raises(sw.ParameterError, match="is no path of one"):
             ask()
+
+
+def test_without_a_rotor_the_inertias_of_the_network_are_all_of_the_load() -> None:
+    made = sw.sizing.duty(motion(100.0, 0.1, 5.0, (0.5, 2.0, 0.25, 4.0)), "drive")
+    (found,), (whole,), (less,) = (
+        sw.sizing.choose(made, [MOTOR], **given).candidates for given in ({}, {"rotor": 0.0}, {"rotor": 0.05})
+    )
+    assert found.tau_peak == whole.tau_peak > less.tau_peak
+    assert found.tau_thermal == whole.tau_thermal > less.tau_thermal

@@ -370,6 +370,9 @@ def test_results_are_a_table_a_file_and_a_picture(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     (axes,) = made.plot().axes
     assert [tick.get_text() for tick in axes.get_xticklabels()] == ["shaft.c", "max shaft.tau"]
+    tau = made.measures["max shaft.tau"]
+    limits = [line.get_ydata()[0] for line in axes.lines if line.get_color() == "tab:red"]
+    np.testing.assert_allclose(limits, (np.array([0.0, 9.99]) - tau.min()) / (np.ptp(tau) or 1.0))
     with pytest.raises(sw.ParameterError, match="There is no column 'J'"):
         made.plot("J")
 

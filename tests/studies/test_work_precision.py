@@ -38,7 +38,9 @@ def test_the_truth_knows_a_shaft_that_is_wired_backwards() -> None:
         return net
 
     t = np.linspace(0.001, 0.02, 20)
-    there, back = (truth(wired(*nodes), "line", 0.02, t).values for nodes in (("m", "l"), ("l", "m")))
+    both = [truth(wired(*nodes), "line", 0.02, t) for nodes in (("m", "l"), ("l", "m"))]
+    assert [known.source for known in both] == ["characteristics"] * 2
+    there, back = (known.values for known in both)
     np.testing.assert_allclose(back["tau_a"], -there["tau_b"], atol=1e-12)
     np.testing.assert_allclose(back["omega_a"], there["omega_b"], atol=1e-12)
     np.testing.assert_allclose(back["tau_mid"], -there["tau_mid"], atol=1e-12)
