@@ -29,6 +29,8 @@ VALUES: dict[str, dict[str, Any]] = {
 }
 ONE_WAY = {"AveragedBLDC", "BLDCMotor", "Hoist", "InductionMachine"}
 """They have a direction, one node and no sign that could turn it."""
+ALONG_A_LINE = {"Rope"}
+"""There is no such part that turns."""
 BUILT_IN = {name: kind for name, kind in REGISTRY.items() if kind.__module__.startswith("shaftwork.")}
 
 
@@ -44,10 +46,16 @@ def seen(kind: type[sw.Component], scale: Scale, domain: Domain = ROTATION) -> A
 def test_every_mechanical_component_is_referred_or_refused(name: str) -> None:
     kind = BUILT_IN[name]
     if any(port.domain in (ROTATION, TRANSLATION) for port in kind.ports):
-        assert isinstance(seen(kind, Scale(-2.5)), str) is (name in ONE_WAY)
+        domain = TRANSLATION if name in ALONG_A_LINE else ROTATION
+        assert isinstance(seen(kind, Scale(-2.5), domain), str) is (name in ONE_WAY)
         # a machine of one pole pair is one of two pairs at half its speed, and there is none of two and a half
-        assert not isinstance(seen(kind, Scale(2.0)), str)
-        assert isinstance(seen(kind, Scale(0.4)), str) is ("pole_pairs" in kind.declared)
+        assert not isinstance(seen(kind, Scale(2.0), domain), str)
+        assert isinstance(seen(kind, Scale(0.4), domain), str) is ("pole_pairs" in kind.declared)
+
+
+@pytest.mark.parametrize("name", sorted(ALONG_A_LINE))
+def test_a_part_that_exists_along_a_line_alone_is_refused_on_a_shaft(name: str) -> None:
+    assert "there is no rotation part" in seen(BUILT_IN[name], Scale(2.0), ROTATION)
 
 
 def test_a_part_whose_law_does_not_scale_so_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:

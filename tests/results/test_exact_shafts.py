@@ -252,7 +252,7 @@ RUNNING = {"a.omega": 4.0, "b.omega": 4.0, "c.omega": 2.0}
         (sw.DryFriction("rub", tau_c=10.0, tau_s=20.0), None, "rub stuck"),
         (sw.DryFriction("rub", tau_c=10.0, tau_s=20.0, omega_s=3.0), RUNNING, "rub slipping forward"),
         (sw.Freewheel("wheel"), None, "wheel locked"),
-        (sw.Freewheel("wheel"), {"c.omega": 2.0}, "wheel free"),
+        (sw.Freewheel("wheel"), {"b.omega": 0.0, "c.omega": 2.0}, "wheel free"),
         (sw.Backlash("gap", gap=0.1, c=1e5, d=3.0), {"gap.phi": 0.06}, "gap in contact"),
         (sw.Backlash("gap", gap=0.1), None, "gap open"),
         (sw.Brake("brake", tau=10.0, on=1.0), None, "brake locked"),
