@@ -42,7 +42,7 @@ def test_what_does_not_run_names_its_reason(study: sw.studies.Stability) -> None
         assert bool(cell.why) or cell.verdict in ("right", "coarse")
         assert cell.verdict not in ("warned", "failed", "unknown")
         if cell.verdict == "too long":
-            assert "3300 steps were not enough" in cell.why
+            assert "3600 steps were not enough" in cell.why
 
 
 @pytest.mark.slow
