@@ -164,6 +164,7 @@ def test_a_diagram_without_its_point_names_options_that_work(
     assert main(["campbell", "crane-start", "--n-max", "3000", *point]) == DONE
 
 
+@pytest.mark.slow
 def test_the_options_that_a_refused_diagram_names_give_that_of_the_running_drive(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -402,6 +403,7 @@ def _ageing(tmp_path: Path) -> str:
     return str(path)
 
 
+@pytest.mark.slow
 def test_modes_and_diagrams_read_laws_at_the_time_that_is_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

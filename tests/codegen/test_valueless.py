@@ -58,6 +58,7 @@ OF_TIME: dict[str, tuple[Callable[[], sw.Network], str]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("name", OF_TIME)
 def test_a_law_of_time_is_named_when_it_loses_its_value(name: str, engine: str) -> None:

@@ -105,6 +105,7 @@ def test_lagranges_equations_are_kirchhoffs(name: str) -> None:
     assert proof.holds, str(proof)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::shaftwork.core.errors.NetworkWarning")  # of impulses and of gears that lock
 @pytest.mark.parametrize("name", WHOLE)
 def test_so_they_are_with_circuits_controllers_and_long_shafts(name: str) -> None:

@@ -56,6 +56,7 @@ LAWS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_a_law_is_soon_compiled_and_runs_or_is_named(law: str, tmp_path: Path) -> None:
     head = 'format = 1\nname = "one"\n[[part]]\ntype = "Inertia"\nname = "J"\nnodes = ["a"]\nJ = 1.0\n'

@@ -68,6 +68,7 @@ def test_between_the_outputs_it_is_as_right() -> None:
     np.testing.assert_allclose(sol.at(times)["s1.tau"], fine["s1.tau"][1:-1], atol=1e-13)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [0.1, 0.02, 0.003])
 def test_no_blow_of_a_train_of_them_is_overlooked(width: float) -> None:
     """100 N m and ten blows of 500 exp(-(sin(pi (t - 0.3)) / w)^2): its mean is exp(-1 / 2 w^2) I0(1 / 2 w^2)."""

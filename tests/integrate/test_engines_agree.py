@@ -34,6 +34,7 @@ def relative_error(found: np.ndarray, expected: np.ndarray) -> float:
     return float((np.abs(found - expected).max(axis=0) / np.abs(expected).max(axis=0)).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9])
 @pytest.mark.parametrize("name", ["oscillator", "relaxation"])

@@ -397,6 +397,7 @@ TOUCHING = {
 """Laws whose argument touches the next whole number or zero in the middle between two jumps, and their integrals."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", TOUCHING)
 @pytest.mark.parametrize("engine", ["auto", "scipy", pytest.param("sundials", marks=pytest.mark.slow)])
 def test_a_threshold_that_is_touched_is_not_passed(law: str, engine: str) -> None:

@@ -47,6 +47,7 @@ def test_a_root_of_a_speed_that_would_become_negative_ends_the_run_where_it_has_
         coasting(-3 * sympy.sqrt(w), 2.0).simulate(6.0, initial={"J.omega": 10.0}, engine=engine)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(
     "law",

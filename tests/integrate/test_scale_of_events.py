@@ -71,6 +71,7 @@ def _softplus(x: float) -> float:
     return (abs(x) + math.log1p(math.exp(-2 * abs(x)))) / 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pulse", PULSES)
 @pytest.mark.parametrize("width", [1.0, 1e-4], ids=lambda width: f"{width:g} s wide")
 @pytest.mark.parametrize(

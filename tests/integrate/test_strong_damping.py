@@ -83,6 +83,7 @@ def test_the_torque_of_a_coupling_is_right_however_strong_its_damping_is(
     assert np.abs(found - expected).max() < BOUND[engine] * np.abs(expected).max()
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:the engine .* is off by:shaftwork.AccuracyWarning")
 @pytest.mark.parametrize("engine", INSTALLED)
 @pytest.mark.parametrize("ratio", [1e-3, 1e4])
@@ -145,6 +146,7 @@ def chain_end_torque(ratio: float, count: int, t_end: float, points: int) -> np.
     return np.array(found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", [name for name in ("auto", *INSTALLED) if name not in EXPLICIT])
 @pytest.mark.parametrize("ratio", [1e-2, 1.0])
 def test_a_long_shaft_with_strong_damping_is_right_at_its_end(engine: str, ratio: float) -> None:

@@ -188,6 +188,7 @@ def test_a_capacitor_behind_a_voltage_that_jumps_takes_the_whole_jump() -> None:
     assert sol["C2.u"] == pytest.approx([0.0, 5.0, 5 * np.exp(-0.25)], abs=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("omega_s", [0.1, 0.01, 1e-3, 1e-4])
 @pytest.mark.parametrize(("amplitude", "rate"), [(3.0, 2.0), (25.0, 3.0)])
 def test_a_rounded_travel_resistance_turns_with_the_speed(omega_s: float, amplitude: float, rate: float) -> None:
@@ -199,6 +200,7 @@ def test_a_rounded_travel_resistance_turns_with_the_speed(omega_s: float, amplit
     assert fast.energy_residual < 1e-10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [1e-2, 1e-4])
 def test_a_short_pulse_is_not_stepped_over_by_the_series(width: float) -> None:
     """The work of a bell curve: its area is width sqrt(pi)."""

@@ -33,6 +33,7 @@ def truth() -> np.ndarray:
     return moved(1.0, "exact")
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:the engine 'sundials' is off by [12]e-06:shaftwork.AccuracyWarning")  # as at size 1
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(

@@ -79,6 +79,7 @@ def test_an_engine_that_auto_takes_says_it_where_it_says_why() -> None:
     assert "finer" not in exact.simulate(1e-3, rtol=1e-15).why
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frequency", [sw.Table([0.0, 1.0], [0.7, 0.7]), sw.Table([0.0, 0.5, 1.0], [0.7, 20.0, 5.0])])
 @pytest.mark.parametrize(
     "part",
@@ -108,6 +109,7 @@ def test_the_engine_that_is_announced_runs_a_drive_by_a_frequency_past_changes_o
     assert sol.max("coupling.tau") == pytest.approx(float(other.max("coupling.tau")), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_another_engine_says_what_was_in_the_way_of_the_series() -> None:
     pytest.importorskip("heyoka")
     net = sw.Network("rough")

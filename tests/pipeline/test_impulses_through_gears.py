@@ -140,6 +140,7 @@ def test_a_jump_of_a_prescribed_speed_turns_a_gear_round_with_the_torques_of_bot
     assert sol["J.omega"][-1] == pytest.approx(-2.0, rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("efficiency", [0.7, 0.99, 1.0])
 @pytest.mark.parametrize("side", ["a", "b"])
 def test_a_stop_on_the_frame_throws_a_geared_train_back(side: str, efficiency: float) -> None:

@@ -182,6 +182,7 @@ def test_a_phase_is_found_by_some_of_its_words_in_any_order() -> None:
     assert model.phase("gap open") is model.phase("gap open, load slipping forward")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NETWORKS)
 def test_the_states_of_the_model_are_those_of_its_motions_and_start_another_one(name: str) -> None:
     """Tolerance 1e-6 of the largest value: both motions are right to 1e-8, and events shift by that."""

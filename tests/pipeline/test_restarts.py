@@ -85,6 +85,7 @@ CRANE = ("J1.omega", "J2.omega", "gap.phi", "gap.tau", "brake.tau")
 WAVES = ("J1.omega", "J2.omega", "s.tau_a", "u.tau_b", "s.tau", "u.omega", "s.energy")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("engine", "cut"),
     [

@@ -37,6 +37,7 @@ def assert_turns_as_one(sol: sw.Solution, *shafts: str, speed: float = SPEED) ->
         assert np.abs(sol[f"{shaft}.tau"]).max() < ROUNDING * JOLT
 
 
+@pytest.mark.slow
 @each_model
 def test_a_shaft_starts_as_one_with_a_prescribed_speed_and_an_inertia(model: sw.ShaftModel) -> None:
     sol = driven(model).simulate(SPAN, initial={"J.omega": SPEED})

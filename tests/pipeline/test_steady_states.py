@@ -190,6 +190,7 @@ def test_a_motion_that_starts_in_the_steady_state_of_a_brake_can_be_read_all_alo
         assert solution.min("rope.f") == pytest.approx(196200.0, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_hoist_that_runs_away_from_rest_names_the_start_that_finds_its_steady_state() -> None:
     """From rest the load of 20 t overhauls the motor at full frequency; near its speed the motor holds it."""
     net = sw.Network("hoist")

@@ -42,6 +42,7 @@ def verdicts(engine: str, count: int) -> dict[int, str]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "engine", ["auto", "exact", *(pytest.param(name, marks=pytest.mark.slow) for name in ENGINES[2:])]
 )

@@ -252,6 +252,7 @@ def test_a_load_that_sticks_at_rest_leaves_the_modes_of_the_running_train() -> N
     )
 
 
+@pytest.mark.slow
 @settings(max_examples=12, deadline=None)
 @given(data=st.data())
 def test_crossings_of_trains_that_stick_in_a_part_of_the_range_are_those_of_each_phase(data: st.DataObject) -> None:
@@ -322,6 +323,7 @@ def test_the_axis_ends_above_the_highest_mode_unless_an_end_is_given() -> None:
     assert given.plot().axes[0].get_ylim()[1] == 500.0
 
 
+@pytest.mark.slow
 def test_the_titles_of_pictures_are_whole() -> None:
     """Points of long names and many phases would run out of the picture on both sides."""
     pytest.importorskip("matplotlib")

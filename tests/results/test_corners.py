@@ -41,6 +41,7 @@ CORNERS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", CORNERS, ids=str)
 def test_extremes_means_and_samples_at_corners_are_the_limits_on_their_sides(law: sympy.Expr) -> None:
     least, most = CORNERS[law]
@@ -96,6 +97,7 @@ def test_a_torque_beyond_all_bounds_is_named_with_its_time() -> None:
 WAVES = [asin(sin(15 * t)), acos(cos(15 * t)), sqrt(2 - 2 * cos(15 * t))]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "engine"),
     [*product(WAVES, ["auto", "scipy", "sundials", "banded"]), (WAVES[0], "exact"), (WAVES[1], "exact")],

@@ -39,6 +39,7 @@ def test_between_undamped_stops_nothing_is_lost_at_any_instant(engine: str) -> N
     assert sol.energy_residual < CLOSE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("d", [2.0, 30.0, 300.0])
 def test_a_damped_stop_loses_what_the_wheel_has_less_and_never_gives_any_back(d: float, engine: str) -> None:
@@ -237,6 +238,7 @@ def test_what_changes_its_mode_at_the_instant_of_a_jump_is_not_charged_with_it()
     assert energy.residual < CLOSE
 
 
+@pytest.mark.slow
 @pytest.mark.no_cover
 def test_the_memory_of_a_balance_does_not_grow_with_the_number_of_steps() -> None:
     net = sw.Network("chain")

@@ -80,6 +80,7 @@ def test_the_driven_mass_rings_down_as_against_a_locked_one_at_3_13_hz() -> None
     assert torques[-1] < RESISTANCE < torques[-2]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gap", [0.001, 0.003])
 def test_with_a_gap_the_ringing_is_slower_and_the_slower_the_smaller_it_gets(gap: float) -> None:
     """As in the experiment of figure 10. The last half swing may end before the gap."""

@@ -85,6 +85,7 @@ def test_a_stiff_variant_runs_alone() -> None:
     assert made.measures["tau"][-1] == alone.measures["tau"][0]
 
 
+@pytest.mark.slow
 def test_blows_that_no_formula_places_are_seen_by_variants_that_could_run_side_by_side() -> None:
     """100 cos(2 t)^40000 is zero but for blows of some ms; steps of a fiftieth of the motion passed half of them."""
     net = sw.Network("press")
