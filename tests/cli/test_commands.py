@@ -456,3 +456,45 @@ def test_a_message_names_options_on_the_command_line_and_calls_in_python(
     message = capsys.readouterr().err
     assert "--at J1.omega=..." in message
     assert "initial=" not in message
+
+
+def test_a_run_with_travelling_waves_has_the_start_of_its_states(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "line.toml"
+    sw.scenes.ship_line(sw.Wave()).save(path)
+    assert main(["run", str(path), "--t-end", "0.01", "--json"]) == DONE
+    data = json.loads(capsys.readouterr().out)
+    at_rest = dict.fromkeys(sw.scenes.ship_line(sw.Wave()).compile().states, 0.0)
+    assert data["start"] == pytest.approx(at_rest, abs=1e-12)
+
+
+def test_a_steady_start_may_be_seen_by_its_angle_and_changed_by_any_name(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    net = sw.Network("drive")
+    net.add(sw.TorqueSource("motor", tau=100.0 - 10.0 * sw.omega), "a")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.Spring("s", c=1e3, d=1.0), "a", "b")
+    net.add(sw.Inertia("J2", J=1.0), "b")
+    net.add(sw.ViscousLoad("l", d=2.0), "b")
+    path = tmp_path / "drive.toml"
+    net.save(path)
+    options = ["--t-end", "0.1", "--steady", "--signals", "J1.phi,s.tau", "--json"]
+    assert main(["run", str(path), *options]) == DONE
+    signals = json.loads(capsys.readouterr().out)["signals"]
+    assert signals["J1.phi"]["end"] == pytest.approx(0.1 * 100.0 / 12.0, rel=1e-7)
+    assert main(["run", str(path), *options, "--initial", "s.tau=0", "--initial", "motor.omega=3"]) == DONE
+    assert json.loads(capsys.readouterr().out)["start"]["J2.omega"] == pytest.approx(100.0 / 12.0, rel=1e-9)
+
+
+def test_a_message_of_a_run_names_the_option_that_a_run_has(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    net = sw.Network("falling")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.TorqueSource("weight", tau=-1.0), "a")
+    path = tmp_path / "falling.toml"
+    net.save(path)
+    assert main(["run", str(path), "--steady", "--t-end", "1"]) == FAILED
+    message = capsys.readouterr().err
+    assert "--initial J1.omega=..." in message
+    assert "--at" not in message

@@ -76,6 +76,13 @@ def test_a_ratio_is_never_zero_and_an_efficiency_never_zero_or_above_one(name: s
     assert all("must be" in (declared[key].objection(value) or "") for key, value in wrong if key in declared)
 
 
+@pytest.mark.parametrize("name", [name for name in OWN if {"t_on", "t_off"} <= REGISTRY[name].declared.keys()])
+def test_what_would_never_be_on_is_refused(name: str) -> None:
+    with pytest.raises(sw.ParameterError, match="t_off = 1 s is not later than t_on = 1 s"):
+        _made(name, t_on=1.0, t_off=1.0)
+    assert _made(name, t_on=1.0, t_off=1.5).name == "part"
+
+
 @pytest.mark.parametrize("name", OWN)
 def test_every_component_refuses_what_it_does_not_know_with_what_it_takes(name: str) -> None:
     with pytest.raises(sw.ParameterError, match="It takes a name and"):

@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from sympy import Heaviside
+from sympy import Add, Heaviside, Piecewise, sin
 
 from shaftwork.components import base
 from shaftwork.components.branches import Branch, ThroughLaw
 from shaftwork.components.electrical import Resistor, VoltageSource
 from shaftwork.components.friction import Brake
-from shaftwork.components.laws import omega
+from shaftwork.components.laws import omega, t
 from shaftwork.components.loads import Conveyor
 from shaftwork.components.machines import DCMachine
 from shaftwork.components.rotation import Damper, Inertia, Spring
@@ -25,7 +25,7 @@ from shaftwork.components.shaft_models import CentralDifference, Lumped, ShaftMo
 from shaftwork.components.sources import TorqueSource
 from shaftwork.core.errors import CompileError, ShaftworkError
 from shaftwork.core.parameters import parameter
-from shaftwork.equations.printing import printed_number
+from shaftwork.equations.printing import WIDEST_CASE, printed_number
 from shaftwork.equations.widths import printed_width
 from shaftwork.network.builder import NetworkBuilder
 from shaftwork.scenes import SCENES
@@ -255,6 +255,20 @@ def test_a_long_row_is_broken_before_a_term() -> None:
     assert hub.count(r"\\") >= 3
     assert hub.count(r"\biggl") == hub.count(r"\biggr") == 1
     assert all(re.match(r"&\\quad [+-] ", row) for row in hub.splitlines() if row.startswith(r"&\quad"))
+
+
+def test_a_case_that_is_a_long_sum_has_all_its_terms_in_rows_of_limited_width() -> None:
+    net = NetworkBuilder("pieces")
+    angles = [3 * k * t for k in range(2, 10)]
+    net.add(TorqueSource("m", tau=Piecewise((Add(*map(sin, angles)), t < 1), (0, True))), "a")
+    net.add(Inertia("J", J=1.0), "a")
+    text = equations_of(net).latex("kirchhoff")
+    (case,) = re.findall(r"\\begin\{array\}\{@\{\}l@\{\}\} (.*?) \\end\{array\}", text)
+    rows = case.split(r" \\ ")
+    assert len(rows) > 1
+    assert all(row.startswith("+ ") for row in rows[1:])
+    assert all(printed_width(row) <= WIDEST_CASE + 2 for row in rows)  # the sign before a row has a width of its own
+    assert [int(n) for n in re.findall(r"(\d+) \\, t", case)] == list(range(6, 30, 3))
 
 
 @pytest.mark.parametrize("name", NETWORKS)

@@ -334,6 +334,39 @@ def test_two_trains_in_one_network_are_a_note() -> None:
     assert (problem.kind, problem.severity) == ("separate train", "note")
 
 
+def ship(propeller: str) -> sw.Network:
+    net = sw.Network("ship")
+    net.add(sw.TorqueSource("engine", tau=100.0), "flange")
+    net.add(sw.Inertia("J1", J=1.0), "flange")
+    net.add(sw.Shaft("line", length=1.0, diameter=0.05), "flange", "prop")
+    net.add(sw.Inertia("JP", J=3.0), propeller)
+    net.add(sw.FanLoad("water", tau_n=100.0, n_n=100.0), propeller)
+    return net
+
+
+def test_a_train_that_nothing_drives_is_told_by_its_motion() -> None:
+    """By a misspelt node, the propeller is none of the line; what is given a speed moves, and a driven train, too."""
+    said = r"stays at rest: .*'JP', 'water' at node 'propeller'.*did you mean node 'prop'"
+    with pytest.warns(sw.NetworkWarning, match=said):
+        ship("propeller").simulate(0.01)
+    ship("propeller").simulate(0.01, initial={"JP.omega": 3.0})
+    ship("prop").simulate(0.01)
+    driven = ship("propeller")
+    driven.add(sw.TorqueSource("wake", tau=1.0), "propeller")
+    driven.simulate(0.01)
+
+
+@pytest.mark.parametrize("node", ["Ground", "GROUND"])
+def test_a_node_that_is_written_like_the_frame_is_told_apart(node: str) -> None:
+    net = sw.Network("braked")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.Inertia("other", J=1.0), node)
+    net.add(sw.Brake("brake", tau=1.0), "a", node)
+    (problem,) = net.check()
+    assert (problem.kind, problem.severity, problem.nodes) == ("nearly ground", "warning", (node,))
+    assert "'ground', in small letters" in problem.message
+
+
 def named_as(part: str, at: str) -> sw.Network:
     net = sw.Network("names")
     net.add(sw.TorqueSource("motor", tau=1.0), "rotor")

@@ -352,3 +352,18 @@ def test_a_motion_is_no_start_value_of_a_steady_state_or_a_derivative() -> None:
         overspeed().steady_state(initial=first)
     with pytest.raises(sw.ParameterError, match="motion_sensitivities takes start values by name, not a motion"):
         sw.studies.motion_sensitivities(wheel(), ["end J.omega"], t_end=1.0, initial=first)
+
+
+@pytest.mark.parametrize(
+    ("t_off", "modes"), [(20.0, ["locked"]), (2.5, ["locked", "released"]), (1.5, ["released"]), (2.0, ["released"])]
+)
+def test_another_time_to_switch_off_releases_a_brake_when_it_comes(t_off: float, modes: list[str]) -> None:
+    """The brake came on at 1 s by a speed that it has long ended: at 2 s only the motion knows that it is on."""
+    net = sw.Network("held")
+    net.add(sw.TorqueSource("motor", tau=1.0), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.Brake("brake", tau=5.0, on=sw.omega - 1.0, t_off=10.0), "a")
+    held = net.simulate(2.0)
+    sol = net.simulate(3.0, initial=held, parameters={"brake.t_off": t_off})
+    assert [row.modes["brake"] for row in sol.phases] == modes
+    assert sol["J.omega"][-1] == pytest.approx(max(0.0, 3.0 - max(2.0, t_off)), abs=1e-9)

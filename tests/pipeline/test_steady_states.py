@@ -233,3 +233,56 @@ def test_a_load_with_a_broken_power_of_the_speed_has_a_steady_state_from_rest(
     net.add(sw.TorqueSource("m", tau=way * (5 - load).subs(sw.omega, way * sw.omega)), "a")
     net.add(sw.Inertia("J", J=1.0), "a")
     assert net.compile().steady_state()["J.omega"] == pytest.approx(way * speed)
+
+
+def test_a_brake_that_rises_is_not_read_before_it_comes_on() -> None:
+    net = drive(sympy.Integer(5))
+    net.add(sw.Brake("stop", tau=10.0, t_on=3.0, t_rise=0.2), "a")
+    said = (
+        r"before: 'stop' changes its mode at t = 3 s. Name the time that is meant, \S+2\) or steady_state\(t=1.5\)"
+    )
+    with pytest.warns(sw.NetworkWarning, match=said):
+        net.compile().steady_state()
+
+
+def test_a_torque_that_pulsates_with_the_angle_has_no_steady_state_and_the_message_says_why() -> None:
+    net = sw.Network("machine")
+    net.add(sw.TorqueSource("e", tau=(100.0 - sw.omega) * (1 + 0.1 * sympy.sin(4 * sw.phi))), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    with pytest.raises(sw.SimulationError, match=r"'e.phi' still changes .* A law reads it.*mean over a turn"):
+        net.compile().steady_state()
+
+
+def test_an_angle_that_is_recorded_alone_may_turn_on_in_a_steady_state() -> None:
+    net = drive(sympy.Integer(5))
+    plain, recorded = net.compile().steady_state(), net.compile(angles=("J1",)).steady_state()
+    assert recorded["J1.phi"] == 0.0
+    assert recorded.items() >= plain.items()
+
+
+@pytest.mark.parametrize(
+    "others",
+    [{"rope.f": 3.0}, {"tip.v": -0.1}, {"rotor.omega": 2.0}, {"drum.omega": 0.5, "rope.f_c": 0.0}, {"load.v": 0.0}],
+    ids=str,
+)
+def test_a_start_in_the_steady_state_takes_other_values_by_any_name(others: dict[str, float]) -> None:
+    """What is not named keeps its steady value, and what is named has its own."""
+    net = sw.Network("hoist")
+    net.add(sw.TorqueSource("motor", tau=50.0 - 5.0 * sw.omega), "rotor")
+    net.add(sw.Inertia("rotor", J=1.0), "rotor")
+    net.add(sw.Gear("gear", ratio=10.0), "rotor", "drum")
+    net.add(sw.Inertia("drum", J=2.0), "drum")
+    net.add(sw.Drum("winding", radius=0.2), "drum", "tip")
+    net.add(sw.TranslationalSpring("rope", c=1e5, d=100.0), "tip", "load")
+    net.add(sw.Mass("load", m=100.0), "load")
+    net.add(sw.ForceSource("weight", f=-981.0), "load")
+    model = net.compile()
+    steady = model.simulate(0.01, initial=model.steady_state(t=0.0))
+    sol = model.simulate(0.01, initial=model.steady_start(others))
+    for name, value in others.items():
+        assert sol[name][0] == pytest.approx(value, abs=1e-9)
+    groups = ({"rotor.omega", "drum.omega", "tip.v"}, {"load.v"}, {"rope.f", "rope.f_c"})
+    for group in groups:
+        if group.isdisjoint(others):
+            name = min(group - {"rope.f"})  # which depends on speeds, too
+            assert sol[name][0] == pytest.approx(steady[name][0], rel=1e-9)

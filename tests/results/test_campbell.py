@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -420,3 +421,74 @@ def test_a_point_may_leave_out_what_follows_the_speeds_given() -> None:
     net.add(sw.Inertia("J3", J=2.0), "c")
     net.add(sw.ViscousLoad("bearing", d=0.1), "c")
     assert net.modes({"J1.omega": 6.0}).title == "geared at J1.omega = 6 (load slipping forward)"
+
+
+def _behind(*parts: tuple[sw.Component, str, str]) -> sw.Network:
+    net = sw.Network("train")
+    net.add(sw.TorqueSource("m", tau=10.0 * (1 - sw.omega / 99) * (1 + 0.1 * sympy.sin(4 * sw.phi))), "a")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    for part, a, b in parts:
+        net.add(part, a, b)
+    return net
+
+
+GEAR = (sw.Gear("g", ratio=4.0), "a", "b")
+J2, J3 = sw.Inertia("J2", J=1.0), sw.Inertia("J3", J=1.0)
+
+
+@pytest.mark.parametrize(
+    ("parts", "more", "point"),
+    [
+        ([GEAR, (sw.Spring("s", c=1e3), "b", "c")], [(J2, "c")], {"J1.omega": "n", "J2.omega": "n/4"}),
+        ([GEAR, (sw.Clutch("cl", tau=9.0), "b", "c")], [(J2, "c")], {"J1.omega": "n", "J2.omega": "n/4"}),
+        ([GEAR, (sw.Backlash("bl", gap=0.1, c=9.0), "b", "c")], [(J2, "c")], {"J1.omega": "n", "J2.omega": "n/4"}),
+        ([GEAR, (sw.Freewheel("fw"), "b", "c")], [(J2, "c")], {"J1.omega": "n", "J2.omega": "n/4"}),
+        (
+            [GEAR, (sw.Shaft("w", length=1.0, diameter=0.05, model=sw.Wave()), "b", "c")],
+            [(J2, "c")],
+            {"J1.omega": "n", "J2.omega": "n/4"},
+        ),
+        (
+            [(sw.Drum("d", radius=0.25), "a", "r"), (sw.Rope("rope", c=1e4), "r", "hook")],
+            [(sw.Mass("load", m=1.0), "hook")],
+            {"J1.omega": "n", "load.v": "n/4"},
+        ),
+    ],
+    ids=["spring", "clutch", "gap", "free wheel", "wave", "rope"],
+)
+def test_the_point_that_a_message_names_follows_gears_through_all_that_joins(
+    parts: Any, more: Any, point: dict[str, str]
+) -> None:
+    """Also beside a law of the angle, which does not hold the shaft."""
+    net = _behind(*parts)
+    for part, node in more:
+        net.add(part, node)
+    with pytest.raises(sw.ParameterError, match="needs a point") as refused:
+        net.campbell([0.0, 100.0])
+    named = ", ".join(f"'{name}': {speed}" for name, speed in point.items())
+    assert f"at=lambda n: {{{named}}}" in str(refused.value)
+
+
+def test_a_speed_that_a_free_planetary_gear_leaves_open_is_left_to_the_user() -> None:
+    net = _behind()
+    net.add(sw.PlanetaryGear("p", ratio=3.0), "a", "carrier", "ring")
+    net.add(J2, "carrier")
+    net.add(J3, "ring")
+    with pytest.raises(sw.ParameterError, match=r"\{'J1.omega': n, 'J\d.omega': \.\.\.\}"):
+        net.campbell([0.0, 100.0])
+
+
+def test_a_torque_that_pulsates_with_the_angle_is_not_linearised_at_one_angle_without_a_word() -> None:
+    """The mean law alone has the modes of the running machine, and no warning; at rest the angle stays."""
+
+    def machine(pulse: float) -> sw.Network:
+        net = sw.Network("machine")
+        net.add(sw.TorqueSource("e", tau=(100.0 - sw.omega) * (1 + pulse * sympy.sin(4 * sw.phi))), "a")
+        net.add(sw.Inertia("J", J=1.0), "a")
+        net.add(sw.ViscousLoad("l", d=1.0), "a")
+        return net
+
+    with pytest.warns(sw.AccuracyWarning, match=r"'e\.phi' does not stay.*'e' gives bends.*at e\.phi = 0 rad"):
+        machine(0.1).modes({"J.omega": 50.0})
+    np.testing.assert_allclose(machine(0.0).modes({"J.omega": 50.0}).rates, [-2.0], rtol=1e-12)
+    machine(0.1).modes()

@@ -99,6 +99,7 @@ def test_the_cycles_of_a_sine_are_those_of_the_closed_form(engine: str) -> None:
     assert worn.repetitions == pytest.approx(1.0 / worn.damage)
     assert worn.hours == pytest.approx(10.0 / 3600.0 / worn.damage)
     assert found.equivalent(4.0, cycles=49.5 + 1.0 / 16.0) == pytest.approx(50.0, rel=1e-12)
+    assert found.equivalent(1.0, cycles=50.0) == pytest.approx((49.5 * 50.0 + 25.0) / 50.0, rel=1e-12)
 
 
 def test_the_peak_of_a_decaying_oscillation_is_the_closed_form_between_output_times() -> None:

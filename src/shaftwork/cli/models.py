@@ -52,7 +52,7 @@ def start_of(options: Namespace, model: Model) -> dict[str, float] | None:
         SimulationError: there is no steady state.
     """
     given = point(options.initial, option="--initial")
-    return {**model.steady_state(t=0.0), **given} if options.steady else given or None
+    return model.steady_start(given) if options.steady else given or None
 
 
 def point_of(options: Namespace, net: Network) -> dict[str, float] | None:

@@ -16,7 +16,7 @@ from typing import Any
 from shaftwork.cli import campbell, check, compare, export, latex, modes, run, scenes, sweep
 from shaftwork.cli.command import Command
 from shaftwork.core.errors import ShaftworkError, SimulationError
-from shaftwork.core.hints import on_the_command_line
+from shaftwork.core.hints import VALUES, on_the_command_line
 
 DONE, FAILED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 COMMANDS: tuple[Command, ...] = tuple(
@@ -34,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options.line = line
     _write_what_a_terminal_cannot_show_as_escapes()
     try:
-        with on_the_command_line(), _warnings_on_standard_error():
+        with on_the_command_line("--initial" if "initial" in options else VALUES), _warnings_on_standard_error():
             data = options.command.run(options, _silent if options.json else _say)
             if options.json:
                 print(json.dumps(_plain(data), indent=2, ensure_ascii=False, allow_nan=False))

@@ -157,7 +157,7 @@ def _data(solution: Solution, signals: Sequence[str]) -> Data:
     return {
         "network": solution.name,
         "t_end": solution.steps[-1],
-        "start": dict(zip(solution.states, solution.x[0], strict=True)),
+        "start": dict(zip(solution.states, solution.x[0], strict=False)),  # behind them is what waves bring
         "engine": solution.engine,
         "why": solution.why,
         "statistics": solution.statistics,

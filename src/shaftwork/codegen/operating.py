@@ -54,21 +54,26 @@ def steady_state(
         SimulationError: the rates do not vanish; the message names the state that keeps changing.
     """
     x = np.array(start, dtype=float)
-    names = [state.name for state in bound.program.form.states]
+    form = bound.program.form
+    names = [state.name for state in form.states]
     weights = energy_weights(bound)
-    rate, step = bound.rhs(t, x), np.zeros_like(x)
+    # What is recorded alone may turn on: it is left at its start.
+    counts = np.array([not (state.kind == "integral" and state.branch in form.recorded) for state in form.states])
+    counted = sparse.diags_array(counts.astype(float), format="csc")
+
+    rate, step = counts * bound.rhs(t, x), np.zeros_like(x)
     h = SMALLEST_STEP
     identity = sparse.eye_array(len(x), format="csc")
     for _ in range(limit):
         floor = np.linalg.norm(weights * x) / weights * (np.finfo(float).eps / tolerance)
-        slopes = _slopes(bound, t, x, rate)
+        slopes = counted @ _slopes(bound, t, x, rate)
         size = np.abs(bound.part.A) @ np.abs(x) + np.abs(bound.part.B) @ np.abs(bound.values(t, x)[1])
         size += np.maximum(np.abs(bound.part.A) @ floor, np.abs(slopes) @ floor)
         settled = np.linalg.norm(step) <= STANDSTILL * np.linalg.norm(x)  # a drive that runs away is not steady
         if settled and (np.abs(rate) <= tolerance * (size + np.finfo(float).tiny)).all():
             return x
         trial = _solve(sparse.csc_array(identity / h - slopes), rate)
-        new = bound.rhs(t, x + trial)
+        new = counts * bound.rhs(t, x + trial)
         defect = np.linalg.norm(weights * (trial / h - new)) / max(
             np.linalg.norm(weights * rate), np.linalg.norm(weights * size) * tolerance, np.finfo(float).tiny
         )
@@ -83,9 +88,16 @@ def steady_state(
             return _just_beyond(x, trial, ends)
         x, rate, step, h = x + trial, new, trial, min(h * (2.0 if defect > DEFECT / 10 else 8.0), 1e12)
     worst = int(np.argmax(np.abs(weights * rate)))
+    found = (
+        f"No steady state was found: '{names[worst]}' still changes by {rate[worst]:.3g} per second at {x[worst]:.6g}."
+    )
+    if worst >= len(x) - len(form.integrals):
+        raise SimulationError(
+            f"{found} A law reads it, so nothing is steady while it changes. Where a torque pulsates with the angle of "
+            "what turns, write its mean over a turn; or run simulate(...) until it repeats itself, and take means."
+        )
     raise SimulationError(
-        f"No steady state was found: '{names[worst]}' still changes by {rate[worst]:.3g} per second at {x[worst]:.6g}. "
-        f"Does something hold the speed (a load, a damper, a motor's curve)? {another_start(bound.program.form)}"
+        f"{found} Does something hold the speed (a load, a damper, a motor's curve)? {another_start(form)}"
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
+from itertools import compress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -51,6 +52,20 @@ def initial_state(bound: BoundArrays, given: Mapping[str, float], t0: float) -> 
     if not isinstance(given, Mapping):
         raise ParameterError(f"initial = {given!r} must map quantities to values, such as {{'J1.omega': 3.0}}.")
     return Start(bound, given, t0).states if given else at_rest(bound, t0)
+
+
+def with_others(
+    bound: BoundArrays, values: Mapping[str, float], others: Mapping[str, float], t0: float
+) -> dict[str, float]:
+    """Start values of all stores, but for those that others determine, with the others.
+
+    Args:
+        bound, t0: as for `initial_state`.
+        values: of all stores, by name.
+        others: "part.quantity" or "node.quantity" to value in SI.
+    """
+    determined = Start(bound, others, t0).determined if others else ()
+    return {name: value for name, value in values.items() if name not in determined} | dict(others)
 
 
 def at_rest(bound: BoundArrays, t0: float) -> Array:
@@ -110,6 +125,14 @@ class Start:
     def given_speeds(self) -> GivenSpeeds:
         """Which speeds the start values give, those inside shafts included."""
         return self._names.readings.given_speeds(self.states, self._rest, self._fixed, self._prescribed)
+
+    @cached_property
+    def determined(self) -> frozenset[str]:
+        """The stores that the start values determine: states, and what is tied to one of them."""
+        _ = self.states
+        states = (name for name, place in self._names.places.items() if self._fixed[place])
+        moved = abs(self._names.ties) @ self._fixed.astype(float)
+        return frozenset((*states, *compress(self._names.tied, moved)))
 
     @property
     def nodes_left(self) -> frozenset[int]:

@@ -13,8 +13,10 @@ from typing import Any
 
 import networkx as nx
 import sympy
+from sympy import Integer
 
 from shaftwork.components.base import Component
+from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.core.domains import Domain
 from shaftwork.core.errors import Problem, ShaftworkError
 from shaftwork.network.graph import GROUND, CircuitGraph, resolve, signals_of
@@ -28,6 +30,7 @@ from shaftwork.network.wording import Spelling, at_nodes, listed, title
 LEFT_OUT = ("node name", "node count", "wrong domain", "no effect", "component")
 """Kinds of problems whose part is left out of what is examined further."""
 
+RESTS = ", and nothing drives that train."
 Train = tuple[int, ...]
 """Numbers of the parts that hang together."""
 
@@ -214,11 +217,7 @@ class _Examination:
 
 def connection_problems(graph: CircuitGraph) -> tuple[Problem, ...]:
     """Parts, ends and whole trains that are not joined to the rest, and nodes whose speed has the name of another."""
-    ends: list[list[tuple[int, str]]] = [[] for _ in graph.nodes]
-    for number, part in enumerate(graph.parts):
-        for port in part.component.ports:
-            if (node := part.nodes[port.name]) != GROUND:
-                ends[node].append((number, port.name))
+    ends = _ends(graph)
     spelling = Spelling(graph.nodes)
     trains = _trains(ends)
     single = [train[0] for train in trains if len(train) == 1]
@@ -231,7 +230,17 @@ def connection_problems(graph: CircuitGraph) -> tuple[Problem, ...]:
     joined = [train for train in trains if train[0] not in alone]
     main = max(joined, key=len, default=())
     problems += [_separate_train(graph, train, main, spelling) for train in joined if train is not main]
-    return (*problems, *_shared_names(graph))
+    return (*problems, *_nearly_reference(graph), *_shared_names(graph))
+
+
+def _ends(graph: CircuitGraph) -> list[list[tuple[int, str]]]:
+    """Of each node the parts that end there, by number and port."""
+    ends: list[list[tuple[int, str]]] = [[] for _ in graph.nodes]
+    for number, part in enumerate(graph.parts):
+        for port in part.component.ports:
+            if (node := part.nodes[port.name]) != GROUND:
+                ends[node].append((number, port.name))
+    return ends
 
 
 def _trains(ends: list[list[tuple[int, str]]]) -> list[Train]:
@@ -302,15 +311,49 @@ def _shared_names(graph: CircuitGraph) -> Iterator[Problem]:
         )
 
 
+def _nearly_reference(graph: CircuitGraph) -> Iterator[Problem]:
+    """Nodes that are written like the frame, and are not."""
+    for node in graph.nodes:
+        if node.strip().lower() == REFERENCE:
+            yield Problem(
+                "nearly ground",
+                f"node '{node}' is a node of its own: the frame is '{REFERENCE}', in small letters.",
+                f"Write '{REFERENCE}', or give the node another name.",
+                (),
+                (node,),
+                "warning",
+            )
+
+
 def _separate_train(graph: CircuitGraph, train: Train, main: Train, spelling: Spelling) -> Problem:
     names = tuple(graph.parts[number].name for number in train)
     nodes = tuple(graph.nodes[node] for node in _port_nodes(graph, train))
     others = listed(tuple(graph.parts[number].name for number in main), most=3)
+    rests = _is_driven(graph, main) and not _is_driven(graph, train)
     return Problem(
         "separate train",
-        f"{listed(names)} at {at_nodes(nodes)} share{'s' * (len(names) == 1)} no node with {others}.",
+        f"{listed(names)} at {at_nodes(nodes)} share{'s' * (len(names) == 1)} no node with {others}"
+        + (RESTS if rests else "."),
         f"Join the two{spelling.suggestion(nodes)}, or simulate them as two networks.",
         names,
         nodes,
         "note",
+    )
+
+
+def resting_trains(graph: CircuitGraph) -> tuple[Problem, ...]:
+    """The trains beside a driven one in which nothing moves unless it is given a start value."""
+    if len(_trains(_ends(graph))) == 1:
+        return ()
+    return tuple(found for found in connection_problems(graph) if found.message.endswith(RESTS))
+
+
+def _is_driven(graph: CircuitGraph, train: Train) -> bool:
+    """Whether something in a train can set it in motion from rest."""
+    parts = [graph.parts[number] for number in train]
+    laws = (graph.branches[k].template for part in parts for k in part.branches)
+    return any(part.component.role == "source" for part in parts) or any(
+        made.law.xreplace(dict.fromkeys((ACROSS, INTEGRAL, *made.reads), Integer(0))) != 0
+        for made in laws
+        if made.kind in (Kind.LAW, Kind.THROUGH_SOURCE, Kind.ACROSS_SOURCE)
     )

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
+from itertools import chain
 
 from shaftwork.components.base import Component
+
+SHORTEST = 4
+"""Letters of a name that another may be a slip of: of shorter ones too many are alike."""
 
 
 def title(part: Component) -> str:
@@ -25,7 +29,7 @@ def at_nodes(names: Sequence[str]) -> str:
 
 
 class Spelling:
-    """Node names that may stand for another by a slip: one letter too many, missing or wrong, other case or spaces."""
+    """Node names that may stand for another by a slip: one letter, case or spaces, or the begin of the other alone."""
 
     def __init__(self, names: Sequence[str]) -> None:
         self._names = names
@@ -43,18 +47,31 @@ class Spelling:
         own = frozenset(names)
         for name in names:
             likes = (other for variant in _variants(name) for other in self._by_variant.get(variant, ()))
-            for other in likes:
+            for other in chain(likes, self._begun_alike(_plain(name))):
                 if other not in own and _digits(other) == _digits(name):  # n1 and n2 are two nodes, not a slip
                     return f" (did you mean node '{other}'?)"
         return ""
+
+    @cached_property
+    def _plain(self) -> list[tuple[str, str]]:
+        return [(plain, name) for name in self._names if len(plain := _plain(name)) >= SHORTEST]
+
+    def _begun_alike(self, name: str) -> Iterator[str]:
+        """The nodes whose names are the begin of this one, or begin with it."""
+        if len(name) >= SHORTEST:
+            yield from (other for plain, other in self._plain if plain.startswith(name) or name.startswith(plain))
 
 
 def _digits(name: str) -> str:
     return "".join(filter(str.isdigit, name))
 
 
+def _plain(name: str) -> str:
+    return "".join(filter(str.isalnum, name.lower()))
+
+
 def _variants(name: str) -> tuple[str, ...]:
     """The name without case and spaces, and all that come of it when one letter is left out."""
-    plain = "".join(filter(str.isalnum, name.lower()))
-    short = len(plain) - len(_digits(plain)) < 4
+    plain = _plain(name)
+    short = len(plain) - len(_digits(plain)) < SHORTEST
     return (plain, *(() if short else (plain[:k] + plain[k + 1 :] for k in range(len(plain)))))

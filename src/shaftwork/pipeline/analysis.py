@@ -18,7 +18,7 @@ from shaftwork.core.notices import once
 from shaftwork.core.parameters import briefly, in_si
 from shaftwork.network.templates import Kind
 from shaftwork.network.wording import listed
-from shaftwork.pipeline.point_speeds import as_multiple, speeds_to_give, warn_of_speeds_left
+from shaftwork.pipeline.point_speeds import as_multiple, speeds_to_give, warn_of_speeds_left, warn_of_turning_angles
 from shaftwork.pipeline.settled import SteadyState
 from shaftwork.results import campbell as diagram
 from shaftwork.results.exact import ExactModel
@@ -99,6 +99,13 @@ def operating_point(model: CompiledModel, p: Array, at: Point, t: Time, settled:
         ParameterError: the point is none.
         SignalError: there is no such quantity.
     """
+    time, x = _moment(model, p, at, t, settled)
+    if not model.linear:
+        warn_of_turning_angles(model.bind(p), time, x)
+    return time, x
+
+
+def _moment(model: CompiledModel, p: Array, at: Point, t: Time, settled: float) -> tuple[float, Array]:
     if isinstance(at, Solution):
         time, x = moment_of(at, tuple(state.name for state in model.form.states))
         return time if t is None else in_si("t", t, "s"), x

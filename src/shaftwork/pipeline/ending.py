@@ -68,7 +68,7 @@ class Ending(dict[str, float]):
             raise ParameterError(
                 f"initial is a motion that does not tell {listed(missing)}, stored here: it was simulated without some "
                 "angles=..., or with a zero in place of a value. Simulate it as this one; or give all start values by "
-                "name, initial={name: sol[name][-1] for name in sol.states} and those."
+                "name, initial={name: sol[name][-1] for name in sol.states} and those, with t_start=sol.t[-1]."
             )
 
 

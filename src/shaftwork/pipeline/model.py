@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.operating import steady_state
-from shaftwork.codegen.start_values import initial_state
+from shaftwork.codegen.start_values import initial_state, with_others
 from shaftwork.codegen.switching import Switching
 from shaftwork.codegen.valueless import rough, without_value
 from shaftwork.core.callbacks import Told
@@ -37,13 +38,13 @@ from shaftwork.pipeline.arguments import (
     step_limit,
     time_span,
 )
-from shaftwork.pipeline.ending import ending_of, refuse_motion, time_of_start
+from shaftwork.pipeline.ending import Ending, ending_of, refuse_motion, time_of_start
 from shaftwork.pipeline.implicit import IMPLICIT, PRESCRIBED, at_rest, solve_loops, start_of_loops
 from shaftwork.pipeline.overview import model_overview
 from shaftwork.pipeline.prepared import Prepared, nominal_tolerances, observed
 from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels
 from shaftwork.pipeline.sizes import in_its_size
-from shaftwork.pipeline.start import start_of
+from shaftwork.pipeline.start import start_of, warn_of_rest
 from shaftwork.pipeline.stored import Rebuild, Repetition, call_of, model_again, remember
 from shaftwork.reduction.form import StateForm
 from shaftwork.results.solution import Solution
@@ -143,6 +144,8 @@ class Model(CompiledModel):
         told = Told(progress)
         demand = Demand(span, *asked, told if progress else None)
         made = dict(zip(self.parameters, self.defaults.tolist(), strict=True)) | values
+        if initial is None or (isinstance(initial, Mapping) and not isinstance(initial, Ending)):
+            warn_of_rest(self.form.graph, initial or {})
         motion = with_accuracy(told.of(lambda: self._motion(values, initial, demand)), demand)
         again = Repetition(self._rebuild, self.netlist, call_of(motion, demand, values, initial), self)
         return replace(motion, parameters=made, initial=dict(initial or {}), rtol=demand.rtol, again=again)
@@ -206,6 +209,25 @@ class Model(CompiledModel):
         if not math.isfinite(t):
             warn_of_earlier_levels(prepared.bound, x, when, self.switching)
         return SteadyState(dict(zip(self.states, x.tolist(), strict=True)), when)
+
+    def steady_start(self, others: Given = None, *, parameters: Given = None) -> dict[str, float]:
+        """Start values: the steady state with the laws at t = 0 s, in which some stores have other values.
+
+        Args:
+            others: start values by name, as for `simulate`; what is stored elsewhere is that of the steady state.
+            parameters: values that differ from the network's.
+
+        Raises:
+            SimulationError: nothing comes to rest or to a steady speed.
+        """
+        values = self._checked_all(parameters)
+        if self._changes_structure(values):
+            return self._variant(values).steady_start(others)
+        return with_others(self._bound_at(values), self._steady(values, 0.0, None), others or {}, 0.0)
+
+    def _bound_at(self, values: Mapping[str, float]) -> BoundArrays:
+        """The equations at the start."""
+        return self.twin.bind(self.vector(values)) if self.form.waves else self.bind(self.vector(values))
 
     def linearize(
         self, at: Point = None, *, inputs: Names = None, outputs: Names = None, t: Time = None, parameters: Given = None

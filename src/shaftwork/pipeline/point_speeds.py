@@ -2,64 +2,67 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from itertools import compress
 
 import numpy as np
-from scipy import linalg
 
+from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.inputs import is_linear
 from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.start_values import Start
 from shaftwork.codegen.wound_shafts import inner_nodes, node_of, speed_at
-from shaftwork.components.branches import ACROSS
+from shaftwork.components.branches import ACROSS, INTEGRAL
+from shaftwork.components.slopes import jumps, slope
 from shaftwork.core.domains import ELECTRICAL
-from shaftwork.core.errors import NetworkWarning
+from shaftwork.core.errors import AccuracyWarning, NetworkWarning
 from shaftwork.core.hints import hint
 from shaftwork.core.notices import warn
+from shaftwork.network.controlled import Reading, readings_of
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.templates import Kind
 from shaftwork.network.wording import listed
 from shaftwork.reduction.form import StateForm
+from shaftwork.reduction.gains import value_of
+from shaftwork.reduction.starting import speeds_along
+from shaftwork.reduction.tree import column_of
 
 SAME = 1e-9
 """Ratios that differ by less are equal, and a speed below this part of the largest is none."""
 
 
-def speeds_to_give(model: CompiledModel) -> Mapping[str, float]:
-    """The speeds that tell how a network turns, as multiples of the first.
+def speeds_to_give(model: CompiledModel) -> Mapping[str, float | None]:
+    """The speeds that tell how a network turns, as multiples of the first; None where that does not tell them.
 
-    What is tied rigidly to them follows, and so do the speeds inside shafts. Springs keep their twist: behind a gear
-    of ratio 3 is a third. What nothing but a friction or a clutch joins to the first turns as it does.
+    What is tied rigidly to them follows, and so do the speeds inside shafts. Springs keep their twist, and what joins
+    at times, as clutches, gaps and ropes do, is taken for joined: behind a gear of ratio 3 is a third. Behind a
+    planetary gear of which one shaft is free, a speed is open.
     """
-    form, ratios = model.form, _ratios(model)
-    inside, names = inner_nodes(form), dict[str, float]()
-    for k, branch in enumerate(form.across_states):
-        node = node_of(form, branch)
-        if node not in inside and form.graph.domains[node] is not ELECTRICAL:
-            names[speed_at(form, node)] = float(ratios[k])
-    return names
+    form = model.form
+    inside = inner_nodes(form)
+    nodes = dict.fromkeys(node_of(form, branch) for branch in form.across_states)
+    named = [node for node in nodes if node not in inside and form.graph.domains[node] is not ELECTRICAL]
+    ratios = speeds_along(form.graph, named[0], _joints(form.graph)) if named else {}
+    return {speed_at(form, node): ratios.get(node) for node in named}
 
 
-def _ratios(model: CompiledModel) -> Array:
-    """Of each speed among the states, how fast it is while no twist changes, over the first that it is joined to."""
-    count = len(model.form.across_states)
-    twists = model.bind().part.A.toarray()[count:, :count]
-    size = np.abs(twists).max(axis=1, keepdims=True, initial=0.0)
-    free = linalg.null_space(twists / np.where(size > 0, size, 1.0)) if twists.size else np.eye(count)
-    together = free @ free.T
-    ratios = np.ones(count)
-    left = np.ones(count, dtype=bool)
-    for k in range(count):
-        if left[k] and together[k, k] > SAME:
-            joined = left & (np.abs(together[k]) > SAME)
-            ratios[joined] = together[k, joined] / together[k, k]
-            left &= ~joined
-    return ratios
+def _joints(graph: CircuitGraph) -> Iterator[Mapping[int, float]]:
+    """Speeds of nodes that depend on each other while no twist changes: node to factor, in sums that are zero."""
+    for part in graph.parts:
+        branches = [graph.branches[k] for k in part.branches]
+        kinds = {made.template.kind for made in branches}
+        if (part.modes and Kind.COUPLING not in kinds) or any(made.template.is_history for made in branches):
+            yield dict(zip((part.nodes[port.name] for port in part.component.ports), (1.0, -1.0), strict=False))
+        for made in branches:
+            if made.template.kind in (Kind.THROUGH_STORE, Kind.COUPLING):
+                yield {node: value_of(factor) for node, factor in column_of(graph, made).items()}
 
 
-def as_multiple(ratio: float) -> str:
-    """A multiple of the speed n as Python and the command line read it: "n", "n/3", "2.5*n"."""
+def as_multiple(ratio: float | None) -> str:
+    """A multiple of the speed n as Python and the command line read it: "n", "n/3", "2.5*n"; "..." for None."""
+    if ratio is None:
+        return "..."
     sign, size = "-" * (ratio < 0), abs(ratio)
     if abs(size - 1) < SAME:
         return f"{sign}n"
@@ -94,6 +97,46 @@ def warn_of_speeds_left(start: Start, form: StateForm) -> None:
         f"depends on it: what stands has other frequencies than what runs. Give {example}; 0 where it does stand.",
         NetworkWarning,
     )
+
+
+def warn_of_turning_angles(bound: BoundArrays, t: float, x: Array) -> None:
+    """Warn where a law is linearised at one angle of a shaft that turns: a pulsation is frozen at that angle.
+
+    Args:
+        bound: the equations of the network.
+        t: time at which laws are read, s.
+        x: (n,) states at the point.
+    """
+    form, first = bound.program.form, len(x) - len(bound.program.form.integrals)
+    rates = np.abs(bound.rhs(t, x)[first:])
+    turns = rates > SAME * np.append(rates, np.abs(x[: len(form.across_states)])).max(initial=0.0)
+    angles = zip(form.integrals, form.states[first:], x[first:], strict=True)
+    for branch, state, value in compress(angles, turns):
+        if readers := _readers(form, branch):
+            warn(
+                f"The point of '{form.graph.name}' is one moment of a motion: '{state.name}' does not stay, and what "
+                f"{listed(readers)} gives bends with it. All is linearised at {state.name} = {value:.4g} {state.unit}; "
+                "elsewhere in a turn, frequencies and damping are others. Of a torque that pulsates linearise the mean "
+                "over a turn: leave the pulsation out of the law, and take it as an excitation, by the orders of a "
+                "diagram or the frequencies of a response.",
+                AccuracyWarning,
+            )
+
+
+def _readers(form: StateForm, integral: int) -> tuple[str, ...]:
+    """The parts with a law whose slopes depend on the integral of a branch, or that jumps with it."""
+    graph, found = form.graph, dict[str, None]()
+    for branch in form.laws:
+        template = graph.branches[branch].template
+        own = [INTEGRAL] if branch == integral else []
+        for symbol in (*own, *(one for one, of in readings_of(graph, branch).items() if of == _integral(integral))):
+            if slope(template.law, symbol).has(ACROSS, INTEGRAL, *template.reads) or jumps(template.law, symbol):
+                found[graph.part_of(branch).name] = None
+    return tuple(found)
+
+
+def _integral(branch: int) -> Reading:
+    return Reading("integral", branch)
 
 
 def _bends(graph: CircuitGraph, branch: int) -> bool:

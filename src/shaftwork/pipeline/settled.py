@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -93,14 +94,15 @@ def warn_of_earlier_levels(bound: BoundArrays, x: Array, when: float, switching:
     """
     edges = [0.0, *(time for time in switching.known(bound.p) if 0.0 < time < when), when]
     spans = [
-        (np.nextafter(first, last), (first + last) / 2, np.nextafter(last, first)) for first, last in pairwise(edges)
+        (np.nextafter(first, last) if first else 0.0, (first + last) / 2, np.nextafter(last, first))
+        for first, last in pairwise(edges)
     ]
     times = np.array(spans)
-    found = list(_levels(bound, x, times))
-    for part, time in switching.clocks(bound.p):
-        if 0.0 < time < when:
-            before = max(edge for edge in edges if edge < time)
-            found.append((f"'{part}' changes its mode at t = {time:.6g} s", (before + time) / 2))
+    changes = [(part, time) for part, time in switching.clocks(bound.p) if 0.0 < time < when]
+    found = list(_levels(bound, x, times, dict(sorted(changes, key=itemgetter(1)))))
+    for part, time in changes:
+        before = max(edge for edge in edges if edge < time)
+        found.append((f"'{part}' changes its mode at t = {time:.6g} s", (before + time) / 2))
     if found:
         said, other = "; ".join(words for words, _ in found), found[0][1]
         warn(
@@ -147,12 +149,17 @@ def warn_of_held_torques(regime: Regime, elements: Sequence[Element], x: Array, 
         )
 
 
-def _levels(bound: BoundArrays, x: Array, times: Array) -> Iterator[tuple[str, float]]:
-    """Of each law with an earlier level what it gave and when; times are (spans, 3): both ends and the middle."""
+def _levels(bound: BoundArrays, x: Array, times: Array, since: Mapping[str, float]) -> Iterator[tuple[str, float]]:
+    """Of each law with an earlier level what it gave and when; times are (spans, 3): both ends and the middle.
+
+    `since` names the parts that had other laws before a time in s, which those of now do not tell.
+    """
     inputs, graph = bound.program.assembly.inputs, bound.program.form.graph
     values = bound.values(times.ravel(), np.tile(x[:, None], times.size))[1].reshape(len(inputs), *times.shape)
-    for branch, courses in zip(inputs.tolist(), values, strict=True):
-        final, size = courses[-1, 1], np.nanmax(np.abs(courses), initial=0.0)
+    for branch, found in zip(inputs.tolist(), values, strict=True):
+        own = times[:, 0] >= since.get(graph.part_of(branch).name, 0.0)
+        final, courses = found[-1, 1], np.where(own[:, None], found, np.nan)
+        size = np.nanmax(np.abs(courses), initial=0.0)
         close = SAME * size
         lasting = np.ptp(courses, axis=1, keepdims=True) <= close
         other = (np.abs(courses) > abs(final) + close) | (courses * final < -(close**2))

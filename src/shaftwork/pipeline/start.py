@@ -10,12 +10,29 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.start_values import initial_state
 from shaftwork.codegen.stores import Stores
+from shaftwork.core.errors import NetworkWarning
+from shaftwork.core.notices import warn
+from shaftwork.network.checks import resting_trains
+from shaftwork.network.graph import CircuitGraph
 from shaftwork.pipeline.ending import Ending
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.model import Model
     from shaftwork.pipeline.prepared import Prepared
     from shaftwork.pipeline.waves import CarriedWaves, WaveStart
+
+
+def warn_of_rest(graph: CircuitGraph, initial: Mapping[str, float]) -> None:
+    """Warn of trains that nothing joins to the drive and that no start value moves.
+
+    Args:
+        graph: the network.
+        initial: start values.
+    """
+    moved = {str(name).rpartition(".")[0] for name, value in initial.items() if value}
+    for found in resting_trains(graph):
+        if moved.isdisjoint((*found.parts, *found.nodes)):
+            warn(f"'{graph.name}' has a train that stays at rest: {found}", NetworkWarning)
 
 
 def start_of(

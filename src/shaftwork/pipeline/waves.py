@@ -288,7 +288,7 @@ def _refuse_other_lines(lines: Mapping[str, Array], before: Mapping[str, Array])
             raise ParameterError(
                 f"Shaft '{name}' has another impedance, delay or friction than in the motion that goes on, and waves "
                 "are on their way through it. Keep them as they were, or begin with start values, "
-                "initial={name: sol[name][-1] for name in sol.states}, which leave the waves out."
+                "initial={name: sol[name][-1] for name in sol.states} and t_start=sol.t[-1], which leave the waves out."
             )
 
 

@@ -214,12 +214,10 @@ class _Structure(View):
     def locked(self) -> Iterator[Problem]:
         """Loops of couplings whose ratios agree at standstill only."""
         routes: nx.Graph[int] = nx.Graph()
-        done = 0
         for closing, nodes in self.tree.locked:
-            for branch in self.graph.branches[done:closing]:
+            for branch in self.graph.branches[:closing]:
                 column = column_of(self.graph, branch) if branch.terms else {}
                 routes.add_edges_from(((a, b) for a, b in pairwise(column) if not routes.has_edge(a, b)), branch=branch)
-            done = closing
             routes.add_nodes_from(nodes)
             paths = [nx.shortest_path(routes, nodes[0], b) for b in nodes[1:] if nx.has_path(routes, nodes[0], b)]
             around = [routes.edges[step]["branch"] for path in paths for step in pairwise(path)]

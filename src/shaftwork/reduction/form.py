@@ -115,6 +115,12 @@ class StateForm:
         return tuple(dict.fromkeys((*own, *read, *self.angles)))
 
     @cached_property
+    def recorded(self) -> tuple[int, ...]:
+        """Integrals that are asked for alone, which nothing reads: they may go on where all else is steady."""
+        read = {reading.of for reading in self.readings if reading.kind == "integral"}
+        return tuple(k for k in self.angles if k not in read and not self.graph.branches[k].template.has_integral)
+
+    @cached_property
     def controlled(self) -> tuple[int, ...]:
         """Prescribed across variables that follow from other branches of their part, not from the time alone."""
         return tuple(index for index in self.across_sources if self.graph.branches[index].template.reads)

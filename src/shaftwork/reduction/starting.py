@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
 from sympy import Float, Symbol
 
@@ -17,6 +17,8 @@ from shaftwork.reduction.tree import column_of
 
 _JOINTS = (Kind.THROUGH_STORE, Kind.COUPLING)
 """Springs and gears: what hands a torque on at standstill."""
+PAIR = 2
+"""Ends of a spring, or shafts of a gear of two."""
 _SLIPPING_OR_STUCK = 3
 """Modes of what rubs at all times: forward, backward, stuck; a brake has more."""
 
@@ -34,7 +36,9 @@ def notes_of(graph: CircuitGraph) -> Iterator[Problem]:
 
 def _against(graph: CircuitGraph, start: int, torque: float) -> str:
     """The loads behind a node that rest until a torque there is above theirs, in words; losses of gears left out."""
-    speeds = _speeds(graph, start)
+    columns = (column_of(graph, branch) for branch in graph.branches if branch.template.kind in _JOINTS)
+    pairs = ({node: value_of(factor) for node, factor in column.items()} for column in columns if len(column) == PAIR)
+    speeds = speeds_along(graph, start, pairs)
     held: dict[str, float] = {}
     for part in graph.parts:
         for node in {*part.nodes.values()} & speeds.keys():
@@ -47,16 +51,26 @@ def _against(graph: CircuitGraph, start: int, torque: float) -> str:
     return f", against {total:.4g} N*m of {' and '.join(held)}{stuck}"
 
 
-def _speeds(graph: CircuitGraph, start: int) -> dict[int, float]:
-    """Speeds of the nodes that springs and gears join to one, over its own while no spring gives."""
+def speeds_along(graph: CircuitGraph, start: int, joints: Iterable[Mapping[int, float]]) -> dict[int, float]:
+    """Speeds of the nodes that are joined to one, over its own.
+
+    Args:
+        graph: the network.
+        start: the one.
+        joints: node to factor, in sums that are zero; that of the frame is.
+    """
+    at: list[list[dict[int, float]]] = [[] for _ in graph.nodes]
+    for joint in joints:
+        moving = {node: factor for node, factor in joint.items() if node != GROUND}
+        for node in moving if len(moving) > 1 else ():
+            at[node].append(moving)
     speeds, ends = {start: 1.0}, [start]
-    joints = [column_of(graph, branch) for branch in graph.branches if branch.template.kind in _JOINTS]
     while ends:
-        node = ends.pop()
-        for column in (column for column in joints if node in column and len(column) == 2):
-            (other,) = column.keys() - {node}
-            if other not in speeds:
-                speeds[other] = -speeds[node] * value_of(column[node]) / value_of(column[other])
+        for joint in at[ends.pop()]:
+            open_ends = [node for node in joint if node not in speeds]
+            if len(open_ends) == 1:
+                (other,) = open_ends
+                speeds[other] = -sum(joint[node] * speeds[node] for node in joint if node != other) / joint[other]
                 ends.append(other)
     return speeds
 

@@ -197,8 +197,7 @@ class Worker:
         parameters, options = task.values(variant), dict(task.options)
         try:
             if task.steady:
-                start = self._model.steady_state(t=0.0, parameters=parameters)
-                options["initial"] = {**start, **(options["initial"] or {})}
+                options["initial"] = self._model.steady_start(options["initial"], parameters=parameters)
             solution = self._model.simulate(task.t_end, parameters=parameters, **options)
         except ShaftworkError as error:
             return nothing, _first_line(error)

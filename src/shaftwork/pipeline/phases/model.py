@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.linear import Linearization
 from shaftwork.codegen.model import CompiledModel, Cost
@@ -224,6 +225,10 @@ class PhasedModel(Model):
         """The phase of a moment, "gap open, brake locked"."""
         pairs = zip(self.phases.elements, moment.regime.modes, strict=True)
         return ", ".join(f"{element.name} {element.modes[name].words}" for element, name in pairs)
+
+    def _bound_at(self, values: Mapping[str, float]) -> BoundArrays:
+        first = self.phases.assembly(self.phases.first)
+        return first.bound(first.vector(values, {}))
 
     def _moment(self, settling: Settling, t: float, initial: Given) -> Moment:
         first = self.phases.assembly(self.phases.first)

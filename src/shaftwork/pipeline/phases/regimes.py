@@ -98,7 +98,10 @@ class Regimes:
         apart = self.taking(first, t, ending)
         if changed:
             refuse_beyond(loose, elements, t, apart.x)
-        anew = [begins_anew(e.part.name, e.modes, ending.modes.get(e.name), changed) for e in elements]
+        anew = [
+            begins_anew(e.part.name, e.modes, ending.modes.get(e.name), t, ending.parameters, parameters)
+            for e in elements
+        ]
         fresh = loose.assembly.first_modes(t, apart.x, loose.p) if any(anew) else first
         triples = zip(anew, fresh, elements, strict=True)
         modes = tuple(name if begins else ending.modes[e.name] for begins, name, e in triples)

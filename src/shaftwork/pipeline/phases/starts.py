@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 
-from sympy import Expr, Integer, Piecewise, Symbol
+from sympy import Expr, Float, Integer, Piecewise, Symbol
 from sympy.core.relational import Relational
 
 from shaftwork.codegen.code import branchwise, scalar
@@ -46,19 +46,42 @@ def starts_of(modes: Modes, symbols: tuple[Symbol, ...]) -> Callable[..., list[f
     return starts
 
 
-def begins_anew(part: str, modes: Modes, mode: str | None, changed: frozenset[str]) -> bool:
+def begins_anew(
+    part: str, modes: Modes, mode: str | None, t: float, before: Mapping[str, float], now: Mapping[str, float]
+) -> bool:
     """Whether an element cannot go on in the mode in which another motion ended.
+
+    Limits and start conditions say in which mode it starts: where their parameters are others it begins anew, unless
+    they stand beside the time alone and tell the same at this time, as a time to switch off that is still to come.
 
     Args:
         part: its name.
         modes: of the element.
         mode: in which the motion ended; None where it had none.
-        changed: parameters, "part.parameter", that are others from now on.
+        t: the time, s.
+        before: the parameters of that motion, "part.parameter" to value; zeros may be left out.
+        now: those from now on.
     """
-    limits = (leave.when for each in modes.options for leave in each.leaves if leave.rebound is not None)
-    decisive = {*conditional(modes), *(symbol for when in limits for symbol in when.free_symbols)}
-    known = any(each.name == mode for each in modes.options)
-    return not known or any(f"{part}.{symbol.name}" in changed for symbol in decisive)
+    if not any(each.name == mode for each in modes.options):
+        return True
+    limits = {
+        symbol
+        for each in modes.options
+        for leave in each.leaves
+        if leave.rebound is not None
+        for symbol in leave.when.free_symbols
+    }
+    symbols = {*limits, *conditional(modes)}
+    was, becomes = (
+        {symbol: Float(values.get(f"{part}.{symbol.name}", 0.0)) for symbol in symbols} for values in (before, now)
+    )
+    others = {symbol for symbol in symbols if was[symbol] != becomes[symbol]}
+    compared = {made for each in modes.options for made in each.starts.atoms(Relational) if others & made.free_symbols}
+    return not others.isdisjoint(limits) or any(
+        made.has(ACROSS, INTEGRAL)
+        or made.xreplace({**was, TIME: Float(t)}) != made.xreplace({**becomes, TIME: Float(t)})
+        for made in compared
+    )
 
 
 def refuse_incomplete(stored: tuple[str, ...], initial: Mapping[str, float], t_start: float) -> None:
