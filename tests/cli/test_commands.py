@@ -390,6 +390,23 @@ def test_a_comparison_that_is_interrupted_has_told_what_was_done(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("out", [True, False])
+def test_a_comparison_is_written_as_a_table_and_a_picture(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *, out: bool
+) -> None:
+    trials = tuple(
+        sw.studies.Trial(f"Lumped(m={m})", "scipy", m, 0.1, 0.01, {"tau_a": 1 / m, "tau_b": 1 / m}) for m in (5, 10)
+    )
+    made = sw.studies.WorkPrecision("train", "line", trials, ("characteristics", 1e-12))
+    monkeypatch.setattr(sw.studies, "work_precision", lambda *_, **__: made)
+    folder = tmp_path / "out"
+    assert main(["compare", "shaft-step", *(["--out", str(folder)] if out else [])]) == DONE
+    assert made.advice in capsys.readouterr().out
+    names = {place.name for place in folder.iterdir()} if out else set()
+    assert names == ({"shaftwork.json", "work-precision.csv", "work-precision.png"} if out else set())
+    assert not out or "Lumped(m=10)" in (folder / "work-precision.csv").read_text("utf-8")
+
+
 def _ageing(tmp_path: Path) -> str:
     """A drive whose damping and torque follow tables: 0.1 t N m s until 30 s, 1 N m and half of it from 15 s on."""
     net = sw.Network("ageing")

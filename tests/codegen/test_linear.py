@@ -272,3 +272,16 @@ def test_a_travelling_wave_is_refused_with_the_model_that_can_be_linearised() ->
     )
     with pytest.raises(sw.SimulationError, match=r"Shaft 'line' is a travelling wave.*model=Spectral\(16\)"):
         net.compile().linearize()
+
+
+def test_values_that_change_no_structure_need_no_other_equations_beside_a_lossy_gear() -> None:
+    """Its balances have other factors than its loops, and neither degenerates."""
+    net = sw.Network("lossy")
+    net.add(sw.TorqueSource("m", tau=1.0), "a")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.LossyGear("g", ratio=3.0, efficiency=0.9), "a", "b")
+    net.add(sw.Spring("s", c=10.0), "b", "c")
+    net.add(sw.Inertia("J2", J=1.0), "c")
+    for model in (net.compile(), net.compile().phase("g driving forward")):
+        p = dict(zip(model.parameters, model.defaults.tolist(), strict=True)) | {"s.c": 20.0}
+        assert not model.arrays.assembly.degenerates(model.vector(p))

@@ -289,3 +289,13 @@ def test_auto_chooses_again_for_the_parameters_of_a_run() -> None:
 def test_a_bore_must_be_smaller_than_the_shaft() -> None:
     with pytest.raises(sw.ParameterError, match=r"inner_diameter = 0\.02 must be smaller than the diameter 0\.02"):
         sw.Shaft("line", **STEEL, inner_diameter=0.02)
+
+
+def test_a_shaft_is_a_chain_of_twenty_elements_unless_told_otherwise() -> None:
+    assert sw.Shaft("line", length=1.0, diameter=0.1).model == sw.Lumped() == sw.Lumped(20)
+
+
+def test_a_wave_has_two_places_at_least() -> None:
+    with pytest.raises(sw.ParameterError, match="places = 1 must be a whole number from 2"):
+        sw.Wave(places=1)
+    assert sw.Wave(places=2).places == 2

@@ -172,3 +172,11 @@ def test_a_count_may_be_an_integer_of_any_kind(three: int) -> None:
 @pytest.mark.parametrize("none", [True, np.bool_(1), 2.0, np.float64(3.0), "4", None, 0, 9])
 def test_what_is_no_count_or_out_of_its_range_is_none(none: object) -> None:
     assert whole(none, 1, 8) is None
+
+
+@pytest.mark.parametrize(("length", "whole_shown"), [(80, True), (81, False)])
+def test_a_wrong_value_is_shown_up_to_a_line(length: int, *, whole_shown: bool) -> None:
+    wrong = "x" * (length - 2)  # with its quotes
+    with pytest.raises(sw.ParameterError) as refused:
+        sw.Port("p", wrong)  # type: ignore[arg-type]
+    assert (repr(wrong) in str(refused.value)) == whole_shown

@@ -441,3 +441,10 @@ def test_what_cannot_be_assembled_or_named_is_refused() -> None:
         sw.Network("empty").lagrangian()
     with pytest.raises(sw.ParameterError, match="There is no phase 'load gone'"):
         sw.scenes.crane_start().lagrangian(phase="load gone")
+
+
+def test_loops_and_laws_are_compared_as_they_stand() -> None:
+    proof = of(next(iter(MECHANICAL))).proof()
+    compared = [row for row in proof.rows if row.kind != "motion"]
+    assert compared
+    assert all(row.factors == (1,) for row in compared)

@@ -18,6 +18,7 @@ import pytest
 
 import shaftwork as sw
 from shaftwork.cli import DONE, INTERRUPTED, WRONG_INPUT, main
+from shaftwork.core.files import replaced
 from tests.faults.killed import VARIANTS
 
 ROOT = Path(__file__).parents[2]
@@ -229,3 +230,18 @@ def test_a_run_that_ends_while_it_puts_its_files_in_place_is_followed_by_a_whole
     assert main(["run", str(tmp_path / "swing.toml"), *RUN, str(out)]) == DONE
     shown = {path.name for path in out.iterdir() if not path.name.startswith(".")}
     assert shown == {"signals.csv", "signals.png", "shaftwork.json"}
+
+
+def test_an_error_while_a_file_is_written_names_the_users_path(tmp_path: Path) -> None:
+    """Not that of the draft that takes its place in the end."""
+    path = tmp_path / "table.csv"
+
+    def write() -> None:
+        with replaced(path) as file:
+            file.write("half")
+            Path(file.name).unlink()  # as a full disk or a colleague might
+
+    with pytest.raises(FileNotFoundError) as failed:
+        write()
+    assert failed.value.filename == str(path)
+    assert list(tmp_path.iterdir()) == []

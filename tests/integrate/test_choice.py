@@ -12,6 +12,7 @@ from scipy import sparse
 
 from shaftwork.integrate import choice
 from shaftwork.integrate.engines import ENGINES
+from shaftwork.integrate.stiffness import norm
 
 
 def test_a_linear_problem_is_solved_exactly(oscillator):
@@ -116,3 +117,9 @@ def test_what_is_stiff_is_told_by_the_time_that_passes_not_by_the_clock(oscillat
     )  # fmt: skip
     late = replace(slow, t0=1e6, t_end=1e6 + slow.t_end, t_eval=None)
     assert choice.choose(late)[0] == choice.choose(slow)[0] == "scipy"
+
+
+def test_the_bound_of_the_eigenvalues_of_a_slow_system_is_as_slow() -> None:
+    matrix = sparse.csc_array(np.array([[0.0, 2e-6], [-1e-6, 3e-6]]))
+    assert norm(matrix) == pytest.approx(5e-6, rel=1e-12)
+    assert norm(sparse.csc_array((3, 3))) == 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
 
 import mpmath
 import numpy as np
@@ -11,6 +12,7 @@ from scipy import sparse
 
 import shaftwork as sw
 from shaftwork.integrate import exact, linear_system
+from shaftwork.integrate.fixed_point import FixedPoint
 from shaftwork.integrate.modal import find_modes
 from shaftwork.integrate.problem import LinearInputs, Problem
 
@@ -201,3 +203,9 @@ def test_what_is_not_lossless_keeps_its_own_decay(spoilt):
     assert modes is not None
     expected = np.linalg.eigvals(matrix)
     assert np.abs(modes.values.real).max() == pytest.approx(np.abs(expected.real).max(), abs=1e-14)
+
+
+def test_what_nothing_drives_stays_in_whole_numbers() -> None:
+    """A matrix of zeros has no rate that would say how long a unit of time is."""
+    kept = FixedPoint(np.array([[Fraction(0), Fraction(0)], [Fraction(0), Fraction(0)]], dtype=object), 3.0)
+    assert kept.squares == 2  # of units of 2 s

@@ -446,3 +446,22 @@ def test_no_pulse_that_switches_a_brake_on_is_missed(on: sympy.Expr, first: floa
     sol = net.simulate(4.0, engine=engine)
     assert sol.events[0][0] == pytest.approx(first, abs=1e-8)  # of a flank of 1e-4 s a tolerance of 1e-8 is as much
     assert sol["J.omega"][-1] == 0.0
+
+
+GOVERNED = {
+    "pieces": sympy.Piecewise((5, sw.omega < 3), (1, True)),
+    "sign": 3 - 2 * sympy.sign(sw.omega - 3),
+    "step": 5 - 4 * sympy.Heaviside(sw.omega - 3),
+}
+
+
+@pytest.mark.parametrize("name", GOVERNED)
+def test_a_jump_at_any_speed_onto_which_the_laws_drive_back_is_refused_at_once(name: str) -> None:
+    """1 rad/s^2 per N m: the speed is 5 (1 - e^-t) up to 3, at ln 2.5 s, from where neither side lets it go."""
+    net = sw.Network("governed")
+    net.add(sw.TorqueSource("motor", tau=GOVERNED[name]), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.ViscousLoad("load", d=1.0), "a")
+    with pytest.raises(sw.SimulationError, match=r"sticks where the condition .*smooth transition") as failed:
+        net.simulate(3.0)
+    assert f"t = {math.log(2.5):.9g}" in str(failed.value)

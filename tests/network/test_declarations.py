@@ -11,7 +11,9 @@ import pytest
 import sympy
 
 import shaftwork as sw
+from shaftwork.components import REGISTRY
 from shaftwork.components.base import Derived, Profile
+from shaftwork.components.branches import across_of
 from shaftwork.components.modes import NEVER
 
 ODD: tuple[Any, ...] = (
@@ -173,3 +175,31 @@ def test_a_parameter_that_no_part_can_have_is_named_with_its_class(name: str, de
     with pytest.raises(sw.ParameterError) as refused:
         sw.component(type("Odd", (sw.Component,), body))
     assert f"Odd: {words}" in str(refused.value)
+
+
+def test_a_prescribed_speed_that_reads_its_own_speed_and_angle_is_told_what_it_may_read() -> None:
+    net = sw.Network("led")
+    net.add(sw.SpeedSource("lead", omega=3.0 + sw.omega + sw.phi), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    (problem,) = net.check()
+    assert "reads omega, phi, but may depend on time t alone" in problem.message
+
+
+def test_a_law_that_reads_a_port_that_is_not_there_is_told_so() -> None:
+    @sw.component
+    class Astray(sw.Component):
+        """Law: tau = omega of a port that it lacks."""
+
+        role = "source"
+        ports = (sw.Port("a"),)
+
+        def branches(self, p: Any) -> Iterator[Any]:  # noqa: ARG002
+            yield sw.ThroughLaw(across_of("elsewhere"), ("a", None))
+
+    try:
+        net = sw.Network("astray")
+        net.add(Astray("part"), "a")
+        net.add(sw.Inertia("J", J=1.0), "a")
+        assert "a law reads across_of('elsewhere'), but the part has no such port" in str(net.check()[0])
+    finally:
+        del REGISTRY["Astray"]

@@ -74,3 +74,16 @@ def test_instants_without_a_solution_are_nan_and_the_next_goes_on_from_the_last_
     known = torque[[0, 1, 4, 5]]
     # the smaller root of torque (1 + omega^2) = 2 omega
     assert speed[[0, 1, 4, 5]] == pytest.approx((1 - np.sqrt(1 - known**2)) / known, rel=1e-12)
+
+
+def test_what_bends_a_law_in_a_loop_is_read_at_the_solved_speed() -> None:
+    net = sw.Network("fan that opens")
+    net.add(sw.Inertia("J", J=2.0), "disc")
+    net.add(sw.Spring("shaft", c=500.0), "disc", "fan")
+    net.add(sw.TorqueSource("fan", tau=-3 * sw.omega - 5 * sympy.Max(sw.omega - 1, 0)), "fan")
+    model = net.compile(algebraic_loops="solve")
+    torques = np.array([1.5, 3.0, 11.0])
+    found = model.bind(model.defaults).switches(np.zeros(3), np.column_stack([np.zeros(3), torques]))
+    speeds = np.array([0.5, 1.0, 2.0])  # 3 omega = 1.5 and 3, 8 omega - 5 = 11
+    assert found.shape == (3, 1)
+    np.testing.assert_allclose(np.abs(found[:, 0]), np.abs(speeds - 1.0), atol=1e-9)

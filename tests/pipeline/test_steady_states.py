@@ -238,9 +238,7 @@ def test_a_load_with_a_broken_power_of_the_speed_has_a_steady_state_from_rest(
 def test_a_brake_that_rises_is_not_read_before_it_comes_on() -> None:
     net = drive(sympy.Integer(5))
     net.add(sw.Brake("stop", tau=10.0, t_on=3.0, t_rise=0.2), "a")
-    said = (
-        r"before: 'stop' changes its mode at t = 3 s. Name the time that is meant, \S+2\) or steady_state\(t=1.5\)"
-    )
+    said = r"before: 'stop' changes its mode at t = 3 s. Name the time that is meant, \S+2\) or steady_state\(t=1.5\)"
     with pytest.warns(sw.NetworkWarning, match=said):
         net.compile().steady_state()
 

@@ -235,3 +235,15 @@ def test_an_end_that_is_no_time_is_refused(t_end: object) -> None:
     small = sw.reduce.simplify(chain([1.0, 2.0], [1e3]), 2, "c0")
     with pytest.raises(sw.ParameterError, match="t_end"):
         small.compare(t_end)  # type: ignore[arg-type]
+
+
+def test_without_a_motor_the_step_of_torque_is_at_the_first_inertia() -> None:
+    """Its groupings are those of the same train with a motor there."""
+    inertias, stiffnesses = [1.0, 3.0, 0.5, 2.0, 4.0], [100.0, 300.0, 200.0, 50.0]
+    driven = chain(inertias, stiffnesses)
+    alone = chain(inertias, stiffnesses)
+    alone.remove("motor")
+    found = [sw.reduce.simplify(net, 3, keep="c1") for net in (driven, alone)]
+    errors = [[grouping.torque_error for grouping in made.groupings] for made in found]
+    np.testing.assert_allclose(errors[1], errors[0], rtol=1e-12)
+    assert len(set(errors[0])) > 1

@@ -9,6 +9,8 @@ import pytest
 
 import shaftwork as sw
 from shaftwork.components.base import REGISTRY
+from shaftwork.reduction.form import state_form
+from shaftwork.reduction.view import View
 
 with patch.dict(REGISTRY):  # the documentation and other tests list the parts of the package alone
 
@@ -81,3 +83,14 @@ def test_what_a_prescribed_speed_takes_is_told_from_the_store_beside_it() -> Non
     assert len(flows) == 2
     assert r"\frac{d \tau_{c,\mathrm{servo}}}{d t} &= c_{\mathrm{servo}}" in net.equations().latex()
     assert net.equations().document()
+
+
+def test_messages_name_the_nodes_of_the_user_and_those_inside_parts_only_where_there_are_no_others() -> None:
+    net = sw.Network("line")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.Shaft("shaft", length=1.0, diameter=0.1, model=sw.Lumped(3)), "a", "b")
+    graph = net.compile().form.graph
+    inner = [number for number, name in enumerate(graph.nodes) if "." in name]
+    view = View(state_form(graph))
+    assert view.nodes([graph.nodes.index("a"), *inner]) == ("a",)
+    assert view.nodes(inner) == tuple(graph.nodes[number] for number in inner)

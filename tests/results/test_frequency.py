@@ -255,3 +255,12 @@ def test_the_bode_plot_has_a_magnitude_and_a_phase() -> None:
     assert np.isfinite(magnitude.lines[0].get_ydata()).all()
     assert np.isfinite(phase.lines[0].get_ydata()).all()
     assert magnitude.lines[1].get_xdata()[0] == resonance  # marked, for it has no height
+
+
+def test_the_largest_finite_value_of_a_response_is_named_beside_a_resonance_however_small_it_is() -> None:
+    net = _two_masses(d=0.0)
+    f = net.modes().frequencies[1]
+    response = net.frequency_response("motor.tau", "J1.omega", [f, 1e5, 1e6])
+    assert response.infinite == (f,)
+    assert 0 < response.magnitude[1] < 0.01
+    assert f"largest {response.magnitude[1]:.6g} at 100000 Hz; infinite at" in str(response)

@@ -305,3 +305,20 @@ def test_at_rest_laws_are_read_at_the_start_and_parts_are_in_the_mode_they_have_
         moving.title == "crane at J1.omega = 8, J2.omega = 8, laws at t = 0 s (brake released, load slipping forward)"
     )
     assert net.modes(t=8.0).title == "crane at rest, laws at t = 8 s (brake locked, load stuck)"
+
+
+def test_a_shape_is_scaled_by_the_unit_with_the_most_kinetic_energy() -> None:
+    """A drum against four masses: it has 0.77 of their energy, and more than any of them alone."""
+    net = sw.Network("drum")
+    net.add(sw.Inertia("drum", J=1.3 * 4.0 * 0.5**2), "shaft")
+    net.add(sw.Drum("winding", radius=0.5), "shaft", "rope end")
+    net.add(sw.TranslationalSpring("rope", c=100.0), "rope end", "m1")
+    for k in range(1, 5):
+        net.add(sw.Mass(f"mass {k}", m=1.0), f"m{k}")
+        if k > 1:
+            net.add(sw.TranslationalSpring(f"link {k}", c=1e7), f"m{k - 1}", f"m{k}")
+    modes = net.modes()
+    swing = int(np.flatnonzero(modes.frequencies > 0)[0])
+    masses = [abs(modes.shapes[f"mass {k}.v"][swing]) for k in range(1, 5)]
+    assert max(masses) == pytest.approx(1.0, rel=1e-12)
+    assert abs(modes.shapes["drum.omega"][swing]) * 0.5 == pytest.approx(1 / 1.3, rel=1e-3)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import pickle
+import sys
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+import sympy
 
 import shaftwork as sw
 from shaftwork.results.measures import Measure
@@ -433,3 +435,36 @@ def test_what_none_passes_is_a_table_of_no_rows() -> None:
     for count in (0, "a", 1.5):
         with pytest.raises(sw.ParameterError, match="must be a number, 1 or more"):
             made.best("max shaft.tau", count)  # type: ignore[arg-type]
+
+
+def test_a_sweep_of_variants_that_all_fail_says_why_they_ran_one_by_one() -> None:
+    net = sw.Network("falling")
+    net.add(sw.TorqueSource("m", tau=sympy.Piecewise((5, sw.omega < 3), (1, True))), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.Damper("d", d=1.0), "a")
+    made = sweep(net, {"J.J": np.linspace(1.0, 2.0, 40)}, t_end=3.0, measures=["max J.omega"], processes=1)
+    assert made.failed.all()
+    assert made.why
+
+
+def test_a_picture_of_a_sweep_names_the_extra_that_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
+    net = sw.Network("one")
+    net.add(sw.TorqueSource("m", tau=1.0), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    made = sweep(net, {"J.J": [1.0, 2.0]}, t_end=1.0, measures=["max J.omega"], processes=1)
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    with pytest.raises(sw.MissingExtraError, match=r"Sweep\.plot\(\) needs matplotlib"):
+        made.plot()
+
+
+def test_a_result_is_never_minus_zero() -> None:
+    net = sw.Network("reversed")
+    net.add(sw.TorqueSource("m", tau=0.0), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.Gear("g", ratio=-2.0), "a", "b")
+    net.add(sw.Spring("s", c=1.0), "b", "c")
+    net.add(sw.Inertia("K", J=1.0), "c")
+    names = ["end b.omega", "max b.omega", "min b.omega", "mean b.omega"]
+    made = sweep(net, {"J.J": np.linspace(1.0, 2.0, 40)}, t_end=1.0, measures=names, processes=1)
+    for name in names:
+        assert not np.signbit(made.measures[name]).any()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import sympy
 
 import shaftwork as sw
 from shaftwork.studies.truth import QUANTITIES, truth, with_model
-from shaftwork.studies.work_precision import Trial, WorkPrecision, work_precision
+from shaftwork.studies.work_precision import Trial, WorkPrecision, _timed, work_precision
 
 SMALL = (sw.OneSpring(), sw.Lumped(10), sw.Lumped(20), sw.CentralDifference(10), sw.Spectral(8), sw.Wave(3))
 
@@ -152,3 +153,10 @@ def test_the_table_has_a_line_for_each_trial_and_a_reason_behind_one_that_failed
         "OneSpring()     scipy   3       100        10.00   1.0e-03  0",
         "Wave(places=5)  scipy   -       -          -       -        -  knows no waves",
     ]
+
+
+def test_a_model_that_takes_too_long_is_given_up_and_says_when(monkeypatch: pytest.MonkeyPatch) -> None:
+    net = sw.scenes.shaft_step()
+    monkeypatch.setattr(sys.modules["shaftwork.studies.work_precision"], "LONGEST", -1.0)
+    with pytest.raises(sw.SimulationError, match=r"given up after -1 s at t = .* of 0\.01 s"):
+        _timed(net.compile(), "line", "scipy", 0.01, np.array([0.01]))

@@ -103,6 +103,8 @@ def solve(
     try:
         return _guarded(problem, load(name)(problem), name), name, why or reason
     except SeriesError as error:
+        if isinstance(error, StickingError) and error.held:
+            raise
         failed = error
         *tried, (last, _) = without_series(problem.max_steps)
     for other, steps in tried:

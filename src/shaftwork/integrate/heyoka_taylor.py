@@ -255,7 +255,7 @@ class _Run:
         time, state = self._last_good(piece, watch)
         made = failure(self.problem, "heyoka", time, state, self._reason(outcome, watch))
         if watch is not None and watch.reason is not None:
-            return StickingError(str(made), watch.reason.partition(", because")[0])
+            return StickingError(str(made), watch.reason.partition(", because")[0], held=watch.held)
         found = f"after t = {time:.9g} s a law, or one of its derivatives, is not finite, as a root's at zero"
         return SeriesError(str(made), found) if outcome == "err_nf_state" else made
 

@@ -135,7 +135,16 @@ class SeriesError(SimulationError):
 
 
 class StickingError(SeriesError):
-    """A motion sticks where laws on both sides drive it back, or only touches the place: another engine can tell."""
+    """A motion sticks where laws on both sides drive it back, or only touches the place: another engine can tell.
+
+    Args:
+        message, found: as for `SeriesError`.
+        held: whether both sides drive it back there, so that no engine goes on.
+    """
+
+    def __init__(self, message: str, found: str, *, held: bool) -> None:
+        super().__init__(message, found)
+        self.held = held
 
 
 class React(Protocol):

@@ -13,6 +13,8 @@ from shaftwork.integrate.problem import Array
 CHATTER_STEPS, CHATTER_SPAN = 200, 1e-9
 # A switch that is on the wrong side by more than this part of its largest value has missed its event.
 WRONG_SIDE = 1e-9
+# What comes back on one side more slowly than at this part of the speed on the other may be a touch.
+BACK = 1e-3
 # How far rounding may have moved time and states, as a part of them.
 ROUNDINGS = 256 * float(np.finfo(float).eps)
 # Where in a trial step a switch that starts at zero is looked at: as early as it is not lost in rounding.
@@ -147,6 +149,8 @@ class Watch:
         self._turns = self._moving & ~np.isin(np.arange(size.size), counting)
         self._cooled = np.full(size.size, -np.inf)
         self.reason: str | None = None
+        self.held = False
+        """Whether what has stopped the run would stop any."""
         self.leaves = False
         """Whether a switch that rested at zero has stopped the run."""
 
@@ -205,6 +209,7 @@ class Watch:
         elif self._short_steps > CHATTER_STEPS:
             stuck = np.argmin(np.where(self._moving, np.abs(values), np.inf))
         if stuck is not None:
+            self.held = self._is_held(integrator, int(stuck))
             condition = self._program.conditions[int(stuck)]
             self.reason = (
                 f"from t = {before:.9g} s on the motion sticks where the condition {condition} changes, because "
@@ -223,6 +228,21 @@ class Watch:
             self._program.slopes(integrator.time, integrator.state, each) for each in (integrator.pars, other)
         )
         return not np.allclose(here, there, rtol=WRONG_SIDE, atol=0.0)
+
+    def _is_held(self, integrator: Any, number: int) -> bool:
+        """Whether the motion on either side of a switch comes back to it: neither as a touch, nor along it."""
+        time, state, program = integrator.time, integrator.state, self._program
+        ways = []
+        for side in (1.0, -1.0):
+            pars = integrator.pars.copy()
+            pars[self._signs.start + number] = side
+            later = state + self._short * program.slopes(time, state, pars)
+            values = (
+                program.switch_values(t, x, pars)[number] for t, x in ((time, state), (time + self._short, later))
+            )
+            here, there = values
+            ways.append(side * (there - here))
+        return bool(max(ways) < -BACK * max(map(abs, ways)) < 0.0)
 
     def _ended_at_a_switch(self, integrator: Any) -> bool:
         """Whether the last step ended where a switch passed through zero."""

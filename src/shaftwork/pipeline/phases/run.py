@@ -266,6 +266,8 @@ class Run:
                 sticks = error if isinstance(error, StickingError) else sticks
                 if engine == "heyoka" and not stiff and not isinstance(error, SeriesError):
                     raise
+                if isinstance(error, StickingError) and error.held:
+                    raise
             del self.changes[noted:]
             self._soon = [*soon]
             passing = Passing(self.settling, moment, t, self.note)
