@@ -9,6 +9,7 @@ import pytest
 import sympy
 
 import shaftwork as sw
+from shaftwork.pipeline.start import steady_start
 
 WHEEL = sw.Table([0.0, 2.0, 20.0, 30.0, 40.0], [0.0, 0.8e6, 0.8e6, 0.7e6, 0.7e6])
 
@@ -276,7 +277,7 @@ def test_a_start_in_the_steady_state_takes_other_values_by_any_name(others: dict
     net.add(sw.ForceSource("weight", f=-981.0), "load")
     model = net.compile()
     steady = model.simulate(0.01, initial=model.steady_state(t=0.0))
-    sol = model.simulate(0.01, initial=model.steady_start(others))
+    sol = model.simulate(0.01, initial=steady_start(model, others))
     for name, value in others.items():
         assert sol[name][0] == pytest.approx(value, abs=1e-9)
     groups = ({"rotor.omega", "drum.omega", "tip.v"}, {"load.v"}, {"rope.f", "rope.f_c"})

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy
 
 import shaftwork as sw
 from shaftwork.scenes import SCENES
@@ -207,3 +208,23 @@ def test_a_part_is_read_with_the_values_of_its_motion_and_one_that_is_none_is_na
     assert sol.observer.part("J1").J == 3.0
     with pytest.raises(sw.SignalError, match=r"There is no part 'J9' in 'one'\. There are: J1, motor"):
         sol.observer.part("J9")
+
+
+@pytest.mark.parametrize(
+    ("speed", "first"),
+    [
+        (sympy.sqrt(sw.t**3), 0.0),
+        (sympy.sqrt(sw.t**3) + sw.t, 2.0),
+        (sw.t ** sympy.Rational(5, 4), 0.0),
+        (sympy.sqrt(sw.t**3) - 3 * sw.t, -6.0),
+    ],
+    ids=str,
+)
+def test_a_quantity_that_is_0_over_0_at_the_start_is_what_it_goes_to(speed: sympy.Expr, first: float) -> None:
+    """The torque of 2 kg m^2 is twice the slope of the speed, and sqrt(t^3) has 3 t^2 / (2 sqrt(t^3))."""
+    net = sw.Network("led")
+    net.add(sw.SpeedSource("lead", omega=speed), "a")
+    net.add(sw.Inertia("J", J=2.0), "a")
+    sol = net.simulate(1.0)
+    assert sol["lead.tau"][0] == pytest.approx(first, rel=1e-7, abs=1e-12)
+    assert sol.min("lead.tau") == pytest.approx(first, rel=1e-7, abs=1e-12)

@@ -51,8 +51,10 @@ def start_of(options: Namespace, model: Model) -> dict[str, float] | None:
         ParameterError: a start value is none.
         SimulationError: there is no steady state.
     """
+    from shaftwork.pipeline.start import steady_start
+
     given = point(options.initial, option="--initial")
-    return model.steady_start(given) if options.steady else given or None
+    return steady_start(model, given) if options.steady else given or None
 
 
 def point_of(options: Namespace, net: Network) -> dict[str, float] | None:

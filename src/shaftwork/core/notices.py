@@ -9,9 +9,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
+from shaftwork.core.errors import AccuracyWarning
+
 PACKAGE = __name__.partition(".")[0]
 FILTERS = threading.RLock()
 """To be held around `warnings.catch_warnings`, whose filters are of all threads: if two overlap, one stays for good."""
+
+
+class PulsationWarning(AccuracyWarning):
+    """What pulsates with the angle of a shaft that turns is linearised at one angle."""
+
 
 _muted: ContextVar[tuple[type[Warning], ...]] = ContextVar("muted", default=())
 _said: ContextVar[set[str] | None] = ContextVar("said", default=None)

@@ -220,6 +220,12 @@ def _numbers(part: Component) -> tuple[str, ...]:
     return tuple(key for key, given in part.declared.items() if isinstance(given.magnitude(part.values[key])[0], float))
 
 
+def changes_structure(form: StateForm, values: Mapping[str, float]) -> bool:
+    """Whether other equations hold for new values: one becomes zero or ceases to, decides a ratio, or is of `Auto`."""
+    decisive = frozenset((*form.graph.zeros, *form.tree.frozen)) if values else frozenset()
+    return any(name in decisive or value == 0 for name, value in values.items()) or branches_anew(form.graph, values)
+
+
 def branches_anew(graph: CircuitGraph, values: Mapping[str, float]) -> bool:
     """Whether a part may have other branches for new values in SI: `Auto` chooses another mesh for a shaft, say.
 

@@ -64,7 +64,7 @@ def small_motions(model: Model, compiled: Compile, *, every: bool) -> SmallMotio
         return ExactPhases(model, compiled, shafts).near
     if shafts:
         return ExactNetwork(model, compiled, shafts).near
-    return lambda at, t, inputs: model.linearize(at, inputs=inputs, t=t)
+    return model.near
 
 
 def exact_shafts(netlist: Netlist, *, every: bool) -> dict[str, Shaft]:

@@ -15,12 +15,13 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.operating import steady_state
-from shaftwork.codegen.start_values import initial_state, with_others
+from shaftwork.codegen.start_values import initial_state
 from shaftwork.codegen.switching import Switching
 from shaftwork.codegen.valueless import rough, without_value
 from shaftwork.core.callbacks import Told
 from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.core.kept import Kept
+from shaftwork.core.notices import PulsationWarning, muted
 from shaftwork.core.parameters import in_si
 from shaftwork.integrate import choice
 from shaftwork.integrate.engines import available
@@ -30,7 +31,7 @@ from shaftwork.pipeline.accuracy import with_accuracy
 from shaftwork.pipeline.arguments import (
     Demand,
     OutputTimes,
-    branches_anew,
+    changes_structure,
     checked_parameters,
     output_times,
     refuse_unrecorded,
@@ -210,24 +211,11 @@ class Model(CompiledModel):
             warn_of_earlier_levels(prepared.bound, x, when, self.switching)
         return SteadyState(dict(zip(self.states, x.tolist(), strict=True)), when)
 
-    def steady_start(self, others: Given = None, *, parameters: Given = None) -> dict[str, float]:
-        """Start values: the steady state with the laws at t = 0 s, in which some stores have other values.
-
-        Args:
-            others: start values by name, as for `simulate`; what is stored elsewhere is that of the steady state.
-            parameters: values that differ from the network's.
-
-        Raises:
-            SimulationError: nothing comes to rest or to a steady speed.
-        """
-        values = self._checked_all(parameters)
+    def start_equations(self, values: Mapping[str, float]) -> BoundArrays:
+        """The equations of which start values tell the states."""
         if self._changes_structure(values):
-            return self._variant(values).steady_start(others)
-        return with_others(self._bound_at(values), self._steady(values, 0.0, None), others or {}, 0.0)
-
-    def _bound_at(self, values: Mapping[str, float]) -> BoundArrays:
-        """The equations at the start."""
-        return self.twin.bind(self.vector(values)) if self.form.waves else self.bind(self.vector(values))
+            return self._variant(values).start_equations({})
+        return (self.twin if self.form.waves else self).bind(self.vector(values))
 
     def linearize(
         self, at: Point = None, *, inputs: Names = None, outputs: Names = None, t: Time = None, parameters: Given = None
@@ -249,12 +237,14 @@ class Model(CompiledModel):
         values = self._checked_all(parameters)
         if self._changes_structure(values):
             return self._variant(values).linearize(at, inputs=inputs, outputs=outputs, t=t)
-        return self._near(values, at, t, inputs, outputs)
+        with muted(PulsationWarning):  # matrices are those of a moment
+            return self.near(at, t, inputs, outputs, values)
 
-    def _near(self, values: Mapping[str, float], at: Point, t: Time, inputs: Names, outputs: Names) -> LinearModel:
+    def near(self, at: Point, t: Time, inputs: Names, outputs: Names = None, values: Given = None) -> LinearModel:
+        """The same for values of parameters that have been looked at and change no structure."""
         from shaftwork.pipeline.analysis import linearized
 
-        p = self.vector(values)
+        p = self.vector(values or {})
         return linearized(self, p, at, t, self.settled(p), inputs, outputs)
 
     def settled(self, p: Array) -> float:
@@ -394,14 +384,9 @@ class Model(CompiledModel):
         return LinearInputs(matrix, lambda t: bound.rhs(t, np.zeros((n, *np.shape(t)))), fractions, straight)
 
     def _changes_structure(self, values: Mapping[str, float]) -> bool:
-        """Whether other equations hold for new values: a value becomes zero or ceases to, ratios meet, `Auto`."""
-        if not values:
-            return False
-        graph = self.form.graph
-        decisive = frozenset((*graph.zeros, *self.form.tree.frozen))
-        if any(name in decisive or value == 0 for name, value in values.items()) or branches_anew(graph, values):
-            return True
-        return self.arrays.assembly.degenerates(self.vector(values))
+        """Whether other equations hold for new values."""
+        own = changes_structure(self.form, values)
+        return own or (bool(values) and self.arrays.assembly.degenerates(self.vector(values)))
 
     def _checked_all(self, parameters: Mapping[str, float] | None) -> dict[str, float]:
         if parameters is None:

@@ -16,9 +16,9 @@ from shaftwork.codegen.wound_shafts import inner_nodes, node_of, speed_at
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.slopes import jumps, slope
 from shaftwork.core.domains import ELECTRICAL
-from shaftwork.core.errors import AccuracyWarning, NetworkWarning
+from shaftwork.core.errors import NetworkWarning
 from shaftwork.core.hints import hint
-from shaftwork.core.notices import warn
+from shaftwork.core.notices import PulsationWarning, warn
 from shaftwork.network.controlled import Reading, readings_of
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.templates import Kind
@@ -119,7 +119,7 @@ def warn_of_turning_angles(bound: BoundArrays, t: float, x: Array) -> None:
                 "elsewhere in a turn, frequencies and damping are others. Of a torque that pulsates linearise the mean "
                 "over a turn: leave the pulsation out of the law, and take it as an excitation, by the orders of a "
                 "diagram or the frequencies of a response.",
-                AccuracyWarning,
+                PulsationWarning,
             )
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.start_values import initial_state
+from shaftwork.codegen.start_values import initial_state, with_others
 from shaftwork.codegen.stores import Stores
 from shaftwork.core.errors import NetworkWarning
 from shaftwork.core.notices import warn
@@ -33,6 +33,24 @@ def warn_of_rest(graph: CircuitGraph, initial: Mapping[str, float]) -> None:
     for found in resting_trains(graph):
         if moved.isdisjoint((*found.parts, *found.nodes)):
             warn(f"'{graph.name}' has a train that stays at rest: {found}", NetworkWarning)
+
+
+def steady_start(
+    model: Model, others: Mapping[str, float], parameters: Mapping[str, float] | None = None
+) -> dict[str, float]:
+    """Start values: the steady state with the laws at t = 0 s, in which some stores have other values.
+
+    Args:
+        model: the compiled network.
+        others: start values by name; what is stored elsewhere is that of the steady state.
+        parameters: values that differ from the network's.
+
+    Raises:
+        ParameterError: a start value is none.
+        SimulationError: nothing comes to rest or to a steady speed.
+    """
+    steady = model.steady_state(t=0.0, parameters=parameters)
+    return with_others(model.start_equations(parameters or {}), steady, others, 0.0) if others else dict(steady)
 
 
 def start_of(

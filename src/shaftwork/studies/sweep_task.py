@@ -26,6 +26,7 @@ from shaftwork.integrate.engines import available
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.ending import Ending
 from shaftwork.pipeline.network import Network
+from shaftwork.pipeline.start import steady_start
 from shaftwork.results.fatigue import SNLine
 from shaftwork.results.measures import Measure
 from shaftwork.results.observer import Array
@@ -197,7 +198,7 @@ class Worker:
         parameters, options = task.values(variant), dict(task.options)
         try:
             if task.steady:
-                options["initial"] = self._model.steady_start(options["initial"], parameters=parameters)
+                options["initial"] = steady_start(self._model, options["initial"] or {}, parameters)
             solution = self._model.simulate(task.t_end, parameters=parameters, **options)
         except ShaftworkError as error:
             return nothing, _first_line(error)

@@ -212,8 +212,9 @@ class PhasedModel(Model):
             time, x = operating_point(first.model, p, at, t, usual)
         return time, settling.settle(time, time, settling.started(time, x), None)[0]
 
-    def _near(self, values: Mapping[str, float], at: Point, t: Time, inputs: Names, outputs: Names) -> LinearModel:
-        time, moment = self.point(values, at, t)
+    def near(self, at: Point, t: Time, inputs: Names, outputs: Names = None, values: Given = None) -> LinearModel:
+        """The network near a point, in the phase that goes on there."""
+        time, moment = self.point(values or {}, at, t)
         model = moment.regime.assembly.model
         slopes = Linearization(model, moment.regime.p, moment.x, time, input_names(model, inputs))
         named = None if outputs is None else (outputs,) if isinstance(outputs, str) else tuple(outputs)
@@ -226,7 +227,8 @@ class PhasedModel(Model):
         pairs = zip(self.phases.elements, moment.regime.modes, strict=True)
         return ", ".join(f"{element.name} {element.modes[name].words}" for element, name in pairs)
 
-    def _bound_at(self, values: Mapping[str, float]) -> BoundArrays:
+    def start_equations(self, values: Mapping[str, float]) -> BoundArrays:
+        """The equations of the first phase, of which start values tell the states."""
         first = self.phases.assembly(self.phases.first)
         return first.bound(first.vector(values, {}))
 
