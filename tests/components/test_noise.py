@@ -128,3 +128,24 @@ def test_noise_prints_as_a_letter_with_its_seed() -> None:
     assert sympy.latex(sw.HeldNoise(sw.t, 3)) == r"\nu_{3}\left(\left\lfloor{t}\right\rfloor\right)"
     assert sympy.latex(sw.SmoothNoise(sw.t, 3) ** 2) == r"\left(\tilde\nu_{3}\left(t\right)\right)^{2}"
     assert sympy.latex(sw.SmoothNoise(sw.t, 3).diff(sw.t)) == r"\tilde\nu^{(1)}_{3}\left(t\right)"
+
+
+@pytest.mark.parametrize(
+    "made", [sw.HeldNoise(sw.t, sw.omega), sw.SmoothNoise(3.0, sw.t), sw.SmoothNoise(sw.phi, sw.phi)]
+)
+def test_a_seed_that_changes_during_the_motion_is_refused(made: sympy.Expr) -> None:
+    net = sw.Network("noisy")
+    net.add(sw.TorqueSource("m", tau=1.0 + made), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    (problem,) = net.check()
+    assert "has a noise whose seed" in str(problem)
+    assert "changes during the motion" in str(problem)
+
+
+def test_a_noise_that_has_no_value_ends_the_run_with_a_named_error() -> None:
+    net = sw.Network("noisy")
+    net.add(sw.TorqueSource("m", tau=sw.HeldNoise(sympy.log(sw.omega - 1.0), 1.0)), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    for engine in ("auto", "scipy"):
+        with pytest.raises(sw.SimulationError, match="has no real value"):
+            net.simulate(0.01, engine=engine)

@@ -289,7 +289,10 @@ def _slopes(node: Any) -> tuple[float, ...]:
 
 SIDED = (sympy.sign, sympy.Abs, sympy.Heaviside, sympy.Max, sympy.Min, sympy.Piecewise, Interpolation)
 """Functions that have a switch for each side."""
-HELD: dict[Any, Callable[..., float]] = {sympy.floor: lambda x: float(math.floor(x)), HeldNoise: noise.held}
+HELD: dict[Any, Callable[..., float]] = {
+    sympy.floor: lambda x: math.floor(x) if math.isfinite(x) else x,
+    HeldNoise: noise.held,
+}
 """Functions that are constant between switches."""
 
 SHAPES: dict[Any, Callable[[Translator, Any], Any]] = {

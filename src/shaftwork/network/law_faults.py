@@ -13,6 +13,7 @@ from sympy.logic.boolalg import BooleanAtom, BooleanFunction
 from shaftwork.components.base import Component
 from shaftwork.components.branches import ACROSS, HISTORY, INTEGRAL
 from shaftwork.components.laws import SYMBOLS, t
+from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.components.tables import Interpolation, InterpolationSlope, Table
 from shaftwork.network.controlled import check_readings
 from shaftwork.network.declared import check_declared
@@ -32,6 +33,10 @@ _EVALUATED = (
     *(Table, Interpolation, InterpolationSlope, Relational, BooleanFunction, BooleanAtom),
 )
 """The nodes of expressions that every engine can evaluate."""
+
+
+_MOVING = frozenset((t, ACROSS, INTEGRAL, *SYMBOLS))
+"""What changes during a motion."""
 
 
 class Fault(NamedTuple):
@@ -105,6 +110,9 @@ def _unreadable(name: str, law: sympy.Expr) -> Fault | None:
         if not isinstance(node, _EVALUATED):
             hint = f"Take sums, products, powers and: {FUNCTION_NAMES}."
             return Fault(name, f"contains the unknown function {node.func.__name__}", hint)
+        if isinstance(node, HeldNoise | SmoothNoise) and not _MOVING.isdisjoint(node.args[1].free_symbols):
+            what = f"has a noise whose seed, {str(node.args[1])[:40]}, changes during the motion"
+            return Fault(name, what, "Give it a number: other numbers give independent noise.")
     return None
 
 
