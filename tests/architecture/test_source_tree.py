@@ -125,6 +125,7 @@ def test_code_run_from_data_is_recognised(line: str) -> None:
     assert any(map(runs_foreign_code, ast.walk(ast.parse(line))))
 
 
+@pytest.mark.slow
 def test_no_line_runs_code_from_data() -> None:
     """But for the one place where equations become functions, whose code holds names of its own alone."""
     files = [file for file in FILES if file.name != "code.py"]
@@ -144,6 +145,7 @@ def test_there_is_no_import_cycle() -> None:
     assert list(nx.simple_cycles(graph)) == []
 
 
+@pytest.mark.slow
 def test_no_module_imports_the_package_itself() -> None:
     """Inside the package, names come from the module that defines them, so that the import direction can be checked."""
     top = {path.stem for path in SOURCE.iterdir()}

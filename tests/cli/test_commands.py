@@ -227,6 +227,7 @@ def test_a_point_of_a_diagram_is_a_multiple_of_its_speed(
     assert "'n' must be a number in SI, or one with its unit" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_sweep_that_is_interrupted_goes_on_from_its_store(
     model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -304,6 +305,7 @@ def test_signals_are_chosen_and_angles_recorded(model: str, capsys: pytest.Captu
     assert [line.split()[0] for line in table] == ["shaft.tau", "J1.phi", "loss.power"]
 
 
+@pytest.mark.slow
 def test_a_run_that_writes_says_what_it_has_written(
     model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -390,6 +392,7 @@ def test_a_comparison_that_is_interrupted_has_told_what_was_done(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("out", [True, False])
 def test_a_comparison_is_written_as_a_table_and_a_picture(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *, out: bool
@@ -505,6 +508,7 @@ def test_a_steady_start_may_be_seen_by_its_angle_and_changed_by_any_name(
     assert json.loads(capsys.readouterr().out)["start"]["J2.omega"] == pytest.approx(100.0 / 12.0, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_message_of_a_run_names_the_option_that_a_run_has(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     net = sw.Network("falling")
     net.add(sw.Inertia("J1", J=1.0), "a")

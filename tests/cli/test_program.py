@@ -79,6 +79,7 @@ def test_latex_prints_the_phases_of_a_scene_or_the_one_asked_for(capsys: pytest.
     assert "There is no phase 'shaft broken'" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["kirchhoff", "state", "second-order", "lagrange"])
 def test_latex_prints_the_equations(form: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["latex", "crane-start", "--form", form]) == DONE

@@ -33,6 +33,7 @@ def result(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
     return json.loads(capsys.readouterr().out)
 
 
+@pytest.mark.slow
 def test_a_load_hangs_still_from_the_steady_state_or_from_its_torque(
     hoist: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -22,6 +22,7 @@ LAWS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS, ids=str)
 def test_a_law_has_the_value_that_sympy_finds(law: sympy.Expr) -> None:
     points = np.random.default_rng(1).uniform(-2.0, 2.0, (40, 2))

@@ -153,6 +153,7 @@ KINKED = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", KINKED)
 def test_a_step_never_crosses_a_kink(name):
     # A Taylor step across a kink would be wrong by about 1e-3; ended there, only DOP853's own error at the kinks
@@ -201,6 +202,7 @@ def test_new_parameters_and_start_states_compile_nothing(monkeypatch):
     assert np.array_equal(ends[0], ends[2])
 
 
+@pytest.mark.slow
 def test_a_large_system_is_compiled_compactly():
     states = sympy.symbols("y:102")
     rows = tuple(states[i - 1] - 2 * states[i] for i in range(len(states)))

@@ -92,6 +92,7 @@ def test_electrical_power_is_mechanical_power_copper_loss_and_what_is_stored() -
     assert electrical == pytest.approx(mechanical + copper + stored, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_a_locked_rotor_takes_the_current_of_two_phases_in_series() -> None:
     """At theta = 66 degrees a is high and b is low, c open: i = U / 2R (1 - exp(-R t / L)), tau = 2 k i."""
     net = sw.Network("locked")
@@ -138,6 +139,7 @@ def test_the_back_emf_is_a_trapezoid_with_flat_tops_of_the_asked_width(flat: flo
     assert np.mean(np.abs(made(angle)) > 1 - 1e-12) == pytest.approx(flat / np.pi, abs=0.01)
 
 
+@pytest.mark.slow
 def test_copper_is_lost_in_the_motor_and_all_that_its_source_gives_is_supplied() -> None:
     """A locked rotor: two windings in series at U, i = U / 2R (1 - exp(-R t / L))."""
     U, R, L, t = 48.0, 0.7, 2e-3, 0.02

@@ -11,6 +11,7 @@ import shaftwork as sw
 CONTACTS = [{"c": 1e4, "d": 3.0}, {"restitution": 0.4}]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("contact", CONTACTS, ids=["elastic", "rigid"])
 def test_play_along_a_line_moves_as_backlash_does(contact: dict[str, float]) -> None:
     """Pushed to and fro, the load strikes both flanks; numbers alike, the motions are alike."""

@@ -111,6 +111,7 @@ def test_a_check_has_nothing_to_note_of_a_start_with_what_helps_or_of_another_mo
     assert held_by_a_load(**options).check() == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("frequency", "moves"), [(2.0, False), (2.5, True)])
 def test_a_load_that_the_note_says_is_not_moved_rests(frequency: float, moves: bool) -> None:  # noqa: FBT001
     net = held_by_a_load(f=frequency)
@@ -120,6 +121,7 @@ def test_a_load_that_the_note_says_is_not_moved_rests(frequency: float, moves: b
     assert bool(sol["J2.omega"][-1] > 0) is moves
 
 
+@pytest.mark.slow
 def test_a_boost_raises_the_flux_at_low_frequency_alone() -> None:
     """Torque goes with the square of the flux: 1.2^2 at standstill, 1.1^2 in the middle, 1 from f_boost on."""
     for f, flux in ((0.0, 1.2), (5.0, 1.1), (10.0, 1.0), (30.0, 1.0)):

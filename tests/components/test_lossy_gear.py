@@ -45,6 +45,7 @@ def modes(sol: sw.Solution) -> list[str]:
     return [row.modes["gear"] for row in sol.phases]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_motion_with_power_both_ways_is_that_of_the_equations_by_hand(engine: Any) -> None:
     """The right-hand side is continuous where the power reverses, so that scipy needs no events at rtol 1e-12."""

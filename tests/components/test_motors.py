@@ -94,6 +94,7 @@ def test_a_compiled_cage_curve_keeps_its_points_to_rounding() -> None:
     assert curve(motor, 1000.0) == pytest.approx(0.0, abs=1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.0, 1e-3, 0.3, 0.8, 1.0, 5.0, 60.0])
 def test_the_chosen_pull_up_speed_makes_a_curve_that_falls_and_rises(share: float) -> None:
     """share is (tau_a - tau_s) / (tau_k - tau_s); no warning, which would be an error here."""
@@ -121,6 +122,7 @@ def test_the_quartic_of_a_slow_motor_is_warned_of_as_well() -> None:
         sw.CageMotor("m", **slow, n_s=0.7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [1.0, -4.0])
 def test_a_cage_motor_is_continuous_and_finite_at_every_speed(ratio: float) -> None:
     """Backwards it gives its locked-rotor torque, above the synchronous speed it brakes with at most -tau_k."""
@@ -193,6 +195,7 @@ MOTORS: dict[str, Callable[..., Component]] = {
 INERTIA = {"cage": 100.0}  # kg m^2; the others are smaller motors
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MOTORS)
 def test_a_motor_gives_exactly_no_torque_before_t_on_and_from_t_off_on(name: str) -> None:
     times = np.linspace(0.0, 2.0, 41)
@@ -204,6 +207,7 @@ def test_a_motor_gives_exactly_no_torque_before_t_on_and_from_t_off_on(name: str
     assert np.ptp(sol["J.omega"][times >= 1.5]) < 1e-12 * sol["J.omega"][-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MOTORS)
 def test_switched_on_later_it_starts_in_the_same_way(name: str) -> None:
     first = alone(MOTORS[name](), INERTIA.get(name, 0.3)).simulate(1.0, rtol=1e-11, t_eval=5)

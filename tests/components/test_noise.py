@@ -142,6 +142,7 @@ def test_a_seed_that_changes_during_the_motion_is_refused(made: sympy.Expr) -> N
     assert "changes during the motion" in str(problem)
 
 
+@pytest.mark.slow
 def test_a_noise_that_has_no_value_ends_the_run_with_a_named_error() -> None:
     net = sw.Network("noisy")
     net.add(sw.TorqueSource("m", tau=sw.HeldNoise(sympy.log(sw.omega - 1.0), 1.0)), "a")

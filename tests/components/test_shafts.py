@@ -89,6 +89,7 @@ def test_a_lumped_shaft_is_the_chain_of_its_parts() -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", [sw.Rigid(), sw.OneSpring(), *MODELS], ids=repr)
 def test_momentum_and_energy_are_kept_by_every_model(model: object) -> None:
     sol = train(model).simulate(0.02, t_eval=[0.013, 0.02])
@@ -241,6 +242,7 @@ def test_a_law_of_the_speed_may_stand_at_either_end() -> None:
     assert np.abs(first["line.tau_b"] - second["line.tau_b"]).max() < 1e-5 * np.abs(first["line.tau_b"]).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("f_max", "tolerance"), [(100.0, 1e-3), (2000.0, 1e-2), (5000.0, 1e-3), (20000.0, 1e-6)])
 def test_auto_takes_the_smallest_spectral_model_that_is_right_up_to_its_frequency(
     f_max: float, tolerance: float

@@ -183,6 +183,7 @@ PRESCRIBED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", PRESCRIBED)
 @pytest.mark.parametrize(("driven", "heavy"), [("sun", "carrier"), ("carrier", "ring"), ("ring", "sun")])
 def test_they_are_kirchhoffs_beside_a_prescribed_speed_of_any_law(law: str, driven: str, heavy: str) -> None:

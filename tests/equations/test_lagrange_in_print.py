@@ -53,6 +53,7 @@ def test_a_document_compiles_and_keeps_inside_its_margins(name: str, values: boo
     assert max(overfull(log), default=0.0) < 10.0  # points, as for the document of Kirchhoff's equations
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PRINTED)
 def test_a_document_has_all_that_is_printed_and_says_what_its_letters_are(name: str) -> None:
     made = PRINTED[name]()

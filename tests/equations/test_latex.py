@@ -214,6 +214,7 @@ def test_derived_quantities_have_values_units_and_one_definition() -> None:
     assert r"\frac{d \tau_{c,k}}{d t} &= 6086.84 \, \Delta \omega_{k}" in numbers
 
 
+@pytest.mark.slow
 @compiles
 @pytest.mark.parametrize(
     "model", [Lumped(5), CentralDifference(6), CentralDifference(6, closure="printed"), Wave()], ids=repr
@@ -271,6 +272,7 @@ def test_a_case_that_is_a_long_sum_has_all_its_terms_in_rows_of_limited_width() 
     assert [int(n) for n in re.findall(r"(\d+) \\, t", case)] == list(range(6, 30, 3))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NETWORKS)
 @pytest.mark.parametrize("form", ["kirchhoff", "state", "second-order"])
 def test_every_form_of_every_network_is_balanced(name: str, form: str) -> None:

@@ -58,6 +58,7 @@ def test_parameters_that_a_given_law_or_a_mode_replaces_are_not_listed() -> None
     assert ("of rigid flanks, speed below which they stay together", "gap") in listed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("phase", ["brake locked, pump stuck", "brake released"])
 @pytest.mark.parametrize("form", [None, "lagrange"])
 def test_every_point_of_a_law_stands_there_whatever_the_phase(phase: str, form: str | None) -> None:
@@ -100,6 +101,7 @@ def test_the_torque_of_a_law_and_the_one_that_holds_are_told_apart() -> None:
     assert (r"$\tau_{\mathrm{pump},2}$", "torque that holds it", "pump") in listed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", registered())
 def test_a_parameter_without_effect_changes_no_motion(name: str) -> None:
     """What is not listed may have another value: the same motion to the last digit."""

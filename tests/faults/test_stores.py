@@ -148,6 +148,7 @@ def test_a_network_that_cannot_be_saved_leaves_the_older_file(tmp_path: Path) ->
     assert path.read_bytes() == before
 
 
+@pytest.mark.slow
 def test_threads_that_save_to_one_file_leave_a_whole_one(tmp_path: Path) -> None:
     """A network of 40 springs and one of 80 take turns; whoever comes last has written it all."""
     networks = []

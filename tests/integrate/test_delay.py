@@ -255,6 +255,7 @@ def test_a_steady_rotation_stays(kind):
     assert np.abs(torques(trajectory) - [TORQUE, -TORQUE]).max() < 1e-12 * 50 * Z
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [1e-2, 1e-3, 1e-7, 1e-12])
 @pytest.mark.parametrize("rtol", [1e-5, 1e-8])
 def test_a_light_end_neither_rings_nor_lags(ratio, rtol):

@@ -84,6 +84,7 @@ def test_no_blow_of_a_train_of_them_is_overlooked(width: float) -> None:
     assert momentum == pytest.approx(1000 + 5000 * ive(0, 0.5 / width**2), rel=1e-11)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("outputs", [2, 1001])
 def test_the_largest_value_of_an_input_does_not_hang_on_the_output_times(outputs: int) -> None:
     law = 100 + 500 * sympy.sin(sympy.pi * (t - sympy.Rational(3, 10))) ** 20000

@@ -45,6 +45,7 @@ def test_every_engine_meets_the_closed_solution(request, name, engine, rtol):
     assert relative_error(trajectory.x, case.solution(trajectory.t)) < bound(engine, rtol)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_dense_output_is_as_good_as_the_steps(oscillator, engine):
     trajectory = ENGINES[engine](replace(oscillator.problem, rtol=1e-8))
@@ -53,6 +54,7 @@ def test_dense_output_is_as_good_as_the_steps(oscillator, engine):
     assert relative_error(trajectory.dense(times), oscillator.solution(times)) < 10 * bound(engine, 1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_an_output_at_a_breakpoint_is_the_state_after_the_jump(oscillator, engine):
     trajectory = ENGINES[engine](replace(oscillator.problem, t_eval=np.array([0.5, 1.0, 2.0]), rtol=1e-8))
@@ -61,6 +63,7 @@ def test_an_output_at_a_breakpoint_is_the_state_after_the_jump(oscillator, engin
     assert np.abs(trajectory.dense(np.array([1.0]))[0] - expected).max() < 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_without_output_times_both_sides_of_a_jump_are_listed(oscillator, engine):
     trajectory = ENGINES[engine](replace(oscillator.problem, t_eval=None, rtol=1e-8))
@@ -73,6 +76,7 @@ def test_without_output_times_both_sides_of_a_jump_are_listed(oscillator, engine
     assert trajectory.statistics["steps"] == trajectory.steps.size - 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", [name for name in ENGINES if name != "heyoka"])
 def test_the_right_hand_side_is_never_evaluated_at_or_past_the_end_of_a_piece(oscillator, engine):
     # The right-hand side does not know the piece, so the switching time itself must never be asked for, and times
@@ -89,6 +93,7 @@ def test_the_right_hand_side_is_never_evaluated_at_or_past_the_end_of_a_piece(os
     assert (asked[first_late:] > 1.0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["heyoka", "DOP853", "CVODE-BDF"])
 def test_a_run_can_be_repeated_to_the_last_bit(oscillator, engine):
     first, second = (ENGINES[engine](oscillator.problem) for _ in range(2))

@@ -28,6 +28,7 @@ def symbolic(row, start):
     return problem(sympy.lambdify((t, (x,)), [row]), start, symbolic=program, t_eval=np.linspace(0, 3, 7))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", NUMERIC)
 def test_a_motion_that_runs_away_is_named_with_its_time_and_state(engine):
     with pytest.raises(SimulationError, match=r"failed at t = 1\.5707.* s.*step.*'motor.omega' = "):

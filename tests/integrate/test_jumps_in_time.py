@@ -276,6 +276,7 @@ def test_a_pulse_between_squares_is_not_stepped_over(engine: str) -> None:
     assert speed == pytest.approx(1e4 * (np.sqrt(0.2501) - 0.5), rel=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_bell_that_lies_between_two_samples_is_found(engine: str) -> None:
     """exp(-x^2) is above 1/2 for |x| < sqrt(ln 2): 3.3e-5 s here, and samples 6e-5 s apart show only its foot."""
@@ -419,6 +420,7 @@ def test_a_brake_whose_torque_touches_a_whole_number_takes_what_its_law_says() -
     assert net.simulate(3.0)["J.omega"][-1] == pytest.approx(60 - 5 * math.pi, rel=1e-7)  # 15 N m while cos > 1/2
 
 
+@pytest.mark.slow
 def test_a_switch_over_the_angle_that_is_touched_is_no_place_where_a_motion_sticks() -> None:
     """A Table over a crank angle touches its last point in each turn."""
     net = sw.Network("crank")

@@ -87,6 +87,7 @@ def test_a_root_in_one_phase_of_several_is_followed_or_refused_and_no_motion_end
         run(5.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["auto", "scipy", "scipy-radau"])
 def test_a_bell_over_the_angle_gives_its_work_and_one_over_the_speed_is_no_door(engine: str) -> None:
     """J w^2 / 2 is the work of 10 N m over phi and of the bell, A sqrt(pi) width; the barrier holds w where it is 0."""

@@ -16,6 +16,7 @@ pytest.importorskip("heyoka")
 EVENT = 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [1.0, 1e-3], ids=["torques of 7 N m", "torques of 7 mN m"])
 @pytest.mark.parametrize("asked", [{"rtol": 1e-9}, {"rtol": 1e-9, "t_eval": 5001}, {"rtol": 1e-13}], ids=str)
 def test_a_slow_ramp_breaks_a_friction_away_on_time_whatever_is_asked_for(size: float, asked: dict[str, float]) -> None:
@@ -129,6 +130,7 @@ BLOWS = {
 """Laws of time with narrow blows that no formula places, and how long they run in s."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("blows", BLOWS)
 @pytest.mark.parametrize(
     "engine",

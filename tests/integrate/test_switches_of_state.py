@@ -241,6 +241,7 @@ def test_a_measured_curve_is_followed_from_point_to_point() -> None:
         assert np.abs(passed - speed).min() < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("d", [20.0, 50.0, 200.0])
 def test_a_speed_that_dies_away_turns_until_it_is_rounding(d: float) -> None:
     """The motor is off and its curve still asks for the sign of a speed, whose turns heyoka cannot tell any more."""

@@ -215,6 +215,7 @@ WRAPPED = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("angle", WRAPPED, ids=str)
 def test_an_angle_that_is_brought_back_into_one_turn_begins_anew(angle: sympy.Expr) -> None:
     """Neither taken for the angle itself nor for its smooth continuation."""
@@ -226,6 +227,7 @@ def test_an_angle_that_is_brought_back_into_one_turn_begins_anew(angle: sympy.Ex
         body(3 + angle).simulate(3.0, engine="heyoka")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["auto", "scipy"])
 def test_a_triangular_wave_has_its_corners(engine: str) -> None:
     """As a law of time and of the angle, against the triangle in pieces."""

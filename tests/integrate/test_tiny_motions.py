@@ -44,6 +44,7 @@ def test_the_relative_error_does_not_depend_on_the_size_of_a_motion(engine: str,
     assert error.max() < ENGINES[engine]
 
 
+@pytest.mark.slow
 def test_a_tiny_motion_of_a_network_with_modes_is_as_right_as_a_large_one() -> None:
     """Inside its gap, to the sixth digit; its angles are some 1e-11 rad."""
 

@@ -233,6 +233,7 @@ def long_chain(count: int) -> sw.Network:
     return net
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "net", [sw.Network(), flat(), sw.scenes.crane(gap=0.01), long_chain(300)], ids=lambda n: n.name
 )
@@ -268,6 +269,7 @@ def test_equations_are_printed_in_words_and_formulas() -> None:
     assert "=" in text
 
 
+@pytest.mark.slow
 def test_a_motion_says_its_phases_and_events() -> None:
     sol = sw.scenes.crane(gap=0.01).simulate(0.5)
     assert f"{len(sol.events)} event" in repr(sol)

@@ -88,6 +88,7 @@ def _texts(inner: st.SearchStrategy[str]) -> st.SearchStrategy[str]:
     return st.one_of(call, pair, case, extreme)
 
 
+@pytest.mark.slow
 @given(st.recursive(st.sampled_from(["t", "-omega", "2", "1/3", "0.1", "pi", "1e-3"]), _texts, max_leaves=8))
 def test_what_was_read_can_be_written(text: str) -> None:
     try:

@@ -129,6 +129,7 @@ def test_work_that_looks_at_all_of_a_part_is_done_for_each() -> None:
     assert [shared.of(sw.Spring(name, c=1.0), {"c": 1.0, "d": 0.0})[0] for name in "ab"] == ["a", "b"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", [0.4, 1.0, 3.0])
 def test_two_shafts_with_equal_auto_models_have_meshes_of_their_own(first: float) -> None:
     """A shaft of another length takes another mesh; the motion is that with both meshes given, to rounding."""

@@ -101,6 +101,7 @@ def test_what_has_no_speed_has_no_angle_and_says_which_parts_have_one() -> None:
             net.compile(angles=name)
 
 
+@pytest.mark.slow
 def test_the_command_shows_the_angle_of_a_clutch(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "clutches.toml"
     clutches().save(file)

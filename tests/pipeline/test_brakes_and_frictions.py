@@ -115,6 +115,7 @@ def test_a_brake_whose_torque_falls_below_zero_runs_free_and_never_drives(law: s
     assert sol.events == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_brake_whose_torque_comes_and_goes_holds_a_load_lets_it_run_free_and_brakes_it_again(engine: str) -> None:
     """2 w' = 3 - max(0, 6 cos t) from where the brake gives way, at cos t = 1/2."""
@@ -251,6 +252,7 @@ def test_a_breakaway_ends_in_slipping_though_nothing_tells_it_from_sticking_at_f
     assert sol["J.omega"][-1] == pytest.approx(3.0, abs=EXACT)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("omega_s", [0.5, 0.1, 1e-3])
 @pytest.mark.parametrize("engine", [*ENGINES, "scipy-radau"])
 def test_no_engine_steps_over_the_rise_of_friction_before_a_stop(engine: str, omega_s: float) -> None:
@@ -386,6 +388,7 @@ def test_what_a_strong_brake_stops_stays_although_rounding_of_the_time_is_a_spee
     assert sol["J.omega"].tolist()[1:] == [0.0, 0.0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_brake_whose_torque_falls_with_the_angle_stops_where_it_should_and_lets_go_again(engine: str) -> None:
     """J phi'' = -(8 - 2 phi) from 5 rad/s; then what it holds is what it had left, which a rising torque exceeds."""

@@ -46,6 +46,7 @@ def test_the_engine_that_is_named_before_a_run_is_that_of_the_run(name: str) -> 
     assert model.choose_engine(0.1) == (sol.engine, sol.why)
 
 
+@pytest.mark.slow
 def test_loops_without_sundials_are_solved_by_radau_and_refused_where_it_is_asked_for(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -60,6 +60,7 @@ def test_every_engine_names_the_same_events_in_the_same_order(name: str) -> None
         np.testing.assert_allclose([event[0] for event in events], [event[0] for event in wanted], rtol=0, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials"])
 @pytest.mark.parametrize("driven", ["r0", "r2"])
 def test_where_a_torque_turns_round_only_the_flanks_next_to_it_part(engine: str, driven: str) -> None:
@@ -74,6 +75,7 @@ def test_where_a_torque_turns_round_only_the_flanks_next_to_it_part(engine: str,
     assert event[0] == pytest.approx(math.pi / 8, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", ["FG", "GF"])
 def test_a_gear_that_would_jam_where_a_friction_lets_go_drives_on(order: str) -> None:
     """It is locked, and its load had turned it; from where the friction slips, a drives, as no other mode has rates."""
@@ -97,6 +99,7 @@ def test_a_gear_that_would_jam_where_a_friction_lets_go_drives_on(order: str) ->
     assert sol["A.omega"][-1] == pytest.approx(wanted, rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials"])
 @pytest.mark.parametrize("when", [{"t_on": 0.5}, {"on": sw.t - 0.5}])
 def test_a_switch_that_will_open_again_closes_on_a_conducting_diode(engine: str, when: dict[str, object]) -> None:

@@ -31,6 +31,7 @@ def pulled(tau: object, *parts: sw.Component) -> sw.Network:
     return net
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("names", [*permutations(FRICTIONS)])
 def test_frictions_on_a_shaft_give_way_in_their_order_at_the_sums_of_what_they_hold(names: tuple[str, ...]) -> None:
     sol = pulled(sw.t, *(friction(name, *FRICTIONS[name]) for name in names)).simulate(25.0)
@@ -56,6 +57,7 @@ def test_friction_and_a_brake_hold_together_what_each_of_them_can(first: str, en
     assert sol["J.omega"][-1] == pytest.approx((20.0**2 - 17.0**2) / 2 - 10.0 * 3.0, abs=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_friction_that_has_given_way_at_rest_holds_again_what_a_brake_lets_go(engine: str) -> None:
     """Up to 12 N m and down to 4: 10 hold them alone, and the 3 of a shoe that slides would not."""

@@ -143,6 +143,7 @@ def dropped() -> sw.Model:
     return wheel(sw.TorqueSource("weight", tau=20.0), stop).compile()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("weight", [20.0, 2000.0])
 def test_rebounds_against_a_push_come_to_rest_however_short_the_flights(weight: float, engine: str) -> None:

@@ -45,6 +45,7 @@ def test_auto_solves_the_crane_to_1e_8_of_the_largest_torque_at_rtol_1e_9() -> N
     assert "Taylor" in sol.why
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_every_engine_agrees_with_the_hand_typed_crane(engine: str) -> None:
     sol = crane().simulate(t_end=1.0, rtol=1e-9, t_eval=101, engine=engine)

@@ -205,6 +205,7 @@ def waving() -> sw.Network:
     return net
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("build", [crane, waving])
 def test_a_point_that_is_no_moment_of_this_network_is_refused(build: Callable[[], sw.Network]) -> None:
     """As that of a network without modes is."""
@@ -234,6 +235,7 @@ def test_sensitivities_at_a_moment_are_those_of_the_modes_there_where_a_speed_is
     assert made.relative["shaft.c"][0] == pytest.approx(0.5, abs=1e-3)  # the damping moves it by its square, 3e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", registered())
 def test_modes_that_say_the_same_have_the_same_equations(name: str) -> None:
     """Else the words of a phase would not tell which equations hold in it."""

@@ -116,6 +116,7 @@ def test_a_file_keeps_everything_that_changes_modes(tmp_path: Path) -> None:
     assert sw.Network.load(tmp_path / "crane.toml").simulate(0.5).events == net.simulate(0.5).events
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_the_engines_own_steps_contain_every_event(engine: str) -> None:
     sol = model().simulate(3.0, engine=engine, t_eval="steps")
@@ -197,12 +198,14 @@ def test_a_brake_that_may_have_come_on_before_is_said_to_be_released_when_a_moti
     went_on(net, 0.55, 0.58)  # at 11 rad/s it is on for certain
 
 
+@pytest.mark.slow
 def test_a_part_that_comes_on_at_a_known_time_goes_on_without_a_word() -> None:
     net = overspeed(sw.Brake("brake", tau=5.0, t_on=0.3))
     for t in (0.1, 0.5):
         assert went_on(net, t, 0.7)["J.omega"][-1] == pytest.approx(net.simulate(0.7)["J.omega"][-1], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_motion_that_goes_on_without_all_that_is_stored_is_refused_with_what_is_missing() -> None:
     """The states of one phase lack the twist of the gap: with it in the middle all else would be 6 % off."""
     crane_with_gap = sw.scenes.crane(gap=0.02).compile()
@@ -304,6 +307,7 @@ def test_a_wheel_slips_in_the_way_it_is_pulled_where_the_rounding_of_a_moment_is
     assert moment.regime.modes == ("forward",)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["auto", "sundials", "scipy-radau"])
 def test_a_light_wheel_is_pushed_along_without_a_step_for_each_of_its_transients(engine: str) -> None:
     """Free it is no trouble; in contact it follows within 1e-9 s, and an explicit method would take 2e8 steps.
@@ -354,6 +358,7 @@ def test_speeds_along_a_shaft_are_read_in_every_phase() -> None:
     np.testing.assert_allclose(speeds[:, -1], sol["J2.omega"], rtol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["heyoka", "scipy"])
 def test_the_limit_of_steps_is_that_of_all_phases_together(engine: str) -> None:
     steps = model().simulate(3.0, engine=engine).statistics["steps"]

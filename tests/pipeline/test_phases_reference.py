@@ -130,6 +130,7 @@ def test_dry_friction_gives_way_when_a_ramp_reaches_it(engine: str) -> None:
     np.testing.assert_allclose(sol["shoe.tau"], [held.reaction(t) for t in sol.t.tolist()], atol=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials"])
 def test_a_block_on_a_belt_sticks_and_slips_with_the_period_of_its_limit_cycle(engine: str) -> None:
     block = friction.StickSlip(J=0.3, c=40.0, tau_c=2.0, tau_s=3.5, belt=0.4)
@@ -166,6 +167,7 @@ def test_an_oscillator_with_dry_friction_loses_4_tau_over_c_a_cycle_and_rests_of
     np.testing.assert_allclose(sol["shoe.tau"][rest], -swing.c * swing.rest[1], atol=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials"])
 def test_an_inertia_bounces_on_a_stop_at_the_times_of_a_geometric_series(engine: str) -> None:
     ball = friction.Bounces(J=2.0, tau=5.0, height=0.7, restitution=0.6)

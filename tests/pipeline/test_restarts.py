@@ -126,6 +126,7 @@ def test_waves_may_be_cut_at_any_instant(cut: float) -> None:
             agree(roll(load).simulate(0.05, initial=before), whole, WAVES, 3e-8)
 
 
+@pytest.mark.slow
 def test_the_extremes_of_the_second_part_are_those_of_the_whole() -> None:
     """The largest torques come after the cuts, in waves that were on their way there."""
     whole = roll().simulate(0.05)
@@ -156,6 +157,7 @@ def test_waves_without_inertias_go_on() -> None:
         agree(model.simulate(2e-3, initial=model.simulate(cut)), whole, ("line.tau", "line.omega", "line.energy"), 1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cut", [0.45, 0.55, 0.9, 1.6, 3.0])
 def test_a_brake_that_has_come_on_stays_on(cut: float) -> None:
     """From 0.5 s; from 0.9 s on the speed is below the one at which it comes on, and at 3 s it is locked."""
@@ -169,6 +171,7 @@ def test_a_brake_that_has_come_on_stays_on(cut: float) -> None:
     assert sum(event[2:] == ("released", "slipping forward") for event in whole.events) == 1
 
 
+@pytest.mark.slow
 def test_a_stored_motion_goes_on_and_so_does_one_that_went_on_before_it_was_stored() -> None:
     whole, first = overspeed().simulate(4.0), stored(overspeed().simulate(0.9))
     second = stored(overspeed().simulate(1.6, initial=first))
@@ -212,6 +215,7 @@ def rigid(*parts: sw.Component) -> sw.Model:
     return net.compile()
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:jumping source")
 @pytest.mark.parametrize("friction", [(), (sw.DryFriction("f", tau_c=0.1),)], ids=["free", "with friction"])
 def test_what_jumps_at_the_cut_jumps_once(friction: tuple[sw.Component, ...]) -> None:

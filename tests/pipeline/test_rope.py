@@ -46,6 +46,7 @@ def test_a_load_that_is_thrown_up_flies_and_falls_back_into_its_rope() -> None:
     assert sol.energy_residual < 1e-9
 
 
+@pytest.mark.slow
 def test_a_rope_with_damping_moves_as_the_law_integrated_on_its_own() -> None:
     """The damper acts while the rope is stretched and never pushes: f = max(0, c s + d v) where s > 0."""
     d = 6e3

@@ -45,6 +45,7 @@ def test_a_shaft_starts_as_one_with_a_prescribed_speed_and_an_inertia(model: sw.
     assert_turns_as_one(sol)
 
 
+@pytest.mark.slow
 @each_model
 def test_a_loaded_shaft_starts_as_it_stays(model: sw.ShaftModel) -> None:
     """A damper takes 40 N m at the end, with which the shaft is wound up all along."""
@@ -143,6 +144,7 @@ def test_a_wave_is_no_inertia_where_a_source_jolts_at_the_start(initial: dict[st
         assert sol[name][0] == pytest.approx(alone[name][0], rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", MESHES, ids=str)
 def test_beside_a_wave_a_mesh_starts_as_without_it(model: sw.ShaftModel) -> None:
     """The two shafts turn apart: what is stored in the one is not touched by the other."""

@@ -244,6 +244,7 @@ def test_a_brake_that_rises_is_not_read_before_it_comes_on() -> None:
         net.compile().steady_state()
 
 
+@pytest.mark.slow
 def test_a_torque_that_pulsates_with_the_angle_has_no_steady_state_and_the_message_says_why() -> None:
     net = sw.Network("machine")
     net.add(sw.TorqueSource("e", tau=(100.0 - sw.omega) * (1 + 0.1 * sympy.sin(4 * sw.phi))), "a")

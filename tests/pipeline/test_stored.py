@@ -106,6 +106,7 @@ def test_a_stored_motion_reads_the_same(kind: str, engine: str, way: str) -> Non
     assert [name for name in first if not same(stored[name], first[name])] == []
 
 
+@pytest.mark.slow
 def test_a_stored_motion_can_be_stored_again() -> None:
     sol = model_of("hybrid").simulate(0.2, t_eval=50)
     assert same(read(pickled(pickled(sol))), read(sol))

@@ -333,3 +333,12 @@ def test_beside_a_wave_there_are_no_phases_to_ask_for() -> None:
     assert net.equations().phase == ""
     with pytest.raises(sw.ParameterError, match=r"beside travelling waves \('line'\)"):
         net.equations(phase="load stuck")
+
+
+def test_a_shaft_without_bearing_friction_warns_of_none_however_thin_it_is() -> None:
+    net = sw.Network("wire")
+    net.add(sw.TorqueSource("m", tau=1e-6), "a")
+    net.add(sw.Inertia("J1", J=1e-9), "a")
+    net.add(sw.Shaft("wire", length=1.0, diameter=1e-3, model=sw.Wave()), "a", "b")
+    net.add(sw.Inertia("J2", J=1e-9), "b")
+    assert net.simulate(1e-3).energy_residual < 1e-9

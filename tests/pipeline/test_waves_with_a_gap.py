@@ -74,6 +74,7 @@ def test_a_motor_and_a_gap_at_the_ends_of_two_waves(lengths: tuple[float, float]
     assert order > 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_beside_a_wave_a_gap_passes_nothing_until_half_of_it_is_passed(way: float) -> None:
     """From its middle each flank is reached after sqrt(2 (gap / 2) J / tau) = 14.1 ms."""

@@ -53,6 +53,7 @@ def test_a_network_of_extreme_values_is_right_or_says_that_it_is_not(engine: str
         assert sum(verdict == "right" for verdict in found.values()) >= 0.9 * len(found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "engine"), [(20296, "sundials"), (22657, "sundials")])
 def test_what_a_long_search_has_found_says_that_it_is_wrong(seed: int, engine: str) -> None:
     """20296: off by 1.0055e-6 beside a strong damper, where the exact motion itself is known to 3e-8.

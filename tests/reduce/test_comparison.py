@@ -244,6 +244,7 @@ def driven(law: sympy.Expr, load: str = "a") -> sw.Network:
 LAW = 10 + 3 * sympy.sin(3 * sw.t)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("other", "text"),
     [

@@ -23,6 +23,7 @@ def inertias(net: sw.Network) -> list[float]:
     return [part.J for part in net.parts if isinstance(part, sw.Inertia)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mesh", ["elastic", "rigid"])
 def test_the_ten_masses_of_the_crane_reduce_to_the_printed_numbers(mesh: str) -> None:
     net = sw.scenes.crane_train(mesh=mesh)

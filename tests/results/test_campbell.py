@@ -174,6 +174,7 @@ def test_modes_responses_and_matrices_say_about_what_they_are_linearised() -> No
     assert title == f"{train.name} at {states[0]} = 0, {states[1]} = 0, {states[2]} = 0, ..."
 
 
+@pytest.mark.slow
 def test_titles_name_the_time_at_which_laws_that_depend_on_it_are_read() -> None:
     net = sw.Network("ramp")
     net.add(sw.FrequencyDrive("m", tau_k=8.0, s_k=0.3, n_sync=3000), "a")  # rises until 5 s
@@ -224,6 +225,7 @@ def test_titles_name_no_time_where_no_law_depends_on_it() -> None:
     assert sw.scenes.ship_line().modes().title == "ship line"
 
 
+@pytest.mark.slow
 def test_a_load_that_sticks_at_rest_leaves_the_modes_of_the_running_train() -> None:
     """lambda^2 - 1.5 c lambda + 11/36 c^2 = 0; at n = 0 the pump is clamped, and nothing is drawn across to that."""
     c = 25000.0
@@ -365,6 +367,7 @@ def _pump_behind_a_shaft() -> sw.Network:
     return net
 
 
+@pytest.mark.slow
 def test_the_point_that_a_refused_diagram_names_is_that_of_the_running_drive() -> None:
     """The inertias at both ends of a shaft; what turns inside it follows them."""
     net = _pump_behind_a_shaft()
@@ -396,6 +399,7 @@ def test_the_point_that_a_refused_diagram_names_follows_gears_and_drums() -> Non
     assert "{'JM.omega': n, 'JG.omega': n, 'JH.omega': n, 'load.v': n/310};" in str(refused.value)
 
 
+@pytest.mark.slow
 def test_a_point_that_leaves_a_load_at_rest_is_noticed_once() -> None:
     net = _pump_behind_a_shaft()
     said = "leaves 'JP.omega' at 0, where 'pump' depends on it"

@@ -80,6 +80,7 @@ def test_a_sweep_measures_corners_as_one_motion_does() -> None:
     assert table.columns["max J.tau"] == pytest.approx([4.0, 8.0])
 
 
+@pytest.mark.slow
 def test_a_torque_beyond_all_bounds_is_named_with_its_time() -> None:
     sol = driven(sqrt(t))
     with pytest.warns(sw.AccuracyWarning, match=r"'J\.tau' .* no finite value at t = 0 s"):

@@ -318,6 +318,7 @@ def test_two_starts_that_lead_to_one_root_are_no_two_modes(roots: tuple[complex,
     assert (found is not None) is kept
 
 
+@pytest.mark.slow
 def test_the_first_modes_of_a_shaft_with_much_friction_are_those_up_to_a_frequency() -> None:
     """Friction makes more half waves than the delay alone tells."""
     net = _train(sw.Wave(), friction=1.0)
@@ -326,6 +327,7 @@ def test_the_first_modes_of_a_shaft_with_much_friction_are_those_up_to_a_frequen
     np.testing.assert_allclose(first.rates, many.rates[:3], rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_an_angle_that_no_slope_reads_is_the_integral_of_its_speed_in_each_mode() -> None:
     """A spring by the square of its angle is none at rest, and only records the angle."""
     net = _train(sw.Wave())

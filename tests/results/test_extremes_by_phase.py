@@ -169,6 +169,7 @@ def test_a_travelling_wave_is_largest_where_it_is_reflected() -> None:
     assert sol.max("J.omega") == pytest.approx(max(speed(2 * DELAY), -top.fun), rel=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["auto", "scipy"])
 def test_along_a_chain_the_extreme_is_that_of_the_worst_spring(engine: str) -> None:
     """`Lumped(6)` is a chain of springs, whose modes are summed and bracketed."""
@@ -195,6 +196,7 @@ def test_along_a_chain_the_extreme_is_that_of_the_worst_spring(engine: str) -> N
     assert min(abs(most.place - LONG["length"] * (np.argmax(exact) + side) / m) for side in (0, 0.5, 1)) < 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", ["crane", "shaft_step"])
 def test_extremes_of_a_stored_motion_are_those_of_the_motion(scene: str) -> None:
     sol = getattr(sw.scenes, scene)().simulate(0.3, t_eval=20)

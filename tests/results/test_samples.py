@@ -55,6 +55,7 @@ def test_a_peak_between_samples_is_told_with_a_number_of_outputs_that_show_it(en
     assert finer.to_pandas("shaft.tau_c")["shaft.tau_c"].max() == pytest.approx(first_peak(damping), rel=0.05)
 
 
+@pytest.mark.slow
 def test_samples_that_reach_all_extremes_and_show_another_frequency_are_told() -> None:
     sol = shaft(513.7, 0.0).simulate(10.0)
     assert sol["shaft.tau"].max() == pytest.approx(sol.max("shaft.tau"), rel=1e-3)

@@ -210,6 +210,7 @@ def test_a_part_is_read_with_the_values_of_its_motion_and_one_that_is_none_is_na
         sol.observer.part("J9")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("speed", "first"),
     [

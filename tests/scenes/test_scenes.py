@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import sympy
 
 import shaftwork as sw
 from shaftwork.scenes.crane import MOTOR, WHEEL_RADIUS
@@ -93,3 +94,16 @@ def test_the_ship_line_loses_its_speed_to_the_water() -> None:
     shafts = sum(7850.0 * math.pi * d**4 / 32 * length for length, d in ((4.5, 0.42), (9.0, 0.38), (6.0, 0.46)))
     (rate,) = sw.scenes.ship_line(sw.Rigid()).modes({}).rates
     assert rate == pytest.approx(-9e3 / (2800.0 + 2 * 160.0 + 5200.0 + shafts), rel=1e-9)
+
+
+def test_the_engine_of_the_ship_line_pulsates_five_times_a_turn() -> None:
+    engine = sw.scenes.ship_line().parts[0]
+    turn = 2 * np.pi / 12.5
+    torque = sympy.lambdify(sw.t, engine.tau)
+    waves = np.abs(np.fft.rfft(torque(np.linspace(0.0, turn, 100, endpoint=False))))
+    assert np.flatnonzero(waves > 1e-9 * waves.max()).tolist() == [0, 5]
+
+
+def test_the_buckets_of_the_excavator_cut_by_the_first_seed_unless_told_otherwise() -> None:
+    assert sw.scenes.excavator().parts == sw.scenes.excavator(seed=1.0).parts
+    assert sw.scenes.excavator().parts != sw.scenes.excavator(seed=2.0).parts

@@ -235,6 +235,7 @@ def test_the_step_on_the_shaft_of_popenda_does_not_depend_on_the_order(disc: flo
     assert difference < 10 * of.error
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_the_estimated_error_of_random_lines_bounds_the_difference_from_a_higher_order(seed: int) -> None:
     draw = np.random.default_rng(seed)

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 import shaftwork as sw
 from shaftwork.sizing.catalogue import OWN, TYPICAL
+from shaftwork.sizing.choice import _reasons
 from tests.properties.examples import share_of_examples
 
 MOTORS = {motor.name: motor for motor in sw.sizing.catalogue()}
@@ -275,3 +276,9 @@ def test_without_a_rotor_the_inertias_of_the_network_are_all_of_the_load() -> No
     )
     assert found.tau_peak == whole.tau_peak > less.tau_peak
     assert found.tau_thermal == whole.tau_thermal > less.tau_thermal
+
+
+def test_a_motor_may_be_used_up_to_its_rated_torque() -> None:
+    assert [*_reasons(MOTOR, MOTOR.tau_n, 2.0, 100.0, 1.3)] == []
+    (reason,) = _reasons(MOTOR, math.nextafter(MOTOR.tau_n, math.inf), 2.0, 100.0, 1.3)
+    assert reason.startswith("thermal torque")

@@ -142,6 +142,7 @@ def assert_momentum_is_kept(omega_rest: float, t: float) -> None:
     assert made["g.restitution"] == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("omega_rest", [1e-4, 1e-6, 1e-7])
 def test_flanks_that_come_to_rest_pass_on_the_derivative_of_their_momentum(omega_rest: float) -> None:
     assert_momentum_is_kept(omega_rest, 1.5)
@@ -205,6 +206,7 @@ def test_a_motor_that_is_switched_off_later_gives_its_torque_for_so_much_longer(
     assert made["end J.omega"]["motor.t_off"] == pytest.approx(torque[0] / 0.5, rel=1e-7)
 
 
+@pytest.mark.slow
 def test_derivatives_of_a_tiny_motion_are_those_of_a_large_one() -> None:
     """The motion goes with the torque, and so do its derivatives by all that is no torque."""
 
@@ -220,6 +222,7 @@ def test_derivatives_of_a_tiny_motion_are_those_of_a_large_one() -> None:
     assert by_inertia(1e-9) == pytest.approx(by_inertia(1e3), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_derivatives_through_tiny_impacts_are_those_through_large_ones() -> None:
     """Which way a motion went through several changes at once is told by parts of its size, whatever that is."""
 

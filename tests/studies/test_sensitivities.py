@@ -198,6 +198,7 @@ def test_what_has_no_derivative_is_refused() -> None:
         frequency_sensitivities(undamped, parameters=["s.d"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["gear.ratio", "drive.omega"])
 def test_what_moves_the_start_of_a_shaft_has_no_derivative_unless_its_speeds_are_given(name: str) -> None:
     """Speeds inside run straight between those of the ends, of which a gear or a source determines one."""

@@ -200,6 +200,7 @@ def test_a_variant_that_cannot_be_assembled_says_its_first_problem() -> None:
     assert made.reasons[3].startswith("'swing' cannot be assembled: 1 problem: massless node: ")
 
 
+@pytest.mark.slow
 def test_a_variant_that_runs_away_leaves_those_beside_it_alone() -> None:
     """J w' = 1 + w^2 is w = tan(t / J), which has no end of the motion at 1 s where J < 2 / pi."""
     net = sw.Network("runaway")

@@ -25,6 +25,7 @@ def ripple(omega: float, mean: float, law: sympy.Expr) -> sw.Network:
     return net
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("omega", "mean"), [(300.0, 1e3), (300.0, 1e6), (1000.0, 1e4)])
 def test_integrals_of_what_the_states_do_not_feel(omega: float, mean: float) -> None:
     measures = {"rms": "rms ripple.tau", "mean": "mean ripple.tau"}
@@ -76,6 +77,7 @@ def test_the_torque_of_a_stiff_damper(d: float, rtol: float, error: float) -> No
     assert made.measures["tau"] / samples["motor.tau"] == pytest.approx(spring + d * (omega_1 - omega_2), rel=error)
 
 
+@pytest.mark.slow
 def test_a_stiff_variant_runs_alone() -> None:
     samples = {"shaft.d": np.append(np.linspace(1.0, 2.0, COUNT - 1), 2e7)}
     measures = {"tau": "max shaft.tau"}

@@ -93,6 +93,7 @@ def test_what_must_be_whole_is_refused_wherever_it_is_not(values: Any) -> None:
         sw.studies.sweep(net, {"m.pole_pairs": values}, t_end=0.1, measures=["end J.omega"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("torque", "load", "why"),
     [

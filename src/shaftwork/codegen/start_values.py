@@ -182,10 +182,9 @@ class Start:
         self._fixed |= movable
         size = np.abs(np.append(rows * np.where(of_kind, x, 0.0), values)).max(initial=0.0)
         reached = rows @ x + constants
-        for k, (quantity, row) in enumerate(demands):
-            found = self._read(quantity) if row.moved else float(reached[k])
-            if not abs(found - values[k]) <= self._drift(quantity):
-                self._refuse_other(quantity.name, found, size)
+        for k, (quantity, _) in enumerate(demands):
+            if not abs(reached[k] - values[k]) <= self._drift(quantity):
+                self._refuse_other(quantity.name, float(reached[k]), size)
 
     def _constant(self, quantity: Quantity, row: Row) -> float:
         """What the states do not add to a quantity.
@@ -194,8 +193,6 @@ class Start:
             ParameterError: the quantity is none to start from.
         """
         name, form = quantity.name, self._bound.program.form
-        if row.moved and name in self._names.tied:  # beside a law, such as a spring in series
-            return self._read(quantity) - float(row.by_state @ self._x)
         if not quantity.is_across and self._names.along(name) is not None:
             raise self._refused(name, "is that of one end of a shaft of several elements")
         if row.moved:
@@ -207,9 +204,6 @@ class Start:
         if not quantity.is_across and sizes.any() and not sizes[self._of_kind[False]].any():
             raise self._refused(name, "follows from speeds")
         return row.prescribed
-
-    def _read(self, quantity: Quantity) -> float:
-        return float(quantity.read(History(self._bound, np.array([self._t]), self._x[None, :]))[0])
 
     def _drift(self, quantity: Quantity) -> float:
         """How far sources move a quantity within a time that is none beside any motion."""

@@ -20,6 +20,7 @@ def network(case: Case) -> sw.Network:
     return net
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(
     shutil.which("ngspice") is None and "CI" not in os.environ, reason="needs ngspice (Debian package); CI has it"
 )
