@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -63,3 +64,17 @@ def test_random_examples_run_without_the_coverage_tool() -> None:
 def test_a_sub_package_is_loaded_when_it_is_first_asked_for(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr(sw, name, raising=False)  # as no import had been yet
     assert getattr(sw, name).__name__ == f"shaftwork.{name}"
+
+
+@pytest.mark.slow
+def test_fewer_examples_than_the_default_break_no_property() -> None:
+    options = ("-q", "-n", "0", "-p", "no:cacheprovider", "-m", "not slow", "tests/properties")
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", *options],
+        cwd=ROOT,
+        env={**os.environ, "SHAFTWORK_EXAMPLES": "2"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout[-2000:]
