@@ -76,7 +76,8 @@ class StartNames:
             if name in self.units or name in self.tied:
                 continue
             owner = name.rpartition(".")[0]
-            near = [other for other in self.units if other.rpartition(".")[0] == owner] or [*self.places]
+            own = (other for other in self.units if other.rpartition(".")[0] == owner)
+            near = [other for other in own if self.quantity(other) is not None] or [*self.places]
             raise SignalError(f"There is no speed, twist or torque '{name}' to start from. Near it: {', '.join(near)}.")
         return {
             str(name): in_si(f"the start value of '{name}'", value, self.units.get(str(name), "1"))

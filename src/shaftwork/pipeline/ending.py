@@ -89,7 +89,8 @@ def ending_of(motion: Solution, graph: CircuitGraph) -> Ending:
         more = f" and {len(other) - NAMED} more" if len(other) > NAMED else ""
         raise ParameterError(
             f"initial is a motion of '{motion.name}', which is another network than '{graph.name}': "
-            f"{', '.join(told)}{more}. Give a motion of the same network; numbers of its parts may differ."
+            f"{', '.join(told)}{more}. Give a motion of the same network; numbers of its parts may differ. "
+            "Or begin with start values, initial={name: sol[name][-1] for name in sol.states} and t_start=sol.t[-1]."
         )
     t, x = float(motion.t[-1]), motion.x[-1]
     waves = None
