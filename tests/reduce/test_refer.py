@@ -392,9 +392,9 @@ def test_the_travel_of_a_crane_is_referred_by_its_wheels(drives: str, mass: floa
     net.add(sw.Inertia("J1", J=0.5), "a")
     net.add(sw.LossyGear("gear", ratio=4.0, efficiency=0.8), "a", "b")
     net.add(sw.Inertia("J2", J=60.0), "b")
-    net.add(sw.CraneTravel("travel", m=4000.0, diameter=0.25, w=0.004567), "b")
+    net.add(sw.CraneTravel("travel", m=4000.0, diameter=0.25, w=0.004567, omega_s=0.5), "b")
     small = sw.reduce.refer(net, "a", drives={"gear": drives})
     (made,) = (part for part in small.network.parts if part.name == "travel")
     assert isinstance(made, sw.CraneTravel)
-    assert (made.m, made.diameter, made.w) == pytest.approx((mass, 0.0625, 0.004567), rel=1e-14)
+    assert (made.m, made.diameter, made.w, made.omega_s) == pytest.approx((mass, 0.0625, 0.004567, 2.0), rel=1e-14)
     assert [type(part) for part in small.network.parts].count(sw.LossyGear) == 0
