@@ -51,7 +51,7 @@ def test_what_readme_links_to_is_in_the_source_distribution() -> None:
 def test_random_examples_run_without_the_coverage_tool() -> None:
     place = "tests/network/test_expressions.py::test_what_was_read_can_be_written"
     run = subprocess.run(
-        [sys.executable, "-m", "pytest", "-p", "no:pytest_cov", "-p", "no:cacheprovider", "-n", "0", "-q", place],
+        [sys.executable, "-m", "pytest", "-p", "no:pytest_cov", "-p", "no:cacheprovider", "-n", "0", "-qm", "", place],
         cwd=ROOT,
         check=False,
         capture_output=True,
