@@ -15,6 +15,7 @@ from shaftwork.core.errors import SimulationError
 from shaftwork.core.hints import hint
 from shaftwork.reduction.form import StateForm
 
+ROUNDING, TINY = float(np.finfo(float).eps), float(np.finfo(float).tiny)
 SMALLEST_STEP = 1e-6
 """First step of the way to a steady state, s."""
 JUMP = 1e-12
@@ -53,30 +54,28 @@ def steady_state(
     Raises:
         SimulationError: the rates do not vanish; the message names the state that keeps changing.
     """
-    x = np.array(start, dtype=float)
     form = bound.program.form
-    names = [state.name for state in form.states]
-    weights = energy_weights(bound)
     # What is recorded alone may turn on: it is left at its start.
     counts = np.array([not (state.kind == "integral" and state.branch in form.recorded) for state in form.states])
     counted = sparse.diags_array(counts.astype(float), format="csc")
+    identity = sparse.eye_array(len(counts), format="csc")
+    weights = energy_weights(bound)
 
+    def length(vector: Array) -> float:
+        return float(np.linalg.norm(weights * vector))
+
+    x = np.array(start, dtype=float)
     rate, step = counts * bound.rhs(t, x), np.zeros_like(x)
     h = SMALLEST_STEP
-    identity = sparse.eye_array(len(x), format="csc")
     for _ in range(limit):
-        floor = np.linalg.norm(weights * x) / weights * (np.finfo(float).eps / tolerance)
         slopes = counted @ _slopes(bound, t, x, rate)
-        size = np.abs(bound.part.A) @ np.abs(x) + np.abs(bound.part.B) @ np.abs(bound.values(t, x)[1])
-        size += np.maximum(np.abs(bound.part.A) @ floor, np.abs(slopes) @ floor)
+        vanishing = tolerance * _rate_sizes(bound, t, x, slopes, length(x) / weights * (ROUNDING / tolerance))
         settled = np.linalg.norm(step) <= STANDSTILL * np.linalg.norm(x)  # a drive that runs away is not steady
-        if settled and (np.abs(rate) <= tolerance * (size + np.finfo(float).tiny)).all():
+        if settled and (np.abs(rate) <= vanishing).all():
             return x
         trial = _solve(sparse.csc_array(identity / h - slopes), rate)
         new = counts * bound.rhs(t, x + trial)
-        defect = np.linalg.norm(weights * (trial / h - new)) / max(
-            np.linalg.norm(weights * rate), np.linalg.norm(weights * size) * tolerance, np.finfo(float).tiny
-        )
+        defect = length(trial / h - new) / max(length(rate), length(vanishing), TINY)
         over = ends is not None and ends(x + trial)
         is_right = defect < DEFECT or (h < JUMP and np.isfinite(defect))
         if not is_right or (over and h > SMALLEST_STEP):
@@ -87,16 +86,28 @@ def steady_state(
         if over and ends is not None:
             return _just_beyond(x, trial, ends)
         x, rate, step, h = x + trial, new, trial, min(h * (2.0 if defect > DEFECT / 10 else 8.0), 1e12)
-    worst = int(np.argmax(np.abs(weights * rate)))
+    raise _still_changing(form, x, rate, int(np.argmax(np.abs(weights * rate))))
+
+
+def _rate_sizes(bound: BoundArrays, t: float, x: Array, slopes: sparse.csc_array, floor: Array) -> Array:
+    """(n,) sizes of what the rates are sums of, where each state is known no better than its floor (n,)."""
+    A, B = np.abs(bound.part.A), np.abs(bound.part.B)
+    sizes = A @ np.abs(x) + B @ np.abs(bound.values(t, x)[1]) + np.maximum(A @ floor, np.abs(slopes) @ floor)
+    return np.asarray(sizes + TINY)
+
+
+def _still_changing(form: StateForm, x: Array, rate: Array, worst: int) -> SimulationError:
+    """What is said where no steady state was found, of the state that changes most."""
     found = (
-        f"No steady state was found: '{names[worst]}' still changes by {rate[worst]:.3g} per second at {x[worst]:.6g}."
+        f"No steady state was found: '{form.states[worst].name}' still changes by {rate[worst]:.3g} per second at "
+        f"{x[worst]:.6g}."
     )
     if worst >= len(x) - len(form.integrals):
-        raise SimulationError(
+        return SimulationError(
             f"{found} A law reads it, so nothing is steady while it changes. Where a torque pulsates with the angle of "
             "what turns, write its mean over a turn; or run simulate(...) until it repeats itself, and take means."
         )
-    raise SimulationError(
+    return SimulationError(
         f"{found} Does something hold the speed (a load, a damper, a motor's curve)? {another_start(form)}"
     )
 

@@ -30,7 +30,6 @@ from shaftwork.network.wording import Spelling, at_nodes, listed, title
 LEFT_OUT = ("node name", "node count", "wrong domain", "no effect", "component")
 """Kinds of problems whose part is left out of what is examined further."""
 
-RESTS = ", and nothing drives that train."
 Train = tuple[int, ...]
 """Numbers of the parts that hang together."""
 
@@ -219,18 +218,31 @@ def connection_problems(graph: CircuitGraph) -> tuple[Problem, ...]:
     """Parts, ends and whole trains that are not joined to the rest, and nodes whose speed has the name of another."""
     ends = _ends(graph)
     spelling = Spelling(graph.nodes)
-    trains = _trains(ends)
-    single = [train[0] for train in trains if len(train) == 1]
-    floating = [k for k in single if not any(_is_complete(graph, k, node) for node in _port_nodes(graph, (k,)))]
+    floating, main, others = _split(graph, ends)
     problems = [_floating_part(graph, number, spelling) for number in floating]
     alone = {*floating}
     for node, found in enumerate(ends):
         if len(found) == 1 and found[0][0] not in alone and not _is_complete(graph, found[0][0], node):
             problems.append(_loose_end(graph, *found[0], node, spelling))
-    joined = [train for train in trains if train[0] not in alone]
-    main = max(joined, key=len, default=())
-    problems += [_separate_train(graph, train, main, spelling) for train in joined if train is not main]
+    problems += [_separate_train(graph, train, main, spelling) for train in others]
     return (*problems, *_nearly_reference(graph), *_shared_names(graph))
+
+
+def resting_trains(graph: CircuitGraph) -> tuple[Problem, ...]:
+    """The trains beside a driven one in which nothing moves unless it is given a start value."""
+    _, main, others = _split(graph, _ends(graph))
+    spelling = Spelling(graph.nodes)
+    return tuple(_separate_train(graph, train, main, spelling) for train in others if _rests(graph, train, main))
+
+
+def _split(graph: CircuitGraph, ends: list[list[tuple[int, str]]]) -> tuple[list[int], Train, list[Train]]:
+    """Parts that are joined to nothing, the largest train, and the others."""
+    trains = _trains(ends)
+    single = [train[0] for train in trains if len(train) == 1]
+    floating = [k for k in single if not any(_is_complete(graph, k, node) for node in _port_nodes(graph, (k,)))]
+    joined = [train for train in trains if train[0] not in {*floating}]
+    main = max(joined, key=len, default=())
+    return floating, main, [train for train in joined if train is not main]
 
 
 def _ends(graph: CircuitGraph) -> list[list[tuple[int, str]]]:
@@ -329,11 +341,10 @@ def _separate_train(graph: CircuitGraph, train: Train, main: Train, spelling: Sp
     names = tuple(graph.parts[number].name for number in train)
     nodes = tuple(graph.nodes[node] for node in _port_nodes(graph, train))
     others = listed(tuple(graph.parts[number].name for number in main), most=3)
-    rests = _is_driven(graph, main) and not _is_driven(graph, train)
     return Problem(
         "separate train",
         f"{listed(names)} at {at_nodes(nodes)} share{'s' * (len(names) == 1)} no node with {others}"
-        + (RESTS if rests else "."),
+        + (", and nothing drives that train." if _rests(graph, train, main) else "."),
         f"Join the two{spelling.suggestion(nodes)}, or simulate them as two networks.",
         names,
         nodes,
@@ -341,11 +352,9 @@ def _separate_train(graph: CircuitGraph, train: Train, main: Train, spelling: Sp
     )
 
 
-def resting_trains(graph: CircuitGraph) -> tuple[Problem, ...]:
-    """The trains beside a driven one in which nothing moves unless it is given a start value."""
-    if len(_trains(_ends(graph))) == 1:
-        return ()
-    return tuple(found for found in connection_problems(graph) if found.message.endswith(RESTS))
+def _rests(graph: CircuitGraph, train: Train, main: Train) -> bool:
+    """Whether nothing sets a train in motion that stands beside a driven one."""
+    return _is_driven(graph, main) and not _is_driven(graph, train)
 
 
 def _is_driven(graph: CircuitGraph, train: Train) -> bool:
