@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy import sparse
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
@@ -69,8 +70,50 @@ class _Columns(History):
         self._given = u, slopes, rate
 
     @cached_property
-    def _inputs(self) -> tuple[Array, Array, Array]:
+    def inputs(self) -> tuple[Array, Array, Array]:
         return self._given
+
+
+class ReadingMatrices:
+    """Quantities as sparse matrices of states and inputs, for who reads them again and again, at few times at once.
+
+    Law: q = X x + U u + R x' + S u', with the inputs and rates that go with the states.
+
+    Args:
+        bound: the array program.
+        reads: take each quantity from all branch quantities.
+    """
+
+    def __init__(self, bound: BoundArrays, reads: Sequence[Read]) -> None:
+        states, inputs = len(bound.program.form.states), bound.part.B.shape[1]
+        self._sizes = states, inputs, states, inputs
+        width = max(1, LARGEST_BLOCK // max(1, len(bound.program.form.graph.branches)))
+        self._matrices = [
+            sparse.hstack(
+                [
+                    sparse.csr_array(np.array([read(columns) for read in reads]))
+                    for columns in self._columns(bound, place, width)
+                ],
+                format="csr",
+            )
+            for place in range(4)
+        ]
+
+    def _columns(self, bound: BoundArrays, place: int, width: int) -> Iterator[_Columns]:
+        """One column for each of what is given at a place: states, inputs, rates of states, rates of inputs."""
+        for first in range(0, max(self._sizes[place], 1), width):
+            one = np.eye(self._sizes[place])[:, first : first + width]
+            x, u, rate, slopes = (
+                one if k == place else np.zeros((size, one.shape[1])) for k, size in enumerate(self._sizes)
+            )
+            yield _Columns(bound, x, u, rate, slopes)
+
+    def __call__(self, history: History) -> Array:
+        """(quantities, k) the quantities along a history."""
+        u, slopes, rate = history.inputs
+        given = history.x[: self._sizes[0]], u, rate, slopes
+        made = zip(self._matrices, given, strict=True)
+        return np.asarray(sum(matrix @ values for matrix, values in made))
 
 
 @dataclass(frozen=True)

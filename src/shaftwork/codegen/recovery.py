@@ -37,7 +37,7 @@ class History:
         self.form = bound.program.form
 
     @cached_property
-    def _inputs(self) -> tuple[Array, Array, Array]:
+    def inputs(self) -> tuple[Array, Array, Array]:
         """u, its derivative by time alone, and x', each (., k).
 
         Raises:
@@ -54,7 +54,7 @@ class History:
     def across(self) -> Array:
         """(branches, k) across variables."""
         form, part = self.form, self.bound.part
-        u, slopes, rate = self._inputs
+        u, slopes, rate = self.inputs
         laws = len(form.laws)
         tree = np.zeros((len(form.graph.branches), len(self.t)))
         first, last = len(form.across_states), len(form.across_states) + len(form.through_states)
@@ -72,7 +72,7 @@ class History:
     def through(self) -> Array:
         """(branches, k) through variables; of a coupling its lambda."""
         form, part = self.form, self.bound.part
-        u, slopes, rate = self._inputs
+        u, slopes, rate = self.inputs
         laws = len(form.laws)
         links = np.zeros((len(form.graph.branches), len(self.t)))
         first, last = len(form.across_states), len(form.across_states) + len(form.through_states)

@@ -178,6 +178,7 @@ def _stiff(problem: Problem, *, compiled: bool) -> tuple[str, str] | None:
     from shaftwork.integrate.stiffness import rates
 
     found = rates(problem)
+    problem.found.setdefault("decay", found.decay)
     duration = problem.t_end - problem.t0
     explicit_steps = max(found.decay, found.oscillation) * duration / STABLE
     if problem.x0.size > LARGEST_NOT_BANDED and explicit_steps > FEWEST_NOT_BANDED and _is_damped_chain(problem):

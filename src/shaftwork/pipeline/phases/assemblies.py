@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import accumulate
+from operator import methodcaller
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +16,9 @@ from sympy import Expr, Integer, Symbol, Tuple
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.code import bindable, is_rough, vectorised, vectorised_list
 from shaftwork.codegen.elements import Array
+from shaftwork.codegen.linear_readings import ReadingMatrices
+from shaftwork.codegen.many import ManyExpressions
+from shaftwork.codegen.matrices import LinearPart
 from shaftwork.codegen.observer import Quantities
 from shaftwork.codegen.recovery import History
 from shaftwork.codegen.stores import Stores
@@ -94,10 +98,10 @@ class Assembly:
     Args:
         model: the compiled equations.
         elements: of the network.
-        forms: of each element.
+        forms: of each element, or None for all of them in one, where no expressions in states tell what guards read.
     """
 
-    def __init__(self, model: Model, elements: Sequence[Element], forms: tuple[str, ...]) -> None:
+    def __init__(self, model: Model, elements: Sequence[Element], forms: tuple[str, ...] | None) -> None:
         self.model, self.elements = model, elements
         self.stores, self.quantities = Stores(model.form), Quantities(model.form)
         self._symbols = tuple(conditional(element.modes) for element in elements)
@@ -107,18 +111,19 @@ class Assembly:
         self._expressions: list[Expr] = []
         self._known: dict[tuple[int, Expr], int] = {}
         self._watched: dict[tuple[int, str], tuple[Watched, ...]] = {}
-        rows = model.rows
+        self._rows = rows = None if forms is None else model.rows
         self._readings = readings = NamedReadings(model.form) if rows is None else Readings(model.form, rows)
         self._parameters = tuple(Symbol(name, real=True) for name in model.parameters)
         self.parts = {part.name: part for part in model.form.graph.parts}
-        for number, (element, form) in enumerate(zip(elements, forms, strict=True)):
+        for number, element in enumerate(elements):
             part = self.parts[element.part.name]
             for mode in element.modes.options:
-                if mode.form == form:
+                if forms is None or mode.form == forms[number]:
                     self._watched[number, mode.name] = tuple(self._leaves(number, readings, part, mode))
         if rows is None:
             _ = self._shown  # so that all quantities are known before any function of them is made
         self._prepared = Kept[bytes, Prepared](KEPT)
+        self._matrices = Kept[LinearPart, ReadingMatrices](KEPT)
         self._rates_made = Kept[bytes, tuple[Callable[[float, Array], Array], dict[str, Any]]](KEPT)
         self._sides: dict[ModeNames, Array] = {}
         self._ends: dict[ModeNames, tuple[tuple[int, Watched], ...]] = {}
@@ -182,28 +187,21 @@ class Assembly:
 
     def guards(self, p: Array) -> Callable[[Array, Array], Array]:
         """All guards as a function of times (k,) and states (k, n) to (k, guards)."""
-        function, read, parameters, size = self._function, self._read(p), tuple(p.tolist()), len(self._expressions)
+        expressions, read = self._many.bind(p), self._read(p)
+        return lambda times, states: expressions(times, read(times, states))
 
-        def values(times: Array, states: Array) -> Array:
-            made = np.empty((times.size, size))
-            with np.errstate(all="ignore"):
-                for column, value in enumerate(function(times, *read(times, states), *parameters)):
-                    made[:, column] = value
-            return made
+    @cached_property
+    def _many(self) -> ManyExpressions:
+        return ManyExpressions(self._expressions, self._readings.symbols, self._parameters, sums=self._rows is None)
 
-        return values
-
-    def _read(self, p: Array) -> Callable[[Array, Array], Iterable[Array]]:
+    def _read(self, p: Array) -> Callable[[Array, Array], Array]:
         """What guards are made of at times (k,) and states (k, n): the states, or quantities that follow from them."""
-        if not isinstance(self._readings, NamedReadings):
+        readings = self._readings
+        if not isinstance(readings, NamedReadings):
             return lambda _, states: states.T
-        quantities, bound = tuple(self._readings.quantities), self.bound(p)
-
-        def read(times: Array, states: Array) -> list[Array]:
-            history = History(bound, times, states)
-            return [history.quantity(wanted) for wanted in quantities]
-
-        return read
+        bound, reads = self.bound(p), [methodcaller("quantity", wanted) for wanted in readings.quantities]
+        matrices = self._matrices(bound.part, lambda: ReadingMatrices(bound, reads))
+        return lambda times, states: matrices(History(bound, times, states))
 
     def _shown_at(self, t: float, x: Array, p: Array) -> Sequence[Any]:
         """What elements show at one instant: speed across, twist and parameters of each."""
@@ -275,18 +273,9 @@ class Assembly:
         found = guards if not clocks else lambda t, y: guards(t, y[:, :size])
         now = np.abs(moment.regime.limits(span[0], x.tolist()))
         watch = Guards(found, self.sides(modes), np.array(moment.bands), now)
-
-        def jacobian(t: float, y: Array) -> Any:
-            return bound().jacobian(t, y)
-
-        if clocks:
-
-            def jacobian(t: float, y: Array) -> Any:
-                return sparse.block_diag((bound().jacobian(t, y[:size]), sparse.csc_array((len(clocks),) * 2)), "csc")
-
         return Problem(
             rhs=self.right_side(p),
-            jacobian=jacobian if size else None,
+            jacobian=self.slopes(bound) if size else None,
             x0=np.concatenate([x, np.zeros(len(clocks))]),
             t0=span[0],
             t_end=span[1],
@@ -300,6 +289,21 @@ class Assembly:
             rough=lambda t, y: self._rough(p, modes, t, y[:, :size]),
             found=known,
         )
+
+    def slopes(self, bind: Callable[[], BoundArrays]) -> Callable[[float, Array], Any]:
+        """The Jacobian of the states and, behind them, of the clocks, from what makes the equations."""
+        size, clocks = len(self.model.states), sparse.csc_array((len(self.clocks),) * 2)
+        if not self.clocks:
+            return lambda t, y: bind().jacobian(t, y)
+        return lambda t, y: sparse.block_diag((bind().jacobian(t, y[:size]), clocks), "csc")
+
+    def alike(self, modes: ModeNames) -> tuple[Assembly, ModeNames]:
+        """Equations and modes that are the same for the choice of an engine."""
+        return self, modes
+
+    def judged(self, moment: Moment, problem: Problem) -> Problem:  # noqa: ARG002
+        """The motion by which an engine is chosen."""
+        return problem
 
     def right_side(self, p: Array) -> Callable[[float, Array], Array]:
         """The rates of the states and, behind them, of the clocks."""
@@ -345,10 +349,6 @@ class Assembly:
         largest = np.abs(guards(times, np.tile(x, (SAMPLES, 1)))).max(axis=0)[list(self.clocks)]
         return CLOCK * np.where(largest > 0, largest, 1.0) * (span[1] - span[0])
 
-    @cached_property
-    def _function(self) -> Callable[..., Any]:
-        return vectorised_list((TIME, *self._readings.symbols, *self._parameters), self._expressions)
-
     def sides(self, modes: ModeNames) -> Array:
         """(guards,) the side of each guard that ends one of the modes."""
         if modes not in self._sides:
@@ -360,7 +360,7 @@ class Assembly:
 
     def motion(self, p: Array) -> tuple[Motion, Limits]:
         """Rates and guards together, and guards alone, from a time in s and a list of states, for a single instant."""
-        if self.model.rows is not None:
+        if self._rows is not None:
             return self._scalar(p.tolist())
         bound, guards = self.bound(p), self.guards(p)
 
@@ -371,7 +371,7 @@ class Assembly:
 
     @cached_property
     def _scalar(self) -> Callable[[list[float]], tuple[Motion, Limits]]:
-        rows = self.model.rows
+        rows = self._rows
         assert rows is not None  # noqa: S101 (asked only then)
         return bindable({"t": TIME, "x": rows.states}, {"p": rows.parameters}, rows.rates, self._expressions)
 
@@ -382,7 +382,7 @@ class Assembly:
     @cached_property
     def program(self) -> Any:
         """The heyoka program with the guards as its events, or None where there can be none."""
-        rows = self.model.rows
+        rows = self._rows
         if rows is None or not (rows.states or self.clocks) or not available("heyoka"):
             return None
         from shaftwork.codegen.heyoka import build

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from shaftwork.components.modes import Choice
@@ -14,6 +15,7 @@ from shaftwork.integrate.engines import ADAMS, available
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.phases.assemblies import Assembly, ModeNames, elements_of
+from shaftwork.pipeline.phases.held import MANY, HeldAssembly, laws_that_hold
 from shaftwork.pipeline.phases.resting import at_rest
 
 if TYPE_CHECKING:
@@ -44,6 +46,7 @@ class Phases:
         self.elements = elements_of(base)
         self.first: ModeNames = tuple(element.modes.options[0].name for element in self.elements)
         self._assemblies: dict[tuple[str, ...], Assembly | NetworkError] = {}
+        self._held: dict[tuple[int, ...], HeldAssembly] = {}
         self._engines: dict[tuple[Assembly, ModeNames, str], tuple[str, str]] = {}
         self._easy: dict[Assembly, dict[tuple[int, str], tuple[str, str]]] = {}
         self.found = Kept[Any, Any](1)
@@ -72,6 +75,35 @@ class Phases:
             raise made.with_traceback(None)  # else it would keep the frames of every time that it was raised
         return made
 
+    def running(self, modes: ModeNames, values: Mapping[str, float]) -> Assembly:
+        """The equations in which a motion goes on: those of `assembly`, or, for many parts that hold, one set for all.
+
+        Args:
+            modes: of every element.
+            values: parameters that differ from the network's.
+
+        Raises:
+            NetworkError: as there.
+        """
+        if (whole := self._whole) is None:
+            return self.assembly(modes)
+        pairs = zip(self.elements, modes, self.first, strict=True)
+        held = tuple(k for k, (e, name, first) in enumerate(pairs) if e.modes[name].form != e.modes[first].form)
+        if held not in self._held:
+            self._held[held] = whole.holding(held)
+        made = self._held[held]
+        # where parts share what they hold, the first carries as much as it can
+        return made if made.joints(made.vector(values, {})).independent else self.assembly(modes)
+
+    @cached_property
+    def _whole(self) -> HeldAssembly | None:
+        """The equations in which nothing holds, for all combinations; None where each has equations of its own."""
+        if sum(len({mode.form for mode in element.modes.options}) > 1 for element in self.elements) < MANY:
+            return None
+        model = self.assembly(self.first).model
+        laws = laws_that_hold(model, self.elements)
+        return None if laws is None else HeldAssembly(model, self.elements, laws)
+
     def _netlist(self, forms: tuple[str, ...]) -> Netlist:
         chosen: dict[str, tuple[Choice, ...]] = {}
         for element, form in zip(self.elements, forms, strict=True):
@@ -97,6 +129,7 @@ class Phases:
         Raises:
             ParameterError: the one that is asked for follows no modes.
         """
+        assembly, modes = assembly.alike(modes)
         key = assembly, modes, asked
         if asked != "auto":
             choice.check(asked)

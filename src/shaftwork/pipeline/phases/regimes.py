@@ -30,10 +30,12 @@ class Regimes:
     Args:
         phases: the sets of equations.
         values: parameters that differ from the network's.
+        own: whether each has equations of its own, also where there are many.
     """
 
-    def __init__(self, phases: Phases, values: Mapping[str, float]) -> None:
+    def __init__(self, phases: Phases, values: Mapping[str, float], *, own: bool) -> None:
         self._phases, self._values = phases, dict(values)
+        self._own = own
         self._made: dict[ModeNames, Regime] = {}
 
     def regime(self, modes: ModeNames) -> Regime:
@@ -43,7 +45,8 @@ class Regimes:
             NetworkError: the equations of these modes contradict each other, or a gear jams in them.
         """
         if modes not in self._made:
-            assembly = self._phases.assembly(modes)
+            phases = self._phases
+            assembly = phases.assembly(modes) if self._own else phases.running(modes, self._values)
             form, p = assembly.model.form, assembly.vector(self._values, self._phases.numbers(modes))
             if self._values and (jammed := tuple(jamming(form, {**assembly.model.parameters, **self._values}))):
                 raise NetworkError(f"'{form.graph.name}' cannot be assembled", jammed)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -68,9 +69,10 @@ class Known:
     begins: list[tuple[Moment, list[Change]]] = field(default_factory=list)
 
 
-def _known(phases: Phases, values: Mapping[str, float], span: tuple[float, float]) -> Known:
+def _known(phases: Phases, values: Mapping[str, float], span: tuple[float, float], *, own: bool) -> Known:
     """What the last run with these values over the same time has found out, or nothing yet."""
-    made: Known = phases.found((tuple(sorted(values.items())), span), lambda: Known(Settling(phases, values, span)))
+    key = tuple(sorted(values.items())), span, own
+    made: Known = phases.found(key, lambda: Known(Settling(phases, values, span, own=own)))
     return made
 
 
@@ -81,11 +83,12 @@ class Run:
         phases: the sets of equations.
         values: parameters that differ from the network's.
         demand: what is asked.
+        own: whether each combination of modes has equations of its own, also where there are many; so for heyoka.
     """
 
-    def __init__(self, phases: Phases, values: Mapping[str, float], demand: Demand) -> None:
+    def __init__(self, phases: Phases, values: Mapping[str, float], demand: Demand, *, own: bool = False) -> None:
         self.phases, self.demand = phases, demand
-        self._known = _known(phases, values, demand.span)
+        self._known = _known(phases, values, demand.span, own=own or demand.engine == "heyoka")
         self.settling = self._known.settling
         self.spans: list[Span] = []
         self.changes: list[Change] = []
@@ -106,8 +109,8 @@ class Run:
         if isinstance(initial, Ending):
             found = self._resumed(initial)
         elif initial is not None or not begins:
-            assembly = self.phases.assembly(self.phases.first)
-            p = self.settling.regime(self.phases.first).p
+            regime = self.settling.regime(self.phases.first)
+            assembly, p = regime.assembly, regime.p
             if isinstance(initial, Mapping) and initial and start != 0:
                 refuse_incomplete(assembly.stores.names, initial, start)
             x, _ = start_of(assembly.model, assembly.prepared(p), initial, self.demand.span)
@@ -141,7 +144,9 @@ class Run:
         return self._engine(moment, lambda: problem) if problem.x0.size else ("exact", PRESCRIBED)
 
     def _engine(self, moment: Moment, problem: Callable[[], Problem]) -> tuple[str, str]:
-        return self.phases.engine(moment.regime.assembly, moment.regime.modes, problem, self.demand.engine)
+        regime = moment.regime
+        judged = partial(regime.assembly.judged, moment)
+        return self.phases.engine(regime.assembly, regime.modes, lambda: judged(problem()), self.demand.engine)
 
     def _suits_heyoka(self, t: float, moment: Moment) -> bool:
         """Whether heyoka goes on from a time on: it is what was asked for, or suits the modes."""

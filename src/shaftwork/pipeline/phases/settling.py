@@ -38,11 +38,14 @@ class Settling:
         phases: the sets of equations.
         values: parameters that differ from the network's.
         span: start and end of the run, s.
+        own: whether each combination of modes has equations of its own, as for an analysis that reads them.
     """
 
-    def __init__(self, phases: Phases, values: Mapping[str, float], span: tuple[float, float]) -> None:
+    def __init__(
+        self, phases: Phases, values: Mapping[str, float], span: tuple[float, float], *, own: bool = True
+    ) -> None:
         self._phases, self.elements = phases, phases.elements
-        self._regimes = Regimes(phases, values)
+        self._regimes = Regimes(phases, values, own=own)
         self.regime, self.held, self.resumed = self._regimes.regime, self._regimes.held, self._regimes.resumed
         self._ahead = AHEAD_OF_RUN * (span[1] - span[0])
         self.tick = ROUNDINGS * math.ulp(max(map(abs, span)))

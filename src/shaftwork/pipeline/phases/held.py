@@ -1,0 +1,144 @@
+"""Many parts that hold and slip: one set of equations for all their combinations.
+
+A network of k frictions has 2^k combinations of what is stuck. For few parts each that is met gets equations of its
+own, with fewer states and compiled code. For many that costs more than the motion: here all have the equations in which
+everything slips, and `codegen.held` adds the reactions of what holds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from copy import copy
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from shaftwork.codegen.elements import Array
+from shaftwork.codegen.held import HeldArrays, HeldStores, Joints
+from shaftwork.codegen.matrices import LinearPart
+from shaftwork.components.modes import Mode
+from shaftwork.core.kept import Kept
+from shaftwork.integrate.problem import Problem
+from shaftwork.network.graph import GROUND
+from shaftwork.network.templates import Kind
+from shaftwork.pipeline.phases.assemblies import Assembly, Element, ModeNames
+from shaftwork.reduction.form import StateForm
+
+if TYPE_CHECKING:
+    from shaftwork.pipeline.model import Model
+    from shaftwork.pipeline.phases.moments import Moment
+
+MANY = 12
+"""From so many elements on that hold and slip."""
+KEPT_RATES = 2
+"""Parameter vectors whose right-hand sides are kept in one combination of what holds."""
+
+
+class HeldAssembly(Assembly):
+    """One set of equations for all modes of a network, with what holds in one combination of them; at first nothing.
+
+    Args:
+        model: the equations in which everything slips.
+        elements: of the network.
+        laws: of each element the branch of its law, None for one that joins nothing.
+    """
+
+    def __init__(self, model: Model, elements: Sequence[Element], laws: Sequence[int | None]) -> None:
+        super().__init__(model, elements, None)
+        self.stores = HeldStores(model.form)
+        self._whole, self._laws, self._held = self, laws, list[int]()
+        joining = (element.number for element, law in zip(elements, laws, strict=True) if law is not None)
+        self._joining = [self._places[number] for number in joining if number in self._places]
+        self._joints: tuple[LinearPart, Joints] | None = None
+        self._found: dict[bytes, dict[str, Any]] = {}
+        _ = self._many, self._shown, self.clocks  # made once for all
+
+    def holding(self, numbers: tuple[int, ...]) -> HeldAssembly:
+        """The equations in which the elements of these numbers hold."""
+        made = copy(self)
+        held = [law for k in numbers if (law := self._laws[k]) is not None]
+        vars(made).update(_held=held, _joints=None, _rates_made=Kept(KEPT_RATES))
+        return made
+
+    def joints(self, p: Array) -> Joints:
+        """What holds, for parameters; the last is kept."""
+        part = self.prepared(p).bound.part
+        if self._joints is None or self._joints[0] is not part:
+            self._joints = part, Joints(self.model.form, part, self._held)
+        return self._joints[1]
+
+    def alike(self, modes: ModeNames) -> tuple[Assembly, ModeNames]:
+        """What is the same for the choice of an engine: whether an element holds or slips does not make it stiff."""
+        return self._whole, tuple("" if law is not None else name for law, name in zip(self._laws, modes, strict=True))
+
+    def judged(self, moment: Moment, problem: Problem) -> Problem:
+        """The motion by which an engine is chosen: with nothing held, as stiffness may be hidden in what is."""
+        p = moment.regime.p
+        return replace(problem, jacobian=self.slopes(partial(self.prepared(p).bound.with_laws, p)))
+
+    def guards(self, p: Array) -> Callable[[Array, Array], Array]:
+        """All guards; rounding gives no speed to what holds."""
+        values, joints = super().guards(p), self.joints(p)
+        return lambda times, states: values(times, joints.alike(states.T).T)
+
+    def bound(self, p: Array) -> HeldArrays:
+        """The equations with their parameters."""
+        plain = self.prepared(p).bound
+        return HeldArrays(plain.program, p, plain.part, self.joints(p))
+
+    def _rates(self, p: Array) -> tuple[Any, dict[str, Any]]:
+        """The right-hand side and what engines find out about it, whatever holds."""
+        free = p.copy()
+        free[self._joining] = 0.0
+        known = self._found.setdefault(free.tobytes(), {})
+        return self._rates_made(p.tobytes(), lambda: (self.bound(p).rhs, known))
+
+
+def laws_that_hold(model: Model, elements: Sequence[Element]) -> list[int | None] | None:
+    """Of each element the branch of the law in whose place a reaction holds, None for one that never holds.
+
+    Args:
+        model: the equations in which no mode joins anything.
+        elements: of the network.
+
+    Returns:
+        None where reactions would not tell the motion: where something has an impact, where a speed is prescribed,
+        where what holds has no inertia at an end, or torques depend on each other.
+    """
+    form = model.form
+    if form.loop_laws or form.across_inputs or form.waves or form.dependent_through:
+        return None
+    found = [_law(form, element) if _joins(element) else None for element in elements]
+    hold = [law for law, element in zip(found, elements, strict=True) if _joins(element)]
+    if None in hold or not all(map(_has_no_impact, elements)):
+        return None
+    return found
+
+
+def _joins(element: Element) -> bool:
+    return len({mode.form for mode in element.modes.options}) > 1
+
+
+def _has_no_impact(element: Element) -> bool:
+    """Whether an element takes up no speed at once: where it joins, its torque is limited on both sides."""
+
+    def is_plain(mode: Mode) -> bool:
+        limited = mode.form == element.modes.options[0].form or {side for side, _ in mode.gives_way} == {1.0, -1.0}
+        return limited and mode.at_rest is None and all(leave.rebound is None for leave in mode.leaves)
+
+    return not element.modes.passes_on and all(map(is_plain, element.modes.options))
+
+
+def _law(form: StateForm, element: Element) -> int | None:
+    """The link whose law has the mode of an element, between its ends, where inertias tell the speeds of both."""
+    graph, part = form.graph, next(part for part in form.graph.parts if part.name == element.part.name)
+    ends = tuple(GROUND if end is None else part.nodes[end] for end in part.ends_of(element.modes))
+    for index in part.branches:
+        branch = graph.branches[index]
+        symbols = {symbol.name for symbol in branch.template.law.free_symbols}
+        if branch.template.kind not in (Kind.LAW, Kind.THROUGH_SOURCE) or element.modes.symbol not in symbols:
+            continue
+        known = index in form.tree.loops and set(form.tree.loops[index]) <= {*form.across_states}
+        if known and (branch.plus, branch.minus) == ends:
+            return index
+    return None
