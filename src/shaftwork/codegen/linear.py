@@ -302,7 +302,7 @@ class _Deviations(History):
         self._given, self._nominal = given, nominal
 
     @property
-    def _inputs(self) -> tuple[Array, Array, Array]:
+    def inputs(self) -> tuple[Array, Array, Array]:
         return self._given
 
     def stored(self, part: GraphPart) -> Array:
