@@ -6,7 +6,7 @@ A stuck friction, a locked brake and an engaged clutch pass what keeps the speed
 
 with G the speeds across what is held, from the speeds of inertias, and lambda in the place of its law. So one set of
 equations serves for whatever holds and whatever slips; an impact by which they come to one speed takes the place of
-lambda in the same system. Source: Brogliato, Nonsmooth Mechanics, 2016, section 5.1.
+lambda in the same system. Source: Brogliato, Nonsmooth Mechanics, 2016.
 """
 
 from __future__ import annotations

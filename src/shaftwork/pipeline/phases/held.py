@@ -108,14 +108,15 @@ def laws_that_hold(model: Model, elements: Sequence[Element]) -> list[int | None
     form = model.form
     if form.loop_laws or form.across_inputs or form.waves or form.dependent_through:
         return None
-    found = [_law(form, element) if _joins(element) else None for element in elements]
-    hold = [law for law, element in zip(found, elements, strict=True) if _joins(element)]
+    found = [_law(form, element) if joins(element) else None for element in elements]
+    hold = [law for law, element in zip(found, elements, strict=True) if joins(element)]
     if None in hold or not all(map(_has_no_impact, elements)):
         return None
     return found
 
 
-def _joins(element: Element) -> bool:
+def joins(element: Element) -> bool:
+    """Whether an element has other branches in some of its modes."""
     return len({mode.form for mode in element.modes.options}) > 1
 
 

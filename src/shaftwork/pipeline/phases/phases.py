@@ -15,7 +15,7 @@ from shaftwork.integrate.engines import ADAMS, available
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.phases.assemblies import Assembly, ModeNames, elements_of
-from shaftwork.pipeline.phases.held import MANY, HeldAssembly, laws_that_hold
+from shaftwork.pipeline.phases.held import MANY, HeldAssembly, joins, laws_that_hold
 from shaftwork.pipeline.phases.resting import at_rest
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ class Phases:
     @cached_property
     def _whole(self) -> HeldAssembly | None:
         """The equations in which nothing holds, for all combinations; None where each has equations of its own."""
-        if sum(len({mode.form for mode in element.modes.options}) > 1 for element in self.elements) < MANY:
+        if sum(map(joins, self.elements)) < MANY:
             return None
         model = self.assembly(self.first).model
         laws = laws_that_hold(model, self.elements)
