@@ -7,7 +7,7 @@ what is at rest is tried, and one is taken that contradicts nothing. Laws:
 - friction, brake, clutch: up to tau at rest, tau against the motion while they slip;
 - freewheel: omega_a <= omega_b, and no pull;
 - rigid contact: no twist beyond its limits, and no pull; an impact takes the speeds to the nearest ones, by kinetic
-  energy, at which nothing closes, and on by e of that change (Newton);
+  energy, at which nothing closes; then what is hit gives back e of its impulse, and again nothing closes (Poisson);
 - soft contact: tau = c x + d v beyond its limit x = 0 while that is no pull, and none else.
 """
 
@@ -53,6 +53,7 @@ class Joint:
         tau: what a friction holds, and its torque while it slips.
         times: from when to when a friction acts, s.
         restitution, rest: of a rigid contact, and the speed below which nothing is thrown back.
+        ratio, efficiency, back: of a gear, see `shaftwork.LossyGear`; matrix exponentials follow none.
     """
 
     kind: str
@@ -65,6 +66,9 @@ class Joint:
     times: tuple[float, float] = (-math.inf, math.inf)
     restitution: float = 0.0
     rest: float = 0.0
+    ratio: float = 1.0
+    efficiency: float = 1.0
+    back: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -131,7 +135,7 @@ class Motion:
         freewheels = [k for k, joint in enumerate(self.train.joints) if joint.kind == "freewheel"]
         if sum(self.rows[k] @ z[: self.n] > 0 for k in freewheels) > 1:
             raise UndecidedError
-        z, met = self._after_impact(z, modes, None), None
+        z, met = self._after_impact(z, modes, None, {}), None
         for _ in range(MOST_EVENTS):
             z, new = self._settled(t, z, modes, met)
             self.events += [(t, k, new[k]) for k in new if new[k] != modes[k]]
@@ -198,55 +202,64 @@ class Motion:
         """Of the mobility across joints; where they depend on each other the least reactions are taken."""
         return np.linalg.pinv(C / self.J @ C.T, rcond=1e-11, hermitian=True) if len(C) else np.zeros((0, 0))
 
-    def _nearest(self, w: Array, least: Sequence[tuple[int, float]]) -> Array:
-        """(n,) the nearest speeds with side * speed <= 0 across joints."""
+    def _nearest(self, w: Array, closing: Sequence[tuple[int, float]]) -> tuple[Array, dict[int, float]]:
+        """(n,) the nearest speeds with side * speed <= 0 across joints, and the impulses that lead there."""
         tolerance = 1e-12 * max(1.0, np.abs(w).max())
-        for chosen in itertools.chain.from_iterable(itertools.combinations(least, m) for m in range(len(least) + 1)):
+        for chosen in itertools.chain.from_iterable(
+            itertools.combinations(closing, m) for m in range(len(closing) + 1)
+        ):
             C = self.rows[[k for k, _ in chosen]]
             impulses = self._inverse(C) @ (C @ w)
             new = w - C.T @ impulses / self.J
             pressed = zip(impulses, chosen, strict=True)
             if all(side * impulse >= -tolerance for impulse, (_, side) in pressed) and all(
-                side * (self.rows[k] @ new) <= tolerance for k, side in least
+                side * (self.rows[k] @ new) <= tolerance for k, side in closing
             ):
-                return new
+                return new, {k: float(impulse) for impulse, (k, _) in zip(impulses, chosen, strict=True)}
         raise AssertionError("no impulse is consistent")
 
-    def _after_impact(self, z: Array, modes: Modes, hit: int | None) -> Array:
-        """The states after what closes has met."""
+    def _after_impact(self, z: Array, modes: Modes, hit: int | None, touching: Mapping[int, float]) -> Array:
+        """The states after what closes has met, and what is hit has given back its share of the impulse (Poisson).
 
-        def closing(closed: Mapping[int, str]) -> list[tuple[int, float]]:
-            kinds = ((k, joint.kind) for k, joint in enumerate(self.train.joints))
-            ways = {"up": 1.0, "down": -1.0, "open": 0.0}
-            made = ((k, 1.0 if kind == "freewheel" else ways[closed[k]]) for k, kind in kinds if kind in RIGID)
-            return [(k, side) for k, side in made if side]
-
-        w, z = z[: self.n].copy(), z.copy()
-        new = self._nearest(w, closing(modes))
+        Args:
+            z: states.
+            modes: with what is hit closed.
+            hit: the contact that is hit; None at the start.
+            touching: other contacts that take part although they are open, with their sides.
+        """
+        w, z, ways = z[: self.n].copy(), z.copy(), {"up": 1.0, "down": -1.0}
+        closing = [*touching.items()]
+        for k, joint in enumerate(self.train.joints):
+            if joint.kind == "freewheel":
+                closing.append((k, 1.0))
+            elif joint.kind == "rigid" and modes[k] in ways:
+                closing.append((k, ways[modes[k]]))
+        new, impulses = self._nearest(w, closing)
         if hit is not None:
             joint = self.train.joints[hit]
             if joint.restitution * abs(self.rows[hit] @ w) > joint.rest:
-                thrown = new + joint.restitution * (new - w)
-                new = self._nearest(thrown, closing({**modes, hit: "open"}))
+                back = joint.restitution * impulses.get(hit, 0.0) * self.rows[hit] / self.J
+                new, _ = self._nearest(new - back, closing)
         z[: self.n] = new
         return z
 
     def _hit(self, t: float, z: Array, modes: Modes, k: int) -> tuple[Array, Modes, int | None]:
         """After the impact of a contact: states, modes, and the contact where it stays closed."""
-        limits = {
-            other: np.array(joint.limits) for other, joint in enumerate(self.train.joints) if joint.kind == "rigid"
-        }
-        touching = [other for other, both in limits.items() if np.abs(z[self.place[other]] - both).min() < REST]
+        touching = {}
+        for other, both in ((o, joint.limits) for o, joint in enumerate(self.train.joints) if joint.kind == "rigid"):
+            apart = np.abs(z[self.place[other]] - np.array(both))
+            if other != k and modes[other] == "open" and apart.min() < REST:
+                touching[other] = 1.0 if apart.argmin() else -1.0
         when, other = self._last_hit
-        if (t - when < AT_ONCE and other != k) or touching != [k]:
+        if t - when < AT_ONCE and other != k:
+            raise UndecidedError
+        if any(self.train.joints[other].restitution for other in touching):
             raise UndecidedError
         self._last_hit = t, k
         joint = self.train.joints[k]
         side = "up" if self._beyond(k, "up") @ z > self._beyond(k, "down") @ z else "down"
         z[self.place[k]] = joint.limits[side == "up"]
-        z = self._after_impact(z, {**modes, k: side}, k)
-        if any(self.rows[other] @ z[: self.n] > -REST for other, mode in modes.items() if mode == "free"):
-            raise UndecidedError  # a freewheel locks in an impact of another part
+        z = self._after_impact(z, {**modes, k: side}, k, touching)
         if abs(self.rows[k] @ z[: self.n]) > REST * max(1.0, np.abs(z[: self.n]).max()):
             self.events.append((t, k, "rebound"))
             return z, modes, None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 from sympy import Integer
@@ -12,13 +12,11 @@ from shaftwork.codegen.observer import Impact
 from shaftwork.components.branches import INTEGRAL
 from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError, SimulationError
-from shaftwork.pipeline.phases.assemblies import Element, ModeNames
+from shaftwork.pipeline.phases.assemblies import Element, ModeNames, Watched
+from shaftwork.pipeline.phases.collisions import NO_IMPACT, Collisions
 from shaftwork.pipeline.phases.impulses import Blow, Impulses, Stage, Start
 from shaftwork.pipeline.phases.moments import CLEAR, Change, Moment
 from shaftwork.pipeline.phases.regimes import Regimes, with_modes
-
-# A speed across what is joined, as part of the largest one or of one, up to which it is an error of the run, no impact.
-NO_IMPACT = 1e-8
 
 
 class Impacts:
@@ -32,6 +30,7 @@ class Impacts:
 
     def __init__(self, regimes: Regimes, elements: Sequence[Element], tick: float) -> None:
         self._regimes, self._elements, self._tick = regimes, elements, tick
+        self._collisions = Collisions(regimes, elements, tick, together=False)
         self._impulses = Impulses(regimes, elements)
         self.gears = self._impulses.gears
 
@@ -59,20 +58,34 @@ class Impacts:
         rates = np.array(regime.motion(t, moment.x.tolist())[0])
         return regime.assembly.across(number, t, moment.x - late * rates, regime.p)
 
+    def fastest(self, t: float, moment: Moment, number: int, ended: Watched) -> tuple[int, Watched]:
+        """Of what is hit at an instant in s what closes fastest, element and guard: impacts follow each other."""
+        if self.gears or ended.leave.rebound is None:
+            return number, ended
+        contact = self._collisions.fastest(t, moment, number, ended.leave)
+        if contact is None or contact.number == number:
+            return number, ended
+        return next(pair for pair in moment.regime.watched if pair[1].leave is contact.leave)
+
     def hit(self, t: float, after: float, moment: Moment, number: int, leave: Leave) -> tuple[Moment, list[Change]]:
         """An impact: the element is joined for an instant, and for good where nothing throws it back.
 
         Law: v = v_joined + e (v_joined - v_before), which gives e times the speed back and keeps every momentum; with
         gears that rub as in `Impulses`.
         """
+        if not self.gears:
+            return self._hit_at_once(t, after, moment, number, leave)
         regime = moment.regime
-        speed = abs(regime.assembly.across(number, after, moment.x, regime.p))
+        closes = regime.assembly.across(number, after, moment.x, regime.p)
+        speed = abs(closes)
         share, rest = (regime.assembly.constant(number, given, regime.p) for given in (leave.rebound, leave.rest))
         held, apart = self._regimes.held(moment, after), {number: regime.modes[number]}
         # what moves more slowly than the rest of an impact stays as it is: two contacts would part and meet for ever
         least = max(rest, NO_IMPACT * speed)
 
         def joined(start: Start, _: Sequence[Stage]) -> Blow:
+            if closes * self._impulses.across(start.moment, after, number) < 0:  # a gear has jammed, and it opens
+                return Blow(start.moment, start.moment.regime)
             met = self._joined(start.moment.regime.modes, start.held, after, {number: leave.to}, least)
             return Blow(met, met.regime)
 
@@ -93,36 +106,48 @@ class Impacts:
         if not rebound:
             new = self._at_limit(new, number, leave)
         new = self._kept(after, regime.modes, new)
-        changes = [hits, *self._differences(t, regime.modes, new.regime.modes, number)]
+        changes = [hits, *self._differences(t, regime.modes, new.regime.modes, {number})]
         self._refuse_gain(t, moment, held, self._regimes.held(new, after), hits)
         return new, changes
 
-    def refuse_slip(self, t: float, moment: Moment, new: Moment, number: int) -> None:
-        """Refuse a stop at once, of a gear that jams, in which what holds by a limited torque would slip or part.
+    def _hit_at_once(
+        self, t: float, after: float, moment: Moment, number: int, leave: Leave
+    ) -> tuple[Moment, list[Change]]:
+        """An impact of all contacts that touch, where no gear passes it on by its direction."""
+        regime, held = moment.regime, self._regimes.held(moment, after)
+        found = self._collisions.impact(after, moment, number, leave)
+        if found is None:  # its equations say what contradicts what
+            new = self._regimes.changed(moment, after, with_modes(regime.modes, {number: leave.to}))
+            return new, [Change(t, self._elements[number], regime.modes[number], leave.to, impact=True)]
+        new, hits = found.after, list[Change]()
+        for contact in sorted((*found.stays, *found.thrown), key=lambda contact: contact.number != number):
+            rebound = contact in found.thrown
+            energies = {} if hits else {"given": found.given, "lost": found.lost}
+            element = self._elements[contact.number]
+            hits.append(Change(t, element, contact.apart, contact.joined, rebound, impact=True, **energies))
+            if not rebound and contact.leave is not None:
+                new = self._at_limit(new, contact.number, contact.leave)
+        new = self._kept(after, regime.modes, new)
+        besides = {contact.number for contact in (*found.stays, *found.thrown)}
+        changes = [*hits, *self._differences(t, regime.modes, new.regime.modes, besides)]
+        self._refuse_gain(t, moment, held, self._regimes.held(new, after), hits[0])
+        return new, changes
+
+    def jammed(self, t: float, moment: Moment, new: Moment) -> Moment:
+        """What a gear that jams stops at once: what holds by a limited torque slips in that, and contacts part.
 
         Args:
             t: s.
             moment: what was before.
             new: after it, with all stopped that is joined.
-            number: of the element that wanted another mode.
-
-        Raises:
-            SimulationError: something would; names it.
         """
         held, stopped = self._regimes.held(moment, t), self._regimes.held(new, t)
         least = NO_IMPACT * max([1.0, *map(abs, held.values())])
         if all(abs(stopped[name] - value) <= least for name, value in held.items()):
-            return
+            return new
         before, modes = moment.regime.modes, new.regime.modes
-        joins = {k: name for k, (_, name) in self._pairs(modes) if name != before[k]}
-        after = self._joined(modes, held, t, joins, least).regime.modes
-        slips = [element.name for k, (element, name) in self._pairs(modes) if name != after[k]]
-        if slips:
-            raise SimulationError(
-                f"'{self._elements[number].name}' is stopped at t = {t:.9g} s by a gear that jams at once, and "
-                f"{' and '.join(repr(name) for name in slips)} would slip or part in that stop, which is not followed. "
-                "Put a spring between them, or give the gear an efficiency_back above zero."
-            )
+        joins = {k: name for k, (_, name) in self._pairs(modes) if name != before[k] and k in self.gears}
+        return self._joined(modes, held, t, joins, least)
 
     def _kept(self, t: float, before: ModeNames, moment: Moment) -> Moment:
         """Contacts that part in an impact of others, and are pushed back before they could be found again, stay closed.
@@ -244,11 +269,13 @@ class Impacts:
     def _pairs(self, modes: ModeNames) -> enumerate[tuple[Element, str]]:
         return enumerate(zip(self._elements, modes, strict=True))
 
-    def _differences(self, t: float, before: ModeNames, after: ModeNames, besides: int | None = None) -> list[Change]:
+    def _differences(
+        self, t: float, before: ModeNames, after: ModeNames, besides: Collection[int] = ()
+    ) -> list[Change]:
         return [
             Change(t, element, before[k], name)
             for k, (element, name) in self._pairs(after)
-            if k != besides and name != before[k]
+            if k not in besides and name != before[k]
         ]
 
     def _joined(

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import combinations
+from itertools import islice
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from shaftwork.codegen.elements import Array
-from shaftwork.components.branches import ACROSS
 from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.pipeline.phases.assemblies import ModeNames, Watched
+from shaftwork.pipeline.phases.commutation import commutations
 from shaftwork.pipeline.phases.courses import Way, chosen, later, leaving, moved
-from shaftwork.pipeline.phases.impacts import NO_IMPACT, Impacts
+from shaftwork.pipeline.phases.impacts import Impacts
 from shaftwork.pipeline.phases.moments import ROUNDINGS, Change, Moment, Regime, clear_of_limits, together
 from shaftwork.pipeline.phases.regimes import Regimes, refuse_beyond, with_modes
 
@@ -175,14 +176,20 @@ class Settling:
         still: list[Way] = []
         seen: dict[ModeNames, None] = {}
         blocked, repeats = None, 0
+        tried: Counter[tuple[ModeNames, int]] = Counter()  # ways round what contradicts others, each of them once
         # a guard is met where it is beyond zero by its band, which then still is the band of what is the same after it
         ended = moment
         exceeded = first
         if exceeded is None:
             moment, exceeded = self._violated(moment, after, ended, still)
         while exceeded is not None:
-            moment, latest, contradiction = self._follow(t, after, moment, *exceeded)
+            here = moment.regime.modes, exceeded[0]
+            moment, latest, contradiction = self._follow(t, after, moment, *exceeded, tried[here])
             changes, blocked = [*changes, *latest], contradiction or blocked
+            if contradiction is not None:
+                tried[here] += 1
+                if tried[here] > 1:
+                    seen.clear()
             impact = bool(latest) and latest[0].impact
             again = bool(latest) and not impact and moment.regime.modes in seen
             repeats += again
@@ -261,9 +268,12 @@ class Settling:
         return step
 
     def _follow(
-        self, t: float, after: float, moment: Moment, number: int, ended: Watched
+        self, t: float, after: float, moment: Moment, number: int, ended: Watched, tried: int = 0
     ) -> tuple[Moment, list[Change], NetworkError | None]:
-        """The mode of an element changes, or what hits is thrown back; and what kept it from what it wanted."""
+        """The mode of an element changes, or what hits is thrown back; and what kept it from what it wanted.
+
+        Of the ways round that, some have been tried.
+        """
         element, leave, regime = self.elements[number], ended.leave, moment.regime
         before = regime.modes[number]
         to = leave.to or self._anew(moment, after, number)
@@ -277,11 +287,11 @@ class Settling:
             if speed or (leave.rebound is not None and not slips):
                 return *self._hit(t, after, moment, number, replace(ended, leave=replace(leave, to=to))), None
             modes = with_modes(regime.modes, {number: to})
-            new, conducting = self._commutated(moment, after, modes, self._regimes.changed(moment, after, modes))
+            new, conducting = self._commutated(moment, after, modes)
             others = [Change(t, self.elements[k], regime.modes[k], name) for k, name in conducting.items()]
             return new, [Change(t, element, before, to), *others], None
         except NetworkError as error:
-            return *self._around(t, after, moment, (number, to), error), error
+            return *self._around(t, after, moment, (number, to), error, tried), error
 
     def _anew(self, moment: Moment, t: float, number: int) -> str:
         """The mode of an element in which a motion would start, other than the one that ends."""
@@ -304,6 +314,7 @@ class Settling:
         It is thrown back where it has passed its limit, and has been on its way since: what it would gain between there
         and here would add up over many rebounds.
         """
+        number, ended = self._impacts.fastest(after, moment, number, ended)
         since = 0.0 if ended.leave.rebound is None else self._since(after, moment, ended)
         new, changes = self._impacts.hit(t, after, moved(moment, after, -since), number, ended.leave)
         if not changes[0].rebound:
@@ -328,37 +339,16 @@ class Settling:
         gain = met.side * later(regime, step, (t, x, rates, now))[3][met.guard] - beyond
         return beyond * step / gain if 0 < beyond < gain else 0.0
 
-    def _commutated(self, moment: Moment, t: float, modes: ModeNames, plain: Moment) -> tuple[Moment, dict[int, str]]:
-        """What takes over a torque or current that a change would cut off, with its energy: a diode, a freewheel."""
-        names = plain.regime.assembly.stores.through
-        if plain.x is moment.x or not names:
-            return plain, {}
-        held = self.held(moment, t)
-
-        def lost(other: Moment) -> float:
-            kept = self.held(other, t)
-            return sum(abs(kept[name] - held[name]) for name in names)
-
-        least = NO_IMPACT * sum(abs(held[name]) for name in names)
-        if lost(plain) <= least:
-            return plain, {}
-        ways = [
-            (k, leave.to)
-            for k, name in enumerate(modes)
-            for leave in self.elements[k].modes[name].leaves
-            if leave.when == ACROSS and leave.to
-        ]
-        for count in (1, 2):
-            for pair in combinations(ways, count):
-                if not self._regimes.possible(with_modes(modes, dict(pair))):
-                    continue
-                other = self._regimes.changed(moment, t, with_modes(modes, dict(pair)))
-                if lost(other) <= least and not self._violated(other, t, other, ())[1]:
-                    return other, dict(pair)
+    def _commutated(self, moment: Moment, t: float, modes: ModeNames) -> tuple[Moment, dict[int, str]]:
+        """The modes that are wanted, and what then takes over a torque or current that they would cut off."""
+        plain = self._regimes.changed(moment, t, modes)
+        for other, changed in commutations(self._regimes, self.elements, t, moment, plain):
+            if not self._violated(other, t, other, ())[1]:
+                return other, changed
         return plain, {}
 
     def _around(
-        self, t: float, after: float, moment: Moment, wanted: tuple[int, str], error: NetworkError
+        self, t: float, after: float, moment: Moment, wanted: tuple[int, str], error: NetworkError, tried: int
     ) -> tuple[Moment, list[Change]]:
         """Past a mode whose equations contradict others: into one to which it leads, or something else gives way.
 
@@ -373,11 +363,10 @@ class Settling:
             ways += [{number: to, k: name} for _, name in limited if k != number]
         for k in self._impacts.gears:
             ways += [{number: to, k: leave.to} for leave in self.elements[k].modes[modes[k]].leaves if k != number]
-        for way in ways:
-            if self._regimes.possible(new := with_modes(modes, way)):
-                made = self._regimes.changed(moment, after, new)
-                self._impacts.refuse_slip(after, moment, made, number)
-                return made, [Change(t, self.elements[k], modes[k], name) for k, name in way.items()]
+        for new in islice(filter(self._regimes.possible, (with_modes(modes, way) for way in ways)), tried, None):
+            made = self._impacts.jammed(after, moment, self._regimes.changed(moment, after, new))
+            pairs = zip(self.elements, modes, made.regime.modes, strict=True)
+            return made, [Change(t, *names) for names in pairs if names[1] != names[2]]
         raise SimulationError(
             f"'{element.name}' can neither stay {element.modes[before].words} nor become {element.modes[to].words} "
             f"at t = {t:.9g} s. {error.problems[0]}"

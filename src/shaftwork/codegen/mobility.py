@@ -1,0 +1,105 @@
+"""How speeds across parts change by impulses through them, and the impulses that keep contacts from closing further.
+
+Impulses lambda at pairs of nodes change the speeds v of inertias at once, and no torque counts beside them:
+
+    M (v' - v) = R' lambda,    u = R v + R_E e,    u' = u + W lambda,    W = R M^-1 R',
+
+with M the inertias in the states and of all that turns with them, R and R_E the speeds across the pairs from those of
+the states and from prescribed ones. Contacts press and never pull: lambda >= 0, w = W lambda + q >= 0, lambda w = 0, a
+linear complementarity problem. Source: Brogliato, Nonsmooth Mechanics, 2016, section 5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shaftwork.codegen.arrays import BoundArrays
+from shaftwork.codegen.elements import Array, potential_matrix
+from shaftwork.network.graph import GROUND
+from shaftwork.network.templates import Kind
+from shaftwork.reduction.form import StateForm
+
+ROUNDING = 1e-12
+"""A part of the largest value that is rounding."""
+WITHOUT_INERTIA = (Kind.CONDUCTANCE, Kind.LAW, Kind.THROUGH_STORE)
+
+
+class Mobility:
+    """The answer of a network to impulses at pairs of nodes.
+
+    Args:
+        form: the equations, in which no coupling loses power.
+        bound: the same with their parameters.
+        pairs: first and second node of each pair; +lambda raises the speed of the first one.
+    """
+
+    def __init__(self, form: StateForm, bound: BoundArrays, pairs: Sequence[tuple[int, int]]) -> None:
+        part, k = bound.part, bound.part.coefficients
+        across, links, massless = list(form.across_states), list(form.dependent_across), _massless(form)
+        nodes = potential_matrix(form)(bound.p).toarray()
+        rows = np.array([_row(nodes, plus) - _row(nodes, minus) for plus, minus in pairs]).reshape(len(pairs), -1)
+        self.has_inertia: NDArray[np.bool_] = ~(rows[:, massless] != 0).any(axis=1)
+        """(pairs,) whether the speeds of inertias and prescribed ones tell the speed across; else no impulse passes."""
+        rows[~self.has_inertia] = 0.0
+        self._R, self._driven = rows[:, across], rows[:, list(form.across_inputs)]
+        loops = part.loops[across][:, links].toarray()
+        mass = np.diag(k[across]) + loops * k[links] @ loops.T
+        self._answers = np.linalg.solve(mass, self._R.T)
+        self.W = self._R @ self._answers
+        """(pairs, pairs) changes of the speeds across by unit impulses."""
+
+    def moved(self, x: Array, impulses: Array) -> Array:
+        """(n,) the states after impulses (pairs,)."""
+        new = x.copy()
+        new[: len(self._answers)] += self._answers @ impulses
+        return new
+
+    def given(self, speeds: Array, impulses: Array) -> Array:
+        """(inputs,) energy in J that prescribed speeds (inputs,) give in impulses (pairs,)."""
+        return np.asarray(-speeds * (impulses @ self._driven))
+
+
+def _row(nodes: Array, node: int) -> Array:
+    return np.zeros(nodes.shape[1]) if node == GROUND else nodes[node]
+
+
+def _massless(form: StateForm) -> list[int]:
+    """Tree branches whose across variables follow from torques."""
+    return [branch for kind in WITHOUT_INERTIA for branch in form.tree.tree[kind]]
+
+
+def complementary(W: Array, q: Array) -> Array | None:
+    """(m,) lambda >= 0 with w = W lambda + q >= 0 and lambda w = 0, or None where there is none.
+
+    W is symmetric and positive semidefinite, so it is the least square of what A lambda leaves of b with W = A' A,
+    q = -A' b, solved by an active set. W lambda is unique, and so are speeds; lambda need not be.
+
+    Source: Lawson and Hanson, Solving Least Squares Problems, 1974, chapter 23.
+    """
+    scale = np.diag(W)
+    if (q[scale <= 0] < 0).any():
+        return None
+    scale = np.where(scale > 0, 1 / np.sqrt(np.where(scale > 0, scale, 1.0)), 0.0)
+    V, b = W * scale[:, None] * scale, q * scale
+    least = ROUNDING * np.abs(b).max(initial=0.0)
+    found, active = np.zeros(len(q)), np.zeros(len(q), dtype=bool)
+    for _ in range(3 * len(q) + 1):
+        w = np.where(active, 0.0, V @ found + b)
+        if not (w < -least).any():
+            return np.asarray(found * scale) if (V @ found + b > -10 * least - ROUNDING).all() else None
+        active[np.argmin(w)] = True
+        while True:
+            wanted = np.zeros(len(q))
+            wanted[active] = np.linalg.lstsq(V[np.ix_(active, active)], -b[active], rcond=ROUNDING)[0]
+            pulls = active & (wanted <= 0)
+            if not pulls.any():
+                break
+            shares = found[pulls] / (found[pulls] - wanted[pulls])
+            found += shares.min() * (wanted - found)
+            active &= ~(pulls & (found <= ROUNDING * np.abs(found).max(initial=0.0)))
+            found[~active] = 0.0
+        found = wanted
+    return None

@@ -1,0 +1,221 @@
+"""Impacts as one problem: all contacts and freewheels of the network that touch, whichever of them is hit.
+
+With u the speed at which a contact opens, negative where it closes, and lambda its impulse, nothing closes any more at
+the end of the compression, and each contact then gives back the share e of its own impulse (Poisson):
+
+    u' = u + W lambda >= 0,              lambda >= 0,    lambda u' = 0,
+    u'' = u' + W (e lambda + mu) >= 0,   mu >= 0,        mu u'' = 0.
+
+For one contact that is Newton's law, u'' = -e u. No impact gains energy, whatever the shares: mu is that impulse after
+which the kinetic energy is least, and mu = (1 - e) lambda would leave as much as there was before. Friction, brakes and
+clutches pass torques that are limited, and no impulse.
+
+Source: Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts, 1996, chapter 8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from shaftwork.codegen.elements import Array
+from shaftwork.codegen.mobility import Mobility, complementary
+from shaftwork.components.branches import ACROSS
+from shaftwork.components.modes import Leave, Modes
+from shaftwork.network.graph import GROUND
+from shaftwork.pipeline.phases.assemblies import Element, ModeNames
+from shaftwork.pipeline.phases.moments import CLEAR, Moment
+from shaftwork.pipeline.phases.regimes import Regimes, with_modes
+
+# A speed across what is joined, as part of the largest one or of one, up to which it is an error of the run, no impact.
+NO_IMPACT = 1e-8
+SAME = 1e-9
+"""Speeds at which contacts close that differ by less than this fraction are the same."""
+
+
+class Contact(NamedTuple):
+    """What cannot close further, be it closed or only touching.
+
+    Args:
+        number: of the element.
+        side: 1 where it opens as the speed across it rises, -1 where as that falls.
+        apart: mode in which it is open.
+        joined: mode in which it is closed.
+        leave: by which it closes; None where it is closed already.
+        restitution: of what it hits with, and
+        rest: speed up to which nothing is thrown back.
+    """
+
+    number: int
+    side: float
+    apart: str
+    joined: str
+    leave: Leave | None = None
+    restitution: float = 0.0
+    rest: float = 0.0
+
+
+class Collision(NamedTuple):
+    """What an impact does.
+
+    Args:
+        after: what follows it.
+        stays: elements that close in it and stay so.
+        thrown: elements that are thrown back.
+        lost: energy in J that is lost, by part.
+        given: energy in J that prescribed speeds give, by part.
+    """
+
+    after: Moment
+    stays: tuple[Contact, ...]
+    thrown: tuple[Contact, ...]
+    lost: dict[str, float]
+    given: dict[str, float]
+
+
+class Collisions:
+    """Solves impacts where no coupling loses power.
+
+    Args:
+        regimes: combinations of modes.
+        elements: of the network.
+        tick: how far in s rounding moves the time.
+        together: whether what touches is thrown back in the same instant as what is hit, and not after it.
+    """
+
+    def __init__(self, regimes: Regimes, elements: Sequence[Element], tick: float, *, together: bool) -> None:
+        self._regimes, self._elements, self._tick, self._together = regimes, elements, tick, together
+
+    def impact(self, t: float, moment: Moment, number: int, leave: Leave) -> Collision | None:
+        """The impact of an element that closes; None where nothing stops what is prescribed.
+
+        Args:
+            t: time in s at which inputs are read.
+            moment: what was before.
+            number: of the element.
+            leave: by which it closes.
+        """
+        regime, held = moment.regime, self._regimes.held(moment, t)
+        contacts = self._in_turn(t, moment, [*self._contacts(t, moment, number, leave)])
+        gives_way = {k: ways for k, ways in limited(self._elements, regime.modes).items() if len(ways) > 1}
+        apart = {k: ways[0][1] for k, ways in gives_way.items()} | {c.number: c.apart for c in contacts}
+        if all(contact.number != number for contact in contacts):  # nothing opens it again
+            apart[number] = leave.to
+        loose = self._regimes.taking(with_modes(regime.modes, apart), t, held)
+        pairs = [self._nodes(loose, contact) for contact in contacts]
+        bound = loose.regime.assembly.bound(loose.regime.p)
+        mobility = Mobility(loose.regime.assembly.model.form, bound, pairs)
+        opens = np.where(mobility.has_inertia, [self._opens(t, moment, contact) for contact in contacts], 0.0)
+        back = np.array([self._restitution(c, u) for c, u in zip(contacts, opens.tolist(), strict=True)])
+        now = np.where(mobility.has_inertia, [self._opens(t, loose, contact) for contact in contacts], 0.0)
+        impulses = complementary(mobility.W, now)
+        if impulses is None:
+            return None
+        if back.any():
+            returned = back * impulses
+            more = complementary(mobility.W, now + mobility.W @ (impulses + returned))
+            impulses += returned + (0.0 if more is None else more)
+        then = now + mobility.W @ impulses
+        after = loose._replace(x=mobility.moved(loose.x, impulses))
+        least = NO_IMPACT * max(1.0, np.abs(opens).max(initial=0.0))
+        hit = [c for c, i in zip(contacts, impulses, strict=True) if c.leave and (i > 0 or c.number == number)]
+        closed = [c for c, u in zip(contacts, then, strict=True) if u <= least and (c.leave is None or c in hit)]
+        modes = {c.number: c.joined for c in closed}
+        for k, ways in gives_way.items():
+            speed = self._across(t, after, k)
+            modes[k] = next((to for side, to in ways if side * speed > least), regime.modes[k])
+        after = self._regimes.changed(after, t, with_modes(loose.regime.modes, modes))
+        stays, thrown = (tuple(c for c in hit if (c in closed) is together) for together in (True, False))
+        given = self._given(t, loose, mobility, impulses)
+        owners = [self._elements[contact.number].part.name for contact in contacts]
+        lost = _sums(owners, (-impulses * (now + then) / 2).tolist())
+        return Collision(after, stays, thrown, lost, given)
+
+    def _given(self, t: float, loose: Moment, mobility: Mobility, impulses: Array) -> dict[str, float]:
+        """Energy in J that prescribed speeds give, by part."""
+        assembly, p = loose.regime.assembly, loose.regime.p
+        form, sources = assembly.model.form, assembly.stores.sources(assembly.bound(p), t)
+        energies = mobility.given(sources[len(form.laws) :], impulses)
+        return _sums([form.graph.part_of(branch).name for branch in form.across_inputs], energies.tolist())
+
+    def _in_turn(self, t: float, moment: Moment, contacts: list[Contact]) -> list[Contact]:
+        """The contacts that take part: of those that throw back only the fastest, but if all do so together."""
+        speeds = {c: -self._opens(t, moment, c) for c in contacts}
+        thrown = [speed for c, speed in speeds.items() if self._restitution(c, -speed)]
+        if self._together or not thrown:
+            return contacts
+        fastest = (1 - SAME) * max(thrown)
+        return [c for c, speed in speeds.items() if not c.restitution or speed >= fastest]
+
+    def fastest(self, t: float, moment: Moment, number: int, leave: Leave) -> Contact | None:
+        """Of what closes and is thrown back what closes fastest, first the element that is given; None where none is.
+
+        Args:
+            t, moment, number, leave: as in `impact`.
+        """
+        contacts = self._in_turn(t, moment, [*self._contacts(t, moment, number, leave)])
+        thrown = (c for c in contacts if self._restitution(c, self._opens(t, moment, c)))
+        return min(thrown, key=lambda contact: contact.number != number, default=None)
+
+    def _opens(self, t: float, moment: Moment, contact: Contact) -> float:
+        """The speed at which a contact opens."""
+        return contact.side * self._across(t, moment, contact.number)
+
+    @staticmethod
+    def _across(t: float, moment: Moment, number: int) -> float:
+        return moment.regime.assembly.across(number, t, moment.x, moment.regime.p)
+
+    def _nodes(self, moment: Moment, contact: Contact) -> tuple[int, int]:
+        """The nodes of a contact, that first whose speed opens it."""
+        element = self._elements[contact.number]
+        part = moment.regime.assembly.parts[element.part.name]
+        ends = part.ends_of(element.modes)[:: int(contact.side)]
+        first, second = (GROUND if end is None else part.nodes[end] for end in ends)
+        return first, second
+
+    def _restitution(self, contact: Contact, opens: float) -> float:
+        """The share of the speed at which a contact closes that comes back."""
+        return contact.restitution if -opens * contact.restitution > contact.rest else 0.0
+
+    def _contacts(self, t: float, moment: Moment, number: int, leave: Leave) -> Iterator[Contact]:
+        """Contacts that are closed or touch, freewheels, and the element that wants to close."""
+        regime, x = moment.regime, moment.x.tolist()
+        rates, now = regime.motion(t, x)
+        near = regime.limits(t + self._tick, regime.rounded(x, rates, self._tick))
+        for k, (element, name) in enumerate(zip(self._elements, regime.modes, strict=True)):
+            modes = element.modes
+            if (side := one_side(modes, name)) is not None:
+                yield Contact(k, side, modes[name].gives_way[0][1], name)
+        for k, watched in regime.watched:
+            closes, guard = watched.leave, watched.guard
+            wanted = k == number and closes.to == leave.to
+            touches = watched.side * now[guard] > -CLEAR * abs(near[guard] - now[guard])
+            takes_part = wanted or (closes.when == ACROSS if closes.rebound is None else touches)
+            side = one_side(self._elements[k].modes, closes.to) if takes_part and closes.to else None
+            if side is not None:
+                closes = leave if wanted else closes
+                constants = (regime.assembly.constant(k, given, regime.p) for given in (closes.rebound, closes.rest))
+                yield Contact(k, side, regime.modes[k], closes.to, closes, *constants)
+
+
+def one_side(modes: Modes, name: str) -> float | None:
+    """The side of the speed across at which a mode opens that joins by a torque of one sign; None of other modes."""
+    mode = modes[name]
+    sides = [side for side, _ in mode.gives_way]
+    return sides[0] if len(sides) == 1 and mode.form != modes.options[0].form else None
+
+
+def limited(elements: Sequence[Element], modes: ModeNames) -> dict[int, tuple[tuple[float, str], ...]]:
+    """Elements that join by a torque that is limited, with the sides on which it is and the modes there."""
+    found = {k: element.modes[name].gives_way for k, (element, name) in enumerate(zip(elements, modes, strict=True))}
+    return {k: ways for k, ways in found.items() if ways}
+
+
+def _sums(names: Sequence[str], values: Sequence[float]) -> dict[str, float]:
+    """The sums of values by name, without zeros."""
+    sums: dict[str, float] = {}
+    for name, value in zip(names, values, strict=True):
+        sums[name] = sums.get(name, 0.0) + value
+    return {name: value for name, value in sums.items() if value}
