@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -95,6 +97,47 @@ def test_the_last_of_a_row_takes_the_speed_of_the_first() -> None:
     assert words(sol) == [("first", "open", "rebound"), ("second", "open", "rebound")]
     speeds = [sol[f"J{k}.omega"][-1] for k in (1, 2, 3)]
     assert speeds == pytest.approx([0.0, 0.0, 1.0], abs=EXACT)
+
+
+def test_the_rest_of_a_row_takes_an_impact_as_one_where_impacts_are_together(tmp_path: Path) -> None:
+    """Moreau: the first flies back by all of its speed, and the impulse of the second is what keeps it closed."""
+    gaps = [sw.Backlash(name, gap=0.2, restitution=1.0) for name in ("first", "second")]
+    net = row(*gaps, J=(1.0, 1.0, 1.0))
+    net.impacts = "together"
+    net.save(tmp_path / "row.toml")
+    sol = sw.Network.load(tmp_path / "row.toml").simulate(0.2, initial={"J1.omega": 1.0, "second.phi": 0.1})
+    assert words(sol) == [("first", "open", "rebound"), ("second", "open", "in contact")]
+    speeds = [sol[f"J{k}.omega"][-1] for k in (1, 2, 3)]
+    assert speeds == pytest.approx([-1 / 3, 2 / 3, 2 / 3], abs=EXACT)
+    assert sol.energy_residual < 1e-12
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("impacts", ["in turn", "together"])
+def test_two_that_hit_a_third_from_both_sides_leave_it_where_it_is(restitution: float, impacts: Any) -> None:
+    gaps = [sw.Backlash(name, gap=0.2, restitution=restitution) for name in ("first", "second")]
+    net = row(*gaps, J=(1.0, 3.0, 1.0))
+    net.impacts = impacts
+    sol = net.simulate(0.2, initial={"J1.omega": 1.0, "J3.omega": -1.0})
+    speeds = [sol[f"J{k}.omega"][-1] for k in (1, 2, 3)]
+    assert speeds == pytest.approx([-restitution, 0.0, restitution], abs=EXACT)
+    assert [sol.energy.lost_in[name] for name in ("first", "second")] == pytest.approx(
+        [(1 - restitution**2) / 2] * 2, abs=EXACT
+    )
+
+
+def test_a_freewheel_locks_in_the_impact_of_another_part() -> None:
+    """What is hit takes what it would overrun along in the same instant: v2 = v3, and v2 - v1 = e at the hammer."""
+    net = row(sw.Backlash("gap", gap=0.2, restitution=0.5), sw.Freewheel("clutch"), J=(1.0, 1.0, 1.0))
+    sol = net.simulate(0.2, initial={"J1.omega": 1.0})
+    assert sol["J2.omega"][-1] == sol["J3.omega"][-1] == pytest.approx(0.5, abs=EXACT)
+    assert sol["J1.omega"][-1] == pytest.approx(0.0, abs=EXACT)
+    assert sol.energy.lost_in["gap"] == pytest.approx(0.25, abs=EXACT)
+
+
+def test_an_unknown_law_for_impacts_at_once_is_refused() -> None:
+    with pytest.raises(sw.ParameterError, match=r"impacts = 'all' must be one of: 'in turn', 'together'"):
+        sw.Network("row", impacts="all")  # type: ignore[arg-type]
 
 
 def test_inelastic_impacts_join_a_row_with_the_mean_of_its_momentum() -> None:

@@ -106,6 +106,8 @@ def part(name: str, joint: Joint) -> sw.Component:
             return sw.Backlash(name, gap=upper - lower, **thrown)
         case "freewheel", _:
             return sw.Freewheel(name)
+        case "gear", _:
+            return sw.LossyGear(name, ratio=joint.ratio, efficiency=joint.efficiency, efficiency_back=joint.back)
     if not times:
         return sw.DryFriction(name, tau_c=joint.tau)
     return (sw.Brake if joint.b < 0 else sw.Clutch)(name, tau=joint.tau, **times)
@@ -131,10 +133,12 @@ def network(train: Train) -> sw.Network:
 
 def end(train: Train, engine: str = "auto") -> Array:
     """The speeds at the end by the library."""
-    initial = {f"J{k}.omega": speed for k, speed in enumerate(train.speeds)}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", sw.NetworkWarning)  # parts may be loose of each other
-        sol = network(train).simulate(train.t_end, rtol=1e-12, t_eval=2, engine=engine, initial=initial)
+        model = network(train).compile()
+        speeds = {f"J{k}.omega": speed for k, speed in enumerate(train.speeds)}
+        initial = {name: speed for name, speed in speeds.items() if name in model.states}  # gears give the others
+        sol = model.simulate(train.t_end, rtol=1e-12, t_eval=2, engine=engine, initial=initial)
     return np.array([sol[f"J{k}.omega"][-1] for k in range(len(train.speeds))])
 
 

@@ -32,6 +32,8 @@ SLACK = 1e-10
 """So much of their size torques and accelerations may contradict a mode: rounding."""
 AT_ONCE = 1e-8
 """Impacts of two contacts within this time, s, are one, of which Newton's law does not tell the outcome."""
+TOUCHES = 1e-13
+"""A contact within this twist of its limit, rad, touches; up to `REST` rounding may tell whether it does."""
 MOST_EVENTS = 500
 FIRSTS = {"spring": "", "soft": "open", "rigid": "open", "friction": "off", "freewheel": "free"}
 """The modes before anything is known."""
@@ -249,6 +251,8 @@ class Motion:
         for other, both in ((o, joint.limits) for o, joint in enumerate(self.train.joints) if joint.kind == "rigid"):
             apart = np.abs(z[self.place[other]] - np.array(both))
             if other != k and modes[other] == "open" and apart.min() < REST:
+                if apart.min() > TOUCHES:
+                    raise UndecidedError
                 touching[other] = 1.0 if apart.argmin() else -1.0
         when, other = self._last_hit
         if t - when < AT_ONCE and other != k:

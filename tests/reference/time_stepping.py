@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -25,6 +25,8 @@ from tests.reference.hybrid_train import Array, Joint, Source, Train
 
 GEAR = ("driving forward", "driving backward", "driven forward", "driven backward", "stuck")
 """The modes of a gear, in the order in which they are tried: a jam is the last way."""
+MOST_WAYS = 2000
+"""So many combinations of what is at its bounds are tried."""
 TINY = 1e-11
 """A part of the largest speed or impulse that is rounding."""
 
@@ -58,7 +60,6 @@ class Stepper:
         ways = {0.0: "stuck", 1.0: "driving forward", -1.0: "driving backward"}
         self.modes = tuple(ways[float(np.sign(self.v[joint.a]))] for joint in self.gears)
         self.active = [0] * len(self.switching)
-        self.jams = 0
 
     def _rows(self, joints: Sequence[Joint]) -> Array:
         rows = np.zeros((len(joints), self.n))
@@ -75,21 +76,18 @@ class Stepper:
         return self.v
 
     def _step(self, t: float) -> None:
+        """One step, of which the middle is at a time in s; springs by the midpoint rule."""
         h, before = self.h, self.v
-        stretched = self.c * (self.twists + h / 2 * (self.S @ before)) + self.d * (self.S @ before)
-        half = self.S.T @ (self.c * h / 2 * (self.S @ before) / 2 * 0 + stretched)
-        # implicit midpoint: x + h (v + v') / 4 and (v + v') / 2 in springs
         pull = self.S.T @ (self.c * (self.twists + h / 4 * (self.S @ before)) + self.d / 2 * (self.S @ before))
-        del half
         gained = self.J * before - h * pull
         for source in self.train.sources:
             gained[source.a] += h * torque(source, t)
-        laws = [self._law(k, t, before) for k in range(len(self.switching))]
-        moving = [mode for mode in itertools.product(GEAR, repeat=len(self.gears)) if mode != self.modes]
-        for modes in (self.modes, *sorted(moving, key=lambda names: names.count("stuck"))):
-            found = self._solved(modes, gained, laws)
-            if found is not None:
-                self.modes, (v, self.active) = modes, found
+        laws = np.array([self._law(k, t, before) for k in range(len(self.switching))]).reshape(-1, 4)
+        others = [modes for modes in itertools.product(GEAR, repeat=len(self.gears)) if modes != self.modes]
+        for modes in (self.modes, *sorted(others, key=lambda modes: modes.count("stuck"))):
+            solution = self._solved(modes, gained, laws)
+            if solution is not None:
+                self.modes, (v, self.active) = modes, solution
                 break
         else:
             raise NoSolutionError(t)
@@ -140,93 +138,16 @@ class Stepper:
             self._answers[modes] = inverse, inverse @ self.R.T
         return self._answers[modes]
 
-    def _solved(
-        self, modes: tuple[str, ...], gained: Array, laws: Sequence[tuple[float, float, float, float]]
-    ) -> tuple[Array, list[int]] | None:
-        """Speeds at the end of the step in some modes of gears, with what is at which bound; None where none agree."""
+    def _solved(self, modes: tuple[str, ...], gained: Array, laws: Array) -> tuple[Array, list[int]] | None:
+        """Speeds at the end of a step in some modes of gears, with what is at which bound; None where none agree."""
         inverse, by_impulses = self._answer(modes)
         free = inverse @ gained
-        W, w0 = self.R @ by_impulses[: self.n], self.R @ free[: self.n]
-        for active in self._guesses(W, w0, laws):
-            P = self._impulses(W, w0, laws, active)
-            whole = free - by_impulses @ P
-            if self._agree(modes, whole, gained, P):
-                return whole[: self.n], active
-        return None
-
-    def _guesses(self, W: Array, w0: Array, laws: Sequence[tuple[float, float, float, float]]) -> Iterator[list[int]]:
-        """What may be at its lower bound (-1), at its upper one (1), or between them (0)."""
-        lower, upper, speed, compliance = np.array(laws).reshape(-1, 4).T
-        scale = max(1.0, np.abs(w0).max(initial=0.0))
-        active = [
-            s if math.isfinite((*b, 0.0)[1 if s > 0 else 0]) else 0 for s, b in zip(self.active, laws, strict=True)
-        ]
-        seen = set[tuple[int, ...]]()
-        size = np.abs(W).max(initial=1e-30)
-        for attempt in range(50 * (len(laws) + 1)):
-            P = self._impulses(W, w0, laws, active)
-            w = w0 - W @ P - speed - compliance * P
-            tiny = TINY * max(scale / size, np.abs(P).max(initial=0.0))
-            wrong: list[tuple[float, int, int]] = []
-            for k, state in enumerate(active):
-                if lower[k] == upper[k]:
-                    continue
-                if state == 0:
-                    if P[k] > upper[k] + tiny:
-                        wrong.append(((P[k] - upper[k]) * size, k, 1))
-                    elif P[k] < lower[k] - tiny:
-                        wrong.append(((lower[k] - P[k]) * size, k, -1))
-                elif state * w[k] < -TINY * scale:
-                    wrong.append((-state * w[k], k, 0))
-            if not wrong:
-                yield active
-                return
-            if tuple(active) in seen:
-                break
-            seen.add(tuple(active))
-            _, k, state = max(wrong) if attempt < 10 * len(laws) else min(wrong, key=lambda one: one[1])
-            active[k] = state
-        options = [
-            (0, -1, 1) if math.isfinite(b[0]) and math.isfinite(b[1]) else (0, 1 if b[0] == -math.inf else -1)
-            for b in laws
-        ]
-        for guess in itertools.product(*options):
-            active = list(guess)
-            P = self._impulses(W, w0, laws, active)
-            w = w0 - W @ P - speed - compliance * P
-            tiny = TINY * max(scale / size, np.abs(P).max(initial=0.0))
-            inside = all(
-                lower[k] == upper[k]
-                or (state and state * w[k] >= -TINY * scale)
-                or (not state and lower[k] - tiny <= P[k] <= upper[k] + tiny and abs(w[k]) < 1e-9 * scale)
-                for k, state in enumerate(active)
-            )
-            if inside:
-                yield active
-                return
-
-    @staticmethod
-    def _impulses(
-        W: Array, w0: Array, laws: Sequence[tuple[float, float, float, float]], active: Sequence[int]
-    ) -> Array:
-        lower, upper, speed, compliance = np.array(laws).reshape(-1, 4).T
-        state = np.array(active)
-        P = np.where(state > 0, upper, np.where(state < 0, lower, 0.0))
-        P[lower == upper] = lower[lower == upper]
-        P[~np.isfinite(P)] = 0.0
-        free = (state == 0) & (lower != upper)
-        if free.any():
-            matrix = W[np.ix_(free, free)] + np.diag(compliance[free])
-            wanted = w0[free] - speed[free] - W[free] @ P
-            try:
-                P[free] = np.linalg.solve(matrix, wanted)
-                if not np.isfinite(P).all() or np.abs(matrix @ P[free] - wanted).max() > 1e-9 * max(
-                    1.0, np.abs(wanted).max()
-                ):
-                    raise np.linalg.LinAlgError
-            except np.linalg.LinAlgError:
-                P[free] = np.linalg.lstsq(matrix, wanted, rcond=1e-11)[0]
-        return P
+        found = Bounded(self.R @ by_impulses[: self.n], self.R @ free[: self.n], laws).solved(self.active)
+        if found is None:
+            return None
+        P, active = found
+        whole = free - by_impulses @ P
+        return (whole[: self.n], active) if self._agree(modes, whole, gained, P) else None
 
     def _agree(self, modes: tuple[str, ...], whole: Array, gained: Array, P: Array) -> bool:
         """Whether speeds and torques of the gears are those of their modes."""
@@ -244,6 +165,83 @@ class Stepper:
             if way * v[joint.a] < -TINY * scale or side * torque_ < -TINY * size:
                 return False
         return True
+
+
+class Bounded:
+    """Impulses P within bounds: w = w0 - W P is the speed that belongs to P in between, no less at the upper bound.
+
+    Args:
+        W: (m, m) speeds that unit impulses take.
+        w0: (m,) speeds without impulses.
+        laws: (m, 4) bounds, speed and compliance.
+    """
+
+    def __init__(self, W: Array, w0: Array, laws: Array) -> None:
+        self.W, self.w0 = W, w0
+        self.lower, self.upper, self.speed, self.compliance = laws.T
+        self.scale, self.size = max(1.0, np.abs(w0).max(initial=0.0)), np.abs(W).max(initial=1e-30)
+        self.acts = self.lower != self.upper
+
+    def solved(self, before: Sequence[int]) -> tuple[Array, list[int]] | None:
+        """The impulses, and what is at its lower bound (-1), at its upper one (1), or between them (0).
+
+        One after another that is wrong is changed, the worst first, then the first (Murty); else all ways are tried.
+
+        Args:
+            before: what was so in the last step.
+        """
+        bounds = {-1: self.lower, 0: np.zeros(len(self.w0)), 1: self.upper}
+        active = [state if math.isfinite(bounds[state][k]) else 0 for k, state in enumerate(before)]
+        size, seen = len(active), set[tuple[int, ...]]()
+        for attempt in range(50 * (size + 1)):
+            P, wrong = self._judged(active)
+            if not wrong:
+                return P, active
+            if tuple(active) in seen:
+                break
+            seen.add(tuple(active))
+            _, k, state = max(wrong) if attempt < 10 * size else min(wrong, key=lambda one: one[1])
+            active[k] = state
+        options = [[s for s in (0, -1, 1) if math.isfinite(bounds[s][k])] for k in range(size)]
+        for guess in itertools.islice(itertools.product(*options), MOST_WAYS):
+            P, wrong = self._judged(list(guess))
+            if (
+                not wrong
+                and np.abs(self._apart(P)[self.acts & (np.array(guess) == 0)]).max(initial=0) < 1e-9 * self.scale
+            ):
+                return P, list(guess)
+        return None
+
+    def _apart(self, P: Array) -> Array:
+        """How far speeds are from those that belong to impulses between the bounds."""
+        return np.asarray(self.w0 - self.W @ P - self.speed - self.compliance * P)
+
+    def _judged(self, active: Sequence[int]) -> tuple[Array, list[tuple[float, int, int]]]:
+        """Impulses, and what contradicts its state: by how much, which, and the state that it should have."""
+        P = self._impulses(active)
+        apart, wrong = self._apart(P), list[tuple[float, int, int]]()
+        tiny = TINY * max(self.scale / self.size, np.abs(P).max(initial=0.0))
+        for k, state in enumerate(active):
+            if not self.acts[k]:
+                continue
+            if state == 0:
+                beyond = {1: P[k] - self.upper[k], -1: self.lower[k] - P[k]}
+                wrong += [(far * self.size, k, side) for side, far in beyond.items() if far > tiny]
+            elif state * apart[k] < -TINY * self.scale:
+                wrong.append((-state * apart[k], k, 0))
+        return P, wrong
+
+    def _impulses(self, active: Sequence[int]) -> Array:
+        state = np.array(active)
+        P = np.where(state > 0, self.upper, np.where(state < 0, self.lower, 0.0))
+        P[~self.acts] = self.lower[~self.acts]
+        free = (state == 0) & self.acts
+        if free.any():
+            matrix = self.W[np.ix_(free, free)] + np.diag(self.compliance[free])
+            wanted = self.w0[free] - self.speed[free] - self.W[free] @ P
+            singular = np.linalg.cond(matrix) > 1e12
+            P[free] = np.linalg.lstsq(matrix, wanted, rcond=1e-11)[0] if singular else np.linalg.solve(matrix, wanted)
+        return P
 
 
 def torque(source: Source, t: float) -> float:

@@ -9,7 +9,7 @@ from typing import Self, TypeVar, overload
 
 from shaftwork.components.base import Component
 from shaftwork.core.errors import ParameterError, ShaftworkError
-from shaftwork.network.netlist import Netlist, Placed
+from shaftwork.network.netlist import IMPACTS, Impacts, Netlist, Placed
 from shaftwork.network.overview import overview
 
 C = TypeVar("C", bound=Component)
@@ -22,13 +22,16 @@ class NetworkBuilder:
     Args:
         name: title of the network, used in reports.
         ports: of a network that is a part of others, the nodes at which it is joined to them.
+        impacts: rigid contacts that touch are hit "in turn", as a row of balls, or "together", in one instant.
 
     Raises:
-        ParameterError: the ports are no texts, or two are the same.
+        ParameterError: the ports are no texts, or two are the same; impacts are neither.
     """
 
-    def __init__(self, name: str = "network", ports: Sequence[str] = ()) -> None:
-        self.name = name
+    def __init__(self, name: str = "network", ports: Sequence[str] = (), *, impacts: Impacts = IMPACTS[0]) -> None:
+        self.name, self.impacts = name, impacts
+        if impacts not in IMPACTS:
+            raise ParameterError(f"impacts = {impacts!r} must be one of: {', '.join(map(repr, IMPACTS))}.")
         self.ports = (ports,) if isinstance(ports, str) else tuple(ports)
         if not all(isinstance(port, str) and port for port in self.ports) or len({*self.ports}) < len(self.ports):
             raise ParameterError(f"ports = {ports!r} must be names of nodes, each once: ports=('in_', 'out').")
@@ -144,7 +147,7 @@ class NetworkBuilder:
 
     def netlist(self) -> Netlist:
         """The network as it stands, frozen."""
-        return Netlist(self.name, tuple(self._placed), self.ports)
+        return Netlist(self.name, tuple(self._placed), self.ports, self.impacts)
 
     def __repr__(self) -> str:
         return overview(self.netlist())

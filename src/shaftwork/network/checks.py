@@ -54,7 +54,7 @@ def examine(netlist: Netlist) -> tuple[Netlist, tuple[Problem, ...]]:
         work.take(placed)
     if not netlist.placed:
         work.report("empty network", f"'{netlist.name}' has no parts.", "Add parts: net.add(part, 'node').")
-    return Netlist(netlist.name, tuple(work.kept)), tuple(work.problems)
+    return dataclasses.replace(netlist, placed=tuple(work.kept), ports=()), tuple(work.problems)
 
 
 class _Examination:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Literal, get_args
 
 from shaftwork.components.base import Component
 from shaftwork.components.modes import Choice
@@ -48,13 +48,26 @@ class Placed:
     origin: Origin | None = field(default=None, compare=False, repr=False)
 
 
+Impacts = Literal["in turn", "together"]
+"""How rigid contacts that touch are hit; see `Netlist`."""
+IMPACTS: tuple[Impacts, ...] = get_args(Impacts)
+
+
 @dataclass(frozen=True)
 class Netlist:
-    """An ordered list of placed components under a name, and the nodes at which it is joined to other networks."""
+    """An ordered list of placed components under a name.
+
+    Args:
+        name: of the network.
+        placed: its components.
+        ports: the nodes at which it is joined to other networks.
+        impacts: "in turn": what touches is hit after what hits it, as in a row of balls; "together": in one instant.
+    """
 
     name: str
     placed: tuple[Placed, ...]
     ports: tuple[str, ...] = ()
+    impacts: Impacts = IMPACTS[0]
 
     def within(self, name: str, nodes: tuple[str, ...]) -> tuple[Placed, ...]:
         """The parts as those of another network, named "name.part".

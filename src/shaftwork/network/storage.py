@@ -33,7 +33,7 @@ def netlist_text(netlist: Netlist) -> str:
         ModelFileError: a parameter has no text form.
     """
     return textfile.write(
-        ModelText(netlist.name, tuple(_part_text(placed) for placed in netlist.placed), netlist.ports)
+        ModelText(netlist.name, tuple(_part_text(placed) for placed in netlist.placed), netlist.ports, netlist.impacts)
     )
 
 
@@ -63,7 +63,8 @@ def read_netlist(path: str | Path) -> Netlist:
     model = textfile.read(_path_of(path))
     try:
         _refuse_endless_laws(model)
-        return Netlist(model.name, tuple(_placed(part, str(path)) for part in model.parts), model.ports)
+        placed = tuple(_placed(part, str(path)) for part in model.parts)
+        return Netlist(model.name, placed, model.ports, model.impacts)
     except ModelFileError as error:
         raise ModelFileError(f"{path}: {error}") from None
 

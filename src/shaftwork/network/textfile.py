@@ -30,6 +30,7 @@ from typing import Any
 
 from shaftwork.components.tables import Table
 from shaftwork.core.errors import ModelFileError, ParameterError
+from shaftwork.network.netlist import IMPACTS, Impacts
 
 FORMAT = 1
 """Version of the format; a reader refuses any other."""
@@ -98,11 +99,12 @@ class PartText:
 
 @dataclass(frozen=True)
 class ModelText:
-    """A network as it stands in a file: its name, its parts in order, and its ports if it is a part of others."""
+    """A network as it stands in a file: its name, its parts in order, its ports if it is a part of others, impacts."""
 
     name: str
     parts: tuple[PartText, ...] = ()
     ports: tuple[str, ...] = ()
+    impacts: Impacts = IMPACTS[0]
 
     def __post_init__(self) -> None:
         _check_name("name", self.name)
@@ -112,6 +114,9 @@ class ModelText:
             )
         for port in self.ports:
             _check_name("ports", port)
+        if self.impacts not in IMPACTS:
+            words = " or ".join(map(_quoted, IMPACTS))
+            raise ModelFileError(f"impacts is {_shown(self.impacts)}. Give {words}, or leave it out.")
 
 
 def read(source: str | os.PathLike[str]) -> ModelText:
@@ -155,6 +160,7 @@ def write(model: ModelText) -> str:
     """The text of a model: `read` of it is the same model, numbers to the last bit; equal models give equal texts."""
     lines = [f"format = {FORMAT}", f"name = {_quoted(model.name)}"]
     lines += [f"ports = [{', '.join(map(_quoted, model.ports))}]"] if model.ports else []
+    lines += [f"impacts = {_quoted(model.impacts)}"] if model.impacts != IMPACTS[0] else []
     for part in model.parts:
         lines += ["", "[[part]]", f"type = {_quoted(part.type)}", f"name = {_quoted(part.name)}"]
         lines.append(f"nodes = [{', '.join(_quoted(node) for node in part.nodes)}]")
@@ -269,9 +275,9 @@ def _model(text: str, *, is_file: bool) -> ModelText:
             f"format is {_shown(tables['format'])}, and this version reads format {FORMAT}. "
             "Update the package if the file is newer."
         )
-    if unknown := [key for key in tables if key not in ("format", "name", "ports", "part")]:
+    if unknown := [key for key in tables if key not in ("format", "name", "ports", "impacts", "part")]:
         raise ModelFileError(
-            f"the key {unknown[0]} is unknown here. Before the first [[part]] stand format, name and ports."
+            f"the key {unknown[0]} is unknown here. Before the first [[part]] stand format, name, ports and impacts."
         )
     name: Any = tables.get("name")
     ports: Any = tables.get("ports", [])
@@ -279,7 +285,8 @@ def _model(text: str, *, is_file: bool) -> ModelText:
     if not isinstance(parts, list) or len(parts) != len(lines):
         raise ModelFileError(f"part is {_shown(parts)}. {_USE}")
     made = tuple(_part(table, place) for table, place in zip(parts, lines, strict=True))
-    return ModelText(name, made, tuple(ports) if isinstance(ports, list) else ports)
+    impacts: Any = tables.get("impacts", IMPACTS[0])
+    return ModelText(name, made, tuple(ports) if isinstance(ports, list) else ports, impacts)
 
 
 def _part(table: dict[str, Any], lines: Mapping[str, int]) -> PartText:

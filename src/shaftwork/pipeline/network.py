@@ -267,7 +267,7 @@ class Network(NetworkBuilder):
 
     @classmethod
     def _of(cls, netlist: Netlist) -> Self:
-        made = cls(netlist.name, netlist.ports)
+        made = cls(netlist.name, netlist.ports, impacts=netlist.impacts)
         made._placed += netlist.placed
         return made
 

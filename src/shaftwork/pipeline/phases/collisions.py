@@ -188,11 +188,12 @@ class Collisions:
             modes = element.modes
             if (side := one_side(modes, name)) is not None:
                 yield Contact(k, side, modes[name].gives_way[0][1], name)
+        overrun = freewheels(self._elements, regime.modes)
         for k, watched in regime.watched:
             closes, guard = watched.leave, watched.guard
             wanted = k == number and closes.to == leave.to
             touches = watched.side * now[guard] > -CLEAR * abs(near[guard] - now[guard])
-            takes_part = wanted or (closes.when == ACROSS if closes.rebound is None else touches)
+            takes_part = wanted or (k in overrun if closes.rebound is None else touches)
             side = one_side(self._elements[k].modes, closes.to) if takes_part and closes.to else None
             if side is not None:
                 closes = leave if wanted else closes
@@ -211,6 +212,17 @@ def limited(elements: Sequence[Element], modes: ModeNames) -> dict[int, tuple[tu
     """Elements that join by a torque that is limited, with the sides on which it is and the modes there."""
     found = {k: element.modes[name].gives_way for k, (element, name) in enumerate(zip(elements, modes, strict=True))}
     return {k: ways for k, ways in found.items() if ways}
+
+
+def freewheels(elements: Sequence[Element], modes: ModeNames) -> dict[int, str]:
+    """Elements that let their ends turn one way alone, while they do, and the modes in which they hold them."""
+    pairs = enumerate(zip(elements, modes, strict=True))
+    leaves = ((k, leave, element.modes) for k, (element, name) in pairs for leave in element.modes[name].leaves)
+    return {
+        k: leave.to
+        for k, leave, own in leaves
+        if leave.to and leave.when == ACROSS and one_side(own, leave.to) is not None
+    }
 
 
 def _sums(names: Sequence[str], values: Sequence[float]) -> dict[str, float]:

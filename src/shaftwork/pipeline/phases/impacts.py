@@ -13,7 +13,7 @@ from shaftwork.components.branches import INTEGRAL
 from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.pipeline.phases.assemblies import Element, ModeNames, Watched
-from shaftwork.pipeline.phases.collisions import NO_IMPACT, Collisions
+from shaftwork.pipeline.phases.collisions import NO_IMPACT, Collisions, freewheels, limited
 from shaftwork.pipeline.phases.impulses import Blow, Impulses, Stage, Start
 from shaftwork.pipeline.phases.moments import CLEAR, Change, Moment
 from shaftwork.pipeline.phases.regimes import Regimes, with_modes
@@ -26,11 +26,12 @@ class Impacts:
         regimes: combinations of modes.
         elements: of the network.
         tick: how far in s rounding moves the time.
+        together: whether what touches is hit in the same instant as what hits it.
     """
 
-    def __init__(self, regimes: Regimes, elements: Sequence[Element], tick: float) -> None:
+    def __init__(self, regimes: Regimes, elements: Sequence[Element], tick: float, *, together: bool) -> None:
         self._regimes, self._elements, self._tick = regimes, elements, tick
-        self._collisions = Collisions(regimes, elements, tick, together=False)
+        self._collisions = Collisions(regimes, elements, tick, together=together)
         self._impulses = Impulses(regimes, elements)
         self.gears = self._impulses.gears
 
@@ -263,8 +264,7 @@ class Impacts:
 
     def limited(self, modes: ModeNames) -> dict[int, tuple[tuple[float, str], ...]]:
         """Elements that join by a torque that is limited, with the sides on which it is and the modes there."""
-        found = {k: element.modes[name].gives_way for k, (element, name) in self._pairs(modes)}
-        return {k: ways for k, ways in found.items() if ways}
+        return limited(self._elements, modes)
 
     def _pairs(self, modes: ModeNames) -> enumerate[tuple[Element, str]]:
         return enumerate(zip(self._elements, modes, strict=True))
@@ -290,18 +290,19 @@ class Impacts:
             joins: elements that become joined, and their modes.
             least: speed up to which an element stays as it is.
         """
-        gives = {k: ways for k, ways in self.limited(before).items() if k not in joins}
+        joined = {k: before[k] for k in self.limited(before)} | freewheels(self._elements, before)
+        gives = {k: self._elements[k].modes[name].gives_way for k, name in joined.items() if k not in joins}
         made = {**joins, **{k: ways[0][1] for k, ways in gives.items()}}
         while True:
-            joined = self._regimes.taking(with_modes(before, made), t, held)
-            after = joined.regime
-            speeds = {k: after.assembly.across(k, t, joined.x, after.p) for k in gives}
+            moment = self._regimes.taking(with_modes(before, made), t, held)
+            after = moment.regime
+            speeds = {k: after.assembly.across(k, t, moment.x, after.p) for k in gives}
             ways = {k: [name for side, name in gives[k] if side * speeds[k] > 0] for k in gives}
             pressed = [k for k in gives if abs(speeds[k]) > least and not ways[k]]
             if not pressed:
                 break
             for k in pressed:
-                made[k] = before[k]
+                made[k] = joined[k]
                 del gives[k]
         made |= {k: ways[k][0] if abs(speeds[k]) > least else before[k] for k in gives}
-        return self._regimes.changed(joined, t, with_modes(before, made))
+        return self._regimes.changed(moment, t, with_modes(before, made))

@@ -51,7 +51,7 @@ class Settling:
         self._ahead = AHEAD_OF_RUN * (span[1] - span[0])
         self.tick = ROUNDINGS * math.ulp(max(map(abs, span)))
         """How far in s rounding moves the time."""
-        self._impacts = Impacts(self._regimes, self.elements, self.tick)
+        self._impacts = Impacts(self._regimes, self.elements, self.tick, together=phases.netlist.impacts == "together")
         self.jumped = self._impacts.jumped
 
     def started(self, t: float, x: Array) -> Moment:
