@@ -7,6 +7,7 @@ both ways share neither states nor matrices.
 from __future__ import annotations
 
 import pickle
+from typing import Any
 
 import numpy as np
 import pytest
@@ -117,6 +118,26 @@ def test_where_two_hold_one_wheel_the_first_carries_what_it_can() -> None:
     np.testing.assert_allclose(sol["x0.tau"][stopped], 2.0, rtol=1e-12)
     np.testing.assert_allclose(sol["brake.tau"][stopped], 1.0, rtol=1e-12)
     np.testing.assert_allclose(sol["J1.omega"], sol.t / 0.3, rtol=1e-7)
+
+
+@pytest.mark.parametrize("impacts", ["in turn", "together"])
+def test_a_row_of_rigid_contacts_shares_one_set_of_equations(impacts: Any) -> None:
+    """Inelastic impacts of a wheel that catches one after another keep the momentum: v_k = 4 / (k + 1)."""
+    net = sw.Network("train of wagons", impacts=impacts)
+    net.add(sw.Inertia("J0", J=1.0), "n0")
+    for k in range(1, COUNT + 1):
+        net.add(sw.Inertia(f"J{k}", J=1.0), f"n{k}")
+        net.add(sw.Backlash(f"gap{k}", gap=0.2), f"n{k - 1}", f"n{k}")
+    model = net.compile()
+    sol = model.simulate(5.0, initial={"J0.omega": 4.0}, rtol=1e-10)
+    hits = np.cumsum([0.1 * k / 4.0 for k in range(1, COUNT + 1)])
+    assert [event[0] for event in sol.events] == pytest.approx(hits[hits < 5.0], abs=1e-9)
+    caught = int(np.count_nonzero(hits < 5.0))
+    assert {float(sol[f"J{k}.omega"][-1]) for k in range(caught + 1)} == {float(sol["J0.omega"][-1])}
+    assert sol["J0.omega"][-1] == pytest.approx(4.0 / (caught + 1), rel=1e-9)
+    assert len(model.phases._assemblies) == 1  # noqa: SLF001 (that no combination has equations of its own is the claim)
+    lost = sum(sol.energy.lost_in[f"gap{k}"] for k in range(1, COUNT + 1))
+    assert lost == pytest.approx(8.0 - 8.0 / (caught + 1), rel=1e-9)
 
 
 @pytest.mark.slow

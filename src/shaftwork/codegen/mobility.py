@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.codegen.arrays import BoundArrays
-from shaftwork.codegen.elements import Array, potential_matrix
+from shaftwork.codegen.elements import Array
 from shaftwork.network.graph import GROUND
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
@@ -33,13 +33,13 @@ class Mobility:
     Args:
         form: the equations, in which no coupling loses power.
         bound: the same with their parameters.
+        nodes: (nodes, branches) the across variables of nodes from those of tree branches.
         pairs: first and second node of each pair; +lambda raises the speed of the first one.
     """
 
-    def __init__(self, form: StateForm, bound: BoundArrays, pairs: Sequence[tuple[int, int]]) -> None:
+    def __init__(self, form: StateForm, bound: BoundArrays, nodes: Array, pairs: Sequence[tuple[int, int]]) -> None:
         part, k = bound.part, bound.part.coefficients
         across, links, massless = list(form.across_states), list(form.dependent_across), _massless(form)
-        nodes = potential_matrix(form)(bound.p).toarray()
         rows = np.array([_row(nodes, plus) - _row(nodes, minus) for plus, minus in pairs]).reshape(len(pairs), -1)
         self.has_inertia: NDArray[np.bool_] = ~(rows[:, massless] != 0).any(axis=1)
         """(pairs,) whether the speeds of inertias and prescribed ones tell the speed across; else no impulse passes."""

@@ -11,14 +11,15 @@ which is an inelastic impact: it keeps every momentum that nothing outside takes
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
-from shaftwork.codegen.elements import Array
+from shaftwork.codegen.elements import Array, GainMatrix, potential_matrix
 from shaftwork.codegen.matrices import LinearPart
+from shaftwork.codegen.mobility import Mobility
 from shaftwork.codegen.recovery import History
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm, store_name
@@ -136,6 +137,14 @@ class Stores:
         """The largest momentum of an inertia or mass: by what part of it an impulse is uncertain."""
         inertias = (pair for pair in self.branches.items() if pair[0] not in self.through)
         return max((abs(float(bound.part.coefficients[k]) * held[name]) for name, k in inertias), default=0.0)
+
+    def mobility(self, bound: BoundArrays, pairs: Sequence[tuple[int, int]]) -> Mobility:
+        """The answer to impulses at pairs of nodes."""
+        return Mobility(self._form, bound, self._nodes(bound.p).toarray(), pairs)
+
+    @cached_property
+    def _nodes(self) -> GainMatrix:
+        return potential_matrix(self._form)
 
     def impulses(self, bound: BoundArrays, gained: Mapping[str, float]) -> Array:
         """(branches,) what passes through every branch at once where stores gain so much; of a coupling its lambda.

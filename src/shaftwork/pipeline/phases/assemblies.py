@@ -98,10 +98,11 @@ class Assembly:
     Args:
         model: the compiled equations.
         elements: of the network.
-        forms: of each element, or None for all of them in one, where no expressions in states tell what guards read.
+        forms: of each element; None for one of which all are in one, and then no expressions in states tell what guards
+            read.
     """
 
-    def __init__(self, model: Model, elements: Sequence[Element], forms: tuple[str, ...] | None) -> None:
+    def __init__(self, model: Model, elements: Sequence[Element], forms: Sequence[str | None]) -> None:
         self.model, self.elements = model, elements
         self.stores, self.quantities = Stores(model.form), Quantities(model.form)
         self._symbols = tuple(conditional(element.modes) for element in elements)
@@ -111,14 +112,14 @@ class Assembly:
         self._expressions: list[Expr] = []
         self._known: dict[tuple[int, Expr], int] = {}
         self._watched: dict[tuple[int, str], tuple[Watched, ...]] = {}
-        self._rows = rows = None if forms is None else model.rows
+        self._rows = rows = None if None in forms else model.rows
         self._readings = readings = NamedReadings(model.form) if rows is None else Readings(model.form, rows)
         self._parameters = tuple(Symbol(name, real=True) for name in model.parameters)
         self.parts = {part.name: part for part in model.form.graph.parts}
         for number, element in enumerate(elements):
             part = self.parts[element.part.name]
             for mode in element.modes.options:
-                if forms is None or mode.form == forms[number]:
+                if forms[number] in (None, mode.form):
                     self._watched[number, mode.name] = tuple(self._leaves(number, readings, part, mode))
         if rows is None:
             _ = self._shown  # so that all quantities are known before any function of them is made

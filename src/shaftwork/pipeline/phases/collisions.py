@@ -105,8 +105,8 @@ class Collisions:
             apart[number] = leave.to
         loose = self._regimes.taking(with_modes(regime.modes, apart), t, held)
         pairs = [self._nodes(loose, contact) for contact in contacts]
-        bound = loose.regime.assembly.bound(loose.regime.p)
-        mobility = Mobility(loose.regime.assembly.model.form, bound, pairs)
+        assembly = loose.regime.assembly
+        mobility = assembly.stores.mobility(assembly.bound(loose.regime.p), pairs)
         opens = np.where(mobility.has_inertia, [self._opens(t, moment, contact) for contact in contacts], 0.0)
         back = np.array([self._restitution(c, u) for c, u in zip(contacts, opens.tolist(), strict=True)])
         now = np.where(mobility.has_inertia, [self._opens(t, loose, contact) for contact in contacts], 0.0)

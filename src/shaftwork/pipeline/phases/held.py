@@ -11,12 +11,12 @@ from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.held import HeldArrays, HeldStores, Joints
 from shaftwork.codegen.matrices import LinearPart
-from shaftwork.components.modes import Mode
 from shaftwork.core.kept import Kept
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.graph import GROUND
@@ -35,16 +35,22 @@ KEPT_RATES = 2
 
 
 class HeldAssembly(Assembly):
-    """One set of equations for all modes of a network, with what holds in one combination of them; at first nothing.
+    """One set of equations for all modes of parts that hold, with those of them that do so; at first none.
 
     Args:
         model: the equations in which everything slips.
         elements: of the network.
-        laws: of each element the branch of its law, None for one that joins nothing.
+        laws: of each element the branch of its law; None for one that is in the form that it has here.
     """
 
     def __init__(self, model: Model, elements: Sequence[Element], laws: Sequence[int | None]) -> None:
-        super().__init__(model, elements, None)
+        forms = [
+            choice.form if law is None else None
+            for law, choice in zip(
+                laws, chain.from_iterable(item.choices for item in model.netlist.placed), strict=True
+            )
+        ]
+        super().__init__(model, elements, forms)
         self.stores = HeldStores(model.form)
         self._whole, self._laws, self._held = self, laws, list[int]()
         joining = (element.number for element, law in zip(elements, laws, strict=True) if law is not None)
@@ -95,39 +101,33 @@ class HeldAssembly(Assembly):
 
 
 def laws_that_hold(model: Model, elements: Sequence[Element]) -> list[int | None] | None:
-    """Of each element the branch of the law in whose place a reaction holds, None for one that never holds.
+    """Of each element that holds the branch of the law in whose place a reaction does so; None for others.
 
     Args:
-        model: the equations in which no mode joins anything.
+        model: equations in which none of them joins anything.
         elements: of the network.
 
     Returns:
-        None where reactions would not tell the motion: where something has an impact, where a speed is prescribed,
-        where what holds has no inertia at an end, or torques depend on each other.
+        None where reactions would not tell the motion: where a speed is prescribed, where what holds has no inertia at
+        an end, or torques depend on each other.
     """
     form = model.form
     if form.loop_laws or form.across_inputs or form.waves or form.dependent_through:
         return None
-    found = [_law(form, element) if joins(element) else None for element in elements]
-    hold = [law for law, element in zip(found, elements, strict=True) if joins(element)]
-    if None in hold or not all(map(_has_no_impact, elements)):
-        return None
-    return found
+    found = [_law(form, element) if holds(element) else None for element in elements]
+    return None if any(law is None and holds(element) for law, element in zip(found, elements, strict=True)) else found
 
 
-def joins(element: Element) -> bool:
-    """Whether an element has other branches in some of its modes."""
-    return len({mode.form for mode in element.modes.options}) > 1
+def holds(element: Element) -> bool:
+    """Whether an element joins its ends in some modes alone, by a torque that ends these, as friction and contacts do.
 
-
-def _has_no_impact(element: Element) -> bool:
-    """Whether an element takes up no speed at once: where it joins, its torque is limited on both sides."""
-
-    def is_plain(mode: Mode) -> bool:
-        limited = mode.form == element.modes.options[0].form or {side for side, _ in mode.gives_way} == {1.0, -1.0}
-        return limited and mode.at_rest is None and all(leave.rebound is None for leave in mode.leaves)
-
-    return not element.modes.passes_on and all(map(is_plain, element.modes.options))
+    Freewheels and diodes have no branch while they are open, in whose place a reaction could act.
+    """
+    options = element.modes.options
+    joined = [mode for mode in options if mode.form != options[0].form]
+    limited = all(mode.gives_way for mode in joined) and all(mode.at_rest is None for mode in options)
+    has_law = any(leave.rebound is not None for mode in options for leave in mode.leaves) or len(options) > 2
+    return bool(joined) and limited and has_law and not element.modes.passes_on
 
 
 def _law(form: StateForm, element: Element) -> int | None:

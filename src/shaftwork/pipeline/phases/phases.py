@@ -15,7 +15,7 @@ from shaftwork.integrate.engines import ADAMS, available
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.phases.assemblies import Assembly, ModeNames, elements_of
-from shaftwork.pipeline.phases.held import MANY, HeldAssembly, joins, laws_that_hold
+from shaftwork.pipeline.phases.held import MANY, HeldAssembly, holds, laws_that_hold
 from shaftwork.pipeline.phases.resting import at_rest
 
 if TYPE_CHECKING:
@@ -46,7 +46,8 @@ class Phases:
         self.elements = elements_of(base)
         self.first: ModeNames = tuple(element.modes.options[0].name for element in self.elements)
         self._assemblies: dict[tuple[str, ...], Assembly | NetworkError] = {}
-        self._held: dict[tuple[int, ...], HeldAssembly] = {}
+        self._wholes: dict[tuple[str, ...], HeldAssembly | None] = {}
+        self._held: dict[tuple[tuple[str, ...], tuple[int, ...]], HeldAssembly] = {}
         self._engines: dict[tuple[Assembly, ModeNames, str], tuple[str, str]] = {}
         self._easy: dict[Assembly, dict[tuple[int, str], tuple[str, str]]] = {}
         self.found = Kept[Any, Any](1)
@@ -85,24 +86,32 @@ class Phases:
         Raises:
             NetworkError: as there.
         """
-        if (whole := self._whole) is None:
+        if len(self._holding) < MANY:
             return self.assembly(modes)
-        pairs = zip(self.elements, modes, self.first, strict=True)
-        held = tuple(k for k, (e, name, first) in enumerate(pairs) if e.modes[name].form != e.modes[first].form)
-        if held not in self._held:
-            self._held[held] = whole.holding(held)
-        made = self._held[held]
+        held = tuple(k for k in self._holding if self._form(k, modes) != self._form(k, self.first))
+        free = tuple(
+            first if k in held else name for k, (name, first) in enumerate(zip(modes, self.first, strict=True))
+        )
+        forms = tuple("" if k in self._holding else self._form(k, modes) for k in range(len(modes)))
+        if forms not in self._wholes:
+            model = self.assembly(free).model
+            laws = laws_that_hold(model, self.elements)
+            self._wholes[forms] = None if laws is None else HeldAssembly(model, self.elements, laws)
+        if (whole := self._wholes[forms]) is None:
+            return self.assembly(modes)
+        if (forms, held) not in self._held:
+            self._held[forms, held] = whole.holding(held)
+        made = self._held[forms, held]
         # where parts share what they hold, the first carries as much as it can
         return made if made.joints(made.vector(values, {})).independent else self.assembly(modes)
 
     @cached_property
-    def _whole(self) -> HeldAssembly | None:
-        """The equations in which nothing holds, for all combinations; None where each has equations of its own."""
-        if sum(map(joins, self.elements)) < MANY:
-            return None
-        model = self.assembly(self.first).model
-        laws = laws_that_hold(model, self.elements)
-        return None if laws is None else HeldAssembly(model, self.elements, laws)
+    def _holding(self) -> tuple[int, ...]:
+        """Elements for which a reaction may stand."""
+        return tuple(k for k, element in enumerate(self.elements) if holds(element))
+
+    def _form(self, number: int, modes: ModeNames) -> str:
+        return self.elements[number].modes[modes[number]].form
 
     def _netlist(self, forms: tuple[str, ...]) -> Netlist:
         chosen: dict[str, tuple[Choice, ...]] = {}
