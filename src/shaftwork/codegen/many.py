@@ -49,14 +49,10 @@ class ManyExpressions:
 
     def bind(self, p: Array) -> Values:
         """The expressions with a parameter vector."""
-        numbers = np.array(self._numbers(*p.tolist()), dtype=float)
-        entries = numbers[: len(self._rows)], (self._rows, self._columns)
-        matrix = sparse.csr_array(entries, shape=(self._count, self._size))
-        constants, others, function, parameters = np.zeros(self._count), self._others, self._function, p.tolist()
-        np.add.at(constants, self._constant_rows, numbers[len(self._rows) :])
+        sums, others, function, parameters = self._sums(p), self._others, self._function, p.tolist()
 
         def values(times: Array, quantities: Array) -> Array:
-            made = np.asarray(matrix @ quantities + constants[:, None])
+            made = sums(quantities)
             with np.errstate(all="ignore"):
                 found = function(times, *quantities, *parameters) if others else ()
                 for row, value in zip(others, found, strict=True):
@@ -64,3 +60,13 @@ class ManyExpressions:
             return made.T
 
         return values
+
+    def _sums(self, p: Array) -> Callable[[Array], Array]:
+        """From quantities (m, k) to (n, k) the sums among the expressions, with a parameter vector."""
+        if not (self._rows or self._constant_rows):
+            return lambda quantities: np.zeros((self._count, quantities.shape[1]))
+        numbers = np.array(self._numbers(*p.tolist()), dtype=float)
+        entries = numbers[: len(self._rows)], (self._rows, self._columns)
+        matrix, constants = sparse.csr_array(entries, shape=(self._count, self._size)), np.zeros((self._count, 1))
+        np.add.at(constants[:, 0], self._constant_rows, numbers[len(self._rows) :])
+        return lambda quantities: np.asarray(matrix @ quantities + constants)

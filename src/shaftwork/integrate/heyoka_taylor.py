@@ -101,7 +101,7 @@ class _Run:
         self.problem = problem
         self.program = problem.program.program
         self.lent, self.integrator = lent, lent.integrator
-        self.parameters = problem.program.parameters
+        self.parameters: Array = problem.program.parameters.copy()
         self.state: Array = np.array(problem.x0, dtype=float)
         self.start = self.state
         self.steps = 0
@@ -123,10 +123,11 @@ class _Run:
         integrator.pars[:used] = self.parameters[:used]
         integrator.reset_cooldowns() if integrator.with_events else None
         if self.problem.guards is not None:
-            self._sizes = np.fmax(self.problem.guards.sizes, 1.0)
+            self._sizes = np.fmax(self.problem.guards.sizes, 1.0).tolist()
             first, last = self.program.parameter_count + len(self.program.switches), self.program.first_weight
-            self._sides, self._offsets = np.split(integrator.pars[first:last], 2)
-            self._guard(self.problem.guards.sides, self.problem.guards.offsets)
+            middle = (first + last) // 2
+            self._sides, self._offsets = integrator.pars[first:middle], integrator.pars[middle:last]
+            self._guard([*enumerate(self.problem.guards.sides.tolist())], self.problem.guards.offsets.tolist())
         self.program.weigh(integrator)
         watch = self._watch(piece)
         self.lent.listeners.clear()
@@ -159,16 +160,17 @@ class _Run:
         if self.problem.react is not None:
             self.problem.react.refuse_missed(self.met, integrator.time, self.state)
 
-    def _guard(self, sides: Array, offsets: Array | Sequence[float]) -> None:
-        """Watch the guards from here on, by their sides and offsets.
+    def _guard(self, ends: Sequence[tuple[int, float]], offsets: Sequence[float]) -> None:
+        """Watch the guards that end the phase from here on, by their numbers and sides, and no others.
 
         heyoka's tolerance is relative to the largest of states and events: a torque of 1e6 N m in one would cost six
         digits. So guards count in parts of their size, which their first values tell, and how far rounding moves them.
         """
-        offsets = np.asarray(offsets)
-        sizes = np.fmax(self._sizes, offsets / ROUNDING)
-        np.divide(sides, sizes, out=self._sides)
-        np.divide(offsets, sizes, out=self._offsets)
+        self._sides[:] = 0.0
+        for number, side in ends:  # a few at each change of mode: plain floats are faster than arrays
+            offset = offsets[number]
+            size = max(self._sizes[number], offset / ROUNDING)
+            self._sides[number], self._offsets[number] = side / size, offset / size
 
     def _guard_met(self, raw: Any, outcome: str, watch: Watch | None) -> int | None:
         """The guard at which the run has stopped, by its own event or at that of a switch at the very same instant."""
@@ -186,12 +188,13 @@ class _Run:
         if self.problem.react is None:
             return False
         integrator = self.integrator
-        reaction = self.problem.react(len(self.reactions), met, integrator.time, integrator.state)
+        time = integrator.time
+        reaction = self.problem.react(len(self.reactions), met, time, integrator.state)
         if reaction is None:
             return False
-        self.reactions.append((integrator.time, reaction.equations))
+        self.reactions.append((time, reaction.equations))
         integrator.pars[: reaction.p.size] = reaction.p
-        self._guard(reaction.sides, reaction.offsets)
+        self._guard(reaction.ends, reaction.offsets)
         self.program.weigh(integrator)
         return True
 
@@ -296,8 +299,8 @@ def _satisfied(
 ) -> bool:
     """Whether a series (n, orders) from a start in s satisfies equations after some time; `sizes` are of states."""
     orders = np.arange(terms.shape[1])
-    state = terms @ elapsed**orders
-    slope = terms[:, 1:] @ (orders[1:] * elapsed ** orders[:-1])
+    powers = elapsed**orders
+    state, slope = terms @ powers, terms[:, 1:] @ (orders[1:] * powers[:-1])
     with np.errstate(all="ignore"):
         defect = elapsed * np.abs(rhs(piece.inside(start + elapsed), state) - slope)
     moved = np.maximum(np.abs(state), sizes) + elapsed * np.abs(slope)

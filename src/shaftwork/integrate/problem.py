@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple, Protocol, TypeVar
 
@@ -102,13 +102,13 @@ class Reaction(NamedTuple):
 
     Args:
         p: (p,) parameters from there on.
-        sides: (m,) of the guards.
-        offsets: (m,) of the guards.
+        ends: number and side of each guard that ends the phase from there on.
+        offsets: (m,) of all guards.
         equations: makes the right-hand side from there on.
     """
 
     p: Array
-    sides: Array
+    ends: Sequence[tuple[int, float]]
     offsets: Sequence[float]
     equations: Callable[[], Callable[[float, Array], Array]]
 
@@ -283,9 +283,16 @@ class DaeProblem:
 AnyProblem = TypeVar("AnyProblem", bound=Problem | DaeProblem)
 
 
+def changed(problem: AnyProblem, **values: Any) -> AnyProblem:
+    """The same problem with other values; `dataclasses.replace` takes longer than many a phase of a motion."""
+    made = object.__new__(type(problem))
+    vars(made).update(vars(problem), **values)
+    return made
+
+
 def tightened(problem: AnyProblem, share: float) -> AnyProblem:
     """The same problem with a part of its tolerances."""
-    return replace(problem, rtol=share * problem.rtol, atol=share * problem.atol)
+    return changed(problem, rtol=share * problem.rtol, atol=share * problem.atol)
 
 
 class Timed(Protocol):

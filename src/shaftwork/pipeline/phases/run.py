@@ -19,7 +19,7 @@ from shaftwork.codegen.timeline import Timeline
 from shaftwork.core.errors import AccuracyWarning, SimulationError
 from shaftwork.core.notices import warn
 from shaftwork.integrate import choice
-from shaftwork.integrate.problem import Problem, SeriesError, StickingError, Trajectory
+from shaftwork.integrate.problem import Problem, SeriesError, StickingError, Trajectory, changed
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.ending import Ending
 from shaftwork.pipeline.implicit import PRESCRIBED, at_rest
@@ -200,7 +200,7 @@ class Run:
         states = regime.assembly.model.states
         atol = demand.rtol * problem.atol
         atol[: len(states)] = demand.tolerances(problem.atol[: len(states)], states)
-        return replace(
+        return changed(
             problem,
             rtol=demand.rtol,
             atol=atol,
@@ -229,7 +229,7 @@ class Run:
             moment, changes = passing.beyond
             self.note(t, changes)
             return t, moment
-        moment = passing.moment._replace(x=x[: moment.x.size])
+        moment = Moment(passing.regime, x[: moment.x.size], passing.bands)
         if sides != (t, t) and regime.assembly.model.form.has_impulses:
             moment, changes, at_once = self.settling.jumped(t, moment, *sides)
             self.note(t, changes)
@@ -265,7 +265,7 @@ class Run:
         for engine, steps in tried:
             try:
                 because = why if failed is None else choice.no_series(failed, engine)
-                return self._solve(replace(problem, max_steps=steps), engine, because), passing
+                return self._solve(changed(problem, max_steps=steps), engine, because), passing
             except SimulationError as error:
                 failed = error if isinstance(error, SeriesError) and not stiff else failed
                 sticks = error if isinstance(error, StickingError) else sticks
@@ -284,7 +284,7 @@ class Run:
         share, loosest = FOLLOWING[name]
         tight = max(min(share * problem.rtol, loosest), min(problem.rtol, TIGHTEST_RTOL))
         if tight != problem.rtol:
-            problem = replace(problem, rtol=tight, atol=problem.atol * (tight / problem.rtol))
+            problem = changed(problem, rtol=tight, atol=problem.atol * (tight / problem.rtol))
         trajectory, _, _ = choice.solve(problem, name, why)
         if trajectory.caveat:
             warn(trajectory.caveat, AccuracyWarning)
