@@ -32,10 +32,10 @@ class ManyExpressions:
         places, self._size = {symbol: k for k, symbol in enumerate(quantities)}, len(quantities)
         factors: list[tuple[int, int, Expr]] = []
         constants: list[tuple[int, Expr]] = []
-        self._others: list[int] = []
-        for row, expression in enumerate(expressions):
+        self._others: list[int] = [] if sums else [*range(len(expressions))]
+        for row, expression in enumerate(expressions if sums else ()):
             terms = [term.as_independent(*quantities, as_Add=False) for term in Add.make_args(expression)]
-            if sums and not expression.has(TIME) and all(rest == 1 or rest in places for _, rest in terms):
+            if not expression.has(TIME) and all(rest == 1 or rest in places for _, rest in terms):
                 factors += [(row, places[rest], factor) for factor, rest in terms if rest != 1]
                 constants += [(row, factor) for factor, rest in terms if rest == 1]
             else:

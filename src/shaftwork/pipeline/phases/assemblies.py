@@ -73,6 +73,12 @@ class Element:
         """How messages and tables call it."""
         return f"{self.part.name}.{self.modes.label}" if self.modes.label else self.part.name
 
+    @cached_property
+    def alike(self) -> Mapping[str, str]:
+        """By mode the first one with the same law: "open" of one that has parted."""
+        first: dict[tuple[str, float], str] = {}
+        return {mode.name: first.setdefault((mode.form, mode.value), mode.name) for mode in self.modes.options}
+
 
 def elements_of(model: Model) -> tuple[Element, ...]:
     """Every element of a network, in the order of its parts."""
@@ -284,8 +290,8 @@ class Assembly:
         return lambda t, y: sparse.block_diag((bind().jacobian(t, y[:size]), clocks), "csc")
 
     def alike(self, modes: ModeNames) -> tuple[Assembly, ModeNames]:
-        """Equations and modes that are the same for the choice of an engine."""
-        return self, modes
+        """Equations and modes that are the same for the choice of an engine: a law knows a mode by its number alone."""
+        return self, tuple(element.alike[name] for element, name in zip(self.elements, modes, strict=True))
 
     def judged(self, moment: Moment, problem: Problem) -> Problem:  # noqa: ARG002
         """The motion by which an engine is chosen."""
