@@ -207,6 +207,7 @@ class Problem:
         progress: told again and again the time in s that an engine has reached, or None. What it raises ends the run.
         overall: the size of the largest state where it stays below one: so much smaller is a tolerance for all states.
         found: what an engine has found out about the equations, for its next run with them.
+        rates: the right-hand side from times (k,) and states (k, n) to (k, n), or None where there is only `rhs`.
     """
 
     rhs: Callable[[float, Array], Array]
@@ -234,6 +235,7 @@ class Problem:
     progress: Callable[[float], None] | None = None
     overall: float = 1.0
     found: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
+    rates: Callable[[Array, Array], Array] | None = None
 
     @property
     def straight(self) -> LinearInputs | None:

@@ -280,7 +280,14 @@ class Assembly:
             explain=lambda t, y: self.without_value(p, modes, t, y[:, :size]),
             rough=lambda t, y: self._rough(p, modes, t, y[:, :size]),
             found=known,
+            rates=None if self.model.form.loop_laws else partial(self._many_rates, p),
         )
+
+    def _many_rates(self, p: Array, times: Array, states: Array) -> Array:
+        """The rates of states and clocks at times (k,) and states (k, n)."""
+        size, clocks = len(self.model.states), list(self.clocks)
+        rates = self.bound(p).rhs(times, states[:, :size].T).T
+        return np.hstack([rates, CLOCK * self.guards(p)(times, states[:, :size])[:, clocks]]) if clocks else rates
 
     def slopes(self, bind: Callable[[], BoundArrays]) -> Callable[[float, Array], Any]:
         """The Jacobian of the states and, behind them, of the clocks, from what makes the equations."""
