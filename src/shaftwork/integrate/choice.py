@@ -136,7 +136,7 @@ def _guarded(problem: Problem, trajectory: Trajectory, name: str) -> Trajectory:
     said = objection(problem, trajectory, name)
     if said is None and problem.observed is None and name not in EXPLICIT and trajectory.t.size:
         said = spoiled(problem, trajectory.t, trajectory.x)
-    return replace(trajectory, caveat=said or "")
+    return replace(trajectory, caveat=said) if said else trajectory
 
 
 def check(name: str) -> None:

@@ -101,6 +101,7 @@ class _Run:
         self.problem = problem
         self.program = problem.program.program
         self.lent, self.integrator = lent, lent.integrator
+        self._x, self._p = lent.integrator.state, lent.integrator.pars  # heyoka's own, which it makes anew at each look
         self.parameters: Array = problem.program.parameters.copy()
         self.state: Array = np.array(problem.x0, dtype=float)
         self.start = self.state
@@ -187,15 +188,14 @@ class _Run:
         """Whether the run goes on past the guard that it has met."""
         if self.problem.react is None:
             return False
-        integrator = self.integrator
-        time = integrator.time
-        reaction = self.problem.react(len(self.reactions), met, time, integrator.state)
+        time = self.integrator.time
+        reaction = self.problem.react(len(self.reactions), met, time, self._x)
         if reaction is None:
             return False
         self.reactions.append((time, reaction.equations))
-        integrator.pars[: reaction.p.size] = reaction.p
+        self._p[: reaction.p.size] = reaction.p
         self._guard(reaction.ends, reaction.offsets)
-        self.program.weigh(integrator)
+        self.program.weigh(self.integrator)
         return True
 
     def _first_step(self, piece: Piece) -> float:
@@ -300,10 +300,10 @@ def _satisfied(
     """Whether a series (n, orders) from a start in s satisfies equations after some time; `sizes` are of states."""
     orders = np.arange(terms.shape[1])
     powers = elapsed**orders
-    state, slope = terms @ powers, terms[:, 1:] @ (orders[1:] * powers[:-1])
+    state, change = terms @ powers, terms @ (orders * powers)  # what it is, and by how much its slope would move it
     with np.errstate(all="ignore"):
-        defect = elapsed * np.abs(rhs(piece.inside(start + elapsed), state) - slope)
-    moved = np.maximum(np.abs(state), sizes) + elapsed * np.abs(slope)
+        defect = np.abs(np.multiply(elapsed, rhs(piece.inside(start + elapsed), state)) - change)
+    moved = np.maximum(np.abs(state), sizes) + np.abs(change)
     return bool((defect <= FIRST_DEFECT * moved + problem.atol).all())
 
 

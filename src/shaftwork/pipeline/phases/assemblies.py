@@ -250,31 +250,35 @@ class Assembly:
         Its states are those of the model and, behind them, the integrals of the guards in `clocks`.
         """
         p, modes, x = moment.regime.p, moment.regime.modes, moment.x
-        size, clocks, guards = x.size, np.zeros(len(self.clocks)), self.guards(p)
+        same = self._problems((modes, p.tobytes()), lambda: self._problem(p, modes))
+        guards, sizes = same.guards, self._sizes(p, x, span) if self.clocks else np.empty(0)
+        assert guards is not None  # noqa: S101 (which `_problem` gives)
         now = np.abs(moment.regime.limits(span[0], x.tolist()))
-        values = guards if not clocks.size else lambda t, y: guards(t, y[:, :size])
         return changed(
-            self._problems((modes, p.tobytes()), lambda: self._problem(p, modes)),
-            x0=np.concatenate([x, clocks]),
+            same,
+            x0=np.concatenate([x, np.zeros(sizes.size)]),
             t0=span[0],
             t_end=span[1],
-            atol=np.concatenate([self.prepared(p).atol, self._sizes(guards, x, span)]),
+            atol=np.concatenate([same.atol, sizes]),
             sides=times.sides,
-            guards=Guards(values, self.sides(modes), np.array(moment.bands), now),
+            guards=Guards(guards.values, guards.sides, np.array(moment.bands), now),
         )
 
     def _problem(self, p: Array, modes: ModeNames) -> Problem:
         """What is the same in all phases of these modes; the rest is empty."""
         bound, (_, known), clocks, size = partial(self.bound, p), self._rates(p), self.clocks, len(self.model.states)
         owners = {made.guard: k for (k, _), found in self._watched.items() for made in found} if clocks else {}
+        guards, none = self.guards(p), np.empty(0)
+        values = guards if not clocks else lambda t, y: guards(t, y[:, :size])
         return Problem(
             rhs=self.right_side(p),
             jacobian=self.slopes(bound) if size else None,
-            x0=np.empty(0),
+            x0=none,
             t0=0.0,
             t_end=0.0,
             names=(*self.model.states, *(f"limit of {self.elements[owners[k]].name}" for k in clocks)),
-            atol=np.empty(0),
+            atol=self.prepared(p).atol,
+            guards=Guards(values, self.sides(modes), none, none),
             switches=(lambda t, y: bound().switches(t, y[:, :size])) if self.model.arrays.inputs.switching else None,
             symbolic=cache(lambda: None if self.program is None else self.program.bind(p)),
             explain=lambda t, y: self.without_value(p, modes, t, y[:, :size]),
@@ -340,12 +344,10 @@ class Assembly:
         """The right-hand side and what engines find out about it, for all phases with these parameters."""
         return self._rates_made(p.tobytes(), lambda: (rates_of(self.model, self.bound(p), self.motion(p)[0], p), {}))
 
-    def _sizes(self, guards: Callable[[Array, Array], Array], x: Array, span: tuple[float, float]) -> Array:
+    def _sizes(self, p: Array, x: Array, span: tuple[float, float]) -> Array:
         """The size of each clock over a phase, as far as the time alone tells."""
-        if not self.clocks:
-            return np.empty(0)
         times = np.linspace(*span, SAMPLES)
-        largest = np.abs(guards(times, np.tile(x, (SAMPLES, 1)))).max(axis=0)[list(self.clocks)]
+        largest = np.abs(self.guards(p)(times, np.tile(x, (SAMPLES, 1)))).max(axis=0)[list(self.clocks)]
         return CLOCK * np.where(largest > 0, largest, 1.0) * (span[1] - span[0])
 
     def sides(self, modes: ModeNames) -> Array:

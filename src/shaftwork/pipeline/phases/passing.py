@@ -86,7 +86,7 @@ class Passing:
         """The modes that go on, and how far rounding moves each guard."""
         self._note: Callable[[float, list[Change]], None] | None = note
         self._size = moment.x.size
-        self.phases = [Phase(start, moment.regime.modes, moment.regime.p)]
+        self._starts = [(start, moment.regime)]
         self._reactions: list[Reaction] = []
         self._suited: set[Regime] = set()
         self.beyond: tuple[Moment, list[Change]] | None = None
@@ -109,10 +109,15 @@ class Passing:
             self._suited.add(regime)
         self.regime, self.bands = regime, bands
         self._note(t, changes)
-        self.phases.append(Phase(t, regime.modes, regime.p))
+        self._starts.append((t, regime))
         reaction = Reaction(regime.p, regime.ends, bands, regime.equations)
         self._reactions.append(reaction)
         return reaction
+
+    @property
+    def phases(self) -> tuple[Phase, ...]:
+        """The phases so far."""
+        return tuple(Phase(start, regime.modes, regime.p) for start, regime in self._starts)
 
     def close(self) -> None:
         """Let go of who is told: the run is over, and only made once more for its dense output.

@@ -11,8 +11,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-import numpy as np
-
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.observer import Impact
 from shaftwork.codegen.timeline import Timeline
@@ -223,7 +221,7 @@ class Run:
         if self.demand.t_eval is not None and t in trajectory.t[-1:] and t < self.demand.span[1]:
             # an output at an event belongs to the next phase, which has it too
             trajectory = replace(trajectory, t=trajectory.t[:-1], x=trajectory.x[:-1])
-        self.spans.append(Span(regime.assembly, trajectory, tuple(passing.phases)))
+        self.spans.append(Span(regime.assembly, trajectory, passing.phases))
         met, sides = trajectory.met, self._instants(moment).sides(t)
         if met is not None and passing.beyond is not None and sides == (t, t):
             moment, changes = passing.beyond
@@ -242,7 +240,7 @@ class Run:
         """The output times of a phase: an event belongs to the next one."""
         if self.demand.t_eval is None:
             return None
-        first, last = np.searchsorted(self.demand.t_eval, (t, end), side="left")
+        first, last = self.demand.t_eval.searchsorted((t, end))
         return self.demand.t_eval[first : last + (end == self.demand.span[1])]
 
     def _passed(self, t: float, moment: Moment) -> tuple[Trajectory, Passing]:
