@@ -129,6 +129,7 @@ class Assembly:
         self._rates_made = Kept[bytes, tuple[Callable[[float, Array], Array], dict[str, Any]]](KEPT)
         self._guards_made = Kept[bytes, Callable[[Array, Array], Array]](KEPT)
         self._problems = Kept[tuple[ModeNames, bytes], Problem](KEPT)
+        self._translated = Kept[tuple[int, Expr], Expr](KEPT)
         self._sides: dict[ModeNames, Array] = {}
         self._ends: dict[ModeNames, tuple[tuple[int, Watched], ...]] = {}
         self._numbers = [self._places[element.number] for element in elements if element.number in self._places]
@@ -241,8 +242,9 @@ class Assembly:
 
     def of_element(self, number: int, expression: Expr | None) -> Expr:
         """What is made of an element's parameters, in those of the network; zero where there is nothing."""
-        element = self.elements[number]
-        return self._readings.guard(self.parts[element.part.name], element.modes, as_expression(expression or 0))
+        element, wanted = self.elements[number], as_expression(expression or 0)
+        part = self.parts[element.part.name]
+        return self._translated((number, wanted), lambda: self._readings.guard(part, element.modes, wanted))
 
     def problem(self, moment: Moment, span: tuple[float, float], times: Timeline) -> Problem:
         """The motion of a phase, before it is known where it ends; tolerances are for rtol = 1.
