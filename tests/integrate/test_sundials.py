@@ -80,3 +80,25 @@ def test_steps_are_counted_alike_with_and_without_output_times():
     asked = sundials.solve_dae(loop())
     assert asked.statistics["steps"] == asked.steps.size - 1
     assert asked.statistics["steps"] == pytest.approx(free.statistics["steps"], rel=0.2)
+
+
+def test_step_ends_that_were_kept_are_those_of_the_dense_output_also_where_the_state_jumps():
+    run = sundials.solve(
+        Problem(
+            lambda _t, x: -x,
+            None,
+            np.array([1.0, 2.0]),
+            0.0,
+            1.0,
+            ("a", "b"),
+            np.full(2, 1e-9),
+            breakpoints=(0.5,),
+            jump=lambda _t, x: x + 1.0,
+            t_eval=np.array([0.0, 1.0]),
+        )
+    )
+    steps = run.dense.steps
+    kept = run.dense(steps)
+    run.dense(steps[:-1] + np.diff(steps) / 3)  # makes the dense output
+    np.testing.assert_array_equal(kept, run.dense._dense(steps))
+    assert kept[steps == 0.5][0] == pytest.approx([1.0 + np.exp(-0.5), 1.0 + 2 * np.exp(-0.5)], rel=1e-6)

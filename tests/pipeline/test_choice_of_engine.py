@@ -120,3 +120,33 @@ def test_another_engine_says_what_was_in_the_way_of_the_series() -> None:
     assert sol.engine == "scipy"
     assert "after t = 0 s a law, or one of its derivatives, is not finite" in sol.why
     assert sol["J.omega"][-1] == pytest.approx(2 / 3, rel=1e-6)
+
+
+def chain(k: int, *parts: sw.Component) -> sw.Model:
+    """Inertias with k gaps that spring between them, and parts at the last one."""
+    net = sw.Network("chain")
+    net.add(sw.TorqueSource("pull", tau=20 * sympy.sin(12 * sw.t)), "n0")
+    net.add(sw.Inertia("J0", J=0.1), "n0")
+    for n in range(k):
+        net.add(sw.Backlash(f"gap{n}", gap=0.004, c=1e3, d=1.0), f"n{n}", f"n{n + 1}")
+        net.add(sw.Inertia(f"J{n + 1}", J=0.1), f"n{n + 1}")
+    for part in parts:
+        net.add(part, f"n{k}")
+    return net.compile()
+
+
+@pytest.mark.skipif(not ENGINES["heyoka"].installed, reason="needs heyoka")
+def test_a_long_chain_of_gaps_is_compiled_and_moves_as_its_arrays_say() -> None:
+    model = chain(32)
+    sol = model.simulate(0.3, t_eval=2)
+    assert sol.engine == "heyoka"
+    other = model.simulate(0.3, t_eval=2, engine="scipy", rtol=1e-7)
+    assert [event[1:] for event in sol.events] == [event[1:] for event in other.events]
+    assert len(sol.events) > 10
+    assert sol.x[-1] == pytest.approx(other.x[-1], rel=1e-6, abs=1e-7)
+
+
+@pytest.mark.parametrize(("stops", "compiled"), [(0, True), (2, True), (3, False)])
+def test_a_large_network_with_many_sets_of_equations_is_left_to_arrays(stops: int, *, compiled: bool) -> None:
+    model = chain(70, *(sw.HardStop(f"stop{n}", lower=-1.0, upper=1.0) for n in range(stops)))
+    assert (model.rows is not None) == compiled

@@ -296,6 +296,20 @@ def test_an_end_of_a_mode_that_the_series_have_hidden_is_told() -> None:
     passing.refuse_missed(next(made.guard for _, made in regime.watched if made.leave.to == "forward"), 1.0, beyond)
 
 
+def test_the_rates_of_many_instants_are_those_of_each() -> None:
+    settling = Settling(model().phases, {}, (0.0, 10.0))
+    regime = settling.regime(("forward", "forward", "released"))
+    x = np.random.default_rng(0).normal(size=(5, len(regime.assembly.model.states)))
+    moment = Moment(regime, x[0], [0.0] * len(regime.sides))
+    problem = regime.assembly.problem(
+        moment, (0.0, 10.0), regime.assembly.model.switching.timeline(regime.p, 0.0, 10.0)
+    )
+    times = np.linspace(0.1, 0.9, 5)
+    assert problem.rates is not None
+    each = [problem.rhs(t, state) for t, state in zip(times.tolist(), x, strict=True)]
+    np.testing.assert_allclose(problem.rates(times, x), each, rtol=1e-12, atol=1e-12)
+
+
 def test_a_wheel_slips_in_the_way_it_is_pulled_where_the_rounding_of_a_moment_is_not_known() -> None:
     net = wheel(sw.TorqueSource("pull", tau=3.0), sw.CoulombLoad("load", tau=2.0))
     settling = Settling(net.compile().phases, {}, (0.0, 10.0))

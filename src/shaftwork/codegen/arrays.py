@@ -50,8 +50,7 @@ class BoundArrays:
 
     def __init__(self, program: ArrayProgram, p: Array, part: LinearPart) -> None:
         self.program, self.p, self.part = program, p, part
-        self._has_slopes = bool(part.B1.nnz)
-        self._controls = np.flatnonzero(program.inputs.controlled)
+        self._has_slopes, self._controls = bool(part.B1.nnz), program.inputs.controls
         loops = program.loop_places
         self.loops = LoopSolver(program.inputs, part, loops, program.loop_in_tree, self.p) if loops.size else None
 

@@ -171,12 +171,11 @@ class HeyokaProgram:
         held = np.zeros(len(self.switches)) if held is None else held
         signs = held
         # A switch may depend on the sign of an earlier one: the maximum of three compares with the maximum of two.
-        for _ in range(len(self.switches)):
+        for left in reversed(range(len(self.switches))):
             values = self.switch_values(t, x, np.concatenate([parameters, signs]))
-            found = np.where(held == 0, np.sign(values), held)
-            if np.array_equal(found, signs):
+            before, signs = signs, np.where(held == 0, np.sign(values), held)
+            if not left or np.array_equal(before, signs):
                 break
-            signs = found
         return signs
 
     def bind(self, parameters: Array) -> BoundProgram:

@@ -83,6 +83,7 @@ class Inputs:
                 self.of_time[group.inputs] = False
             elif group.made_of.template.reads:
                 self.of_time[group.inputs], self.controlled[group.inputs] = False, True
+        self.controls = np.flatnonzero(self.controlled)
 
     def _group(self, made: TemplateGroup, place: Any, output: Any, integral: Any) -> _Group:
         is_wave = made.template.is_history

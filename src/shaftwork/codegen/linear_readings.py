@@ -110,10 +110,12 @@ class ReadingMatrices:
 
     def __call__(self, history: History) -> Array:
         """(quantities, k) the quantities along a history."""
-        u, slopes, rate = history.inputs
-        given = history.x[: self._sizes[0]], u, rate, slopes
-        made = zip(self._matrices, given, strict=True)
-        return np.asarray(sum(matrix @ values for matrix, values in made))
+        by_state, by_input, by_rate, by_slope = self._matrices
+        made = by_state @ history.x[: self._sizes[0]] + by_input @ history.values[1]
+        if by_rate.nnz or by_slope.nnz:
+            _, slopes, rate = history.inputs
+            made = made + by_rate @ rate + by_slope @ slopes
+        return np.asarray(made)
 
 
 @dataclass(frozen=True)

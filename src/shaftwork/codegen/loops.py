@@ -46,7 +46,7 @@ class LoopSolver:
     def __init__(self, inputs: Inputs, part: LinearPart, places: Index, in_tree: NDArray[np.bool_], p: Array) -> None:
         self._inputs, self._part, self._p = inputs, part, p
         self.places, self._tree = places, in_tree
-        self._controls = np.flatnonzero(inputs.controlled)
+        self._controls = inputs.controls
         self._D = part.D.toarray()
         self._P, self._Q = part.tree_law_x.toarray(), part.tree_law_u.toarray()
         self._last = np.zeros(len(places))

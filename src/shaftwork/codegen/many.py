@@ -32,10 +32,10 @@ class ManyExpressions:
         places, self._size = {symbol: k for k, symbol in enumerate(quantities)}, len(quantities)
         factors: list[tuple[int, int, Expr]] = []
         constants: list[tuple[int, Expr]] = []
-        self._others: list[int] = []
-        for row, expression in enumerate(expressions):
+        self._others: list[int] = [] if sums else [*range(len(expressions))]
+        for row, expression in enumerate(expressions if sums else ()):
             terms = [term.as_independent(*quantities, as_Add=False) for term in Add.make_args(expression)]
-            if sums and not expression.has(TIME) and all(rest == 1 or rest in places for _, rest in terms):
+            if not expression.has(TIME) and all(rest == 1 or rest in places for _, rest in terms):
                 factors += [(row, places[rest], factor) for factor, rest in terms if rest != 1]
                 constants += [(row, factor) for factor, rest in terms if rest == 1]
             else:
@@ -49,14 +49,10 @@ class ManyExpressions:
 
     def bind(self, p: Array) -> Values:
         """The expressions with a parameter vector."""
-        numbers = np.array(self._numbers(*p.tolist()), dtype=float)
-        entries = numbers[: len(self._rows)], (self._rows, self._columns)
-        matrix = sparse.csr_array(entries, shape=(self._count, self._size))
-        constants, others, function, parameters = np.zeros(self._count), self._others, self._function, p.tolist()
-        np.add.at(constants, self._constant_rows, numbers[len(self._rows) :])
+        sums, others, function, parameters = self._sums(p), self._others, self._function, p.tolist()
 
         def values(times: Array, quantities: Array) -> Array:
-            made = np.asarray(matrix @ quantities + constants[:, None])
+            made = sums(quantities)
             with np.errstate(all="ignore"):
                 found = function(times, *quantities, *parameters) if others else ()
                 for row, value in zip(others, found, strict=True):
@@ -64,3 +60,13 @@ class ManyExpressions:
             return made.T
 
         return values
+
+    def _sums(self, p: Array) -> Callable[[Array], Array]:
+        """From quantities (m, k) to (n, k) the sums among the expressions, with a parameter vector."""
+        if not (self._rows or self._constant_rows):
+            return lambda quantities: np.zeros((self._count, quantities.shape[1]))
+        numbers = np.array(self._numbers(*p.tolist()), dtype=float)
+        entries = numbers[: len(self._rows)], (self._rows, self._columns)
+        matrix, constants = sparse.csr_array(entries, shape=(self._count, self._size)), np.zeros((self._count, 1))
+        np.add.at(constants[:, 0], self._constant_rows, numbers[len(self._rows) :])
+        return lambda quantities: np.asarray(matrix @ quantities + constants)

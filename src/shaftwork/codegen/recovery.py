@@ -37,8 +37,8 @@ class History:
         self.form = bound.program.form
 
     @cached_property
-    def inputs(self) -> tuple[Array, Array, Array]:
-        """u, its derivative by time alone, and x', each (., k).
+    def values(self) -> tuple[Array, Array]:
+        """Outputs y and inputs u, each (., k).
 
         Raises:
             SimulationError: a law has no value.
@@ -46,7 +46,16 @@ class History:
         y, u = self.bound.values(self.t, self.x)
         if not np.isfinite(u).all() and (law := without_value(self.bound, self.t, self.x.T)) is not None:
             raise no_value(*law)
-        inputs = self.bound.program.inputs
+        return y, u
+
+    @cached_property
+    def inputs(self) -> tuple[Array, Array, Array]:
+        """u, its derivative by time alone, and x', each (., k).
+
+        Raises:
+            SimulationError: a law has no value.
+        """
+        (y, u), inputs = self.values, self.bound.program.inputs
         slopes = inputs.of_time[:, None] * inputs.time_slopes(self.t, y, self.x, self.bound.p)
         return u, slopes, self.bound.rates(self.t, self.x, y, u)
 

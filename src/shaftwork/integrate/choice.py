@@ -136,7 +136,7 @@ def _guarded(problem: Problem, trajectory: Trajectory, name: str) -> Trajectory:
     said = objection(problem, trajectory, name)
     if said is None and problem.observed is None and name not in EXPLICIT and trajectory.t.size:
         said = spoiled(problem, trajectory.t, trajectory.x)
-    return replace(trajectory, caveat=said or "")
+    return replace(trajectory, caveat=said) if said else trajectory
 
 
 def check(name: str) -> None:
@@ -175,11 +175,17 @@ def load(name: str) -> Engine:
 
 def _stiff(problem: Problem, *, compiled: bool) -> tuple[str, str] | None:
     """The implicit engine and why, where it costs less than the explicit one."""
-    from shaftwork.integrate.stiffness import rates
+    from shaftwork.integrate.stiffness import bound_of_decay, jacobians, rates
 
-    found = rates(problem)
+    matrices, duration = [*jacobians(problem)], problem.t_end - problem.t0
+    name = "sundials" if ENGINES["sundials"].installed else "scipy-radau"
+    explicit_step = HEYOKA_STEP_PER_STATE * problem.x0.size if compiled else DOP853_STEP
+    implicit_step = CVODE_STEP if name == "sundials" else RADAU_STEP
+    most = bound_of_decay(matrices) * duration / STABLE
+    if problem.x0.size <= LARGEST_NOT_BANDED and most * explicit_step <= TRANSIENT_STEPS * implicit_step:
+        return None
+    found = rates(matrices)
     problem.found.setdefault("decay", found.decay)
-    duration = problem.t_end - problem.t0
     explicit_steps = max(found.decay, found.oscillation) * duration / STABLE
     if problem.x0.size > LARGEST_NOT_BANDED and explicit_steps > FEWEST_NOT_BANDED and _is_damped_chain(problem):
         return "banded", (
@@ -188,9 +194,7 @@ def _stiff(problem: Problem, *, compiled: bool) -> tuple[str, str] | None:
         )
     stable_steps = found.decay * duration / STABLE
     implicit_steps = TRANSIENT_STEPS * (1 + len(problem.breakpoints)) + STEPS_PER_RADIAN * found.oscillation * duration
-    name = "sundials" if ENGINES["sundials"].installed else "scipy-radau"
-    explicit = stable_steps * (HEYOKA_STEP_PER_STATE * problem.x0.size if compiled else DOP853_STEP)
-    if explicit <= implicit_steps * (CVODE_STEP if name == "sundials" else RADAU_STEP):
+    if stable_steps * explicit_step <= implicit_steps * implicit_step:
         return None
     return name, (
         f"The system is stiff: its fastest decay ({found.decay:.3g} 1/s) would force an explicit method to about "

@@ -168,9 +168,9 @@ class Look:
         self.states = np.concatenate([self.states, states])[order]
         self.values = np.concatenate([self.values, self._switches(times, states)])[order]
 
-    def at(self, t: float) -> Array:
-        """The switches (m,) at a time in s."""
-        return np.asarray(self._switches(np.array([t]), self._dense(np.array([t])))[0])
+    def at(self, times: Array) -> Array:
+        """The switches (k, m) at times (k,)."""
+        return self._switches(times, self._dense(times))
 
     def is_far(self) -> bool:
         """Whether all switches are far from zero for what they move."""
@@ -230,7 +230,7 @@ class Look:
 
         def value(t: float) -> float:
             if t not in known:
-                known[t] = float(self.at(t)[column])
+                known[t] = float(self.at(np.array([t]))[0, column])
             return known[t]
 
         tolerance = max(near, float(np.spacing(self.times[-1])))

@@ -101,7 +101,8 @@ class _Run:
         self.problem = problem
         self.program = problem.program.program
         self.lent, self.integrator = lent, lent.integrator
-        self.parameters = problem.program.parameters
+        self._x, self._p = lent.integrator.state, lent.integrator.pars  # heyoka's own, which it makes anew at each look
+        self.parameters: Array = problem.program.parameters.copy()
         self.state: Array = np.array(problem.x0, dtype=float)
         self.start = self.state
         self.steps = 0
@@ -123,10 +124,11 @@ class _Run:
         integrator.pars[:used] = self.parameters[:used]
         integrator.reset_cooldowns() if integrator.with_events else None
         if self.problem.guards is not None:
-            self._sizes = np.fmax(self.problem.guards.sizes, 1.0)
+            self._sizes = np.fmax(self.problem.guards.sizes, 1.0).tolist()
             first, last = self.program.parameter_count + len(self.program.switches), self.program.first_weight
-            self._sides, self._offsets = np.split(integrator.pars[first:last], 2)
-            self._guard(self.problem.guards.sides, self.problem.guards.offsets)
+            middle = (first + last) // 2
+            self._sides, self._offsets = integrator.pars[first:middle], integrator.pars[middle:last]
+            self._guard([*enumerate(self.problem.guards.sides.tolist())], self.problem.guards.offsets.tolist())
         self.program.weigh(integrator)
         watch = self._watch(piece)
         self.lent.listeners.clear()
@@ -159,16 +161,17 @@ class _Run:
         if self.problem.react is not None:
             self.problem.react.refuse_missed(self.met, integrator.time, self.state)
 
-    def _guard(self, sides: Array, offsets: Array | Sequence[float]) -> None:
-        """Watch the guards from here on, by their sides and offsets.
+    def _guard(self, ends: Sequence[tuple[int, float]], offsets: Sequence[float]) -> None:
+        """Watch the guards that end the phase from here on, by their numbers and sides, and no others.
 
         heyoka's tolerance is relative to the largest of states and events: a torque of 1e6 N m in one would cost six
         digits. So guards count in parts of their size, which their first values tell, and how far rounding moves them.
         """
-        offsets = np.asarray(offsets)
-        sizes = np.fmax(self._sizes, offsets / ROUNDING)
-        np.divide(sides, sizes, out=self._sides)
-        np.divide(offsets, sizes, out=self._offsets)
+        self._sides[:] = 0.0
+        for number, side in ends:  # a few at each change of mode: plain floats are faster than arrays
+            offset = offsets[number]
+            size = max(self._sizes[number], offset / ROUNDING)
+            self._sides[number], self._offsets[number] = side / size, offset / size
 
     def _guard_met(self, raw: Any, outcome: str, watch: Watch | None) -> int | None:
         """The guard at which the run has stopped, by its own event or at that of a switch at the very same instant."""
@@ -185,14 +188,14 @@ class _Run:
         """Whether the run goes on past the guard that it has met."""
         if self.problem.react is None:
             return False
-        integrator = self.integrator
-        reaction = self.problem.react(len(self.reactions), met, integrator.time, integrator.state)
+        time = self.integrator.time
+        reaction = self.problem.react(len(self.reactions), met, time, self._x)
         if reaction is None:
             return False
-        self.reactions.append((integrator.time, reaction.equations))
-        integrator.pars[: reaction.p.size] = reaction.p
-        self._guard(reaction.sides, reaction.offsets)
-        self.program.weigh(integrator)
+        self.reactions.append((time, reaction.equations))
+        self._p[: reaction.p.size] = reaction.p
+        self._guard(reaction.ends, reaction.offsets)
+        self.program.weigh(self.integrator)
         return True
 
     def _first_step(self, piece: Piece) -> float:
@@ -296,11 +299,11 @@ def _satisfied(
 ) -> bool:
     """Whether a series (n, orders) from a start in s satisfies equations after some time; `sizes` are of states."""
     orders = np.arange(terms.shape[1])
-    state = terms @ elapsed**orders
-    slope = terms[:, 1:] @ (orders[1:] * elapsed ** orders[:-1])
+    powers = elapsed**orders
+    state, change = terms @ powers, terms @ (orders * powers)  # what it is, and by how much its slope would move it
     with np.errstate(all="ignore"):
-        defect = elapsed * np.abs(rhs(piece.inside(start + elapsed), state) - slope)
-    moved = np.maximum(np.abs(state), sizes) + elapsed * np.abs(slope)
+        defect = np.abs(np.multiply(elapsed, rhs(piece.inside(start + elapsed), state)) - change)
+    moved = np.maximum(np.abs(state), sizes) + np.abs(change)
     return bool((defect <= FIRST_DEFECT * moved + problem.atol).all())
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple, Protocol, TypeVar
 
@@ -102,13 +102,13 @@ class Reaction(NamedTuple):
 
     Args:
         p: (p,) parameters from there on.
-        sides: (m,) of the guards.
-        offsets: (m,) of the guards.
+        ends: number and side of each guard that ends the phase from there on.
+        offsets: (m,) of all guards.
         equations: makes the right-hand side from there on.
     """
 
     p: Array
-    sides: Array
+    ends: Sequence[tuple[int, float]]
     offsets: Sequence[float]
     equations: Callable[[], Callable[[float, Array], Array]]
 
@@ -207,6 +207,7 @@ class Problem:
         progress: told again and again the time in s that an engine has reached, or None. What it raises ends the run.
         overall: the size of the largest state where it stays below one: so much smaller is a tolerance for all states.
         found: what an engine has found out about the equations, for its next run with them.
+        rates: the right-hand side from times (k,) and states (k, n) to (k, n), or None where there is only `rhs`.
     """
 
     rhs: Callable[[float, Array], Array]
@@ -234,6 +235,7 @@ class Problem:
     progress: Callable[[float], None] | None = None
     overall: float = 1.0
     found: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
+    rates: Callable[[Array, Array], Array] | None = None
 
     @property
     def straight(self) -> LinearInputs | None:
@@ -283,9 +285,16 @@ class DaeProblem:
 AnyProblem = TypeVar("AnyProblem", bound=Problem | DaeProblem)
 
 
+def changed(problem: AnyProblem, **values: Any) -> AnyProblem:
+    """The same problem with other values; `dataclasses.replace` takes longer than many a phase of a motion."""
+    made = object.__new__(type(problem))
+    vars(made).update(vars(problem), **values)
+    return made
+
+
 def tightened(problem: AnyProblem, share: float) -> AnyProblem:
     """The same problem with a part of its tolerances."""
-    return replace(problem, rtol=share * problem.rtol, atol=share * problem.atol)
+    return changed(problem, rtol=share * problem.rtol, atol=share * problem.atol)
 
 
 class Timed(Protocol):

@@ -27,7 +27,7 @@ from shaftwork.integrate.pieces import (
     used_up,
 )
 from shaftwork.integrate.problem import Array, Problem, Trajectory, tightened
-from shaftwork.integrate.stiffness import rates
+from shaftwork.integrate.stiffness import bound_of_decay, jacobians, rates
 
 Method = Literal["DOP853", "Radau"]
 
@@ -80,7 +80,7 @@ def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
         if BEARABLE < factor < 1 / np.finfo(float).eps:  # it is beyond all bounds where nothing has moved yet
             share = max(1 / (EDGE * factor), FINEST / problem.rtol)
             tight = tightened(problem, share)
-            decay = rates(problem).decay
+            decay = rates(jacobians(problem)).decay
             again = _march(tight, method, longest=STABLE / decay if decay > 0 else np.inf)
             runs = [replace(new, counts=_sums([new, old])) for new, old in zip(again, runs, strict=True)]
     starts = np.array([run.times[0] for run in runs])
@@ -114,10 +114,15 @@ def _on_edge(problem: Problem, runs: list[_Run]) -> bool:
 
     The decay is looked at once for many brief phases in the same modes, and anew for a long one.
     """
-    if "decay" not in problem.found or sum(run.counts["steps"] for run in runs) > BRIEF:
-        problem.found["decay"] = rates(problem).decay
-    longest = max(float(np.diff(run.times).max()) for run in runs)
-    return bool(longest * problem.found["decay"] > INSIDE)
+    longest, found = max(float(np.diff(run.times).max()) for run in runs), problem.found
+    long = sum(run.counts["steps"] for run in runs) > BRIEF
+    if long or "decay" not in found:
+        if long or "bound" not in found:
+            found["bound"] = bound_of_decay(jacobians(problem))
+        if longest * found["bound"] <= INSIDE:
+            return False
+        found["decay"] = rates(jacobians(problem)).decay
+    return bool(longest * found["decay"] > INSIDE)
 
 
 def _samples(runs: list[_Run]) -> tuple[Array, Array]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,10 +32,20 @@ class Rates:
     oscillation: float
 
 
-def rates(problem: Problem) -> Rates:
-    """Fastest decay and oscillation at the start of a problem and at a few states that it may soon reach."""
-    found = [Rates(0.0, 0.0), *(_rates_of(matrix) for matrix in _jacobians(problem))]
+def rates(matrices: Iterable[Any]) -> Rates:
+    """Fastest decay and oscillation of Jacobians."""
+    found = [Rates(0.0, 0.0), *map(_rates_of, matrices)]
     return Rates(max(rate.decay for rate in found), max(rate.oscillation for rate in found))
+
+
+def bound_of_decay(matrices: Iterable[Any]) -> float:
+    """At least the decay of `rates`, in 1/s, without eigenvalues: of many brief phases it tells enough."""
+    return max((_bounds_of(matrix).decay for matrix in matrices), default=0.0)
+
+
+def jacobians(problem: Problem) -> Iterator[Any]:
+    """Those at the start of a problem and at a few states that it may soon reach."""
+    return (made for made in _jacobians(problem) if np.isfinite(made.data).all())
 
 
 def _jacobians(problem: Problem) -> Iterator[Any]:
@@ -62,15 +72,18 @@ def _implicit_step(problem: Problem, time: float, matrix: Any, step: float) -> A
 
 
 def _rates_of(matrix: Any) -> Rates:
-    if not np.isfinite(matrix.data).all():
-        return Rates(0.0, 0.0)
     if matrix.shape[0] <= LARGEST_EIGENVALUES:
         values = np.linalg.eigvals(matrix.toarray())
         damped = np.abs(values.real) > np.abs(values.imag)
         decay = np.max(-values.real, initial=0.0, where=damped)
         return Rates(float(decay), float(np.max(np.abs(values.imag), initial=0.0, where=~damped)))
-    scale = balance(matrix)
-    scaled = scale_by(matrix, scale)
+    return _bounds_of(matrix)
+
+
+def _bounds_of(matrix: Any) -> Rates:
+    """Bounds of the rates, by the symmetric and the other part of the balanced matrix."""
+    matrix = matrix.toarray() if matrix.shape[0] <= LARGEST_EIGENVALUES else matrix  # small full ones are faster
+    scaled = scale_by(matrix, balance(matrix))
     return Rates(norm((scaled + scaled.T) / 2), norm((scaled - scaled.T) / 2))
 
 
@@ -98,5 +111,5 @@ def scale_by(matrix: Any, scale: Array) -> Any:
 
 
 def norm(matrix: Any) -> float:
-    """Largest column sum of a sparse matrix: a bound of its eigenvalues."""
+    """Largest column sum of a sparse or full matrix: a bound of its eigenvalues."""
     return float(abs(matrix).sum(axis=0).max(initial=0.0))

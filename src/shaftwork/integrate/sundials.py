@@ -43,6 +43,8 @@ LARGEST_DENSE = 100
 # A run up to a guard is made again where this part of its tolerance would not do, and where it is not as tight already:
 # absolute tolerances of small twists may be that tight.
 ENOUGH, TIGHTEST_ATOL = 0.5, 1e-17
+# Of a run with output times so many numbers at the ends of its steps are kept.
+MOST_KEPT = 1_000_000
 FINEST = ENGINES["sundials"].finest
 
 
@@ -318,12 +320,11 @@ def _trajectory(problem: Problem | DaeProblem, opening: Opening, degree: int) ->
     dense = _Replay(problem, opening, degree)
     if problem.t_eval is None:
         t, states = both_sides(problem, *dense.step_ends)
-        return Trajectory(
-            t, states, dense, {"steps": dense.steps.size - 1}, met=dense.met, end=(float(t[-1]), states[-1])
-        )
+        end = float(t[-1]), states[-1]
+        return Trajectory(t, states, dense, {"steps": dense.steps.size - 1}, met=dense.met, end=end)
     times = np.asarray(problem.t_eval, dtype=float)
     rows: list[Array] = []
-    steps, jumps = 0, frozenset(problem.breakpoints)  # only asked for membership
+    jumps = frozenset(problem.breakpoints)  # only asked for membership
 
     def ask(start: float, end: float) -> Array:
         # An output at the end of a step is read there, except at a breakpoint: the next piece starts with it.
@@ -331,14 +332,15 @@ def _trajectory(problem: Problem | DaeProblem, opening: Opening, degree: int) ->
         return times[np.searchsorted(times, start, side="right") : np.searchsorted(times, end, side=side)]
 
     found, met = _march(problem, opening, ask)
+    steps = sum(len(marched) for _, marched in found)
+    if steps * problem.x0.size <= MOST_KEPT:
+        dense.ends = tuple(map(np.concatenate, _step_ends(found)))
     for piece, (start, marched) in zip(pieces(problem), found, strict=False):  # a guard may end it early
         if piece.start in times:
             rows.append(start[None, :])
         rows.extend(step.inside for step in marched)
-        steps += len(marched)
     last = found[-1][1][-1]
-    none = np.empty((0, last.state.size))
-    states = np.concatenate([none, *rows])
+    states = np.concatenate([np.empty((0, last.state.size)), *rows])
     return Trajectory(times[: len(states)], states, dense, {"steps": steps}, met=met, end=(last.end, last.state))
 
 
@@ -349,6 +351,8 @@ class _Replay:
         self._problem = problem
         self._opening = opening
         self._shares = points(degree)[1:-1]
+        self.ends: tuple[Array, ...] = ()
+        """Times and states at the step ends of an earlier run: who asks for these alone needs no further one."""
 
     @cached_property
     def _marched(self) -> Marched:
@@ -365,27 +369,31 @@ class _Replay:
 
     @cached_property
     def _dense(self) -> PiecewiseDense:
-        parts, starts = [], []
-        for state, steps in self._found:
-            before = state
-            for step in steps:
-                nodes = np.vstack([before, step.inside, step.state])
-                parts.append(Polynomial(step.start, step.end, nodes))
-                starts.append(step.start)
-                before = step.state
-        ends = np.array([*starts, self._found[-1][1][-1].end])
-        return PiecewiseDense(np.array(starts), tuple(parts), ends, self._problem.x0.size)
+        parts = [
+            Polynomial(step.start, step.end, np.vstack([before, step.inside, step.state]))
+            for (_, steps), states in zip(self._found, self.step_ends[1], strict=True)
+            for before, step in zip(states, steps, strict=False)
+        ]
+        starts = np.array([part.start for part in parts])
+        return PiecewiseDense(starts, tuple(parts), np.append(starts, parts[-1].end), self._problem.x0.size)
 
     @property
     def step_ends(self) -> tuple[list[Array], list[Array]]:
         """Times and states at the step ends of each piece."""
-        times = [np.array([steps[0].start, *(step.end for step in steps)]) for _, steps in self._found]
-        states = [np.vstack([start, *(step.state for step in steps)]) for start, steps in self._found]
-        return times, states
+        return _step_ends(self._found)
 
     @property
     def steps(self) -> Array:
-        return self._dense.steps
+        return np.unique(self.ends[0]) if self.ends else self._dense.steps
 
     def __call__(self, times: Array) -> Array:
+        if self.ends:
+            last = np.searchsorted(self.ends[0], times, side="right") - 1  # after the jump, where there are two
+            if np.array_equal(self.ends[0][last], times):
+                return self.ends[1][last]
         return self._dense(times)
+
+
+def _step_ends(found: list[tuple[Array, list[_Step]]]) -> tuple[list[Array], list[Array]]:
+    times = [np.array([steps[0].start, *(step.end for step in steps)]) for _, steps in found]
+    return times, [np.vstack([start, *(step.state for step in steps)]) for start, steps in found]

@@ -39,7 +39,7 @@ class Sizes:
 
     def tolerances(self, ordinary: Array, names: Sequence[str]) -> Array:
         """(n,) absolute tolerances of states by name, as fractions of the relative one, from those at usual speeds."""
-        return np.minimum(ordinary, [NOMINAL * self.of.get(name, np.inf) for name in names])
+        return np.minimum(ordinary, [NOMINAL * self.of.get(name, np.inf) for name in names]) if self.of else ordinary
 
 
 @dataclasses.dataclass(frozen=True)

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
-from itertools import accumulate
+from functools import cache, cached_property, partial
 from operator import methodcaller
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import sparse
-from sympy import Expr, Integer, Symbol, Tuple
+from sympy import Expr, Symbol
 
 from shaftwork.codegen.arrays import BoundArrays
-from shaftwork.codegen.code import bindable, is_rough, vectorised, vectorised_list
+from shaftwork.codegen.code import bindable, is_rough, vectorised
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.linear_readings import ReadingMatrices
 from shaftwork.codegen.many import ManyExpressions
@@ -24,18 +23,17 @@ from shaftwork.codegen.recovery import History
 from shaftwork.codegen.stores import Stores
 from shaftwork.codegen.timeline import Timeline
 from shaftwork.codegen.valueless import first_missing, in_words, rough, without_value
-from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Leave, Mode, Modes
 from shaftwork.components.pieces import pieces_degree
-from shaftwork.core.errors import CompileError, no_value
+from shaftwork.core.errors import CompileError
 from shaftwork.core.kept import Kept
 from shaftwork.integrate.engines import available
-from shaftwork.integrate.problem import Guards, Problem
+from shaftwork.integrate.problem import Guards, Problem, changed
 from shaftwork.network.graph import GraphPart
 from shaftwork.pipeline.phases.rates import rates_of
-from shaftwork.pipeline.phases.starts import conditional, starts_of
+from shaftwork.pipeline.phases.shown import Shown
 from shaftwork.pipeline.prepared import Prepared
 from shaftwork.reduction.readings import NamedReadings, Readings
 
@@ -75,6 +73,12 @@ class Element:
         """How messages and tables call it."""
         return f"{self.part.name}.{self.modes.label}" if self.modes.label else self.part.name
 
+    @cached_property
+    def alike(self) -> Mapping[str, str]:
+        """By mode the first one with the same law: "open" of one that has parted."""
+        first: dict[tuple[str, float], str] = {}
+        return {mode.name: first.setdefault((mode.form, mode.value), mode.name) for mode in self.modes.options}
+
 
 def elements_of(model: Model) -> tuple[Element, ...]:
     """Every element of a network, in the order of its parts."""
@@ -105,9 +109,6 @@ class Assembly:
     def __init__(self, model: Model, elements: Sequence[Element], forms: Sequence[str | None]) -> None:
         self.model, self.elements = model, elements
         self.stores, self.quantities = Stores(model.form), Quantities(model.form)
-        self._symbols = tuple(conditional(element.modes) for element in elements)
-        # of each element the place where what it shows begins
-        self._firsts = tuple(accumulate((2 + len(symbols) for symbols in self._symbols), initial=0))
         self._places = {name: k for k, name in enumerate(model.parameters)}
         self._expressions: list[Expr] = []
         self._known: dict[tuple[int, Expr], int] = {}
@@ -121,11 +122,15 @@ class Assembly:
             for mode in element.modes.options:
                 if forms[number] in (None, mode.form):
                     self._watched[number, mode.name] = tuple(self._leaves(number, readings, part, mode))
+        self._shown = Shown(elements, self.parts, readings, self._parameters)
         if rows is None:
-            _ = self._shown  # so that all quantities are known before any function of them is made
+            _ = self._shown.function  # so that all quantities are known before any function of them is made
         self._prepared = Kept[bytes, Prepared](KEPT)
         self._matrices = Kept[LinearPart, ReadingMatrices](KEPT)
         self._rates_made = Kept[bytes, tuple[Callable[[float, Array], Array], dict[str, Any]]](KEPT)
+        self._guards_made = Kept[bytes, Callable[[Array, Array], Array]](KEPT)
+        self._problems = Kept[tuple[ModeNames, bytes], Problem](KEPT)
+        self._translated = Kept[tuple[int, Expr], Expr](KEPT)
         self._sides: dict[ModeNames, Array] = {}
         self._ends: dict[ModeNames, tuple[tuple[int, Watched], ...]] = {}
         self._numbers = [self._places[element.number] for element in elements if element.number in self._places]
@@ -188,6 +193,9 @@ class Assembly:
 
     def guards(self, p: Array) -> Callable[[Array, Array], Array]:
         """All guards as a function of times (k,) and states (k, n) to (k, guards)."""
+        return self._guards_made(p.tobytes(), lambda: self._guards(p))
+
+    def _guards(self, p: Array) -> Callable[[Array, Array], Array]:
         expressions, read = self._many.bind(p), self._read(p)
         return lambda times, states: expressions(times, read(times, states))
 
@@ -204,45 +212,21 @@ class Assembly:
         matrices = self._matrices(bound.part, lambda: ReadingMatrices(bound, reads))
         return lambda times, states: matrices(History(bound, times, states))
 
-    def _shown_at(self, t: float, x: Array, p: Array) -> Sequence[Any]:
-        """What elements show at one instant: speed across, twist and parameters of each."""
-        shown = self._shown
-        values = (np.ravel(value)[0] for value in self._read(p)(np.array([t]), x[None, :]))
-        return shown(t, *map(float, values), *p.tolist())  # type: ignore[no-any-return]
+    def _read_at(self, t: float, x: Array, p: Array) -> list[float]:
+        """The same at one instant."""
+        return [float(np.ravel(value)[0]) for value in self._read(p)(np.array([t]), x[None, :])]
 
     def first_modes(self, t: float, x: Array, p: Array) -> ModeNames:
         """The mode of each element in which a motion starts, in the equations in which nothing is joined by a mode."""
-        shown = self._shown_at(t, x, p)
-        elements = enumerate(self.elements)
-        return tuple(self._start(k, "", t, shown) or element.modes.options[0].name for k, element in elements)
+        return self._shown.first_modes(t, self._read_at(t, x, p), p)
 
     def start_of(self, number: int, besides: str, t: float, x: Array, p: Array) -> str:
         """The mode of an element in which a motion would start, besides one; empty where it would start in none."""
-        return self._start(number, besides, t, self._shown_at(t, x, p))
-
-    def _start(self, number: int, besides: str, t: float, shown: Sequence[Any]) -> str:
-        modes = self.elements[number].modes
-        first, symbols = self._firsts[number], self._symbols[number]
-        holds = starts_of(modes, symbols)(t, *shown[first : first + 2 + len(symbols)])
-        if holds is None:
-            raise no_value(t, in_words(self.elements[number].part, Tuple(*(mode.starts for mode in modes.options))))
-        return next((m.name for m, found in zip(modes.options, holds, strict=True) if found and m.name != besides), "")
-
-    @cached_property
-    def _shown(self) -> Callable[..., Any]:
-        """Of each element the speed across it, its twist and the parameters in its conditions, one after another."""
-        shown = []
-        for number, element in enumerate(self.elements):
-            part = self.parts[element.part.name]
-            reads = any(mode.starts.has(INTEGRAL) for mode in element.modes.options)
-            for symbol in (ACROSS, INTEGRAL, *self._symbols[number]):
-                known = symbol != INTEGRAL or reads
-                shown.append(self._readings.guard(part, element.modes, symbol) if known else Integer(0))
-        return vectorised_list((TIME, *self._readings.symbols, *self._parameters), shown)
+        return self._shown.start_of(number, besides, t, self._read_at(t, x, p), p)
 
     def across(self, number: int, t: float, x: Array, p: Array) -> float:
         """The speed across an element."""
-        return float(self._shown_at(t, x, p)[self._firsts[number]])
+        return self._shown.across(number, t, self._read_at(t, x, p), p)
 
     def twist(self, number: int) -> int | None:
         """The state that is the twist of an element, or None where none is."""
@@ -259,8 +243,9 @@ class Assembly:
 
     def of_element(self, number: int, expression: Expr | None) -> Expr:
         """What is made of an element's parameters, in those of the network; zero where there is nothing."""
-        element = self.elements[number]
-        return self._readings.guard(self.parts[element.part.name], element.modes, as_expression(expression or 0))
+        element, wanted = self.elements[number], as_expression(expression or 0)
+        part = self.parts[element.part.name]
+        return self._translated((number, wanted), lambda: self._readings.guard(part, element.modes, wanted))
 
     def problem(self, moment: Moment, span: tuple[float, float], times: Timeline) -> Problem:
         """The motion of a phase, before it is known where it ends; tolerances are for rtol = 1.
@@ -268,39 +253,59 @@ class Assembly:
         Its states are those of the model and, behind them, the integrals of the guards in `clocks`.
         """
         p, modes, x = moment.regime.p, moment.regime.modes, moment.x
-        guards, bound, (_, known) = self.guards(p), partial(self.bound, p), self._rates(p)
-        clocks, size = list(self.clocks), x.size
-        owners = {made.guard: k for (k, _), found in self._watched.items() for made in found} if clocks else {}
-        found = guards if not clocks else lambda t, y: guards(t, y[:, :size])
+        same = self._problems((modes, p.tobytes()), lambda: self._problem(p, modes))
+        guards, sizes = same.guards, self._sizes(p, x, span) if self.clocks else np.empty(0)
+        assert guards is not None  # noqa: S101 (which `_problem` gives)
         now = np.abs(moment.regime.limits(span[0], x.tolist()))
-        watch = Guards(found, self.sides(modes), np.array(moment.bands), now)
+        return changed(
+            same,
+            x0=np.concatenate([x, np.zeros(sizes.size)]),
+            t0=span[0],
+            t_end=span[1],
+            atol=np.concatenate([same.atol, sizes]),
+            sides=times.sides,
+            guards=Guards(guards.values, guards.sides, np.array(moment.bands), now),
+        )
+
+    def _problem(self, p: Array, modes: ModeNames) -> Problem:
+        """What is the same in all phases of these modes; the rest is empty."""
+        bound, (_, known), clocks, size = partial(self.bound, p), self._rates(p), self.clocks, len(self.model.states)
+        owners = {made.guard: k for (k, _), found in self._watched.items() for made in found} if clocks else {}
+        guards, none = self.guards(p), np.empty(0)
+        values = guards if not clocks else lambda t, y: guards(t, y[:, :size])
         return Problem(
             rhs=self.right_side(p),
             jacobian=self.slopes(bound) if size else None,
-            x0=np.concatenate([x, np.zeros(len(clocks))]),
-            t0=span[0],
-            t_end=span[1],
+            x0=none,
+            t0=0.0,
+            t_end=0.0,
             names=(*self.model.states, *(f"limit of {self.elements[owners[k]].name}" for k in clocks)),
-            atol=np.concatenate([self.prepared(p).atol, self._sizes(guards, x, span)]),
-            sides=times.sides,
+            atol=self.prepared(p).atol,
+            guards=Guards(values, self.sides(modes), none, none),
             switches=(lambda t, y: bound().switches(t, y[:, :size])) if self.model.arrays.inputs.switching else None,
-            guards=watch,
-            symbolic=lambda: None if self.program is None else self.program.bind(p),
+            symbolic=cache(lambda: None if self.program is None else self.program.bind(p)),
             explain=lambda t, y: self.without_value(p, modes, t, y[:, :size]),
             rough=lambda t, y: self._rough(p, modes, t, y[:, :size]),
             found=known,
+            rates=None if self.model.form.loop_laws else partial(self._many_rates, p),
         )
+
+    def _many_rates(self, p: Array, times: Array, states: Array) -> Array:
+        """The rates of states and clocks at times (k,) and states (k, n)."""
+        size, clocks = len(self.model.states), list(self.clocks)
+        rates = self.bound(p).rhs(times, states[:, :size].T).T
+        return np.hstack([rates, CLOCK * self.guards(p)(times, states[:, :size])[:, clocks]]) if clocks else rates
 
     def slopes(self, bind: Callable[[], BoundArrays]) -> Callable[[float, Array], Any]:
         """The Jacobian of the states and, behind them, of the clocks, from what makes the equations."""
-        size, clocks = len(self.model.states), sparse.csc_array((len(self.clocks),) * 2)
         if not self.clocks:
             return lambda t, y: bind().jacobian(t, y)
+        size, clocks = len(self.model.states), sparse.csc_array((len(self.clocks),) * 2)
         return lambda t, y: sparse.block_diag((bind().jacobian(t, y[:size]), clocks), "csc")
 
     def alike(self, modes: ModeNames) -> tuple[Assembly, ModeNames]:
-        """Equations and modes that are the same for the choice of an engine."""
-        return self, modes
+        """Equations and modes that are the same for the choice of an engine: a law knows a mode by its number alone."""
+        return self, tuple(element.alike[name] for element, name in zip(self.elements, modes, strict=True))
 
     def judged(self, moment: Moment, problem: Problem) -> Problem:  # noqa: ARG002
         """The motion by which an engine is chosen."""
@@ -342,12 +347,10 @@ class Assembly:
         """The right-hand side and what engines find out about it, for all phases with these parameters."""
         return self._rates_made(p.tobytes(), lambda: (rates_of(self.model, self.bound(p), self.motion(p)[0], p), {}))
 
-    def _sizes(self, guards: Callable[[Array, Array], Array], x: Array, span: tuple[float, float]) -> Array:
+    def _sizes(self, p: Array, x: Array, span: tuple[float, float]) -> Array:
         """The size of each clock over a phase, as far as the time alone tells."""
-        if not self.clocks:
-            return np.empty(0)
         times = np.linspace(*span, SAMPLES)
-        largest = np.abs(guards(times, np.tile(x, (SAMPLES, 1)))).max(axis=0)[list(self.clocks)]
+        largest = np.abs(self.guards(p)(times, np.tile(x, (SAMPLES, 1)))).max(axis=0)[list(self.clocks)]
         return CLOCK * np.where(largest > 0, largest, 1.0) * (span[1] - span[0])
 
     def sides(self, modes: ModeNames) -> Array:

@@ -57,13 +57,13 @@ class HeldAssembly(Assembly):
         self._joining = [self._places[number] for number in joining if number in self._places]
         self._joints: tuple[LinearPart, Joints] | None = None
         self._found: dict[bytes, dict[str, Any]] = {}
-        _ = self._many, self._shown, self.clocks  # made once for all
+        _ = self._many, self.clocks  # made once for all
 
     def holding(self, numbers: tuple[int, ...]) -> HeldAssembly:
         """The equations in which the elements of these numbers hold."""
         made = copy(self)
         held = [law for k in numbers if (law := self._laws[k]) is not None]
-        vars(made).update(_held=held, _joints=None, _rates_made=Kept(KEPT_RATES))
+        vars(made).update(_held=held, _joints=None, _rates_made=Kept(KEPT_RATES), _problems=Kept(KEPT_RATES))
         return made
 
     def joints(self, p: Array) -> Joints:

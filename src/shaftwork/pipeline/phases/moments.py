@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -84,6 +84,16 @@ class Regime:
         """Whether what is prescribed, a speed for one, depends on the time: near an instant it is no straight line."""
         form = self.assembly.model.form
         return any(form.graph.branches[source].template.law.has(TIME) for source in form.across_sources)
+
+    @cached_property
+    def ends(self) -> tuple[tuple[int, float], ...]:
+        """Number and side of each guard that ends one of the modes."""
+        return tuple((watched.guard, watched.side) for _, watched in self.watched)
+
+    @cached_property
+    def equations(self) -> Callable[[], Callable[[float, Array], Array]]:
+        """Makes the right-hand side."""
+        return partial(self.assembly.right_side, self.p)
 
     @cached_property
     def _rounding(self) -> list[tuple[float, float, float]]:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -36,6 +35,10 @@ class Phase(NamedTuple):
     p: Array
 
 
+_Following = tuple[Regime, Sequence[float], list[Change]]
+"""The modes that follow, how far rounding moves their guards, and the changes that lead there."""
+
+
 def _always(_t: float, _moment: Moment) -> bool:
     return True
 
@@ -47,13 +50,13 @@ class _Way:
     Args:
         to: the modes that follow.
         side: on which the guard was met.
-        watched: guards and sides of those modes.
+        watched: guards and sides of those modes, and whether it is another one than leads there.
         change: its element, and the modes before and after.
     """
 
     to: Regime
     side: float
-    watched: tuple[tuple[int, float], ...]
+    watched: tuple[tuple[int, float, bool], ...]
     change: tuple[Element, str, str]
 
 
@@ -78,10 +81,12 @@ class Passing:
         note: Callable[[float, list[Change]], None],
         suits: Callable[[float, Moment], bool] = _always,
     ) -> None:
-        self._settling, self.moment, self._suits = settling, moment, suits
+        self._settling, self._suits = settling, suits
+        self.regime, self.bands = moment.regime, moment.bands
+        """The modes that go on, and how far rounding moves each guard."""
         self._note: Callable[[float, list[Change]], None] | None = note
         self._size = moment.x.size
-        self.phases = [Phase(start, moment.regime.modes, moment.regime.p)]
+        self._starts = [(start, moment.regime)]
         self._reactions: list[Reaction] = []
         self._suited: set[Regime] = set()
         self.beyond: tuple[Moment, list[Change]] | None = None
@@ -95,20 +100,24 @@ class Passing:
         found = self._direct(met, t, x) or self._settled(met, t, x)
         if found is None:
             return None
-        moment, changes = found
-        regime = moment.regime
+        regime, bands, changes = found
         if regime not in self._suited:
-            without_clocks = moment._replace(x=x[: self._size].copy())
-            if not self._suits(t, without_clocks):
-                self.beyond = without_clocks, changes
+            moment = Moment(regime, x[: self._size].copy(), bands)
+            if not self._suits(t, moment):
+                self.beyond = moment, changes
                 return None
             self._suited.add(regime)
-        self.moment = moment
+        self.regime, self.bands = regime, bands
         self._note(t, changes)
-        self.phases.append(Phase(t, regime.modes, regime.p))
-        reaction = Reaction(regime.p, regime.sides, moment.bands, partial(regime.assembly.right_side, regime.p))
+        self._starts.append((t, regime))
+        reaction = Reaction(regime.p, regime.ends, bands, regime.equations)
         self._reactions.append(reaction)
         return reaction
+
+    @property
+    def phases(self) -> tuple[Phase, ...]:
+        """The phases so far."""
+        return tuple(Phase(start, regime.modes, regime.p) for start, regime in self._starts)
 
     def close(self) -> None:
         """Let go of who is told: the run is over, and only made once more for its dense output.
@@ -117,12 +126,12 @@ class Passing:
         """
         self._note, self._suits = None, _always
 
-    def _settled(self, met: int, t: float, x: Array) -> tuple[Moment, list[Change]] | None:
-        before = Moment(self.moment.regime, x[: self._size].copy(), self.moment.bands)
+    def _settled(self, met: int, t: float, x: Array) -> _Following | None:
+        before = Moment(self.regime, x[: self._size].copy(), self.bands)
         self.refuse_missed(met, t, x)
         moment, changes = settled(self._settling, t, t, before, met)
         if moment.x is before.x:
-            return moment, changes
+            return moment.regime, moment.bands, changes
         self.beyond = moment, changes  # other states are other equations, or an impact in these
         return None
 
@@ -133,7 +142,7 @@ class Passing:
             SeriesError: the engine has not seen it.
             SimulationError: a law or a guard has no value.
         """
-        regime, bands, states = self.moment.regime, self.moment.bands, x[: self._size].tolist()
+        regime, bands, states = self.regime, self.bands, x[: self._size].tolist()
         rates, now = regime.motion(t, states)
         if any(map(math.isnan, now)):
             law = regime.assembly.without_value(regime.p, regime.modes, np.array([t]), np.array([states]))
@@ -151,23 +160,23 @@ class Passing:
                 found = f"{words}, and the series of heyoka have not shown it"
                 raise SeriesError(f"The heyoka engine has not seen that {words}. Take engine='scipy'.", found)
 
-    def _direct(self, met: int, t: float, x: Array) -> tuple[Moment, list[Change]] | None:
+    def _direct(self, met: int, t: float, x: Array) -> _Following | None:
         """The modes that follow by this guard alone, or None where it takes more to tell.
 
         The same as in `Settling`, for the guards of one combination of modes only, as it is asked at every change.
         """
-        ways = self.moment.regime.ways
-        way: _Way | None = ways[met] if met in ways else ways.setdefault(met, self._find(self.moment.regime, met))
+        ways = self.regime.ways
+        way: _Way | None = ways[met] if met in ways else ways.setdefault(met, self._find(self.regime, met))
         if way is None:
             return None
         to, states = way.to, x.tolist()[: self._size]
         rates, now = to.motion(t, states)
-        tick, before = self._settling.tick, self.moment.bands
+        tick, before = self._settling.tick, self.bands
         near = to.limits(t + tick, to.rounded(states, rates, tick))
         bands = [0.0] * len(now)
-        for guard, side in way.watched:
+        for guard, side, other in way.watched:
             beyond, band = side * now[guard], abs(near[guard] - now[guard])
-            if (beyond >= -band or beyond >= -before[guard]) and (guard != met or side == way.side):
+            if other and (beyond >= -band or beyond >= -before[guard]):
                 return None
             bands[guard] = clear_of_limit(beyond, band)
         if way.side * now[met] < 0:
@@ -176,7 +185,7 @@ class Passing:
         ahead = to.limits(t + step, [v + step * rate for v, rate in zip(states, rates, strict=True)])
         if not way.side * (ahead[met] - now[met]) > 0:  # it is not left behind for good
             return None
-        return Moment(to, x, bands), [Change(t, *way.change)]
+        return to, bands, [Change(t, *way.change)]
 
     def _find(self, regime: Regime, met: int) -> _Way | None:
         """Where a guard leads in the same equations."""
@@ -189,5 +198,5 @@ class Passing:
         if element.modes[leave.to].form != element.modes[before].form:
             return None
         to = self._settling.regime((*regime.modes[:number], leave.to, *regime.modes[number + 1 :]))
-        watched = tuple((made.guard, made.side) for _, made in to.watched)
+        watched = tuple((guard, side, guard != met or side == ended.side) for guard, side in to.ends)
         return _Way(to, ended.side, watched, (element, before, leave.to))

@@ -11,15 +11,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-import numpy as np
-
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.observer import Impact
 from shaftwork.codegen.timeline import Timeline
 from shaftwork.core.errors import AccuracyWarning, SimulationError
 from shaftwork.core.notices import warn
 from shaftwork.integrate import choice
-from shaftwork.integrate.problem import Problem, SeriesError, StickingError, Trajectory
+from shaftwork.integrate.problem import Problem, SeriesError, StickingError, Trajectory, changed
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.ending import Ending
 from shaftwork.pipeline.implicit import PRESCRIBED, at_rest
@@ -200,7 +198,7 @@ class Run:
         states = regime.assembly.model.states
         atol = demand.rtol * problem.atol
         atol[: len(states)] = demand.tolerances(problem.atol[: len(states)], states)
-        return replace(
+        return changed(
             problem,
             rtol=demand.rtol,
             atol=atol,
@@ -223,13 +221,13 @@ class Run:
         if self.demand.t_eval is not None and t in trajectory.t[-1:] and t < self.demand.span[1]:
             # an output at an event belongs to the next phase, which has it too
             trajectory = replace(trajectory, t=trajectory.t[:-1], x=trajectory.x[:-1])
-        self.spans.append(Span(regime.assembly, trajectory, tuple(passing.phases)))
+        self.spans.append(Span(regime.assembly, trajectory, passing.phases))
         met, sides = trajectory.met, self._instants(moment).sides(t)
         if met is not None and passing.beyond is not None and sides == (t, t):
             moment, changes = passing.beyond
             self.note(t, changes)
             return t, moment
-        moment = passing.moment._replace(x=x[: moment.x.size])
+        moment = Moment(passing.regime, x[: moment.x.size], passing.bands)
         if sides != (t, t) and regime.assembly.model.form.has_impulses:
             moment, changes, at_once = self.settling.jumped(t, moment, *sides)
             self.note(t, changes)
@@ -242,7 +240,7 @@ class Run:
         """The output times of a phase: an event belongs to the next one."""
         if self.demand.t_eval is None:
             return None
-        first, last = np.searchsorted(self.demand.t_eval, (t, end), side="left")
+        first, last = self.demand.t_eval.searchsorted((t, end))
         return self.demand.t_eval[first : last + (end == self.demand.span[1])]
 
     def _passed(self, t: float, moment: Moment) -> tuple[Trajectory, Passing]:
@@ -265,7 +263,7 @@ class Run:
         for engine, steps in tried:
             try:
                 because = why if failed is None else choice.no_series(failed, engine)
-                return self._solve(replace(problem, max_steps=steps), engine, because), passing
+                return self._solve(changed(problem, max_steps=steps), engine, because), passing
             except SimulationError as error:
                 failed = error if isinstance(error, SeriesError) and not stiff else failed
                 sticks = error if isinstance(error, StickingError) else sticks
@@ -284,7 +282,7 @@ class Run:
         share, loosest = FOLLOWING[name]
         tight = max(min(share * problem.rtol, loosest), min(problem.rtol, TIGHTEST_RTOL))
         if tight != problem.rtol:
-            problem = replace(problem, rtol=tight, atol=problem.atol * (tight / problem.rtol))
+            problem = changed(problem, rtol=tight, atol=problem.atol * (tight / problem.rtol))
         trajectory, _, _ = choice.solve(problem, name, why)
         if trajectory.caveat:
             warn(trajectory.caveat, AccuracyWarning)

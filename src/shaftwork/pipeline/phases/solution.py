@@ -10,7 +10,7 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.observer import Impact, ModelObserver
 from shaftwork.codegen.phase_observer import PhaseObserver, Stretch, Stretches
-from shaftwork.pipeline.phases.assemblies import ModeNames
+from shaftwork.pipeline.phases.assemblies import Element, ModeNames
 from shaftwork.pipeline.phases.moments import Change
 from shaftwork.pipeline.phases.passing import Phase
 from shaftwork.pipeline.phases.run import Run, Span
@@ -116,10 +116,15 @@ def _sums(first: Mapping[str, float], second: Mapping[str, float]) -> dict[str, 
 
 def _events(changes: Iterable[Change]) -> Iterator[tuple[float, str, str, str]]:
     """Changes in words: what says the same before and after is none."""
+    words: dict[tuple[Element, str, str, bool], tuple[str, str, str]] = {}
     for time, element, before, after, rebound, *_ in changes:
-        was, now = element.modes[before].words, "rebound" if rebound else element.modes[after].words
+        key = element, before, after, rebound
+        if key not in words:
+            was, now = element.modes[before].words, "rebound" if rebound else element.modes[after].words
+            words[key] = element.name, was, now
+        name, was, now = words[key]
         if was != now:
-            yield time, element.name, was, now
+            yield time, name, was, now
 
 
 def _table(run: Run) -> tuple[PhaseRow, ...]:
@@ -133,11 +138,11 @@ def _table(run: Run) -> tuple[PhaseRow, ...]:
     starts: list[float] = []
     found: list[Mapping[str, str]] = []
     for phase, end in zip(phases, ends, strict=True):
-        if phase.modes not in words:
+        modes = words.get(phase.modes)
+        if modes is None:
             pairs = zip(run.phases.elements, phase.modes, strict=True)
             said = tuple(element.modes[name].words for element, name in pairs)
-            words[phase.modes] = known.setdefault(said, dict(zip(names, said, strict=True)))
-        modes = words[phase.modes]
+            modes = words[phase.modes] = known.setdefault(said, dict(zip(names, said, strict=True)))
         if end > phase.start and not (found and found[-1] is modes):
             starts.append(phase.start)
             found.append(modes)
