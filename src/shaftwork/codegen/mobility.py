@@ -71,6 +71,22 @@ def _massless(form: StateForm) -> list[int]:
     return [branch for kind in WITHOUT_INERTIA for branch in form.tree.tree[kind]]
 
 
+def impulses_of_impact(W: Array, opens: Array, back: Array) -> Array | None:
+    """(m,) impulses of compression and restitution, or None where nothing keeps contacts from closing.
+
+    Args:
+        W: (m, m) as of a `Mobility`.
+        opens: (m,) speeds at which contacts open before the impact.
+        back: (m,) the share of its impulse that each gives back.
+    """
+    impulses = complementary(W, opens)
+    if impulses is None or not back.any():
+        return impulses
+    impulses = (1 + back) * impulses
+    further = complementary(W, opens + W @ impulses)
+    return None if further is None else impulses + further
+
+
 def complementary(W: Array, q: Array) -> Array | None:
     """(m,) lambda >= 0 with w = W lambda + q >= 0 and lambda w = 0, or None where there is none.
 

@@ -15,13 +15,13 @@ Source: Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts, 1996,
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.mobility import Mobility, complementary
+from shaftwork.codegen.mobility import Mobility, impulses_of_impact
 from shaftwork.components.branches import ACROSS
 from shaftwork.components.modes import Leave, Modes
 from shaftwork.network.graph import GROUND
@@ -97,41 +97,51 @@ class Collisions:
             number: of the element.
             leave: by which it closes.
         """
-        regime, held = moment.regime, self._regimes.held(moment, t)
         contacts = self._in_turn(t, moment, [*self._contacts(t, moment, number, leave)])
-        gives_way = {k: ways for k, ways in limited(self._elements, regime.modes).items() if len(ways) > 1}
-        apart = {k: ways[0][1] for k, ways in gives_way.items()} | {c.number: c.apart for c in contacts}
-        if all(contact.number != number for contact in contacts):  # nothing opens it again
-            apart[number] = leave.to
-        loose = self._regimes.taking(with_modes(regime.modes, apart), t, held)
-        pairs = [self._nodes(loose, contact) for contact in contacts]
-        assembly = loose.regime.assembly
+        loose = self._apart(t, moment, contacts, {number: leave.to})
+        assembly, pairs = loose.regime.assembly, [self._nodes(loose, contact) for contact in contacts]
         mobility = assembly.stores.mobility(assembly.bound(loose.regime.p), pairs)
-        opens = np.where(mobility.has_inertia, [self._opens(t, moment, contact) for contact in contacts], 0.0)
-        back = np.array([self._restitution(c, u) for c, u in zip(contacts, opens.tolist(), strict=True)])
-        now = np.where(mobility.has_inertia, [self._opens(t, loose, contact) for contact in contacts], 0.0)
-        impulses = complementary(mobility.W, now)
+        before = self._opening(t, moment, contacts, mobility)
+        back = np.array([self._restitution(c, u) for c, u in zip(contacts, before.tolist(), strict=True)])
+        opens = self._opening(t, loose, contacts, mobility)
+        impulses = impulses_of_impact(mobility.W, opens, back)
         if impulses is None:
             return None
-        if back.any():
-            returned = back * impulses
-            more = complementary(mobility.W, now + mobility.W @ (impulses + returned))
-            impulses += returned + (0.0 if more is None else more)
-        then = now + mobility.W @ impulses
-        after = loose._replace(x=mobility.moved(loose.x, impulses))
-        least = NO_IMPACT * max(1.0, np.abs(opens).max(initial=0.0))
+        after, then = loose._replace(x=mobility.moved(loose.x, impulses)), opens + mobility.W @ impulses
+        least = NO_IMPACT * max(1.0, np.abs(before).max(initial=0.0))
         hit = [c for c, i in zip(contacts, impulses, strict=True) if c.leave and (i > 0 or c.number == number)]
         closed = [c for c, u in zip(contacts, then, strict=True) if u <= least and (c.leave is None or c in hit)]
-        modes = {c.number: c.joined for c in closed}
-        for k, ways in gives_way.items():
-            speed = self._across(t, after, k)
-            modes[k] = next((to for side, to in ways if side * speed > least), regime.modes[k])
-        after = self._regimes.changed(after, t, with_modes(loose.regime.modes, modes))
-        stays, thrown = (tuple(c for c in hit if (c in closed) is together) for together in (True, False))
-        given = self._given(t, loose, mobility, impulses)
+        modes = {c.number: c.joined for c in closed} | self._slipping(t, moment, after, least)
         owners = [self._elements[contact.number].part.name for contact in contacts]
-        lost = _sums(owners, (-impulses * (now + then) / 2).tolist())
-        return Collision(after, stays, thrown, lost, given)
+        return Collision(
+            self._regimes.changed(after, t, with_modes(loose.regime.modes, modes)),
+            tuple(c for c in hit if c in closed),
+            tuple(c for c in hit if c not in closed),
+            _sums(owners, (-impulses * (opens + then) / 2).tolist()),
+            self._given(t, loose, mobility, impulses),
+        )
+
+    def _apart(self, t: float, moment: Moment, contacts: Sequence[Contact], wanted: Mapping[int, str]) -> Moment:
+        """The moment with all contacts open, and what rubs slipping; joined is what wants to be and never opens."""
+        modes = {k: ways[0][1] for k, ways in self._rubbing(moment).items()} | {c.number: c.apart for c in contacts}
+        modes = {**wanted, **modes}
+        return self._regimes.taking(with_modes(moment.regime.modes, modes), t, self._regimes.held(moment, t))
+
+    def _rubbing(self, moment: Moment) -> dict[int, tuple[tuple[float, str], ...]]:
+        """Elements that hold by torques limited on both sides, with the modes to which these lead."""
+        return {k: ways for k, ways in limited(self._elements, moment.regime.modes).items() if len(ways) > 1}
+
+    def _slipping(self, t: float, moment: Moment, after: Moment, least: float) -> dict[int, str]:
+        """The modes of what rubs after an impact: it slips where the speed across it is more than the least."""
+        speeds = {k: self._across(t, after, k) for k in self._rubbing(moment)}
+        return {
+            k: next((to for side, to in ways if side * speeds[k] > least), moment.regime.modes[k])
+            for k, ways in self._rubbing(moment).items()
+        }
+
+    def _opening(self, t: float, moment: Moment, contacts: Sequence[Contact], mobility: Mobility) -> Array:
+        """(contacts,) the speeds at which contacts open; zero where no impulse passes."""
+        return np.where(mobility.has_inertia, [self._opens(t, moment, contact) for contact in contacts], 0.0)
 
     def _given(self, t: float, loose: Moment, mobility: Mobility, impulses: Array) -> dict[str, float]:
         """Energy in J that prescribed speeds give, by part."""
