@@ -191,7 +191,9 @@ class Bounded:
             before: what was so in the last step.
         """
         bounds = {-1: self.lower, 0: np.zeros(len(self.w0)), 1: self.upper}
-        active = [state if math.isfinite(bounds[state][k]) else 0 for k, state in enumerate(before)]
+        # what presses begins without an impulse: beside gears there may be several solutions, and this is the least
+        opens = np.where(np.isinf(self.upper), -1, np.where(np.isinf(self.lower), 1, 0)).tolist()
+        active = [opens[k] or state for k, state in enumerate(before)]
         size, seen = len(active), set[tuple[int, ...]]()
         for attempt in range(50 * (size + 1)):
             P, wrong = self._judged(active)
