@@ -152,7 +152,9 @@ class BoundArrays:
         step = inputs.values(after, zero, x, self.p)
         if before is not None:
             step = step - inputs.values(before, zero, x, self.p)
-        return np.asarray(x + self.part.B1 @ (step * inputs.of_time))
+        made = x.copy()
+        made[: inputs.states] += self.part.B1 @ (step * inputs.of_time)  # what arrives by waves follows the states
+        return made
 
 
 def _bound_again(program: ArrayProgram, p: Array, part: LinearPart, last: Array | None) -> BoundArrays:

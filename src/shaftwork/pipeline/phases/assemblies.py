@@ -129,6 +129,14 @@ class Assembly:
         self._ends: dict[ModeNames, tuple[tuple[int, Watched], ...]] = {}
         self._numbers = [self._places[element.number] for element in elements if element.number in self._places]
 
+    def arriving(self, x: Array) -> dict[str, float]:  # noqa: ARG002
+        """What arrives by waves, behind the states of a moment, by name; nothing where there are no waves."""
+        return {}
+
+    def taking(self, t: float, held: Mapping[str, float], p: Array) -> Array:
+        """The states with which the equations take up what was stored, with the inputs of a time in s."""
+        return self.stores.states(self.bound(p), t, held)
+
     def _leaves(self, number: int, readings: Readings, part: GraphPart, mode: Mode) -> Iterator[Watched]:
         """The guards of a mode; what another mode of the element has is shared, with the other sign as well."""
         taken: list[int] = []

@@ -163,6 +163,8 @@ class PhasedModel(Model):
 
     def _steady(self, values: Mapping[str, float], t: float, initial: Given) -> SteadyState:
         """Steady states of one set of equations after another, until no mode changes there."""
+        if self.form.waves:
+            return self.twin.steady_state(t, initial=initial, parameters=values)
         first = self.phases.assembly(self.phases.first)
         when = t if math.isfinite(t) else first.model.settled(first.vector(values, {}))
         settling = Settling(self.phases, values, (0.0, 1.0))
@@ -214,6 +216,8 @@ class PhasedModel(Model):
 
     def near(self, at: Point, t: Time, inputs: Names, outputs: Names = None, values: Given = None) -> LinearModel:
         """The network near a point, in the phase that goes on there."""
+        if self.form.waves:  # which no matrix holds
+            return super().near(at, t, inputs, outputs, values)
         time, moment = self.point(values or {}, at, t)
         model = moment.regime.assembly.model
         slopes = Linearization(model, moment.regime.p, moment.x, time, input_names(model, inputs))
@@ -229,6 +233,8 @@ class PhasedModel(Model):
 
     def start_equations(self, values: Mapping[str, float]) -> BoundArrays:
         """The equations of the first phase, of which start values tell the states."""
+        if self.form.waves:
+            return self.twin.start_equations(values)
         first = self.phases.assembly(self.phases.first)
         return first.bound(first.vector(values, {}))
 
