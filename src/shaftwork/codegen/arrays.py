@@ -70,6 +70,10 @@ class BoundArrays:
         y = self._outputs(t, x)
         return y, inputs.values(t, y, x, self.p)
 
+    def outputs(self, t: Any, x: Array) -> Array:
+        """Outputs y alone; arguments as for `values`."""
+        return self._outputs(t, x) if self.loops is None else self.values(t, x)[0]
+
     def _outputs(self, t: Any, x: Array) -> Array:
         """Outputs y where there are no loops."""
         inputs, part = self.program.inputs, self.part
@@ -83,7 +87,7 @@ class BoundArrays:
 
     def switches(self, t: Array, x: Array) -> Array:
         """What jumps or bends a law where its sign changes, (k, m), at times (k,) and states (k, n)."""
-        y = self._outputs(t, x.T) if self.loops is None else self.values(t, x.T)[0]
+        y = self.outputs(t, x.T)
         return self.program.inputs.switches(t, y, x.T, self.p).T
 
     def rhs(self, t: Any, x: Array) -> Array:

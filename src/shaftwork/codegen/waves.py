@@ -60,8 +60,7 @@ class WaveSystem:
 
     def speeds(self, t: Array, x: Array, h: Array) -> Array:
         """The speeds (q, k) of the ends at times (k,)."""
-        y, _ = self._bound.values(t, np.concatenate([x, h]))
-        return np.asarray(y[self._ends])
+        return np.asarray(self._bound.outputs(t, np.concatenate([x, h]))[self._ends])
 
     def jacobian(self, t: float, x: Array, h: Array) -> Any:
         """d rhs / d x, sparse, at one time with x (n,) and h (q,)."""

@@ -31,7 +31,7 @@ FOLLOWING = {
     "scipy-radau": (1 / 30, 1e-7),
     "sundials": (1 / 300, 1e-8),
     ADAMS: (1 / 100, 1e-8),
-    "wave": (1 / 10, 1e-8),
+    "wave": (1.0, 1e-6),  # its panels leave out a tenth of the tolerance
 }
 _ENGINES = ", ".join(name for name in FOLLOWING if name not in (ADAMS, "wave"))
 
