@@ -290,7 +290,7 @@ def beside(part: sw.Component, *nodes: str, model: object = None) -> sw.Network:
 
 @pytest.mark.slow
 def test_modes_beside_a_wave_are_those_of_the_phase_that_goes_on_at_the_point() -> None:
-    """Stuck at rest, with all the wave from a clamped end; slipping, with a constant torque, as if nothing were there."""
+    """Stuck at rest, as at a wall; slipping, with a constant torque, as if nothing were there."""
     net = beside(sw.CoulombLoad("load", tau=2.0), "l")
     stuck, slips = net.modes(count=3), net.modes(at={"Jm.omega": 1.0, "Je.omega": 1.0, "J3.omega": 1.0}, count=3)
     clamped, free = beside(sw.Ground("wall"), "l").modes(count=3), beside(sw.Damper("none", d=0.0), "l").modes(count=3)

@@ -12,6 +12,7 @@ import pytest
 import sympy
 
 import shaftwork as sw
+from tests.reference.drill_string import String, motion
 
 STEEL = {"diameter": 0.02, "density": 7900.0, "shear_modulus": 77.5e9}
 Z = np.pi * 0.02**4 / 32 * np.sqrt(7900.0 * 77.5e9)
@@ -183,3 +184,42 @@ def test_a_steady_operation_beside_a_wave_knows_the_phases() -> None:
     np.testing.assert_allclose(stays["Jm.omega"], 36.0, rtol=1e-10)
     np.testing.assert_allclose(stays["line.tau"], 30.0, rtol=1e-9)
     assert stays.phases[0].modes == {"f": "slipping forward"}
+
+
+def drill_string(model: object) -> sw.Network:
+    """3 km of drill pipe between a top drive with a speed controller and a bit with Stribeck friction."""
+    net = sw.Network("drill string")
+    speed = 5.0 * sympy.Min(1, sw.t / 10)
+    net.add(sw.SpeedController("top drive", omega_ref=speed, k_p=1000.0, t_i=5.0), "top")
+    net.add(sw.Inertia("J_top", J=2000.0), "top")
+    net.add(sw.Shaft("pipe", length=3000.0, diameter=0.127, inner_diameter=0.108, model=model), "top", "bit")
+    net.add(sw.Inertia("J_bit", J=300.0), "bit")
+    net.add(sw.DryFriction("rock", tau_c=5000.0, tau_s=8000.0, omega_s=1.0), "bit")
+    return net
+
+
+@pytest.mark.parametrize(("rtol", "bound"), [(1e-6, 1e-7), (1e-8, 1e-9), (1e-10, 1e-10)])
+def test_a_drill_string_sticks_and_slips_as_the_method_of_steps_says(rtol: float, bound: float) -> None:
+    """Over two cycles, against scipy with Chebyshev interpolants of what has left the ends."""
+    polar = np.pi * (0.127**4 - 0.108**4) / 32
+    reference = String(
+        Z=polar * np.sqrt(7850.0 * 79.3e9),
+        T=3000.0 * np.sqrt(7850.0 / 79.3e9),
+        J_top=2000.0,
+        J_bit=300.0,
+        k_p=1000.0,
+        t_i=5.0,
+        omega_ref=5.0,
+        t_ramp=10.0,
+        tau_c=5000.0,
+        tau_s=8000.0,
+        omega_s=1.0,
+    )
+    stops, times, speeds = motion(reference, 28.0)
+    t, first = np.unique(times, return_index=True)
+    sol = drill_string(sw.Wave()).simulate(28.0, t_eval=t, rtol=rtol)
+    assert [event[3] == "stuck" for event in sol.events] == [stop.sticks for stop in stops]
+    assert len(stops) == 4
+    np.testing.assert_allclose([event[0] for event in sol.events], [stop.time for stop in stops], rtol=bound)
+    assert np.abs(sol["J_bit.omega"] - speeds[first]).max() < bound * speeds.max()
+    assert sol.energy_residual < 1e-10
