@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import sympy
+from scipy.optimize import brentq
 
 import shaftwork as sw
 from tests.reference.drill_string import String, motion
@@ -223,3 +224,47 @@ def test_a_drill_string_sticks_and_slips_as_the_method_of_steps_says(rtol: float
     np.testing.assert_allclose([event[0] for event in sol.events], [stop.time for stop in stops], rtol=bound)
     assert np.abs(sol["J_bit.omega"] - speeds[first]).max() < bound * speeds.max()
     assert sol.energy_residual < 1e-10
+
+
+def at_a_bare_end(part: sw.Component, tau: sympy.Expr) -> sw.Network:
+    """A wave with a part and nothing else at its far end."""
+    net = sw.Network("bare end")
+    net.add(sw.TorqueSource("motor", tau=tau), "m")
+    net.add(sw.Damper("before", d=Z), "m")
+    net.add(sw.Shaft("line", length=2.0, **STEEL, model=sw.Wave()), "m", "e")
+    net.add(part, "e")
+    return net
+
+
+def test_friction_at_a_node_without_inertia_is_a_load_on_the_impedance_alone() -> None:
+    """Z omega = T(t - delay) - tau_c sign(omega) where the torque exceeds tau_c, and nothing moves elsewhere."""
+    tau, rubs, frequency = 20.0, 12.0, 300.0
+    drive, times = tau * sympy.sin(frequency * sw.t), np.linspace(0, 0.03, 301)
+    sol = at_a_bare_end(sw.DryFriction("rock", tau_c=rubs), drive).simulate(0.03, t_eval=times)
+    came = np.where(times > DELAY, tau * np.sin(frequency * (times - DELAY)), 0.0)
+    expected = np.sign(came) * np.maximum(np.abs(came) - rubs, 0) / Z
+    np.testing.assert_allclose(sol["e.omega"], expected, atol=1e-7 * tau / Z)
+    slips = [event[0] for event in sol.events if event[3].startswith("slipping")]
+    np.testing.assert_allclose(
+        np.sin(frequency * (np.array(slips) - DELAY)), rubs / tau * np.array([1, -1, 1]), rtol=1e-7
+    )
+    assert sol.energy_residual < 1e-9
+
+
+def test_a_motor_at_a_node_without_inertia_is_solved_with_the_wave() -> None:
+    """Z omega = T(t - delay) + tau(omega), at each instant by itself."""
+    tau, frequency, times = 0.4, 300.0, np.linspace(0, 0.02, 101)
+    motor = sw.KlossMotor("motor b", tau_k=0.3, s_k=0.4, n_sync=60)
+    net = at_a_bare_end(motor, tau * sympy.sin(frequency * sw.t))
+    with pytest.raises(sw.NetworkError, match="algebraic loop"):
+        net.compile()
+    sol = net.simulate(0.02, t_eval=times, algebraic_loops="solve")
+
+    def left(omega: float, came: float) -> float:
+        slip = 1 - omega / (2 * np.pi)
+        return Z * omega - came - 2 * 0.3 * slip * 0.4 / (slip**2 + 0.4**2)
+
+    came = np.where(times > DELAY, tau * np.sin(frequency * (times - DELAY)), 0.0)
+    expected = [brentq(left, -50, 50, args=(each,), xtol=1e-12) for each in came.tolist()]
+    np.testing.assert_allclose(sol["e.omega"], expected, atol=1e-7)
+    assert sol.energy_residual < 1e-9

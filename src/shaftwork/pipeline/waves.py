@@ -205,17 +205,12 @@ def _is_wave(form: StateForm, part: int) -> bool:
     return any(form.graph.branches[end].part == part for end in form.waves)
 
 
-def engine_of_waves(form: StateForm, asked: str) -> tuple[str, str]:
+def engine_of_waves(asked: str) -> tuple[str, str]:
     """The engine of a model with lines, and why.
 
     Raises:
-        ParameterError: another one was asked for, or a nonlinear law is at a massless node.
+        ParameterError: another one was asked for.
     """
-    if form.loop_laws:
-        raise ParameterError(
-            f"'{form.graph.name}' has a travelling wave at a massless node with a nonlinear law. Give the node an "
-            "inertia, or take model=Spectral(16)."
-        )
     if asked not in ("auto", "wave"):
         raise ParameterError(
             f"engine = {asked!r} knows no travelling waves. Take the engine 'auto', or another model of the shaft: "

@@ -134,7 +134,7 @@ class Phases:
             ParameterError: the one that is asked for follows no modes.
         """
         if assembly.model.form.waves:
-            return engine_of_waves(assembly.model.form, asked)
+            return engine_of_waves(asked)
         assembly, modes = assembly.alike(modes)
         key = assembly, modes, asked
         if asked != "auto":

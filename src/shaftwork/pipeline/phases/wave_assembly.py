@@ -13,6 +13,7 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.waves import WaveSystem
 from shaftwork.pipeline.phases.assemblies import Assembly, Limits, Motion
+from shaftwork.pipeline.prepared import NOMINAL
 
 RATE = "rate of "
 
@@ -42,8 +43,7 @@ class WaveAssembly(Assembly):
     def sizes(self, p: Array) -> list[float]:
         """The nominal size of each state; of what arrives that of a wave with a nominal speed."""
         impedances, _ = WaveSystem(self.bound(p)).lines
-        speed = 1e-3  # as of all states, see `shaftwork.pipeline.prepared`
-        return [*super().sizes(p), *(2 * speed * np.repeat(impedances, 2)).tolist(), *np.zeros(2 * impedances.size)]
+        return [*super().sizes(p), *(2 * NOMINAL * np.repeat(impedances, 2)).tolist(), *np.zeros(2 * impedances.size)]
 
     def motion(self, p: Array) -> tuple[Motion, Limits]:
         """Rates and guards together, and guards alone, for a single instant."""
