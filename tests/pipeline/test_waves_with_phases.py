@@ -268,3 +268,14 @@ def test_a_motor_at_a_node_without_inertia_is_solved_with_the_wave() -> None:
     expected = [brentq(left, -50, 50, args=(each,), xtol=1e-12) for each in came.tolist()]
     np.testing.assert_allclose(sol["e.omega"], expected, atol=1e-7)
     assert sol.energy_residual < 1e-9
+
+
+def test_a_brake_that_time_switches_within_one_delay_is_not_missed() -> None:
+    """Nothing moves but the time, ten times faster than a wave runs along 300 m."""
+    net = sw.Network("pulsed")
+    net.add(sw.TorqueSource("motor", tau=1e-3), "m")
+    net.add(sw.Shaft("line", length=300.0, **STEEL, model=sw.Wave()), "m", "a")
+    net.add(sw.Inertia("J1", J=0.02), "a")
+    net.add(sw.Brake("brake", tau=5.0, on=sympy.sin(600.0 * sw.t) - 0.999), "a")
+    sol = net.simulate(0.05)
+    assert sol.events[0][0] == pytest.approx(np.arcsin(0.999) / 600, rel=1e-9)

@@ -46,6 +46,7 @@ class DelayProblem:
         t0, t_end, names, atol, rtol, breakpoints, jump, sides, t_eval, explain, max_steps, earlier_steps, progress: as
             in `Problem`; a step is a panel.
         guards: as in `Problem`, of the states with the history torques behind them (k, n + q); see `March`.
+        timed: guards that change with time by themselves, so that panels must be short enough to see them.
         linear: whether rhs and speeds are affine in x and h, with constant matrices.
         steady: whether, between breakpoints, rhs and speeds do not depend on the time.
         speeds0: (q,) speed of each end at t0 in rad/s, along a line straight from the one to the other; None for rest.
@@ -74,6 +75,7 @@ class DelayProblem:
     earlier_steps: int = 0
     progress: Callable[[float], None] | None = None
     guards: Guards | None = None
+    timed: tuple[int, ...] = ()
     linear: bool = False
     steady: bool = False
     speeds0: Array | None = None

@@ -15,7 +15,7 @@ from shaftwork.integrate.lossless.collocation import GAUSS, LEFT, POWERS, RADAU,
 from shaftwork.integrate.lossless.lines import DelayProblem, Lines, past_of
 from shaftwork.integrate.lossless.panels import History
 from shaftwork.integrate.lossless.restriction import Restriction
-from shaftwork.integrate.lossless.scales import RESOLVED, Scales
+from shaftwork.integrate.lossless.scales import RESOLVED, Scales, left_out
 from shaftwork.integrate.lossless.stages import Stages
 from shaftwork.integrate.lossless.waveforms import Panels, Polynomials, StatesDense, Still
 from shaftwork.integrate.pieces import failure, pieces, reached, start_of_piece
@@ -23,6 +23,8 @@ from shaftwork.integrate.problem import Array, Trajectory
 
 # The shortest panel takes this part of rtol times the shortest delay.
 SHORTEST = 1e-2
+# A panel may leave out this part of a guard that changes with time by itself.
+SEEN = 1e-3
 
 
 @dataclass
@@ -213,6 +215,8 @@ class March:
             self._accept(panel)
             return None
         restriction = Restriction(panel.start, panel.length, self._x, panel.rows, panel.arrived)
+        if not short and self._problem.timed and not self._sees(panel, restriction):
+            return panel.start + panel.length / 2
         start, end = panel.start, panel.start + panel.length
         ahead = np.concatenate([panel.end, restriction.arriving(1.0)])
         cut = self._watch.cut(start, restriction.at(start), end, ahead, restriction)
@@ -228,6 +232,13 @@ class March:
         self._accept(panel)
         self._span.met, self._span.t = self._watch.met, start + length
         return None
+
+    def _sees(self, panel: _Panel, restriction: Restriction) -> bool:
+        """Whether a panel is short enough for the guards that change with time by themselves."""
+        assert self._problem.guards is not None  # noqa: S101 (asked only then)
+        times = panel.start + panel.length * GAUSS.nodes
+        values = self._problem.guards.values(times, restriction(times))[:, list(self._problem.timed)].T
+        return bool((left_out(values, np.empty(0)) <= SEEN * np.abs(values).max(axis=1)).all())
 
     def _accept(self, panel: _Panel) -> None:
         if len(self._states) - self._span.first >= self._problem.max_steps:

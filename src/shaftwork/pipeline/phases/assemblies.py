@@ -166,8 +166,13 @@ class Assembly:
         """The guards in states, parameters and time."""
         return tuple(self._expressions)
 
-    @cached_property
+    @property
     def clocks(self) -> tuple[int, ...]:
+        """The guards in `timed` whose integrals stand behind the states."""
+        return self.timed
+
+    @cached_property
+    def timed(self) -> tuple[int, ...]:
         """Guards that change with time by themselves, other than along straight pieces, or where no state moves.
 
         A step must be short enough to see it.

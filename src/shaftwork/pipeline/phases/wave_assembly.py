@@ -21,7 +21,10 @@ RATE = "rate of "
 class WaveAssembly(Assembly):
     """One set of equations with ends of waves, and its guards."""
 
-    clocks: tuple[int, ...] = ()
+    @property
+    def clocks(self) -> tuple[int, ...]:
+        """None: panels resolve what changes with time alone by themselves."""
+        return ()
 
     @property
     def ends(self) -> tuple[str, ...]:

@@ -85,6 +85,7 @@ class WaveRun:
             earlier_steps=problem.earlier_steps,
             progress=problem.progress,
             guards=problem.guards,
+            timed=assembly.timed,
             linear=assembly.model.linear,
         )
         with np.errstate(all="ignore"):
