@@ -70,6 +70,12 @@ class BoundArrays:
         y = self._outputs(t, x)
         return y, inputs.values(t, y, x, self.p)
 
+    def full(self) -> tuple[Array, Array, Array] | None:
+        """A, B and C in full where x' = A x + B u and y = C x; None where more enters."""
+        if self.loops is not None or self._has_slopes or self.part.D.nnz:
+            return None
+        return self.part.A.toarray(), self.part.B.toarray(), self.part.C.toarray()
+
     def outputs(self, t: Any, x: Array) -> Array:
         """Outputs y alone; arguments as for `values`."""
         return self._outputs(t, x) if self.loops is None else self.values(t, x)[0]

@@ -99,6 +99,7 @@ class March:
     def _enter(self, problem: DelayProblem, equations: Equations) -> None:
         self._problem, self._equations = problem, equations
         self._x = np.asarray(problem.x0, dtype=float)
+        self._trend = np.zeros(self._x.size)
         self._span = _Span(len(self._states), problem.t0)
 
     def go_on(self, problem: DelayProblem, equations: Equations | None) -> Equations:
@@ -122,7 +123,7 @@ class March:
     def run(self) -> None:
         """Cover all pieces, up to the first guard that is met."""
         for piece in pieces(self._problem):
-            self._x = start_of_piece(self._problem, piece, self._x)
+            self._x, self._trend = start_of_piece(self._problem, piece, self._x), np.zeros(self._x.size)
             self._equations.stages.enter(piece.low, piece.high)
             self._watch = GuardWatch(self._problem, piece.low, piece.high)
             t, ahead = piece.start, False
@@ -198,7 +199,7 @@ class March:
     def _solve(self, scheme: Scheme, start: float, length: float, arrived: Array) -> _Panel | None:
         """A panel; None where there is no solution or it is not finite."""
         h, stages = arrived if scheme is GAUSS else arrived @ scheme.bring, self._equations.stages
-        found = stages.solve(scheme, start, length, self._x, self._equations.scales.states, h)
+        found = stages.solve(scheme, start, length, self._x, self._equations.scales.states, h, self._trend)
         if found is None:
             return None
         x, v = found
@@ -251,7 +252,7 @@ class March:
         self._states.append(np.column_stack([self._x, x]))
         if self._problem.guards is not None:
             self._arrived.append(panel.arrived)
-        self._x = panel.end
+        self._x, self._trend = panel.end, x @ RIGHT[:, 1] * (2 / panel.length)
         if self._problem.progress is not None:
             self._problem.progress(panel.start + panel.length)
 
