@@ -279,3 +279,20 @@ def test_a_brake_that_time_switches_within_one_delay_is_not_missed() -> None:
     net.add(sw.Brake("brake", tau=5.0, on=sympy.sin(600.0 * sw.t) - 0.999), "a")
     sol = net.simulate(0.05)
     assert sol.events[0][0] == pytest.approx(np.arcsin(0.999) / 600, rel=1e-9)
+
+
+def test_a_freewheel_between_bare_ends_of_waves_passes_on_what_pushes_forward() -> None:
+    """Locked, both impedances carry T, so omega = T / 2 Z; free, the first one carries it alone."""
+    tau, frequency, times = 20.0, 300.0, np.linspace(0, 0.03, 301)
+    net = sw.Network("bare freewheel")
+    net.add(sw.TorqueSource("motor", tau=tau * sympy.sin(frequency * sw.t)), "m")
+    net.add(sw.Damper("before", d=Z), "m")
+    net.add(sw.Shaft("first", length=2.0, **STEEL, model=sw.Wave()), "m", "a")
+    net.add(sw.Freewheel("wheel"), "a", "b")
+    net.add(sw.Shaft("second", length=1.37, **STEEL, model=sw.Wave()), "b", "e")
+    net.add(sw.Damper("behind", d=Z), "e")
+    sol = net.simulate(0.03, t_eval=times)
+    came = np.where(times > DELAY, tau * np.sin(frequency * (times - DELAY)), 0.0)
+    np.testing.assert_allclose(sol["b.omega"], np.maximum(came, 0) / (2 * Z), atol=1e-7 * tau / Z)
+    np.testing.assert_allclose(sol["a.omega"], np.where(came > 0, came / 2, came) / Z, atol=1e-7 * tau / Z)
+    assert sol.energy_residual < 1e-9
