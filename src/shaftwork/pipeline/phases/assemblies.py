@@ -157,8 +157,7 @@ class Assembly:
     def watched(self, modes: ModeNames) -> tuple[tuple[int, Watched], ...]:
         """Element and guard of everything that may end one of the modes."""
         if modes not in self._ends:
-            pairs = ((number, made) for number, name in enumerate(modes) for made in self._watched[number, name])
-            self._ends[modes] = tuple(pairs)
+            self._ends[modes] = tuple((k, made) for k, name in enumerate(modes) for made in self._watched[k, name])
         return self._ends[modes]
 
     @property
@@ -173,10 +172,7 @@ class Assembly:
 
     @cached_property
     def timed(self) -> tuple[int, ...]:
-        """Guards that change with time by themselves, other than along straight pieces, or where no state moves.
-
-        A step must be short enough to see it.
-        """
+        """Guards that change with time by themselves, and not along straight pieces alone, or where no state moves."""
         every = not self.model.states
         return tuple(k for k, made in enumerate(self._expressions) if every or pieces_degree(made) is None)
 
@@ -218,15 +214,13 @@ class Assembly:
 
     def _shown_at(self, t: float, x: Array, p: Array) -> Sequence[Any]:
         """What elements show at one instant: speed across, twist and parameters of each."""
-        shown = self._shown
         values = (np.ravel(value)[0] for value in self._read(p)(np.array([t]), x[None, :]))
-        return shown(t, *map(float, values), *p.tolist())  # type: ignore[no-any-return]
+        return self._shown(t, *map(float, values), *p.tolist())  # type: ignore[no-any-return]
 
     def first_modes(self, t: float, x: Array, p: Array) -> ModeNames:
         """The mode of each element in which a motion starts, in the equations in which nothing is joined by a mode."""
         shown = self._shown_at(t, x, p)
-        elements = enumerate(self.elements)
-        return tuple(self._start(k, "", t, shown) or element.modes.options[0].name for k, element in elements)
+        return tuple(self._start(k, "", t, shown) or e.modes.options[0].name for k, e in enumerate(self.elements))
 
     def start_of(self, number: int, besides: str, t: float, x: Array, p: Array) -> str:
         """The mode of an element in which a motion would start, besides one; empty where it would start in none."""
@@ -259,10 +253,8 @@ class Assembly:
     def twist(self, number: int) -> int | None:
         """The state that is the twist of an element, or None where none is."""
         form, owner = self.model.form, self.elements[number].part.name
-        own = (
-            k for k, s in enumerate(form.states) if s.kind == "integral" and form.graph.part_of(s.branch).name == owner
-        )
-        return next(own, None)
+        angles = ((k, state.branch) for k, state in enumerate(form.states) if state.kind == "integral")
+        return next((k for k, branch in angles if form.graph.part_of(branch).name == owner), None)
 
     def constant(self, number: int, expression: Expr | None, p: Array) -> float:
         """A number that is made of an element's parameters."""
@@ -395,8 +387,7 @@ class Assembly:
     @cached_property
     def program(self) -> Any:
         """The heyoka program with the guards as its events, or None where there can be none."""
-        rows = self._rows
-        if rows is None or not (rows.states or self.clocks) or not available("heyoka"):
+        if (rows := self._rows) is None or not (rows.states or self.clocks) or not available("heyoka"):
             return None
         from shaftwork.codegen.heyoka import build
 
