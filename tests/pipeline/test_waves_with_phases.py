@@ -296,3 +296,10 @@ def test_a_freewheel_between_bare_ends_of_waves_passes_on_what_pushes_forward() 
     np.testing.assert_allclose(sol["b.omega"], np.maximum(came, 0) / (2 * Z), atol=1e-7 * tau / Z)
     np.testing.assert_allclose(sol["a.omega"], np.where(came > 0, came / 2, came) / Z, atol=1e-7 * tau / Z)
     assert sol.energy_residual < 1e-9
+
+
+def test_what_takes_matrices_refuses_a_wave_with_phases_by_name() -> None:
+    net = stick_slip(sw.Wave())
+    for verb in (net.compile().linearize, lambda: sw.studies.frequency_sensitivities(net)):
+        with pytest.raises(sw.SimulationError, match="'line' is a travelling wave"):
+            verb()

@@ -12,7 +12,7 @@ import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.linear import Linearization
+from shaftwork.codegen.linear import Linearization, refuse_waves
 from shaftwork.codegen.model import CompiledModel, Cost
 from shaftwork.codegen.operating import another_start, steady_state
 from shaftwork.codegen.start_values import initial_state
@@ -200,7 +200,9 @@ class PhasedModel(Model):
         Raises:
             ParameterError: the point is none.
             SignalError: there is no such quantity.
+            SimulationError: a shaft is a wave.
         """
+        refuse_waves(self.form)
         first = self.phases.assembly(self.phases.first)
         settling = Settling(self.phases, values, (0.0, 1.0))
         p = settling.regime(self.phases.first).p
@@ -216,8 +218,6 @@ class PhasedModel(Model):
 
     def near(self, at: Point, t: Time, inputs: Names, outputs: Names = None, values: Given = None) -> LinearModel:
         """The network near a point, in the phase that goes on there."""
-        if self.form.waves:  # which no matrix holds
-            return super().near(at, t, inputs, outputs, values)
         time, moment = self.point(values or {}, at, t)
         model = moment.regime.assembly.model
         slopes = Linearization(model, moment.regime.p, moment.x, time, input_names(model, inputs))
