@@ -289,50 +289,43 @@ def beside(part: sw.Component, *nodes: str, model: object = None) -> sw.Network:
 
 
 @pytest.mark.slow
-def test_friction_beside_a_wave_is_rounded_and_says_so_once() -> None:
-    with pytest.warns(
-        sw.AccuracyWarning, match=r"\('line'\) nothing sticks; the friction of 'load' is rounded"
-    ) as said:
-        modes = beside(sw.CoulombLoad("load", tau=2.0), "l").modes(count=3)
-    assert len(said) == 1
-    # the slope of the rounded law damps whatever rests: its meshes must have the same law
-    damped = beside(sw.Damper("load", d=2.0 / 0.01), "l").modes(count=3)
-    assert modes.rates == pytest.approx(damped.rates, rel=1e-9)
+def test_modes_beside_a_wave_are_those_of_the_phase_that_goes_on_at_the_point() -> None:
+    """Stuck at rest, as at a wall; slipping, with a constant torque, as if nothing were there."""
+    net = beside(sw.CoulombLoad("load", tau=2.0), "l")
+    stuck, slips = net.modes(count=3), net.modes(at={"Jm.omega": 1.0, "Je.omega": 1.0, "J3.omega": 1.0}, count=3)
+    clamped, free = beside(sw.Ground("wall"), "l").modes(count=3), beside(sw.Damper("none", d=0.0), "l").modes(count=3)
+    assert stuck.rates == pytest.approx(clamped.rates, rel=1e-9)
+    assert slips.rates == pytest.approx(free.rates, rel=1e-9, abs=1e-9)
 
 
 @pytest.mark.slow
-def test_a_brake_beside_a_wave_comes_on_at_its_time() -> None:
-    """Rounding over 0.01 rad/s changes a speed of some 10 rad/s by nothing before it is at rest."""
-    brake, times = sw.Brake("brake", tau=5.0, t_on=0.1), [0.05, 0.1, 0.12, 0.15]
-    with pytest.warns(sw.AccuracyWarning, match="'brake'"):
-        wave = beside(brake, "l").simulate(0.15, t_eval=times)
-    mesh = beside(brake, "l", model=sw.Spectral(16)).simulate(0.15, t_eval=times)
-    assert wave["Jm.omega"] == pytest.approx(mesh["Jm.omega"], rel=1e-4)
-    assert wave["brake.tau"][[0, 2]] == pytest.approx([0.0, 5.0])
-
-
 @pytest.mark.parametrize(
     "part",
     [
         sw.Freewheel("part"),
         sw.Backlash("part", gap=0.01),
+        sw.Brake("part", tau=5.0, t_on=0.1),
         sw.Brake("part", tau=1.0, on=sw.omega - 3),
         sw.BLDCMotor("part", U=50.0, R=1.0, L=1e-3, k=0.1),
     ],
-    ids=lambda part: type(part).__name__,
+    ids=["freewheel", "rigid gap", "timed brake", "brake by speed", "inverter"],
 )
-def test_what_has_no_law_of_all_its_modes_is_refused_beside_a_wave(part: sw.Component) -> None:
-    """They were left open for ever without a word."""
-    nodes = ("l", "x") if len(part.ports) > 1 else ("l",)
-    with pytest.raises(sw.ParameterError, match=r"'part'.* which travelling waves do not follow"):
-        beside(part, *nodes).compile()
+def test_parts_that_change_their_mode_beside_a_wave_are_as_beside_its_mesh(part: sw.Component) -> None:
+    nodes, times = ("l", "x") if len(part.ports) > 1 else ("l",), np.linspace(0, 0.15, 76)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        wave = beside(part, *nodes).simulate(0.15, t_eval=times)
+    mesh = beside(part, *nodes, model=sw.Spectral(16)).simulate(0.15, t_eval=times)
+    for name in ("Jm.omega", "J3.omega"):
+        assert np.abs(wave[name] - mesh[name]).max() < 2e-5 * np.abs(mesh[name]).max()
+    assert wave.energy_residual < 1e-9
 
 
-def test_beside_a_wave_there_are_no_phases_to_ask_for() -> None:
+def test_phases_beside_a_wave_have_equations_of_their_own() -> None:
     net = beside(sw.CoulombLoad("load", tau=2.0), "l")
-    assert net.equations().phase == ""
-    with pytest.raises(sw.ParameterError, match=r"beside travelling waves \('line'\)"):
-        net.equations(phase="load stuck")
+    assert net.start_phase() == "load stuck"
+    assert net.equations(phase="load stuck").phase == "load stuck"
+    assert net.compile().phase("load stuck").states == ("Je.omega", "J3.omega", "s.tau_c")
 
 
 def test_a_shaft_without_bearing_friction_warns_of_none_however_thin_it_is() -> None:

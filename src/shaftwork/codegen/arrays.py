@@ -69,6 +69,16 @@ class BoundArrays:
         y = self._outputs(t, x)
         return y, inputs.values(t, y, x, self.p)
 
+    def full(self) -> tuple[Array, Array, Array] | None:
+        """A, B and C in full where x' = A x + B u and y = C x; None where more enters."""
+        if self.loops is not None or self._has_slopes or self.part.D.nnz:
+            return None
+        return self.part.A.toarray(), self.part.B.toarray(), self.part.C.toarray()
+
+    def outputs(self, t: Any, x: Array) -> Array:
+        """Outputs y alone; arguments as for `values`."""
+        return self._outputs(t, x) if self.loops is None else self.values(t, x)[0]
+
     def _outputs(self, t: Any, x: Array) -> Array:
         """Outputs y where there are no loops."""
         inputs, part = self.program.inputs, self.part
@@ -82,7 +92,7 @@ class BoundArrays:
 
     def switches(self, t: Array, x: Array) -> Array:
         """What jumps or bends a law where its sign changes, (k, m), at times (k,) and states (k, n)."""
-        y = self._outputs(t, x.T) if self.loops is None else self.values(t, x.T)[0]
+        y = self.outputs(t, x.T)
         return self.program.inputs.switches(t, y, x.T, self.p).T
 
     def rhs(self, t: Any, x: Array) -> Array:
@@ -151,7 +161,9 @@ class BoundArrays:
         step = inputs.values(after, zero, x, self.p)
         if before is not None:
             step = step - inputs.values(before, zero, x, self.p)
-        return np.asarray(x + self.part.B1 @ (step * inputs.of_time))
+        made = x.copy()
+        made[: inputs.states] += self.part.B1 @ (step * inputs.of_time)  # what arrives by waves follows the states
+        return made
 
 
 def _bound_again(program: ArrayProgram, p: Array, part: LinearPart, last: Array | None) -> BoundArrays:

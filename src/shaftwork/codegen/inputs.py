@@ -40,6 +40,11 @@ class _Group:
     slopes: tuple[Function | None, ...]
 
     @cached_property
+    def arrives(self) -> bool:
+        """Whether it is what arrives by waves, which is as it is given."""
+        return self.made_of.template.is_history
+
+    @cached_property
     def moving(self) -> tuple[tuple[Expr, tuple[float, ...]], ...]:
         """What makes the law jump, bend or rise steeply because of the motion, each once, and at which levels."""
         template = self.made_of.template
@@ -211,7 +216,10 @@ class Inputs:
         with np.errstate(all="ignore"):  # a law that has no value is NaN here; the engines say when and where
             for group in self._groups:
                 function = pick(group)
-                if function is not None:
+                if group.arrives:
+                    if function is group.value and group.integrals[-1] < len(x):
+                        result[group.inputs] = x[group.integrals]
+                elif function is not None:
                     result[group.inputs] = function(t, *_read(group, y, x, p))
         return result
 

@@ -151,6 +151,20 @@ def _of_node(form: StateForm, part: GraphPart, node: int, rows: Sequence[Row | N
     return row
 
 
+def refuse_waves(form: StateForm) -> None:
+    """Refuse a network of whose lines nothing is told.
+
+    Raises:
+        SimulationError: a line has a delay that no matrix holds.
+    """
+    if form.waves:
+        raise SimulationError(
+            f"Shaft '{form.graph.part_of(form.waves[0]).name}' is a travelling wave, whose delay no matrix holds. Its "
+            "modes and its frequency response are those of net.modes() and net.frequency_response(); for matrices take "
+            "model=Spectral(16)."
+        )
+
+
 class Linearization:
     """A network near a point, as matrices and as a way to read every quantity of a small motion.
 
@@ -171,12 +185,8 @@ class Linearization:
     def __init__(
         self, model: CompiledModel, p: Array, x: Array, t: float, inputs: Sequence[str], arriving: Array | None = None
     ) -> None:
-        if model.form.waves and arriving is None:
-            shaft = model.form.graph.part_of(model.form.waves[0]).name
-            raise SimulationError(
-                f"Shaft '{shaft}' is a travelling wave, whose delay no matrix holds. Its modes and its frequency "
-                f"response are those of net.modes() and net.frequency_response(); for matrices take model=Spectral(16)."
-            )
+        if arriving is None:
+            refuse_waves(model.form)
         places = _places(model.form.graph, inputs)
         form, branches = _with_inputs(model.form, places)
         x = x if arriving is None else np.concatenate([x, arriving])

@@ -111,11 +111,11 @@ class ReadingMatrices:
     def __call__(self, history: History) -> Array:
         """(quantities, k) the quantities along a history."""
         by_state, by_input, by_rate, by_slope = self._matrices
-        made = by_state @ history.x[: self._sizes[0]] + by_input @ history.values[1]
+        read = by_state @ history.x[: self._sizes[0]] + by_input @ history.values[1]
         if by_rate.nnz or by_slope.nnz:
             _, slopes, rate = history.inputs
-            made = made + by_rate @ rate + by_slope @ slopes
-        return np.asarray(made)
+            read = read + by_rate @ rate + by_slope @ slopes
+        return np.asarray(read)
 
 
 @dataclass(frozen=True)

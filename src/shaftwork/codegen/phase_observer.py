@@ -29,7 +29,8 @@ class Stretch:
         observer: of the equations.
         instants: at which inputs jump.
         dense: the motion, in the states of the equations; None where it has none.
-        states: their names.
+        states: their names; what arrives by waves stands behind them.
+        ends: number of ends of waves.
         modes: of every element.
     """
 
@@ -41,6 +42,7 @@ class Stretch:
     instants: Timeline
     dense: Callable[[Array], Array]
     states: tuple[str, ...]
+    ends: int
     modes: Mapping[str, str]
 
 
@@ -81,14 +83,17 @@ class Stretches:
         return self[max(int(np.searchsorted(self.starts, t, side="right")) - 1, 0)]
 
     def dense(self, t: Array) -> Array:
-        """(k, stores) all that is stored at times (k,)."""
+        """(k, stores) all that is stored at times (k,), and behind it what arrives by waves."""
         t = np.atleast_1d(np.asarray(t, dtype=float))
-        made = np.empty((t.size, len(self[0].stores.names)))
+        count = len(self[0].stores.names)
+        made = np.empty((t.size, count + self[0].ends))
         index = np.clip(np.searchsorted(self.starts, t, side="right") - 1, 0, None)
         for number in np.unique(index).tolist():
             stretch, places = self[number], np.flatnonzero(index == number)
             read_at = stretch.instants.one_sided(t[places])
-            made[places] = stretch.stores.of(stretch.bind, read_at, stretch.dense(t[places]))
+            x = stretch.dense(t[places])
+            made[places, :count] = stretch.stores.of(stretch.bind, read_at, x)
+            made[places, count:] = x[:, len(stretch.states) :]
         return made
 
 
@@ -172,7 +177,7 @@ class PhaseObserver:
 
     def held(self, t: float, x: Array) -> dict[str, float]:  # noqa: ARG002
         """All that is stored, by name, which is what the states (n,) of a motion through phases are."""
-        return dict(zip(self._names, x.tolist(), strict=True))
+        return dict(zip(self._names, x.tolist(), strict=False))  # waves may follow
 
     def read_at(self, t: float) -> float:
         """When inputs are read at a time in s, as in one phase."""
@@ -190,7 +195,7 @@ class PhaseObserver:
         names = self._names
         for stretches, places in self._stretches.groups(t):
             first = stretches[0]
-            columns = [names.index(state) for state in first.states]
+            columns = [*(names.index(state) for state in first.states), *range(len(names), x.shape[1])]
             yield first.observer, places, self._sided(first.instants, t, places), x[places][:, columns]
 
     @staticmethod

@@ -42,6 +42,10 @@ class Carrying(Protocol):
         ...
 
 
+LARGEST_FULL = 64
+"""Up to so many states full matrices are faster than sparse ones."""
+
+
 class WaveSystem:
     """Rates and speeds of the ends for states x (n, k) and histories h (q, k); the ends a and b of each line in a row.
 
@@ -53,15 +57,20 @@ class WaveSystem:
         self._bound, self._form = bound, bound.program.form
         place = {branch: k for k, branch in enumerate(self._form.outputs)}
         self._ends = np.array([place[branch] for branch in self._form.waves], dtype=np.intp)
+        self._full = bound.full() if len(self._form.states) <= LARGEST_FULL else None
 
     def rhs(self, t: Array, x: Array, h: Array) -> Array:
         """d x / dt (n, k) at times (k,)."""
-        return self._bound.rhs(t, np.concatenate([x, h]))
+        if self._full is None:
+            return self._bound.rhs(t, np.concatenate([x, h]))
+        by_state, by_input, outputs = self._full
+        inputs = self._bound.program.inputs
+        u = inputs.values(t, outputs @ x, np.concatenate([x, h]), self._bound.p)
+        return np.asarray(by_state @ x + by_input @ u)
 
     def speeds(self, t: Array, x: Array, h: Array) -> Array:
         """The speeds (q, k) of the ends at times (k,)."""
-        y, _ = self._bound.values(t, np.concatenate([x, h]))
-        return np.asarray(y[self._ends])
+        return np.asarray(self._bound.outputs(t, np.concatenate([x, h]))[self._ends])
 
     def jacobian(self, t: float, x: Array, h: Array) -> Any:
         """d rhs / d x, sparse, at one time with x (n,) and h (q,)."""

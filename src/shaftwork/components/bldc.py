@@ -21,7 +21,6 @@ from shaftwork.components.branches import (
 )
 from shaftwork.components.modes import ANEW, Leave, Mode, Modes
 from shaftwork.core.domains import ELECTRICAL, ROTATION
-from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter
 
 PHASES = {"a": Integer(0), "b": 2 * pi / 3, "c": -2 * pi / 3}
@@ -71,11 +70,6 @@ class BLDCMotor(Component):
     )
 
     def branches(self, p: Any) -> Iterator[Branch]:
-        if p.form_a is None:
-            raise ParameterError(
-                f"BLDCMotor '{self.name}' changes its mode, which travelling waves do not follow. Take another model "
-                "of the shafts: model=sw.Spectral(8) or sw.Lumped(20); or an AveragedBLDC."
-            )
         shapes = {phase: _shape(_angle(p, phase), p.flat) for phase in PHASES}
         for phase, shape in shapes.items():
             leg, winding, emf = (f"{place}_{phase}" for place in ("leg", "winding", "emf"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
-from sympy import Expr, Integer, Max, Min, Piecewise, true
+from sympy import Expr, Integer, Piecewise, true
 
 from shaftwork.components.base import Component, Port, Role, component
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, Branch, ThroughLaw, rigid
@@ -113,12 +113,7 @@ def _stored(upper: Any, lower: Any, p: Any) -> Expr:
 
 
 def _law(upper: Any, lower: Any, p: Any) -> Expr:
-    """The torque in a mode; where nothing chooses modes, in all of them."""
-    forward, backward = _torques(upper, lower, p)
-    if p.form is None:
-        pieces = [(Max(0, forward), upper < INTEGRAL)] if upper is not None else []
-        pieces += [(Min(0, backward), lower > INTEGRAL)] if lower is not None else []
-        return Piecewise(*pieces, (Integer(0), True))
+    """The torque in a mode."""
     one, other = upper if upper is not None else lower, lower if lower is not None else upper
     limit = (one + other) / 2 + p.mode * (one - other) / 2
     return p.mode**2 * (p.c * (INTEGRAL - limit) + p.d * ACROSS)

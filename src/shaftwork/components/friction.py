@@ -6,22 +6,20 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any, ClassVar
 
-from sympy import And, Expr, Min, Ne, Not, exp, false, tanh
+from sympy import And, Expr, Min, Ne, Not, exp, false
 
 from shaftwork.components.base import Component, Port, Role, component
 from shaftwork.components.bounds import no_less
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, Branch, End, ThroughLaw, rigid
 from shaftwork.components.laws import as_expression, t
 from shaftwork.components.modes import ANEW, Leave, Mode, Modes
-from shaftwork.components.switching import number_of, refuse_no_time_on, while_on
+from shaftwork.components.switching import number_of, refuse_no_time_on
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter
 
 SLIPPING, STUCK, HELD = "", "stuck", "held by others"
 # What holds gives way this much above its limit: then there is a torque that moves it, and no rounding of one.
 GIVES_WAY = 1 + 2e-14
-ROUNDED = 0.01
-"""Speed in rad/s over which friction is rounded where nothing chooses modes, beside shafts of travelling waves."""
 
 
 def rubbing(
@@ -62,10 +60,8 @@ def rubs(size: Any, p: Any, second: End = "b") -> Iterator[Branch]:
 
 
 def slips(torque: Callable[[Any], Expr], p: Any, second: End = "b") -> Iterator[Branch]:
-    """The same for any torque of the way: 1 forward, -1 backward, and between them where friction is rounded."""
-    if p.form is None:
-        yield ThroughLaw(torque(tanh(ACROSS / ROUNDED)))
-    elif p.form == STUCK:
+    """The same for any torque of the way: 1 forward, -1 backward."""
+    if p.form == STUCK:
         yield rigid(("a", second))
     else:
         yield ThroughLaw(torque(p.mode))
@@ -175,9 +171,6 @@ class Brake(Component):
         )
 
     def branches(self, p: Any) -> Iterator[Branch]:
-        if p.form is None:
-            yield from self._without_modes(p)
-            return
         capacity = as_expression(self._capacity(p))
         if p.form != STUCK and capacity.has(INTEGRAL):
             yield ThroughLaw(p.mode * capacity, label="phi")
@@ -185,15 +178,6 @@ class Brake(Component):
         yield from rubs(capacity, p)
         if capacity.has(INTEGRAL) or as_expression(p.on or 0).has(INTEGRAL):
             yield ThroughLaw(p.mode * (1 - p.mode**2) * INTEGRAL, label="phi")  # no torque: it carries the angle
-
-    def _without_modes(self, p: Any) -> Iterator[Branch]:
-        """The law of all modes in one, where times alone decide between on and off."""
-        if p.on is not None:
-            raise ParameterError(
-                f"{type(self).__name__} '{self.name}' acts from when `on` comes true, which travelling waves do not "
-                "follow. Give t_on, or another model of the shafts: model=sw.Spectral(8) or sw.Lumped(20)."
-            )
-        yield ThroughLaw(while_on(self._capacity(p) * tanh(ACROSS / ROUNDED), p))
 
 
 @component

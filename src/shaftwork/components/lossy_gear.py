@@ -10,7 +10,6 @@ from sympy import Integer
 from shaftwork.components.base import Component, Role, component
 from shaftwork.components.branches import ACROSS, Branch, LossyCoupling, rigid, through_of
 from shaftwork.components.modes import Leave, Mode, Modes
-from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter
 
 DRIVING, DRIVEN, STUCK = "driving", "driven", "stuck"
@@ -31,7 +30,7 @@ class LossyGear(Component):
     A self-locking gear that would have to brake more inertia than there is on the side of a has no motion with b
     driving: it stops at once. Behind a bare spring, with no inertia at node a, it would stop and start without end;
     a run refuses that. A rigid impact turns the gear as torques would, on, to rest and round, and what the gear loses
-    then is its own. Shafts of travelling waves know no modes, so it cannot stand beside them.
+    then is its own.
     Analogue: a transformer with different ratios of voltages and currents. Source: Pelchen, Schweiger and Otter 2002.
     """
 
@@ -58,11 +57,6 @@ class LossyGear(Component):
 
     def branches(self, p: Any) -> Iterator[Branch]:
         terms = ((Integer(1), "a", None), (-p.ratio, "b", None))
-        if p.form is None:
-            raise ParameterError(
-                f"LossyGear '{self.name}' changes its mode, which travelling waves do not follow. Take another "
-                "model of the shafts: model=sw.Spectral(8) or sw.Lumped(20)."
-            )
         if p.form == STUCK:
             yield rigid(("a", None), AT_A)
             yield rigid(("b", None), AT_B)

@@ -6,7 +6,7 @@ own. Two modes of the same *form* have the same branches and differ in one numbe
 the network has other equations. A network makes those of a combination of forms when a motion first comes there.
 
 `Component.branches` finds the form as `p.form` and the number as `p.mode`; of an element with a label as
-`p.form_<label>` and `p.mode_<label>`. Where nothing chooses modes, as for shafts of travelling waves, `p.form` is None.
+`p.form_<label>` and `p.mode_<label>`.
 """
 
 from __future__ import annotations
@@ -183,16 +183,12 @@ class Choice:
     """What is chosen for an element when branches are made: a form, and a number or None for a parameter.
 
     Args:
-        form: of the mode; None where the laws of all modes are wanted in one.
+        form: of the mode.
         value: the number for `p.mode` in laws; None leaves a parameter in its place.
     """
 
-    form: str | None
+    form: str
     value: float | None = None
-
-
-ALL_IN_ONE = (Choice(None, 0.0),)
-"""The laws of all modes in one, for every element of a part."""
 
 
 def mode_symbol(name: str) -> Symbol:

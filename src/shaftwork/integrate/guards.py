@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 from scipy.optimize import brentq
@@ -10,7 +11,7 @@ from scipy.optimize import brentq
 from shaftwork.core.errors import no_value
 from shaftwork.integrate.chebyshev import Polynomial, points
 from shaftwork.integrate.crossings import FIRST, LOOKS, Look, tolerance
-from shaftwork.integrate.problem import Array, DaeProblem, Problem
+from shaftwork.integrate.problem import Array, DaeProblem, Explain, Guards, Problem
 
 Dense = Callable[[Array], Array]
 
@@ -31,6 +32,20 @@ DEGREE, BESIDE = 12, 8
 NEARER = 0.5 ** np.arange(1, 41)
 
 
+class Guarded(Protocol):
+    """What a problem of any kind says of its guards; see `Problem`."""
+
+    @property
+    def guards(self) -> Guards | None:
+        """What ends the run."""
+        ...
+
+    @property
+    def explain(self) -> Explain | None:
+        """Which law has no value."""
+        ...
+
+
 class GuardWatch:
     """Finds the first guard of a problem that a step meets; the last one found is `met`.
 
@@ -40,7 +55,7 @@ class GuardWatch:
         high: the latest.
     """
 
-    def __init__(self, problem: Problem | DaeProblem, low: float, high: float) -> None:
+    def __init__(self, problem: Guarded, low: float, high: float) -> None:
         guards = problem.guards
         self._columns = np.zeros(0, dtype=np.intp) if guards is None else np.flatnonzero(guards.sides)
         self._offsets = np.zeros(0) if guards is None else guards.offsets[self._columns]
@@ -83,6 +98,14 @@ class GuardWatch:
         time, self.met = min(known)
         return min(max(time, start + CLEARANCE * float(np.spacing(abs(end)))), end)
 
+    def beyond(self, t: float, x: Array) -> int | None:
+        """The guard that is farthest beyond its limit at a time in s with the state (n,); None where none is."""
+        if not self._columns.size:
+            return None
+        now = self._values(np.array([t]), x[None, :])[0]
+        place = int(np.argmax(now))
+        return int(self._columns[place]) if now[place] > 0 else None
+
     def follows(self, start: float, x: Array, end: float, dense: Dense) -> bool:
         """Whether a step obeys the equations up to the guard that it has met.
 
@@ -95,7 +118,7 @@ class GuardWatch:
             end: where it meets the guard, s.
             dense: its dense output, times (k,) to states (k, n).
         """
-        if isinstance(self._problem, DaeProblem):
+        if not isinstance(self._problem, Problem):
             return True
         edges = end - (end - start) * np.append(0.5 ** np.arange(PANELS), 0.0)
         half = np.diff(edges)[:, None] / 2

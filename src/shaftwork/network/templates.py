@@ -37,7 +37,7 @@ from shaftwork.components.branches import (
 )
 from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME
-from shaftwork.components.modes import ALL_IN_ONE, Choice, Modes, has_mode, mode_symbol
+from shaftwork.components.modes import Choice, Modes, has_mode, mode_symbol
 from shaftwork.components.slopes import jumps, slope
 from shaftwork.core.domains import DOMAINS
 from shaftwork.core.errors import ParameterError, ShaftworkError
@@ -174,9 +174,7 @@ def _choose(p: Any, modes: tuple[Modes, ...], choices: tuple[Choice, ...]) -> di
     """Put the chosen forms and numbers of modes into `p`; symbol and name of the numbers that stay parameters."""
     firsts = tuple(Choice(element.options[0].form, element.options[0].value) for element in modes)
     free: dict[Symbol, str] = {}
-    for element, choice in zip(
-        modes, choices * len(modes) if choices == ALL_IN_ONE else choices or firsts, strict=True
-    ):
+    for element, choice in zip(modes, choices or firsts, strict=True):
         setattr(p, element.form, choice.form)
         if choice.value is not None:
             setattr(p, element.symbol, Float(choice.value) if choice.value % 1 else Integer(int(choice.value)))

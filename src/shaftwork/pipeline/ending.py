@@ -53,6 +53,12 @@ class Ending(dict[str, float]):
         beside = f"t={self.t!r}, modes={self.modes}, parameters={self.parameters}, waves={self.waves!r}"
         return f"Ending({super().__repr__()}, {beside})"
 
+    def beside(self, arriving: Mapping[str, float]) -> Ending:
+        """The same with what arrives by waves, by name."""
+        if not arriving:
+            return self
+        return Ending({**self, **arriving}, self.t, self.read, self.modes, self.parameters, self.waves)
+
     def changed(self, parameters: Mapping[str, float]) -> frozenset[str]:
         """The names of the parameters that are others from now on."""
         names = {**self.parameters, **parameters}

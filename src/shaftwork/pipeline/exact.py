@@ -14,7 +14,7 @@ from shaftwork.codegen.linear import Linearization
 from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.recovery import History
 from shaftwork.codegen.start_values import initial_state
-from shaftwork.components.modes import ALL_IN_ONE, Choice
+from shaftwork.components.modes import Choice
 from shaftwork.components.shaft_models import MOST_SPECTRAL, OneSpring, Rigid, Spectral, Wave
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import AccuracyWarning, NetworkWarning, ParameterError
@@ -35,7 +35,7 @@ from shaftwork.pipeline.analysis import (
     titled,
 )
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.phases.assemblies import ModeNames
+from shaftwork.pipeline.phases.elements import ModeNames
 from shaftwork.pipeline.phases.model import PhasedModel
 from shaftwork.results.exact import ExactModel, ExactSlopes
 from shaftwork.results.exact_lines import ExactLines
@@ -104,19 +104,14 @@ class ExactNetwork:
         return self._with({name: dataclasses.replace(shaft, **lossless) for name, shaft in self._shafts.items()})
 
     def _with(self, shafts: Mapping[str, Shaft]) -> Model:
-        """The network with shafts replaced, in the modes that are chosen; beside waves, with the laws of all in one.
+        """The network with shafts replaced, in the modes that are chosen.
 
         Its warnings are those of the network itself, already given.
         """
         if not shafts:
             return self._model
-        choices = ALL_IN_ONE if self._model.form.waves else ()
-        placed = tuple(
-            dataclasses.replace(item, part=shafts.get(item.part.name, item.part), choices=item.choices or choices)
-            for item in self._model.netlist.placed
-        )
         with muted(NetworkWarning, AccuracyWarning):
-            return self._compiled(Netlist(self._model.name, placed))
+            return self._compiled(_with_shafts(self._model.netlist, shafts))
 
     @cached_property
     def _values(self) -> tuple[Mapping[str, float], ...]:
@@ -233,12 +228,24 @@ class ExactPhases:
     Args:
         model: the network as it is.
         compiled: makes the model of a changed netlist.
-        shafts: the exact ones, by name, in the order of the network; none of them is a wave.
+        shafts: the exact ones, by name, in the order of the network.
     """
 
     def __init__(self, model: PhasedModel, compiled: Compile, shafts: Mapping[str, Shaft]) -> None:
         self._model, self._compiled, self._shafts = model, compiled, shafts
         self._networks = Kept[ModeNames, ExactNetwork](MESHES)
+
+    @cached_property
+    def _own(self) -> PhasedModel:
+        """The network with meshes in place of waves, which tells the modes at a point."""
+        waves = {name: shaft for name, shaft in self._shafts.items() if isinstance(shaft.resolved, Wave)}
+        if not waves:
+            return self._model
+        meshes = {name: dataclasses.replace(shaft, model=OWN) for name, shaft in waves.items()}
+        with muted(NetworkWarning, AccuracyWarning):
+            made = self._compiled(_with_shafts(self._model.netlist, meshes))
+        assert isinstance(made, PhasedModel)  # noqa: S101 (its other parts are the same)
+        return made
 
     def near(self, at: Point, t: Time = None, inputs: Names = ()) -> ExactModel:
         """The network near a point, in the modes that go on there; arguments as for `Model.linearize`.
@@ -247,7 +254,11 @@ class ExactPhases:
             SignalError: there is no such input.
             SimulationError: a law has no finite slope at the point.
         """
-        time, moment = self._model.point({}, at, t)
+        point = at
+        if isinstance(at, Solution) and self._own is not self._model:
+            time, _ = moment_of(at, self._model.states)
+            t, point = time if t is None else t, _values_of(at, tuple(self._shafts))
+        time, moment = self._own.point({}, point, t)
         modes = moment.regime.modes
         network = self._networks(modes, lambda: ExactNetwork(self._in(modes), self._compiled, self._shafts))
         phase = self._model.words(moment)
@@ -265,6 +276,12 @@ class ExactPhases:
             chosen[owner] = (*chosen.get(owner, ()), choice)
         with muted(NetworkWarning):
             return self._compiled(netlist.with_choices(chosen))
+
+
+def _with_shafts(netlist: Netlist, shafts: Mapping[str, Shaft]) -> Netlist:
+    """The network with some shafts replaced, by name."""
+    placed = (dataclasses.replace(item, part=shafts.get(item.part.name, item.part)) for item in netlist.placed)
+    return Netlist(netlist.name, tuple(placed))
 
 
 def _values_of(motion: Solution, shafts: tuple[str, ...]) -> dict[str, float]:

@@ -283,7 +283,7 @@ class Model(CompiledModel):
         if self.form.waves:
             from shaftwork.pipeline.waves import engine_of_waves
 
-            return engine_of_waves(self.form, asked)
+            return engine_of_waves(asked)
         choice.check(asked)
         if not self.states:
             return "exact", PRESCRIBED

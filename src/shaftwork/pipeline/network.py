@@ -19,9 +19,7 @@ from shaftwork.network.builder import NetworkBuilder
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.netlist import Netlist
 from shaftwork.network.storage import read_netlist, write_netlist
-from shaftwork.network.wording import listed
 from shaftwork.pipeline.angles import with_angles
-from shaftwork.pipeline.beside_waves import warn_of_rounding, waving, with_one_law
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.model import PhasedModel
 from shaftwork.pipeline.phases.names import in_phase, meant, whole_name, words_of
@@ -98,14 +96,8 @@ class Network(NetworkBuilder):
             return self.expanded().equations(phase=phase)
         netlist = self.netlist()
         form = _sound(netlist)
-        if (form.waves or not any(part.modes for part in form.graph.parts)) and phase is None:
+        if not any(part.modes for part in form.graph.parts) and phase is None:
             return kirchhoff(form)
-        if form.waves:
-            raise ParameterError(
-                f"phase = {phase!r}: beside travelling waves ({listed(waving(form.graph))}) parts have the laws of "
-                "all their modes in one. Leave phase out, or take another model of the shaft, such as Lumped(20)."
-            )
-
         return _InPhase(netlist, form)("" if phase is None else phase)
 
     def start_phase(self) -> str:
@@ -284,13 +276,8 @@ def network_of(given: Any) -> Network:
 
 
 def _sound(netlist: Netlist, accepted: str = "") -> StateForm:
-    """The state form of a network without errors but for an accepted kind; warnings are issued.
-
-    Beside travelling waves parts that change their mode have the laws of all their modes in one.
-    """
+    """The state form of a network without errors but for an accepted kind; warnings are issued."""
     _, form, problems = diagnose(netlist)
-    if form is not None and form.waves and any(part.modes for part in form.graph.parts):
-        _, form, problems = diagnose(with_one_law(netlist, form.graph))
     if errors := tuple(found for found in problems if found.severity == "error" and found.kind != accepted):
         raise NetworkError(f"'{netlist.name}' cannot be assembled", errors)
     for problem in problems:
@@ -320,11 +307,9 @@ class Compiler:
         """
         with _without_collection():
             form = _sound(netlist, self.accepted)
-            if form.waves:
-                warn_of_rounding(form.graph)
             if self.angles:
                 form = with_angles(form.graph, self.angles)
-            chosen = form.waves or any(item.choices for item in netlist.placed)
+            chosen = any(item.choices for item in netlist.placed)
             kind = PhasedModel if any(part.modes for part in form.graph.parts) and not chosen else Model
             return kind(form, netlist, self)
 

@@ -24,7 +24,7 @@ from shaftwork.network.wording import listed
 
 if TYPE_CHECKING:
     from shaftwork.network.graph import CircuitGraph, GraphBranch
-    from shaftwork.pipeline.phases.assemblies import Element
+    from shaftwork.pipeline.phases.elements import Element
     from shaftwork.pipeline.phases.moments import Regime
 
 SAME = 1e-6

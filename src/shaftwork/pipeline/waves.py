@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -16,7 +17,6 @@ from shaftwork.codegen.stores import Stores
 from shaftwork.codegen.waves import WaveSystem
 from shaftwork.codegen.wound_shafts import EndSpeeds
 from shaftwork.components.base import Component
-from shaftwork.components.modes import ALL_IN_ONE
 from shaftwork.components.shaft_models import Lumped, Wave
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import AccuracyWarning, NetworkWarning, ParameterError
@@ -75,6 +75,10 @@ class _StatesAndWaves:
         before = Polynomials(past.starts, past.lengths, past.waves @ POWERS, 0.0)(np.minimum(times, start))
         return np.where((times < start)[:, None], before, 2 * np.repeat(self.impedances, 2) * v + h)
 
+    def carried(self, t: float) -> CarriedWaves | None:
+        """What is on its way at a time in s; None where leaps do not know it."""
+        return None if self.found.past is None else CarriedWaves(self.found.past(t), self.lines)
+
 
 @dataclass(frozen=True)
 class CarriedWaves:
@@ -87,6 +91,15 @@ class CarriedWaves:
 
     past: Past
     lines: Mapping[str, Array]
+
+
+@runtime_checkable
+class _Carries(Protocol):
+    """Dense output that knows the waves on their way."""
+
+    def carried(self, t: float) -> CarriedWaves | None:
+        """What is on its way at a time in s; None where leaps do not know it."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -103,23 +116,23 @@ class WaveStart:
 
 
 def twin(netlist: Netlist) -> Netlist:
-    """The network with a spring or two in place of every wave, which stands and turns steadily as the waves do."""
+    """The network with a spring or two in place of every wave, which stands and turns steadily as the waves do.
+
+    Forms that are chosen for parts are chosen there too.
+    """
 
     def stiff(part: Component) -> Component:
         if not isinstance(part, Shaft) or not isinstance(part.model, Wave):
             return part
         return dataclasses.replace(part, model=Lumped(1 if part.friction == 0 else 2))
 
-    # the laws of all modes in one, as beside the waves; a part without modes has no choice
-    placed = (dataclasses.replace(item, part=stiff(item.part), choices=ALL_IN_ONE) for item in netlist.placed)
+    placed = (dataclasses.replace(item, part=stiff(item.part)) for item in netlist.placed)
     return Netlist(netlist.name, tuple(placed))
 
 
 def on_their_way(dense: object, t: float) -> CarriedWaves | None:
     """The waves on their way at a time in s of a motion with this dense output; None where leaps do not know them."""
-    if not isinstance(dense, _StatesAndWaves) or dense.found.past is None:
-        return None
-    return CarriedWaves(dense.found.past(t), dense.lines)
+    return dense.carried(t) if isinstance(dense, _Carries) else None
 
 
 def warn_of_lost_waves(t_start: float, *, in_leaps: bool = False) -> None:
@@ -192,17 +205,12 @@ def _is_wave(form: StateForm, part: int) -> bool:
     return any(form.graph.branches[end].part == part for end in form.waves)
 
 
-def engine_of_waves(form: StateForm, asked: str) -> tuple[str, str]:
+def engine_of_waves(asked: str) -> tuple[str, str]:
     """The engine of a model with lines, and why.
 
     Raises:
-        ParameterError: another one was asked for, or a nonlinear law is at a massless node.
+        ParameterError: another one was asked for.
     """
-    if form.loop_laws:
-        raise ParameterError(
-            f"'{form.graph.name}' has a travelling wave at a massless node with a nonlinear law. Give the node an "
-            "inertia, or take model=Spectral(16)."
-        )
     if asked not in ("auto", "wave"):
         raise ParameterError(
             f"engine = {asked!r} knows no travelling waves. Take the engine 'auto', or another model of the shaft: "
@@ -234,11 +242,7 @@ def solve_waves(
     system = WaveSystem(bound)
     impedances, delays = system.lines
     carried = start if isinstance(start, CarriedWaves) else None
-    if carried is not None:
-        _refuse_other_lines(_lines_by_shaft(bound, system), carried.lines)
-    _warn_of_friction(bound, impedances)
-    if not linear:
-        _warn_of_short_lines(bound, delays, problem.t_end - problem.t0)
+    checked_lines(bound, system, start, problem.t_end - problem.t0, linear=linear)
     delayed = DelayProblem(
         rhs=system.rhs,
         speeds=system.speeds,
@@ -266,11 +270,23 @@ def solve_waves(
     )
     found = solve(delayed)
     x = np.hstack([found.x, found.h])
-    dense = _StatesAndWaves(found, past_of(delayed), impedances, _lines_by_shaft(bound, system))
+    dense = _StatesAndWaves(found, past_of(delayed), impedances, lines_by_shaft(bound, system))
     return Trajectory(found.t, x, dense, found.statistics)
 
 
-def _lines_by_shaft(bound: BoundArrays, system: WaveSystem) -> dict[str, Array]:
+def checked_lines(
+    bound: BoundArrays, system: WaveSystem, start: WaveStart | CarriedWaves | None, span: float, *, linear: bool
+) -> None:
+    """Refuse or warn of lines before a run; arguments, errors and warnings as of `solve_waves`, the span in s."""
+    impedances, delays = system.lines
+    if isinstance(start, CarriedWaves):
+        _refuse_other_lines(lines_by_shaft(bound, system), start.lines)
+    _warn_of_friction(bound, impedances)
+    if not linear:
+        _warn_of_short_lines(bound, delays, span)
+
+
+def lines_by_shaft(bound: BoundArrays, system: WaveSystem) -> dict[str, Array]:
     """Impedances and delays (2, lines) of each shaft."""
     form, lines = bound.program.form, np.array(system.lines)
     owners = [form.graph.part_of(end).name for end in form.waves[::2]]

@@ -67,12 +67,6 @@ def controlled_problems(view: View) -> Iterator[Problem]:
     yield from dict.fromkeys(unknown)  # one cause for all windings of a motor
     for law in view.form.controlled:
         yield from _beside_a_store(view, law)
-    if reading and view.form.waves:
-        message = (
-            f"{view.titles(reading)} reads other quantities of its own, and {view.titles(view.form.waves)} is a wave."
-        )
-        hint = "The two do not go together: take another model of the shaft, such as Spectral(16)."
-        yield Problem("controlled source", message, hint, view.parts((*reading, *view.form.waves)))
 
 
 def _unknown(view: View, law: int, reading: Reading) -> Iterator[Problem]:

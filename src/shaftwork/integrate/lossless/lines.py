@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from shaftwork.core.times import around
 from shaftwork.integrate.lossless.collocation import POINTS
-from shaftwork.integrate.problem import Array, Explain, Trajectory
+from shaftwork.integrate.problem import Array, Explain, Guards, Trajectory
 
 
 @dataclass(frozen=True)
@@ -43,8 +43,10 @@ class DelayProblem:
         delays: (q / 2,) delays in s; the ends are numbered a and b of the first line, a and b of the second, ...
         impedances: (q / 2,) impedances in N m s.
         x0: (n,) start state; n may be 0.
-        t0, t_end, names, atol, rtol, breakpoints, jump, sides, t_eval, explain, max_steps, progress: as in `Problem`; a
-            step is a panel.
+        t0, t_end, names, atol, rtol, breakpoints, jump, sides, t_eval, explain, max_steps, earlier_steps, progress: as
+            in `Problem`; a step is a panel.
+        guards: as in `Problem`, of the states with the history torques behind them (k, n + q); see `March`.
+        timed: guards that change with time by themselves, so that panels must be short enough to see them.
         linear: whether rhs and speeds are affine in x and h, with constant matrices.
         steady: whether, between breakpoints, rhs and speeds do not depend on the time.
         speeds0: (q,) speed of each end at t0 in rad/s, along a line straight from the one to the other; None for rest.
@@ -70,7 +72,10 @@ class DelayProblem:
     t_eval: Array | None = None
     explain: Explain | None = None
     max_steps: int = 10_000_000
+    earlier_steps: int = 0
     progress: Callable[[float], None] | None = None
+    guards: Guards | None = None
+    timed: tuple[int, ...] = ()
     linear: bool = False
     steady: bool = False
     speeds0: Array | None = None

@@ -33,6 +33,19 @@ class History:
         self.lengths.append(length)
         self.waves.append(waves)
 
+    def at(self, t: float) -> tuple[Array, Array]:
+        """History torques h (q,) and their rates (q,) just after a time in s, up to which all that left is known."""
+        count = sum(len(ends) for ends in self._lines.ends)
+        arrived, rates = np.empty(count), np.empty(count)
+        for delay, ends, partners in zip(self._lines.delays, self._lines.ends, self._lines.partners, strict=True):
+            number = max(bisect_right(self.starts, t - delay + self._merge) - 1, 0)
+            place = 2 * (t - delay - self.starts[number]) / self.lengths[number] - 1
+            powers = self.waves[number][partners] @ POWERS
+            arrived[ends] = -powers @ place ** np.arange(STAGES)
+            slopes = np.arange(1, STAGES) * place ** np.arange(STAGES - 1)
+            rates[ends] = -powers[:, 1:] @ slopes * (2 / self.lengths[number])
+        return arrived, rates
+
     def arriving(self, start: float, length: float, tolerance: Array) -> tuple[Array, float | None]:
         """History torques h (q, s) at the Gauss points of a panel, and where to divide it if they are not resolved.
 

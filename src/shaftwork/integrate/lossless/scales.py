@@ -37,9 +37,14 @@ class Scales:
         """Largest sizes (n,) of the states."""
         return self._largest[self._ends :]
 
-    def see(self, rows: Array) -> None:
-        """Take values (q + n, k) into account."""
-        self._largest, self.tolerance = self._with(rows)
+    @property
+    def waves(self) -> Array:
+        """Largest sizes (q,) of the waves."""
+        return self._largest[: self._ends]
+
+    def see(self, waves: Array, states: Array) -> None:
+        """Take values of waves (q, k) and states (n, k) into account."""
+        self._largest, self.tolerance = self._with(np.concatenate([waves, states]))
 
     def resolved(self, rows: Array, starts: Array) -> bool:
         """Whether a panel's values (q + n, s) at the Gauss points and start state (n,) leave out less than they may."""

@@ -48,7 +48,7 @@ class Stages:
         self._low, self._high = low, high
 
     def solve(
-        self, scheme: Scheme, start: float, length: float, x: Array, largest: Array, h: Array
+        self, scheme: Scheme, start: float, length: float, x: Array, largest: Array, h: Array, trend: Array
     ) -> tuple[Array, Array] | None:
         """Stages (n, s) of the states and speeds (q, s) of the ends, or None for a `reason`.
 
@@ -59,9 +59,10 @@ class Stages:
             x: (n,) state at its start.
             largest: (n,) largest size of the states so far.
             h: (q, s) history torques at the nodes.
+            trend: (n,) rates at its start, for a first guess; Newton's method does without.
         """
         times = np.minimum(np.maximum(start + length * scheme.nodes, self._low), self._high)
-        stages = self._newton(scheme, times, length, x, largest, h) if x.size else np.empty((0, STAGES))
+        stages = self._newton(scheme, times, length, x, largest, h, trend) if x.size else np.empty((0, STAGES))
         return None if stages is None else (stages, self._problem.speeds(times, stages, h))
 
     def unseen(self, start: float, length: float, x: Array, end: Array, stages: Array, h: Array) -> Array:
@@ -83,9 +84,11 @@ class Stages:
         self.counts["rhs"] += 2
         return np.asarray(np.abs(found - rates @ _ENDS).max(axis=1) * length * UNSEEN)
 
-    def _newton(self, scheme: Scheme, times: Array, length: float, x: Array, largest: Array, h: Array) -> Array | None:
+    def _newton(
+        self, scheme: Scheme, times: Array, length: float, x: Array, largest: Array, h: Array, trend: Array
+    ) -> Array | None:
         problem, start = self._problem, x[:, None]
-        stages = np.repeat(start, STAGES, axis=1)
+        stages = start + np.multiply.outer(trend, length * scheme.nodes)
         previous, fresh = math.inf, self._jacobian is None
         for iteration in range(ITERATIONS):
             slopes = problem.rhs(times, stages, h)

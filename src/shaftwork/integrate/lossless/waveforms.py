@@ -57,31 +57,37 @@ class StatesDense:
 
 
 @dataclass(frozen=True)
-class Ends:
-    """What the ends of the lines do at any time.
+class Still:
+    """Dense output of a span without any length, whose end is its start.
 
     Args:
-        problem: which gives their speeds.
-        lines: which end receives what from where.
-        states: (n,) polynomials of the states.
-        waves: (q,) polynomials of the waves that leave the ends.
+        x: (n,) the states.
+        t: s.
     """
 
-    problem: DelayProblem
-    lines: Lines
-    states: Polynomials
-    waves: Polynomials
+    x: Array
+    t: float
 
-    def __call__(self, times: Array, *, left: bool = False) -> tuple[Array, Array]:
-        """History torques (k, q) in N m and speeds (k, q) in rad/s at times (k,); at a kink after or `left` of it."""
-        times = np.atleast_1d(np.asarray(times, dtype=float))
-        h = np.empty((times.size, self.waves.powers.shape[1]))
-        # What arrives at the very end of the run is not of the run.
-        arriving = np.minimum(times, self.problem.t_end - 2 * self.waves.merge)
-        for delay, ends, partners in zip(self.lines.delays, self.lines.ends, self.lines.partners, strict=True):
-            h[:, ends] = -self.waves(arriving - delay, left=left)[:, partners]
-        inside = one_sided(self.problem, times, left=left)
-        return h, np.asarray(self.problem.speeds(inside, self.states(times, left=left).T, h.T)).T
+    @property
+    def steps(self) -> Array:
+        """The one time."""
+        return np.array([self.t])
+
+    def __call__(self, times: Array) -> Array:
+        return np.tile(self.x, (np.atleast_1d(times).size, 1))
+
+
+@dataclass(frozen=True)
+class Left:
+    """The waves that have left the ends of the lines, at any time and over the last delay.
+
+    Args:
+        lines: which end receives what from where.
+        waves: (q,) polynomials of the waves.
+    """
+
+    lines: Lines
+    waves: Polynomials
 
     def squares(self, times: Array) -> Array:
         """Integrals (k, q) over the last delay, up to times (k,), of the squared wave that leaves each end.
@@ -117,6 +123,39 @@ class Ends:
         lengths[-1] *= part
         values[-1] = waves.powers[last - 1] @ np.vander((1 + POINTS) * part - 1, STAGES, increasing=True).T
         return Past(starts, lengths, values)
+
+
+@dataclass(frozen=True)
+class Ends:
+    """What the ends of the lines do at any time.
+
+    Args:
+        problem: which gives their speeds.
+        lines: which end receives what from where.
+        states: (n,) polynomials of the states.
+        waves: (q,) polynomials of the waves that leave the ends.
+    """
+
+    problem: DelayProblem
+    lines: Lines
+    states: Polynomials
+    waves: Polynomials
+
+    def __call__(self, times: Array, *, left: bool = False) -> tuple[Array, Array]:
+        """History torques (k, q) in N m and speeds (k, q) in rad/s at times (k,); at a kink after or `left` of it."""
+        times = np.atleast_1d(np.asarray(times, dtype=float))
+        h = np.empty((times.size, self.waves.powers.shape[1]))
+        # What arrives at the very end of the run is not of the run.
+        arriving = np.minimum(times, self.problem.t_end - 2 * self.waves.merge)
+        for delay, ends, partners in zip(self.lines.delays, self.lines.ends, self.lines.partners, strict=True):
+            h[:, ends] = -self.waves(arriving - delay, left=left)[:, partners]
+        inside = one_sided(self.problem, times, left=left)
+        return h, np.asarray(self.problem.speeds(inside, self.states(times, left=left).T, h.T)).T
+
+    @property
+    def left(self) -> Left:
+        """The waves over the last delay."""
+        return Left(self.lines, self.waves)
 
 
 def one_sided(problem: DelayProblem, times: Array, *, left: bool = False) -> Array:
@@ -162,10 +201,11 @@ def trajectory(problem: DelayProblem, panels: Panels, statistics: Mapping[str, i
     steps = np.append(panels.starts, problem.t_end)
     dense = StatesDense(Polynomials(panels.starts, panels.lengths, panels.states @ STATE_POWERS, panels.merge), steps)
     ends = Ends(problem, Lines.of(problem.delays), dense.states, waves)
+    left_ends = ends.left
     if problem.t_eval is not None:
         t = np.asarray(problem.t_eval, dtype=float)
         return DelayTrajectory(
-            t, dense(t), dense, statistics, *ends(t), waves=ends, squares=ends.squares, past=ends.past
+            t, dense(t), dense, statistics, *ends(t), waves=ends, squares=left_ends.squares, past=left_ends.past
         )
     edges = pairwise([0, *(count for count, _ in panels.pieces)])
     spans = [(slice(low, high), end) for (low, high), (_, end) in zip(edges, panels.pieces, strict=True)]
@@ -174,4 +214,4 @@ def trajectory(problem: DelayProblem, panels: Panels, statistics: Mapping[str, i
     left = np.append(np.diff(t) == 0, True)
     h, v = ends(t)
     h[left], v[left] = ends(t[left], left=True)
-    return DelayTrajectory(t, x, dense, statistics, h, v, waves=ends, squares=ends.squares, past=ends.past)
+    return DelayTrajectory(t, x, dense, statistics, h, v, waves=ends, squares=left_ends.squares, past=left_ends.past)

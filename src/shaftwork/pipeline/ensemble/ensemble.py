@@ -26,7 +26,8 @@ from shaftwork.pipeline.ensemble.groups import Group, Index, Mask, joined
 from shaftwork.pipeline.ensemble.programs import EXTREMES, EnsembleCode
 from shaftwork.pipeline.ensemble.rises import first_rises
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.phases.assemblies import Assembly, ModeNames
+from shaftwork.pipeline.phases.assemblies import Assembly
+from shaftwork.pipeline.phases.elements import ModeNames
 from shaftwork.pipeline.phases.model import PhasedModel
 from shaftwork.pipeline.phases.regimes import with_modes
 from shaftwork.pipeline.phases.starts import conditional

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from shaftwork.codegen.elements import Array
 from shaftwork.pipeline.ensemble.programs import EnsembleCode
-from shaftwork.pipeline.phases.assemblies import Assembly, ModeNames
+from shaftwork.pipeline.phases.assemblies import Assembly
 from shaftwork.pipeline.phases.courses import FEW
+from shaftwork.pipeline.phases.elements import ModeNames
 from shaftwork.pipeline.phases.moments import CLEAR, EPS, GOLDEN, NOTHING, ROUNDINGS
 from shaftwork.pipeline.phases.settling import AHEAD, AHEAD_OF_RUN
 from shaftwork.pipeline.prepared import NOMINAL

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.codegen.elements import Array
-from shaftwork.pipeline.phases.assemblies import ModeNames
+from shaftwork.pipeline.phases.elements import ModeNames
 
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]

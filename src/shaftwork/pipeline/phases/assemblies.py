@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache, cached_property, partial
 from operator import methodcaller
 from typing import TYPE_CHECKING, Any
@@ -25,13 +24,14 @@ from shaftwork.codegen.timeline import Timeline
 from shaftwork.codegen.valueless import first_missing, in_words, rough, without_value
 from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME
-from shaftwork.components.modes import Leave, Mode, Modes
+from shaftwork.components.modes import Mode
 from shaftwork.components.pieces import pieces_degree
 from shaftwork.core.errors import CompileError
 from shaftwork.core.kept import Kept
 from shaftwork.integrate.engines import available
 from shaftwork.integrate.problem import Guards, Problem, changed
 from shaftwork.network.graph import GraphPart
+from shaftwork.pipeline.phases.elements import Element, ModeNames, Watched
 from shaftwork.pipeline.phases.rates import rates_of
 from shaftwork.pipeline.phases.shown import Shown
 from shaftwork.pipeline.prepared import Prepared
@@ -48,52 +48,8 @@ SAMPLES = 64
 CLOCK = 1e-20
 """What a clock counts: heyoka's tolerance is relative to the largest state, which this must never be."""
 
-ModeNames = tuple[str, ...]
-"""The mode of every element of a network, in their order."""
 Motion = Callable[[float, list[float]], tuple[list[float], list[float]]]
 Limits = Callable[[float, list[float]], list[float]]
-
-
-@dataclass(frozen=True, eq=False)
-class Element:
-    """A piece of a part that changes its mode.
-
-    Args:
-        part: of which it is.
-        modes: its modes.
-        number: "part.mode", the parameter in laws.
-    """
-
-    part: GraphPart
-    modes: Modes
-    number: str
-
-    @property
-    def name(self) -> str:
-        """How messages and tables call it."""
-        return f"{self.part.name}.{self.modes.label}" if self.modes.label else self.part.name
-
-    @cached_property
-    def alike(self) -> Mapping[str, str]:
-        """By mode the first one with the same law: "open" of one that has parted."""
-        first: dict[tuple[str, float], str] = {}
-        return {mode.name: first.setdefault((mode.form, mode.value), mode.name) for mode in self.modes.options}
-
-
-def elements_of(model: Model) -> tuple[Element, ...]:
-    """Every element of a network, in the order of its parts."""
-    return tuple(
-        Element(part, modes, f"{part.name}.{modes.symbol}") for part in model.form.graph.parts for modes in part.modes
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class Watched:
-    """What may end a mode in a set of equations: the guard's place, the side on which it is met, and what follows."""
-
-    guard: int
-    side: float
-    leave: Leave
 
 
 class Assembly:
@@ -135,6 +91,14 @@ class Assembly:
         self._ends: dict[ModeNames, tuple[tuple[int, Watched], ...]] = {}
         self._numbers = [self._places[element.number] for element in elements if element.number in self._places]
 
+    def arriving(self, x: Array) -> dict[str, float]:  # noqa: ARG002
+        """What arrives by waves, behind the states of a moment, by name; nothing where there are no waves."""
+        return {}
+
+    def taking(self, t: float, held: Mapping[str, float], p: Array) -> Array:
+        """The states with which the equations take up what was stored, with the inputs of a time in s."""
+        return self.stores.states(self.bound(p), t, held)
+
     def _leaves(self, number: int, readings: Readings, part: GraphPart, mode: Mode) -> Iterator[Watched]:
         """The guards of a mode; what another mode of the element has is shared, with the other sign as well."""
         taken: list[int] = []
@@ -155,8 +119,7 @@ class Assembly:
     def watched(self, modes: ModeNames) -> tuple[tuple[int, Watched], ...]:
         """Element and guard of everything that may end one of the modes."""
         if modes not in self._ends:
-            pairs = ((number, made) for number, name in enumerate(modes) for made in self._watched[number, name])
-            self._ends[modes] = tuple(pairs)
+            self._ends[modes] = tuple((k, made) for k, name in enumerate(modes) for made in self._watched[k, name])
         return self._ends[modes]
 
     @property
@@ -164,12 +127,14 @@ class Assembly:
         """The guards in states, parameters and time."""
         return tuple(self._expressions)
 
-    @cached_property
+    @property
     def clocks(self) -> tuple[int, ...]:
-        """Guards that change with time by themselves, other than along straight pieces, or where no state moves.
+        """The guards in `timed` whose integrals stand behind the states."""
+        return self.timed
 
-        A step must be short enough to see it.
-        """
+    @cached_property
+    def timed(self) -> tuple[int, ...]:
+        """Guards that change with time by themselves, and not along straight pieces alone, or where no state moves."""
         every = not self.model.states
         return tuple(k for k, made in enumerate(self._expressions) if every or pieces_degree(made) is None)
 
@@ -213,7 +178,6 @@ class Assembly:
         return lambda times, states: matrices(History(bound, times, states))
 
     def _read_at(self, t: float, x: Array, p: Array) -> list[float]:
-        """The same at one instant."""
         return [float(np.ravel(value)[0]) for value in self._read(p)(np.array([t]), x[None, :])]
 
     def first_modes(self, t: float, x: Array, p: Array) -> ModeNames:
@@ -231,10 +195,8 @@ class Assembly:
     def twist(self, number: int) -> int | None:
         """The state that is the twist of an element, or None where none is."""
         form, owner = self.model.form, self.elements[number].part.name
-        own = (
-            k for k, s in enumerate(form.states) if s.kind == "integral" and form.graph.part_of(s.branch).name == owner
-        )
-        return next(own, None)
+        angles = ((k, state.branch) for k, state in enumerate(form.states) if state.kind == "integral")
+        return next((k for k, branch in angles if form.graph.part_of(branch).name == owner), None)
 
     def constant(self, number: int, expression: Expr | None, p: Array) -> float:
         """A number that is made of an element's parameters."""
@@ -270,7 +232,7 @@ class Assembly:
     def _problem(self, p: Array, modes: ModeNames) -> Problem:
         """What is the same in all phases of these modes; the rest is empty."""
         bound, (_, known), clocks, size = partial(self.bound, p), self._rates(p), self.clocks, len(self.model.states)
-        owners = {made.guard: k for (k, _), found in self._watched.items() for made in found} if clocks else {}
+        owners = {made.guard: k for (k, _), found in self._watched.items() for made in found}
         guards, none = self.guards(p), np.empty(0)
         values = guards if not clocks else lambda t, y: guards(t, y[:, :size])
         return Problem(
@@ -386,8 +348,7 @@ class Assembly:
     @cached_property
     def program(self) -> Any:
         """The heyoka program with the guards as its events, or None where there can be none."""
-        rows = self._rows
-        if rows is None or not (rows.states or self.clocks) or not available("heyoka"):
+        if (rows := self._rows) is None or not (rows.states or self.clocks) or not available("heyoka"):
             return None
         from shaftwork.codegen.heyoka import build
 
@@ -395,6 +356,6 @@ class Assembly:
         rates = (*rows.rates, *(CLOCK * self._expressions[k] for k in self.clocks))
         changing = [rows.parameters[place] for place in self._numbers]
         try:
-            return build(states, TIME, rows.parameters, rates, self.guards_shown, changing)
+            return build(states, TIME, rows.parameters, rates, tuple(self._expressions), changing)
         except CompileError:
             return None

@@ -25,7 +25,7 @@ from shaftwork.codegen.mobility import Mobility, impulses_of_impact
 from shaftwork.components.branches import ACROSS
 from shaftwork.components.modes import Leave, Modes
 from shaftwork.network.graph import GROUND
-from shaftwork.pipeline.phases.assemblies import Element, ModeNames
+from shaftwork.pipeline.phases.elements import Element, ModeNames
 from shaftwork.pipeline.phases.moments import CLEAR, Moment
 from shaftwork.pipeline.phases.regimes import Regimes, with_modes
 

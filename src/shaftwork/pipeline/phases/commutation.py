@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from itertools import combinations
 
 from shaftwork.components.branches import ACROSS
-from shaftwork.pipeline.phases.assemblies import Element
 from shaftwork.pipeline.phases.collisions import NO_IMPACT
+from shaftwork.pipeline.phases.elements import Element
 from shaftwork.pipeline.phases.moments import Moment
 from shaftwork.pipeline.phases.regimes import Regimes, with_modes
 

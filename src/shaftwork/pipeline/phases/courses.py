@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shaftwork.pipeline.phases.assemblies import Watched
+from shaftwork.pipeline.phases.elements import Watched
 from shaftwork.pipeline.phases.moments import ROUNDINGS, Course, Moment, Regime
 
 # What a look ahead gains must be more than so many rounding units.

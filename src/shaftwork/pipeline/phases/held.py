@@ -21,7 +21,8 @@ from shaftwork.core.kept import Kept
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.graph import GROUND
 from shaftwork.network.templates import Kind
-from shaftwork.pipeline.phases.assemblies import Assembly, Element, ModeNames
+from shaftwork.pipeline.phases.assemblies import Assembly
+from shaftwork.pipeline.phases.elements import Element, ModeNames
 from shaftwork.reduction.form import StateForm
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ from shaftwork.codegen.observer import Impact
 from shaftwork.components.branches import INTEGRAL
 from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError, SimulationError
-from shaftwork.pipeline.phases.assemblies import Element, ModeNames, Watched
 from shaftwork.pipeline.phases.collisions import NO_IMPACT, Collisions, freewheels, limited
+from shaftwork.pipeline.phases.elements import Element, ModeNames, Watched
 from shaftwork.pipeline.phases.impulses import Blow, Impulses, Stage, Start
 from shaftwork.pipeline.phases.moments import CLEAR, Change, Moment
 from shaftwork.pipeline.phases.regimes import Regimes, with_modes
@@ -143,7 +143,7 @@ class Impacts:
             new: after it, with all stopped that is joined.
         """
         held, stopped = self._regimes.held(moment, t), self._regimes.held(new, t)
-        least = NO_IMPACT * max([1.0, *map(abs, held.values())])
+        least = NO_IMPACT * max([1.0, *(abs(held[name]) for name in moment.regime.assembly.stores.names)])
         if all(abs(stopped[name] - value) <= least for name, value in held.items()):
             return new
         before, modes = moment.regime.modes, new.regime.modes

@@ -18,7 +18,8 @@ from shaftwork.codegen.recovery import History, into
 from shaftwork.components.branches import ACROSS, through_of
 from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError, SimulationError
-from shaftwork.pipeline.phases.assemblies import Assembly, Element, ModeNames
+from shaftwork.pipeline.phases.assemblies import Assembly
+from shaftwork.pipeline.phases.elements import Element, ModeNames
 from shaftwork.pipeline.phases.moments import EPS, ROUNDINGS, Moment, Regime
 from shaftwork.pipeline.phases.regimes import Regimes, with_modes
 
@@ -194,7 +195,8 @@ class Impulses:
 
     def _stopping(self, t: float, start: Start, after: Moment) -> Iterator[tuple[float, float, int, str]]:
         """Gears that would turn round: their speeds before and after, negative the way they turn, and what follows."""
-        least = NOTHING_OF * max(np.abs(made.x).max(initial=0.0) for made in (start.moment, after))
+        states = (made.x[: len(made.regime.assembly.model.states)] for made in (start.moment, after))
+        least = NOTHING_OF * max(np.abs(x).max(initial=0.0) for x in states)
         for k, speed in start.speeds.items():
             speeds = speed, self.across(after, t, k)
             for leave in self._elements[k].modes[start.moment.regime.modes[k]].leaves:

@@ -12,7 +12,7 @@ import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.linear import Linearization
+from shaftwork.codegen.linear import Linearization, refuse_waves
 from shaftwork.codegen.model import CompiledModel, Cost
 from shaftwork.codegen.operating import another_start, steady_state
 from shaftwork.codegen.start_values import initial_state
@@ -163,6 +163,8 @@ class PhasedModel(Model):
 
     def _steady(self, values: Mapping[str, float], t: float, initial: Given) -> SteadyState:
         """Steady states of one set of equations after another, until no mode changes there."""
+        if self.form.waves:
+            return self.twin.steady_state(t, initial=initial, parameters=values)
         first = self.phases.assembly(self.phases.first)
         when = t if math.isfinite(t) else first.model.settled(first.vector(values, {}))
         settling = Settling(self.phases, values, (0.0, 1.0))
@@ -198,7 +200,9 @@ class PhasedModel(Model):
         Raises:
             ParameterError: the point is none.
             SignalError: there is no such quantity.
+            SimulationError: a shaft is a wave.
         """
+        refuse_waves(self.form)
         first = self.phases.assembly(self.phases.first)
         settling = Settling(self.phases, values, (0.0, 1.0))
         p = settling.regime(self.phases.first).p
@@ -229,6 +233,8 @@ class PhasedModel(Model):
 
     def start_equations(self, values: Mapping[str, float]) -> BoundArrays:
         """The equations of the first phase, of which start values tell the states."""
+        if self.form.waves:
+            return self.twin.start_equations(values)
         first = self.phases.assembly(self.phases.first)
         return first.bound(first.vector(values, {}))
 

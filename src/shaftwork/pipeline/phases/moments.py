@@ -13,7 +13,8 @@ import numpy as np
 
 from shaftwork.codegen.elements import Array
 from shaftwork.components.laws import t as TIME
-from shaftwork.pipeline.phases.assemblies import Assembly, Element, Limits, ModeNames, Motion, Watched
+from shaftwork.pipeline.phases.assemblies import Assembly, Limits, Motion
+from shaftwork.pipeline.phases.elements import Element, ModeNames, Watched
 from shaftwork.pipeline.prepared import NOMINAL
 
 # A guard within so many rounding units of zero is on its limit, and only its further course tells its side.

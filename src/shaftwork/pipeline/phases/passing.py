@@ -12,7 +12,7 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import no_value
 from shaftwork.integrate.problem import Reaction, SeriesError
-from shaftwork.pipeline.phases.assemblies import Element, ModeNames
+from shaftwork.pipeline.phases.elements import Element, ModeNames
 from shaftwork.pipeline.phases.moments import Change, Moment, Regime, clear_of_limit
 from shaftwork.pipeline.phases.rejoining import settled
 from shaftwork.pipeline.phases.settling import Settling

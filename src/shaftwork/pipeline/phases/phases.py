@@ -14,9 +14,12 @@ from shaftwork.integrate import choice
 from shaftwork.integrate.engines import ADAMS, available
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.netlist import Netlist
-from shaftwork.pipeline.phases.assemblies import Assembly, ModeNames, elements_of
+from shaftwork.pipeline.phases.assemblies import Assembly
+from shaftwork.pipeline.phases.elements import ModeNames, elements_of
 from shaftwork.pipeline.phases.held import MANY, HeldAssembly, holds, laws_that_hold
 from shaftwork.pipeline.phases.resting import at_rest
+from shaftwork.pipeline.phases.wave_assembly import WaveAssembly
+from shaftwork.pipeline.waves import engine_of_waves
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.model import Model
@@ -29,8 +32,9 @@ FOLLOWING = {
     "scipy-radau": (1 / 30, 1e-7),
     "sundials": (1 / 300, 1e-8),
     ADAMS: (1 / 100, 1e-8),
+    "wave": (1.0, 1e-6),  # its panels leave out a tenth of the tolerance
 }
-_ENGINES = ", ".join(name for name in FOLLOWING if name != ADAMS)
+_ENGINES = ", ".join(name for name in FOLLOWING if name not in (ADAMS, "wave"))
 
 
 class Phases:
@@ -67,7 +71,8 @@ class Phases:
                     model = self._rebuild(netlist)
                     if (resting := at_rest(netlist, model.form)) is not netlist:
                         model = self._rebuild(resting)
-                made: Assembly | NetworkError = Assembly(model, self.elements, forms)
+                kind = WaveAssembly if model.form.waves else Assembly
+                made: Assembly | NetworkError = kind(model, self.elements, forms)
             except NetworkError as error:
                 made = error
             self._assemblies.setdefault(forms, made)  # another thread may have been first
@@ -138,11 +143,13 @@ class Phases:
         Raises:
             ParameterError: the one that is asked for follows no modes.
         """
+        if assembly.model.form.waves:
+            return engine_of_waves(asked)
         assembly, modes = assembly.alike(modes)
         key = assembly, modes, asked
         if asked != "auto":
             choice.check(asked)
-            if asked not in FOLLOWING:
+            if asked not in FOLLOWING or asked == "wave":
                 raise ParameterError(
                     f"The engine '{asked}' follows no parts that change their mode "
                     f"({', '.join(element.name for element in self.elements)}). Take one of: {_ENGINES}."

@@ -12,7 +12,7 @@ from shaftwork.codegen.elements import Array
 from shaftwork.components.branches import INTEGRAL
 from shaftwork.core.errors import NetworkError, ParameterError
 from shaftwork.pipeline.ending import Ending
-from shaftwork.pipeline.phases.assemblies import Element, ModeNames
+from shaftwork.pipeline.phases.elements import Element, ModeNames
 from shaftwork.pipeline.phases.moments import Moment, Regime
 from shaftwork.pipeline.phases.starts import begins_anew
 from shaftwork.reduction.cancelling import jamming
@@ -71,10 +71,10 @@ class Regimes:
         return True
 
     def held(self, moment: Moment, t: float) -> dict[str, float]:
-        """All that is stored, by name."""
+        """All that is stored, and what arrives by waves, by name."""
         assembly, p = moment.regime.assembly, moment.regime.p
         values = assembly.stores.of(lambda: assembly.bound(p), np.array([t]), moment.x[None, :])[0]
-        return dict(zip(assembly.stores.names, values.tolist(), strict=True))
+        return dict(zip(assembly.stores.names, values.tolist(), strict=True)) | assembly.arriving(moment.x)
 
     def taking(self, modes: ModeNames, t: float, held: Mapping[str, float]) -> Moment:
         """A moment in the given modes that takes up what was stored, with the inputs of a time in s.
@@ -83,7 +83,7 @@ class Regimes:
             NetworkError: the equations of these modes contradict each other.
         """
         new = self.regime(modes)
-        return Moment(new, new.assembly.stores.states(new.assembly.bound(new.p), t, held))
+        return Moment(new, new.assembly.taking(t, held, new.p))
 
     def resumed(self, ending: Ending) -> Moment:
         """The moment at which another motion ended, in its modes.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from shaftwork.pipeline.phases.assemblies import Element
+from shaftwork.pipeline.phases.elements import Element
 from shaftwork.pipeline.phases.moments import Change, Moment, Regime, together
 from shaftwork.pipeline.phases.regimes import with_modes
 from shaftwork.pipeline.phases.settling import Settling
@@ -28,8 +28,7 @@ def settled(settling: Settling, t: float, after: float, moment: Moment, met: int
     if not joins or (met is None and not settling.ends(Moment(regime, moment.x), after, moment.x)):
         return settling.settle(t, after, moment, met)
     new = settling.regime(with_modes(regime.modes, joins))
-    x = new.assembly.stores.states(new.assembly.bound(new.p), after, settling.held(moment, after))
-    joined = Moment(new, x)
+    joined = Moment(new, new.assembly.taking(after, settling.held(moment, after), new.p))
     outcome, changes = settling.settle(t, after, joined, None)
     if outcome.regime.modes == regime.modes:  # rounding hides what was met
         named = next(((k, watched.leave) for k, watched in regime.watched if watched.guard == met), None)

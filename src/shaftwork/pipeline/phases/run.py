@@ -11,6 +11,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 
+import numpy as np
+
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.observer import Impact
 from shaftwork.codegen.timeline import Timeline
@@ -22,13 +24,15 @@ from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.ending import Ending
 from shaftwork.pipeline.implicit import PRESCRIBED, at_rest
 from shaftwork.pipeline.phases.assemblies import Assembly
-from shaftwork.pipeline.phases.moments import Change, Moment
+from shaftwork.pipeline.phases.moments import Change, Moment, Regime
 from shaftwork.pipeline.phases.passing import Passing, Phase
 from shaftwork.pipeline.phases.phases import FOLLOWING, Phases
 from shaftwork.pipeline.phases.rejoining import settled
 from shaftwork.pipeline.phases.settling import Settling
 from shaftwork.pipeline.phases.starts import refuse_incomplete, warn_of_what_may_have_begun
+from shaftwork.pipeline.phases.wave_run import WaveRun
 from shaftwork.pipeline.start import start_of
+from shaftwork.pipeline.waves import CarriedWaves, WaveStart
 
 # So many changes of mode, each within this part of the run of the one before, are chatter. Rebounds come ever faster,
 # too, before they end: a thousand of them where nearly all speed is given back.
@@ -92,6 +96,7 @@ class Run:
         self.changes: list[Change] = []
         self.jumps: list[Impact] = []
         self.engine, self.why, self.steps = "", "", 0
+        self.waves: WaveRun | None = None
         self._soon = [0 for _ in CHATTER]
 
     def march(self, initial: Mapping[str, float] | None) -> None:
@@ -104,6 +109,8 @@ class Run:
     def begin(self, initial: Mapping[str, float] | None) -> Moment:
         """The states and modes at the start."""
         start, begins = self.demand.span[0], self._known.begins
+        if self.settling.regime(self.phases.first).assembly.model.form.waves:
+            begins = []  # what leaves the ends before the start is of the run
         if isinstance(initial, Ending):
             found = self._resumed(initial)
         elif initial is not None or not begins:
@@ -111,7 +118,8 @@ class Run:
             assembly, p = regime.assembly, regime.p
             if isinstance(initial, Mapping) and initial and start != 0:
                 refuse_incomplete(assembly.stores.names, initial, start)
-            x, _ = start_of(assembly.model, assembly.prepared(p), initial, self.demand.span)
+            x, waves = start_of(assembly.model, assembly.prepared(p), initial, self.demand.span)
+            x = self._beside_waves(regime, x, waves)
             after = self.timeline(assembly, p).sides(start)[1]
             found = self.settling.settle(start, after, self.settling.started(after, x), None)
             if initial is None:
@@ -125,10 +133,18 @@ class Run:
         self.note(start, changes)
         return moment
 
+    def _beside_waves(self, regime: Regime, x: Array, start: WaveStart | CarriedWaves | None) -> Array:
+        """The states at the start, and behind them what arrives by waves, if there are any."""
+        if not regime.assembly.model.form.waves:
+            return x
+        self.waves = WaveRun(regime.assembly.bound(regime.p), start, self.demand.span)
+        return np.concatenate([x, self.waves.arriving(self.demand.span[0])])
+
     def _resumed(self, ending: Ending) -> tuple[Moment, list[Change]]:
         """The states and modes in which another motion ended, and what changes at that instant."""
-        start = self.demand.span[0]
-        moment, changes = self.settling.resumed(ending), list[Change]()
+        start, first = self.demand.span[0], self.settling.regime(self.phases.first)
+        x = self._beside_waves(first, np.zeros(len(first.assembly.model.states)), ending.waves)
+        moment, changes = self.settling.resumed(ending.beside(first.assembly.arriving(x))), list[Change]()
         after = self._instants(moment).sides(start)[1]
         if after != ending.read and moment.regime.assembly.model.form.has_impulses:
             moment, changes, _ = self.settling.jumped(start, moment, ending.read, after)
@@ -251,6 +267,8 @@ class Run:
             made = at_rest(problem, moment.regime.assembly.model.degree)
             return replace(made, end=(problem.t_end, problem.x0)), passing
         name, why = self._engine(moment, lambda: problem)
+        if self.waves is not None:
+            return self._solve(problem, name, why, self.waves.solver(moment.regime)), passing
         stiff = name != "heyoka"
         if self.demand.engine != "auto" or (stiff and not self.phases.tries_heyoka(moment.regime.assembly)):
             return self._solve(problem, name, why), passing
@@ -278,12 +296,14 @@ class Run:
             raise sticks
         return self._solve(problem, last, why if failed is None else choice.no_series(failed, last)), passing
 
-    def _solve(self, problem: Problem, name: str, why: str) -> Trajectory:
+    def _solve(
+        self, problem: Problem, name: str, why: str, solver: Callable[[Problem], Trajectory] | None = None
+    ) -> Trajectory:
         share, loosest = FOLLOWING[name]
         tight = max(min(share * problem.rtol, loosest), min(problem.rtol, TIGHTEST_RTOL))
         if tight != problem.rtol:
             problem = changed(problem, rtol=tight, atol=problem.atol * (tight / problem.rtol))
-        trajectory, _, _ = choice.solve(problem, name, why)
+        trajectory = choice.solve(problem, name, why)[0] if solver is None else solver(problem)
         if trajectory.caveat:
             warn(trajectory.caveat, AccuracyWarning)
         if not self.engine:

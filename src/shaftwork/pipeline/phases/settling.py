@@ -13,9 +13,9 @@ import numpy as np
 
 from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import NetworkError, SimulationError
-from shaftwork.pipeline.phases.assemblies import ModeNames, Watched
 from shaftwork.pipeline.phases.commutation import commutations
 from shaftwork.pipeline.phases.courses import Way, chosen, later, leaving, moved
+from shaftwork.pipeline.phases.elements import ModeNames, Watched
 from shaftwork.pipeline.phases.impacts import Impacts
 from shaftwork.pipeline.phases.moments import ROUNDINGS, Change, Moment, Regime, clear_of_limits, together
 from shaftwork.pipeline.phases.regimes import Regimes, refuse_beyond, with_modes

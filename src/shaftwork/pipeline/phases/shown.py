@@ -20,7 +20,7 @@ from shaftwork.pipeline.phases.starts import conditional, starts_of
 from shaftwork.reduction.readings import Readings
 
 if TYPE_CHECKING:
-    from shaftwork.pipeline.phases.assemblies import Element, ModeNames
+    from shaftwork.pipeline.phases.elements import Element, ModeNames
 
 
 class Shown:

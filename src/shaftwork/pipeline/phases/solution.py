@@ -10,17 +10,19 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.observer import Impact, ModelObserver
 from shaftwork.codegen.phase_observer import PhaseObserver, Stretch, Stretches
-from shaftwork.pipeline.phases.assemblies import Element, ModeNames
+from shaftwork.pipeline.phases.assemblies import Assembly
+from shaftwork.pipeline.phases.elements import Element, ModeNames
 from shaftwork.pipeline.phases.moments import Change
 from shaftwork.pipeline.phases.passing import Phase
 from shaftwork.pipeline.phases.run import Run, Span
+from shaftwork.pipeline.phases.wave_run import WaveRun
 from shaftwork.results.solution import PhaseRow, Solution
 
 
 def solution(run: Run, name: str) -> Solution:
     """The motion as a whole, to be read."""
     names = run.spans[0].assembly.stores.names
-    whole = _Whole(run)
+    whole = _Whole(run) if run.waves is None else _WithWaves(run, run.waves)
     return Solution(
         name=name,
         t=np.concatenate([span.trajectory.t for span in run.spans]),
@@ -37,10 +39,16 @@ def solution(run: Run, name: str) -> Solution:
 
 
 def _stored(run: Run, span: Span, names: tuple[str, ...]) -> Array:
-    """(k, stores) all that is stored at the output times of a span."""
-    t, states = span.trajectory.t, span.trajectory.x[:, : len(span.assembly.model.states)]
+    """(k, stores) all that is stored at the output times of a span, and what arrives by waves."""
+    t, states = span.trajectory.t, span.trajectory.x[:, : _width(span.assembly)]
+    arrived = states[:, len(span.assembly.model.states) :]
     if not t.size:
-        return np.empty((0, len(names)))
+        return np.empty((0, len(names) + arrived.shape[1]))
+    return np.hstack([_stores(run, span, names, states), arrived])
+
+
+def _stores(run: Run, span: Span, names: tuple[str, ...], states: Array) -> Array:
+    t = span.trajectory.t
     stores = span.assembly.stores
     if stores.by_loops:
         return stores.of(lambda: span.assembly.bound(span.phases[0].p), t, states)
@@ -52,6 +60,11 @@ def _stored(run: Run, span: Span, names: tuple[str, ...]) -> Array:
         here = index == number
         made[here] = stores.of(partial(span.assembly.bound, span.phases[number].p), read_at[here], states[here])
     return made
+
+
+def _width(assembly: Assembly) -> int:
+    """The number of states, and of what arrives by waves behind them."""
+    return len(assembly.model.states) + len(assembly.model.form.waves)
 
 
 class _Whole:
@@ -76,9 +89,22 @@ class _Whole:
         return self.stretches.dense(times)
 
 
+class _WithWaves(_Whole):
+    """The same beside travelling waves, which are a motion between the phases too.
+
+    Args:
+        run: the motion.
+        waves: of it.
+    """
+
+    def __init__(self, run: Run, waves: WaveRun) -> None:
+        super().__init__(run)
+        self.held, self.leaving, self.carried = waves.held, waves.leaving, waves.carried
+
+
 def _stretch(run: Run, span: Span, phase: Phase) -> Stretch:
     assembly, states = span.assembly, span.assembly.model.states
-    size, dense = len(states), span.trajectory.dense
+    size, dense = _width(assembly), span.trajectory.dense
     instants = run.timeline(assembly, phase.p)
     bind = partial(assembly.bound, phase.p)
     return Stretch(
@@ -90,6 +116,7 @@ def _stretch(run: Run, span: Span, phase: Phase) -> Stretch:
         instants=instants,
         dense=lambda times: dense(times)[:, :size],
         states=states,
+        ends=len(assembly.model.form.waves),
         modes=dict(zip((element.name for element in run.phases.elements), phase.modes, strict=True)),
     )
 

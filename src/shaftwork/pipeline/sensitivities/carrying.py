@@ -13,7 +13,8 @@ from shaftwork.codegen.differentiated import Differentiated
 from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.phases.assemblies import Assembly, ModeNames
+from shaftwork.pipeline.phases.assemblies import Assembly
+from shaftwork.pipeline.phases.elements import ModeNames
 from shaftwork.pipeline.phases.moments import Change
 from shaftwork.pipeline.phases.phases import Phases
 from shaftwork.pipeline.phases.regimes import with_modes

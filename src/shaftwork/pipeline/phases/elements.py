@@ -1,0 +1,59 @@
+"""What changes its mode in a network, and what it watches for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from shaftwork.components.modes import Leave, Modes
+from shaftwork.network.graph import GraphPart
+
+if TYPE_CHECKING:
+    from shaftwork.pipeline.model import Model
+
+ModeNames = tuple[str, ...]
+"""The mode of every element of a network, in their order."""
+
+
+@dataclass(frozen=True, eq=False)
+class Element:
+    """A piece of a part that changes its mode.
+
+    Args:
+        part: of which it is.
+        modes: its modes.
+        number: "part.mode", the parameter in laws.
+    """
+
+    part: GraphPart
+    modes: Modes
+    number: str
+
+    @property
+    def name(self) -> str:
+        """How messages and tables call it."""
+        return f"{self.part.name}.{self.modes.label}" if self.modes.label else self.part.name
+
+    @cached_property
+    def alike(self) -> Mapping[str, str]:
+        """By mode the first one with the same law: "open" of one that has parted."""
+        first: dict[tuple[str, float], str] = {}
+        return {mode.name: first.setdefault((mode.form, mode.value), mode.name) for mode in self.modes.options}
+
+
+def elements_of(model: Model) -> tuple[Element, ...]:
+    """Every element of a network, in the order of its parts."""
+    return tuple(
+        Element(part, modes, f"{part.name}.{modes.symbol}") for part in model.form.graph.parts for modes in part.modes
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Watched:
+    """What may end a mode in a set of equations: the guard's place, the side on which it is met, and what follows."""
+
+    guard: int
+    side: float
+    leave: Leave
