@@ -22,7 +22,7 @@ STEPS = (1000, 2000, 4000)
 NEAR = 1e-3
 """Of the largest speed: so far away may the last of the steps be, beside what halving them changes."""
 GEARED = ("soft", "friction", "brake", "freewheel")
-"""What stands beside gears: a rigid impact follows its impulse through them, of which a step knows the end alone."""
+"""What stands beside gears, from rest: an impact follows its impulse through them, and a step knows its end alone."""
 
 
 class GearedDraw(Draw):
@@ -32,12 +32,9 @@ class GearedDraw(Draw):
         """Two to six inertias; what switches stands in the row, across it, or on the frame."""
         rng = self.rng
         n, left, joints = int(rng.integers(2, 7)), int(rng.integers(1, 11)), list[Joint]()
-        speeds = np.where(rng.random(n) < 0.4, 0.0, rng.normal(0.0, 5.0, n))
         for a in range(n - 1):
             if rng.random() < 0.4 and not (joints and joints[-1].kind == "gear"):
-                gear = self.gear(a)
-                joints.append(gear)
-                speeds[a + 1] = speeds[a] / gear.ratio
+                joints.append(self.gear(a))
                 continue
             kind = "spring" if not left or rng.random() < 0.3 else str(rng.choice(self.kinds))
             left -= kind != "spring"
@@ -48,7 +45,7 @@ class GearedDraw(Draw):
             joints.append(self.joint(kind, a, -1 if kind != "soft" and rng.random() < 0.6 else other))
         sources = tuple(self.source(int(rng.integers(n))) for _ in range(int(rng.integers(1, 3))))
         inertias = (10.0 ** rng.uniform(-1.0, 0.5, n)).tolist()
-        return Train(tuple(inertias), tuple(speeds.tolist()), tuple(joints), sources, float(rng.uniform(0.4, 1.0)))
+        return Train(tuple(inertias), (0.0,) * n, tuple(joints), sources, float(rng.uniform(0.4, 1.0)))
 
     def gear(self, a: int) -> Joint:
         """One that its load can drive, or that locks itself."""

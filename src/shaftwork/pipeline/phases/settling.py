@@ -364,7 +364,10 @@ class Settling:
         for k in self._impacts.gears:
             ways += [{number: to, k: leave.to} for leave in self.elements[k].modes[modes[k]].leaves if k != number]
         for new in islice(filter(self._regimes.possible, (with_modes(modes, way) for way in ways)), tried, None):
-            made = self._impacts.jammed(after, moment, self._regimes.changed(moment, after, new))
+            try:
+                made = self._impacts.jammed(after, moment, self._regimes.changed(moment, after, new))
+            except NetworkError:  # what slips behind the gear lets another one jam
+                continue
             pairs = zip(self.elements, modes, made.regime.modes, strict=True)
             return made, [Change(t, *names) for names in pairs if names[1] != names[2]]
         raise SimulationError(
