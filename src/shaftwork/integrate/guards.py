@@ -165,7 +165,6 @@ class GuardWatch:
             return None
         row = int(below[0] + above[0])
         before = int(below[below < row][-1])
-
         return self._root(look, column, before, row)
 
     @staticmethod
@@ -177,13 +176,16 @@ class GuardWatch:
         """
         low, high, ulp = float(look.times[before]), float(look.times[row]), float(np.spacing(look.times[-1]))
         course = Polynomial(low, high, look.at(np.minimum(low + (high - low) * points(DEGREE), high))[:, [column]])
-        if course.nodes[0, 0] * course.nodes[-1, 0] > 0:  # an end that is rounding away from the dense output
-            return high
-        root = float(brentq(lambda t: float(course(np.array([t]))[0, 0]), low, high, xtol=ulp))
+        root = _zero(lambda t: float(course(np.array([t]))[0, 0]), low, high, ulp)
         beside = look.at(root + BESIDE * ulp * np.array([-1.0, 1.0]))[:, column]
-        if beside[0] < 0 < beside[1]:
+        if root == high or beside[0] < 0 < beside[1]:
             return root
-        return float(brentq(lambda t: float(look.at(np.array([t]))[0, column]), low, high, xtol=ulp))
+        return _zero(lambda t: float(look.at(np.array([t]))[0, column]), low, high, ulp)
+
+
+def _zero(value: Callable[[float], float], low: float, high: float, ulp: float) -> float:
+    """Where a function passes through zero; its end where it does not, as that is rounding away from others."""
+    return high if value(low) * value(high) > 0 else float(brentq(value, low, high, xtol=ulp))
 
 
 def share_of_tolerance(problem: Problem | DaeProblem, times: Array, states: Array) -> float:
