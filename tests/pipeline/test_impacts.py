@@ -135,6 +135,21 @@ def test_a_freewheel_locks_in_the_impact_of_another_part() -> None:
     assert sol.energy.lost_in["gap"] == pytest.approx(0.25, abs=EXACT)
 
 
+@pytest.mark.parametrize("restitutions", [(0.9, 0.1), (0.1, 0.9)])
+@pytest.mark.parametrize("geared", [False, True])
+def test_contacts_side_by_side_share_their_impulse_in_whatever_order(
+    restitutions: tuple[float, float],
+    geared: bool,  # noqa: FBT001
+) -> None:
+    """Each gives back its share of half of it: together e = 0.5."""
+    net = row(sw.Backlash("first", gap=0.2, restitution=restitutions[0]))
+    net.add(sw.Backlash("second", gap=0.2, restitution=restitutions[1]), "a", "c" if geared else "b")
+    if geared:
+        net.add(sw.Gear("gear", ratio=1.0), "b", "c")
+    sol = net.simulate(0.15, initial={"J1.omega": 1.0})
+    assert [sol[f"J{k}.omega"][-1] for k in (1, 2)] == pytest.approx([0.25, 0.75], abs=EXACT)
+
+
 def test_an_unknown_law_for_impacts_at_once_is_refused() -> None:
     with pytest.raises(sw.ParameterError, match=r"impacts = 'all' must be one of: 'in turn', 'together'"):
         sw.Network("row", impacts="all")  # type: ignore[arg-type]

@@ -303,3 +303,34 @@ def test_what_takes_matrices_refuses_a_wave_with_phases_by_name() -> None:
     for verb in (net.compile().linearize, lambda: sw.studies.frequency_sensitivities(net)):
         with pytest.raises(sw.SimulationError, match="'line' is a travelling wave"):
             verb()
+
+
+@pytest.mark.parametrize("share", [1.0, 0.999])
+def test_a_friction_that_holds_just_what_arrives_is_followed(share: float) -> None:
+    """Its guard rests at the limit, but for rounding, until the next front comes: from rest, 2 Z 5 rad/s of torque."""
+    steel = {"length": 1.0, "diameter": 0.02, "density": 7900.0, "shear_modulus": 77.5e9}
+    impedance = 7900.0 * np.pi * 0.02**4 / 32 * (77.5e9 / 7900.0) ** 0.5
+    net = sw.Network("limit")
+    net.add(sw.SpeedSource("drive", omega=5.0), "a")
+    net.add(sw.Shaft("line", **steel, model=sw.Wave()), "a", "b")
+    net.add(sw.DryFriction("rubs", tau_c=share * 2.0 * impedance * 5.0), "b")
+    delay = 1.0 / (77.5e9 / 7900.0) ** 0.5
+    sol = net.simulate(2.5 * delay, t_eval=[1.5 * delay, 2.5 * delay])
+    np.testing.assert_allclose(sol["b.omega"], (1.0 - share) * 10.0, rtol=0, atol=1e-9)
+
+
+def test_friction_that_falls_faster_than_waves_resist_is_refused_at_a_node_without_inertia() -> None:
+    """Several speeds go with what arrives then; Newton's method jumped to one at which the friction drove."""
+    steel = {"diameter": 0.02, "density": 7900.0, "shear_modulus": 77.5e9, "model": sw.Wave()}
+    net = sw.Network("falling")
+    net.add(sw.TorqueSource("m", tau=5.0), "a")
+    net.add(sw.Inertia("J", J=0.01), "a")
+    net.add(sw.Shaft("first", length=1.0, **steel), "a", "b")
+    net.add(sw.DryFriction("rubs", tau_c=3.0, tau_s=5.0, omega_s=1.0), "b")
+    net.add(sw.Shaft("second", length=0.61, **steel), "b", "d")
+    net.add(sw.Inertia("K", J=0.004), "d")
+    net.add(sw.Damper("bearing", d=1.0), "d")
+    with pytest.raises(sw.SimulationError, match=r"'rubs': the torque falls faster .* Give the node an inertia"):
+        net.simulate(0.01, algebraic_loops="solve")
+    gentle = net.compile(algebraic_loops="solve").simulate(0.01, parameters={"rubs.omega_s": 10.0})
+    assert (gentle["rubs.omega"] * gentle["rubs.tau"]).min() >= 0.0

@@ -52,7 +52,11 @@ class BoundArrays:
         self.program, self.p, self.part = program, p, part
         self._has_slopes, self._controls = bool(part.B1.nnz), program.inputs.controls
         loops = program.loop_places
-        self.loops = LoopSolver(program.inputs, part, loops, program.loop_in_tree, self.p) if loops.size else None
+        form = program.form
+        owners = tuple(dict.fromkeys(form.graph.part_of(law).name for law in form.loop_laws)) if form.waves else ()
+        self.loops = None
+        if loops.size:
+            self.loops = LoopSolver(program.inputs, part, loops, program.loop_in_tree, self.p, owners)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _bound_again, (self.program, self.p, self.part, None if self.loops is None else self.loops.last)

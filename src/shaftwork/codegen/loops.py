@@ -21,6 +21,7 @@ from scipy import sparse
 from shaftwork.codegen.elements import Array, Index
 from shaftwork.codegen.inputs import Inputs
 from shaftwork.codegen.matrices import LinearPart
+from shaftwork.core.errors import SimulationError
 
 ITERATIONS, HALVINGS = 50, 30
 ROUNDING = 1e-14
@@ -41,15 +42,28 @@ class LoopSolver:
         places: where the loop laws stand in u.
         in_tree: which of them are in the tree, in the order of the rows of P and Q.
         p: parameter vector.
+        beside_waves: the parts of the laws, where lines are at their nodes; there another solution is refused.
     """
 
-    def __init__(self, inputs: Inputs, part: LinearPart, places: Index, in_tree: NDArray[np.bool_], p: Array) -> None:
-        self._inputs, self._part, self._p = inputs, part, p
+    def __init__(
+        self,
+        inputs: Inputs,
+        part: LinearPart,
+        places: Index,
+        in_tree: NDArray[np.bool_],
+        p: Array,
+        beside_waves: tuple[str, ...] = (),
+    ) -> None:
+        self._inputs, self._part, self._p, self._beside_waves = inputs, part, p, beside_waves
         self.places, self._tree = places, in_tree
         self._controls = inputs.controls
         self._D = part.D.toarray()
         self._P, self._Q = part.tree_law_x.toarray(), part.tree_law_u.toarray()
         self._last = np.zeros(len(places))
+        self._sign = 0.0
+        if beside_waves:  # of laws that do not change with what they determine
+            plain = self._total(np.eye(len(places)), np.zeros((inputs.size, len(places))))[0]
+            self._sign = float(np.sign(np.linalg.det(plain)))
 
     def solve(self, t: Any, x: Array) -> Array:
         """The unknowns a (loops,) at a time and state; (loops, k) at times (k,) and states (n, k) of a motion.
@@ -117,9 +131,19 @@ class LoopSolver:
         return np.where((near | (np.abs(residual) <= NEARLY * size)).all(axis=0), a, np.nan)
 
     def _step(self, t: Array, x: Array, a: Array, residual: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Newton's step (loops, k), NaN where a slope is not finite; and whether (k,) it takes the residual away."""
+        """Newton's step (loops, k), NaN where a slope is not finite; and whether (k,) it takes the residual away.
+
+        Raises:
+            SimulationError: beside waves, several solutions are near.
+        """
         slope = np.moveaxis(self._by_loops(t, x, a)[0], -1, 0)
         known = np.isfinite(slope).all(axis=(1, 2))
+        if self._sign and (self._sign * np.linalg.det(slope[known]) <= 0).any():
+            names = " and ".join(map(repr, self._beside_waves))
+            raise SimulationError(
+                f"{names}: the torque falls faster with the speed than the impedances of the waves at its node, which "
+                "are all that resists there, so several speeds go with it. Give the node an inertia, however small."
+            )
         step = np.full_like(residual, np.nan)
         inverse = np.linalg.pinv(slope[known], rcond=len(a) * np.finfo(float).eps)
         step[:, known] = -np.einsum("kij,jk->ik", inverse, residual[:, known])

@@ -24,6 +24,10 @@ from shaftwork.reduction.form import StateForm
 
 ROUNDING = 1e-12
 """A part of the largest value that is rounding."""
+ROUNDED = 1e-9
+"""A part of the largest speed by which contacts may close after an impact: impulses that share it are rounded."""
+LEAST = 1e-10
+"""What is added to the diagonal of a matrix of ones, so that of many solutions the least one is found."""
 WITHOUT_INERTIA = (Kind.CONDUCTANCE, Kind.LAW, Kind.THROUGH_STORE)
 
 
@@ -91,7 +95,8 @@ def complementary(W: Array, q: Array) -> Array | None:
     """(m,) lambda >= 0 with w = W lambda + q >= 0 and lambda w = 0, or None where there is none.
 
     W is symmetric and positive semidefinite, so it is the least square of what A lambda leaves of b with W = A' A,
-    q = -A' b, solved by an active set. W lambda is unique, and so are speeds; lambda need not be.
+    q = -A' b, solved by an active set. W lambda is unique, and so are speeds. Where lambda is not, as of contacts side
+    by side, it is the least one, which they share: their order says nothing.
 
     Source: Lawson and Hanson, Solving Least Squares Problems, 1974, chapter 23.
     """
@@ -100,16 +105,27 @@ def complementary(W: Array, q: Array) -> Array | None:
         return None
     scale = np.where(scale > 0, 1 / np.sqrt(np.where(scale > 0, scale, 1.0)), 0.0)
     V, b = W * scale[:, None] * scale, q * scale
+    pressed = _pressed(V + LEAST * np.eye(len(q)), b)
+    if pressed is None:
+        return None
+    shares = np.zeros(len(q))
+    shares[pressed] = np.linalg.lstsq(V[np.ix_(pressed, pressed)], -b[pressed], rcond=ROUNDING)[0]
+    keeps = V @ shares + b > -ROUNDED * np.abs(b).max(initial=0.0)
+    return np.maximum(shares, 0.0) * scale if keeps.all() else None
+
+
+def _pressed(V: Array, b: Array) -> NDArray[np.bool_] | None:
+    """(m,) where lambda > 0, for a positive definite matrix; None where rounding hides it."""
     least = ROUNDING * np.abs(b).max(initial=0.0)
-    found, active = np.zeros(len(q)), np.zeros(len(q), dtype=bool)
-    for _ in range(3 * len(q) + 1):
+    found, active = np.zeros(len(b)), np.zeros(len(b), dtype=bool)
+    for _ in range(3 * len(b) + 1):
         w = np.where(active, 0.0, V @ found + b)
         if not (w < -least).any():
-            return np.asarray(found * scale) if (V @ found + b > -10 * least - ROUNDING).all() else None
+            return active
         active[np.argmin(w)] = True
         while True:
-            wanted = np.zeros(len(q))
-            wanted[active] = np.linalg.lstsq(V[np.ix_(active, active)], -b[active], rcond=ROUNDING)[0]
+            wanted = np.zeros(len(b))
+            wanted[active] = np.linalg.solve(V[np.ix_(active, active)], -b[active])
             pulls = active & (wanted <= 0)
             if not pulls.any():
                 break

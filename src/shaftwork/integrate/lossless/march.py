@@ -238,8 +238,10 @@ class March:
         """Whether a panel is short enough for the guards that change with time by themselves."""
         assert self._problem.guards is not None  # noqa: S101 (asked only then)
         times = panel.start + panel.length * GAUSS.nodes
-        values = self._problem.guards.values(times, restriction(times))[:, list(self._problem.timed)].T
-        return bool((left_out(values, np.empty(0)) <= SEEN * np.abs(values).max(axis=1)).all())
+        timed = list(self._problem.timed)
+        values = self._problem.guards.values(times, restriction(times))[:, timed].T
+        least = self._problem.guards.offsets[timed]  # what arrives may hold a guard at its limit, but for rounding
+        return bool((left_out(values, np.empty(0)) <= SEEN * np.abs(values).max(axis=1) + least).all())
 
     def _accept(self, panel: _Panel) -> None:
         if len(self._states) - self._span.first >= self._problem.max_steps:
