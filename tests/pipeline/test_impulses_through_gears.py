@@ -119,6 +119,21 @@ def test_what_a_gear_loses_in_an_impact_is_its_own(e: float) -> None:
     assert sol.energy.lost_in["gap"] == pytest.approx(impulse * (1 - e) * 10.0 / 2, rel=1e-12)
 
 
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+def test_a_gear_that_locks_itself_holds_what_a_stop_would_throw_back(e: float) -> None:
+    """J1 drives the gear on into the stop: of 5 J the stop takes its impulse times the mean speed, and the mesh the rest."""
+    net = sw.Network("jams")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.Inertia("J2", J=1.0), "b")
+    net.add(sw.LossyGear("gear", ratio=3.0, efficiency=0.7, efficiency_back=0.0), "a", "b")
+    net.add(sw.HardStop("stop", upper=0.1, restitution=e), "b")
+    sol = net.simulate(0.11, initial={"J1.omega": 3.0, "J2.omega": 1.0})
+    assert sol["J2.omega"][-1] == 0.0
+    impulse = 3.0 * 0.7 * 3.0 + 1.0  # of the stop, at a mean speed of 0.5 rad/s
+    assert sol.energy.lost_in["stop"] == pytest.approx(impulse / 2.0, rel=1e-12)
+    assert sol.energy.lost_in["gear"] == pytest.approx(5.0 - impulse / 2.0, rel=1e-12)
+
+
 @pytest.mark.slow
 def test_an_impact_through_a_gear_is_the_limit_of_a_stiff_contact() -> None:
     """Braked, at rest and turned round within it: the contact is damped 60 times as much as it takes not to swing."""

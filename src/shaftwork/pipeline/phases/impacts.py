@@ -97,7 +97,10 @@ class Impacts:
         moved = any(abs(plastic[name] - value) > NO_IMPACT * speed for name, value in held.items())
         rebound = leave.rebound is not None and moved and share * speed > rest
         if rebound:
-            stages += self._thrown_back(after, stages, number, leave.to, share, apart)
+            try:
+                stages += self._thrown_back(after, stages, number, leave.to, share, apart)
+            except NetworkError:  # a gear that locks itself holds what would come back
+                rebound = False
         given, lost = self._impulses.given(after, stages), self._impulses.lost(after, stages)
         element = self._elements[number]
         lost[element.part.name] = lost.get(element.part.name, 0.0) + self._impulses.work(after, number, stages)
