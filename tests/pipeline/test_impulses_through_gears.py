@@ -121,7 +121,7 @@ def test_what_a_gear_loses_in_an_impact_is_its_own(e: float) -> None:
 
 @pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
 def test_a_gear_that_locks_itself_holds_what_a_stop_would_throw_back(e: float) -> None:
-    """J1 drives the gear on into the stop: of 5 J the stop takes its impulse times the mean speed, and the mesh the rest."""
+    """J1 drives the gear into the stop: of 5 J the stop takes its impulse times the mean speed, the mesh the rest."""
     net = sw.Network("jams")
     net.add(sw.Inertia("J1", J=1.0), "a")
     net.add(sw.Inertia("J2", J=1.0), "b")
