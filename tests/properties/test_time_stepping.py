@@ -18,8 +18,8 @@ from tests.properties.test_hybrid_reference import Draw, end
 from tests.reference.hybrid_train import Joint, Train
 from tests.reference.time_stepping import NoSolutionError, Stepper
 
-STEPS = (1000, 2000, 4000)
-NEAR = 1e-3
+STEPS = (500, 1000, 2000)
+NEAR = 2e-3
 """Of the largest speed: so far away may the last of the steps be, beside what halving them changes."""
 GEARED = ("soft", "friction", "brake", "freewheel")
 """What stands beside gears, from rest: an impact follows its impulse through them, and a step knows its end alone."""
