@@ -24,13 +24,16 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.mobility import Mobility, impulses_of_impact
 from shaftwork.components.branches import ACROSS
 from shaftwork.components.modes import Leave, Modes
+from shaftwork.core.kept import Kept
 from shaftwork.network.graph import GROUND
 from shaftwork.pipeline.phases.elements import Element, ModeNames
-from shaftwork.pipeline.phases.moments import CLEAR, Moment
+from shaftwork.pipeline.phases.moments import CLEAR, Moment, Regime
 from shaftwork.pipeline.phases.regimes import Regimes, with_modes
 
 # A speed across what is joined, as part of the largest one or of one, up to which it is an error of the run, no impact.
 NO_IMPACT = 1e-8
+KEPT = 64
+"""Sets of contacts of which what impulses do is kept."""
 SAME = 1e-9
 """Speeds at which contacts close that differ by less than this fraction are the same."""
 
@@ -87,6 +90,7 @@ class Collisions:
 
     def __init__(self, regimes: Regimes, elements: Sequence[Element], tick: float, *, together: bool) -> None:
         self._regimes, self._elements, self._tick, self._together = regimes, elements, tick, together
+        self._mobilities = Kept[tuple[Regime, tuple[tuple[int, int], ...]], Mobility](KEPT)
 
     def impact(self, t: float, moment: Moment, number: int, leave: Leave) -> Collision | None:
         """The impact of an element that closes; None where nothing stops what is prescribed.
@@ -99,8 +103,7 @@ class Collisions:
         """
         contacts = self._in_turn(t, moment, [*self._contacts(t, moment, number, leave)])
         loose = self._apart(t, moment, contacts, {number: leave.to})
-        assembly, pairs = loose.regime.assembly, [self._nodes(loose, contact) for contact in contacts]
-        mobility = assembly.stores.mobility(assembly.bound(loose.regime.p), pairs)
+        mobility = self._mobility(loose, contacts)
         before = self._opening(t, moment, contacts, mobility)
         back = np.array([self._restitution(c, u) for c, u in zip(contacts, before.tolist(), strict=True)])
         opens = self._opening(t, loose, contacts, mobility)
@@ -120,6 +123,12 @@ class Collisions:
             _sums(owners, (-impulses * (opens + then) / 2).tolist()),
             self._given(t, loose, mobility, impulses),
         )
+
+    def _mobility(self, loose: Moment, contacts: Sequence[Contact]) -> Mobility:
+        """How impulses at contacts change speeds, in the modes in which all are open."""
+        regime, pairs = loose.regime, tuple(self._nodes(loose, contact) for contact in contacts)
+        stores, p = regime.assembly.stores, regime.p
+        return self._mobilities((regime, pairs), lambda: stores.mobility(regime.assembly.bound(p), pairs))
 
     def _apart(self, t: float, moment: Moment, contacts: Sequence[Contact], wanted: Mapping[int, str]) -> Moment:
         """The moment with all contacts open, and what rubs slipping; joined is what wants to be and never opens."""
