@@ -55,7 +55,7 @@ def test_parameters_that_a_given_law_or_a_mode_replaces_are_not_listed() -> None
     listed = {(row[1], row[2]) for row in rows(net.equations().document())}
     assert ("duration of the ramp", "motor") in listed
     assert ("frequency at which the boost ends", "motor") in listed
-    assert ("of rigid flanks, speed below which they stay together", "gap") in listed
+    assert ("of rigid flanks, speed up to which they stay together", "gap") in listed
 
 
 @pytest.mark.slow
