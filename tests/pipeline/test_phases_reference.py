@@ -209,7 +209,7 @@ def test_no_engine_ends_a_series_of_bounces_early(
 
 
 def test_slow_bounces_are_those_of_a_fast_motion_in_another_time() -> None:
-    """With a torque smaller by 1e-8 all speeds are smaller by 1e-4, the fastest 2e-4 rad/s, and all times longer by 1e4.
+    """With a torque smaller by 1e-8 all speeds are smaller by 1e-4, the fastest 2e-4 rad/s, all times longer by 1e4.
 
     A speed across of up to 1e-8 rad/s is no impact, so the slow ones end after some thirty.
     """
