@@ -15,8 +15,8 @@ import numpy as np
 import scipy_events as rival
 
 DRIVES, SIDE, BRAKE, LOAD, FIRST = range(5)
-"""Parameters: whether the motor drives, which flank carries, the signs of the two frictions; from FIRST on the sign with
-which each event is met, zero where it is not."""
+"""Parameters: whether the motor drives, which flank carries, the signs of the two frictions; from FIRST on the sign
+with which each event is met, zero where it is not."""
 UPPER, LOWER, PARTS, STOPS_1, SLIPS_1, STOPS_2, SLIPS_2 = range(7)
 """Events: a flank touches, the flanks part; of J1 and J2 each: it stops, and its friction gives way."""
 OFFSET = 1e-14
