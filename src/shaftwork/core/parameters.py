@@ -6,6 +6,7 @@ import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from operator import index
 from typing import Any
 
@@ -215,6 +216,10 @@ def without_unit(name: str, value: Any, whose: str) -> Any:
     return value
 
 
+_argument = lru_cache(maxsize=256)(Parameter)
+"""The declaration of an argument of a function: a short run asks for some of them again and again."""
+
+
 def in_si(name: str, value: Any, unit: str = "1", **bounds: Any) -> float:
     """A number that a user gave as an argument, in SI; a quantity with units is converted.
 
@@ -227,7 +232,7 @@ def in_si(name: str, value: Any, unit: str = "1", **bounds: Any) -> float:
     Raises:
         ParameterError: it is no number, of the wrong unit or outside its bounds.
     """
-    number, objection = Parameter(name, unit, "", **bounds).magnitude(value)
+    number, objection = _argument(name, unit, "", **bounds).magnitude(value)
     if objection is not None:
         raise ParameterError(f"{name} = {value!r} {objection}.")
     return float(number)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.start_values import initial_state, with_others
 from shaftwork.codegen.stores import Stores
-from shaftwork.core.errors import NetworkWarning
+from shaftwork.core.errors import NetworkWarning, Problem
 from shaftwork.core.notices import warn
 from shaftwork.network.checks import resting_trains
 from shaftwork.network.graph import CircuitGraph
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
     from shaftwork.pipeline.prepared import Prepared
     from shaftwork.pipeline.waves import CarriedWaves, WaveStart
 
+_RESTING: WeakKeyDictionary[CircuitGraph, tuple[Problem, ...]] = WeakKeyDictionary()
+"""What `resting_trains` gives: it takes as long as a short run."""
+
 
 def warn_of_rest(graph: CircuitGraph, initial: Mapping[str, float]) -> None:
     """Warn of trains that nothing joins to the drive and that no start value moves.
@@ -30,7 +34,9 @@ def warn_of_rest(graph: CircuitGraph, initial: Mapping[str, float]) -> None:
         initial: start values.
     """
     moved = {str(name).rpartition(".")[0] for name, value in initial.items() if value}
-    for found in resting_trains(graph):
+    if (resting := _RESTING.get(graph)) is None:
+        resting = _RESTING[graph] = resting_trains(graph)
+    for found in resting:
         if moved.isdisjoint((*found.parts, *found.nodes)):
             warn(f"'{graph.name}' has a train that stays at rest: {found}", NetworkWarning)
 

@@ -13,8 +13,7 @@ from shaftwork.pipeline.ensemble.programs import EnsembleCode
 from shaftwork.pipeline.phases.assemblies import Assembly
 from shaftwork.pipeline.phases.courses import FEW
 from shaftwork.pipeline.phases.elements import ModeNames
-from shaftwork.pipeline.phases.moments import CLEAR, EPS, GOLDEN, NOTHING, ROUNDINGS
-from shaftwork.pipeline.phases.settling import AHEAD, AHEAD_OF_RUN
+from shaftwork.pipeline.phases.moments import AHEAD, AHEAD_OF_RUN, CLEAR, EPS, GOLDEN, NOTHING, ROUNDINGS
 from shaftwork.pipeline.prepared import NOMINAL
 
 Mask = NDArray[np.bool_]

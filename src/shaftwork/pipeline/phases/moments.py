@@ -24,6 +24,9 @@ CLEAR = 8
 # What is as good as zero, and is not.
 NOTHING = 1e-200
 EPS = float(np.finfo(float).eps)
+# How far ahead the further course is looked at: parts of the time in which a state moves by its nominal size, and of
+# the run.
+AHEAD, AHEAD_OF_RUN = 1e-3, 1e-7
 GOLDEN = (5**0.5 - 1) / 2
 
 
@@ -97,17 +100,40 @@ class Regime:
         return partial(self.assembly.right_side, self.p)
 
     @cached_property
-    def _rounding(self) -> list[tuple[float, float, float]]:
-        """Of each state a part of it and the least that rounding moves it, to both sides and not alike; the side."""
+    def _moves(self) -> list[tuple[float, float, float, float]]:
+        """Of each state a part of it and the least that rounding moves it, to both sides and not alike; the side; and
+        how far a look ahead takes it.
+        """
         parts = [(-1) ** k * (0.5 + k * GOLDEN % 1) * ROUNDINGS * EPS for k in range(len(self.sizes))]
         pairs = zip(parts, self.sizes, strict=True)
-        return [(part, part * size / NOMINAL, math.copysign(1.0, part)) for part, size in pairs]
+        return [(part, part * size / NOMINAL, math.copysign(1.0, part), AHEAD * size) for part, size in pairs]
 
     def rounded(self, x: list[float], rates: list[float], tick: float) -> list[float]:
         """The states so far away as rounding may move them, and the time by a tick in s."""
-        changes = zip(x, rates, self._rounding, strict=True)
+        changes = zip(x, rates, self._moves, strict=True)
         # all of it to the same side: what a tick moves must not make up for the rest
-        return [v + part * abs(v) + least + way * tick * abs(rate) for v, rate, (part, least, way) in changes]
+        return [v + part * abs(v) + least + way * tick * abs(rate) for v, rate, (part, least, way, _) in changes]
+
+    def around(self, t: float, x: list[float], tick: float, step: float) -> tuple[list[float], ...]:
+        """The guards at an instant, as far away from it as rounding may move it, and later along a straight line.
+
+        Every event asks for them: one loop does what `rounded` and `Settling.ahead` do.
+
+        Args:
+            t: time, s.
+            x: states.
+            tick: how far rounding moves the time, s.
+            step: the longest look ahead, s.
+        """
+        rates, now = self.motion(t, x)
+        beside = []
+        for v, rate, (part, least, way, reach) in zip(x, rates, self._moves, strict=True):
+            speed = abs(rate)
+            beside.append(v + part * abs(v) + least + way * tick * speed)
+            if speed and reach < step * speed:
+                step = reach / speed
+        later = [v + step * rate for v, rate in zip(x, rates, strict=True)]
+        return now, self.limits(t + tick, beside), self.limits(t + step, later)
 
 
 class Moment(NamedTuple):

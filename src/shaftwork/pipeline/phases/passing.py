@@ -169,10 +169,8 @@ class Passing:
         way: _Way | None = ways[met] if met in ways else ways.setdefault(met, self._find(self.regime, met))
         if way is None:
             return None
-        to, states = way.to, x.tolist()[: self._size]
-        rates, now = to.motion(t, states)
-        tick, before = self._settling.tick, self.bands
-        near = to.limits(t + tick, to.rounded(states, rates, tick))
+        to, before = way.to, self.bands
+        now, near, later = to.around(t, x.tolist()[: self._size], self._settling.tick, self._settling.longest)
         bands = [0.0] * len(now)
         for guard, side, other in way.watched:
             beyond, band = side * now[guard], abs(near[guard] - now[guard])
@@ -181,9 +179,7 @@ class Passing:
             bands[guard] = clear_of_limit(beyond, band)
         if way.side * now[met] < 0:
             return None
-        step = self._settling.ahead(to, rates)
-        ahead = to.limits(t + step, [v + step * rate for v, rate in zip(states, rates, strict=True)])
-        if not way.side * (ahead[met] - now[met]) > 0:  # it is not left behind for good
+        if not way.side * (later[met] - now[met]) > 0:  # it is not left behind for good
             return None
         return to, bands, [Change(t, *way.change)]
 

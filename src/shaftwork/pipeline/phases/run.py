@@ -273,9 +273,7 @@ class Run:
         if self.demand.engine != "auto" or (stiff and not self.phases.tries_heyoka(moment.regime.assembly)):
             return self._solve(problem, name, why), passing
         most = problem.max_steps
-        first = min(most, choice.patience(problem)) if stiff else most
-        others = [(name, most)] if stiff else choice.without_series(most)
-        *tried, (last, _) = [("heyoka", first), *others]
+        tried, last = [("heyoka", min(most, choice.patience(problem)) if stiff else most)], name
         sticks: StickingError | None = None
         failed: SeriesError | None = None
         for engine, steps in tried:
@@ -289,6 +287,9 @@ class Run:
                     raise
                 if isinstance(error, StickingError) and error.held:
                     raise
+            if engine == "heyoka" and not stiff:
+                *others, (last, _) = choice.without_series(most)
+                tried += others
             del self.changes[noted:]
             self._soon = [*soon]
             passing = Passing(self.settling, moment, t, self.note)

@@ -17,14 +17,21 @@ from shaftwork.pipeline.phases.commutation import commutations
 from shaftwork.pipeline.phases.courses import Way, chosen, later, leaving, moved
 from shaftwork.pipeline.phases.elements import ModeNames, Watched
 from shaftwork.pipeline.phases.impacts import Impacts
-from shaftwork.pipeline.phases.moments import ROUNDINGS, Change, Moment, Regime, clear_of_limits, together
+from shaftwork.pipeline.phases.moments import (
+    AHEAD,
+    AHEAD_OF_RUN,
+    ROUNDINGS,
+    Change,
+    Moment,
+    Regime,
+    clear_of_limits,
+    together,
+)
 from shaftwork.pipeline.phases.regimes import Regimes, refuse_beyond, with_modes
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.phases.phases import Phases
 
-# How far ahead that course is looked at: parts of the time in which a state moves by its nominal size, and of the run.
-AHEAD, AHEAD_OF_RUN = 1e-3, 1e-7
 # So many changes within one instant have no end: of two rigid flanks without a gap between them, say.
 MOST_AT_ONCE = 2000
 MOST_REPEATS = 2
@@ -48,7 +55,8 @@ class Settling:
         self._phases, self.elements = phases, phases.elements
         self._regimes = Regimes(phases, values, own=own)
         self.regime, self.held, self.resumed = self._regimes.regime, self._regimes.held, self._regimes.resumed
-        self._ahead = AHEAD_OF_RUN * (span[1] - span[0])
+        self.longest = AHEAD_OF_RUN * (span[1] - span[0])
+        """How far ahead in s the further course is looked at, at most."""
         self.tick = ROUNDINGS * math.ulp(max(map(abs, span)))
         """How far in s rounding moves the time."""
         self._impacts = Impacts(self._regimes, self.elements, self.tick, together=phases.netlist.impacts == "together")
@@ -124,8 +132,7 @@ class Settling:
                 found[k] = made.leave.to, made.guard
         if not found:
             return {}
-        rates, now = regime.motion(t, x)
-        others = regime.limits(t + self.tick, regime.rounded(x, rates, self.tick))
+        now, others, _ = regime.around(t, x, self.tick, self.longest)
         return {k: to for k, (to, guard) in found.items() if now[guard] == others[guard] == 0.0}
 
     def _fewest(self, t: float, after: float, moment: Moment, met: int | None) -> tuple[Moment, list[Change]]:
@@ -261,7 +268,7 @@ class Settling:
 
     def ahead(self, regime: Regime, rates: list[float]) -> float:
         """How far in s the further course is looked at."""
-        step = self._ahead
+        step = self.longest
         for rate, size in zip(rates, regime.sizes, strict=True):
             if rate and AHEAD * size < step * abs(rate):
                 step = AHEAD * size / abs(rate)
