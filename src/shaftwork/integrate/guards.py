@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
 from scipy.optimize import brentq
 
 from shaftwork.core.errors import no_value
-from shaftwork.integrate.chebyshev import Polynomial, points
+from shaftwork.integrate.chebyshev import course, points
 from shaftwork.integrate.crossings import FIRST, LOOKS, Look, tolerance
 from shaftwork.integrate.problem import Array, DaeProblem, Explain, Guards, Problem
 
@@ -18,6 +18,8 @@ Dense = Callable[[Array], Array]
 # What the tolerance moves a guard, as part of its course in a run of a few steps, may be no more.
 KNOWN, BRIEF = 1e-5, 100
 
+# Where a step is looked at, one after another while a guard may be met; or all at once, where that costs no more.
+BY_AND_BY, AT_ONCE = (FIRST, LOOKS), (np.sort(np.append(FIRST, LOOKS)),)
 # No step is shorter than so many rounding units of the time.
 CLEARANCE = 8
 # A step that meets a guard is looked at in panels that are halved towards it, so many times; Gauss' nodes in each.
@@ -53,14 +55,16 @@ class GuardWatch:
         problem: what is being solved.
         low: the earliest time in s at which inputs are read.
         high: the latest.
+        looks: parts of a step at which it is looked at.
     """
 
-    def __init__(self, problem: Guarded, low: float, high: float) -> None:
+    def __init__(self, problem: Guarded, low: float, high: float, looks: Sequence[Array] = BY_AND_BY) -> None:
         guards = problem.guards
         self._columns = np.zeros(0, dtype=np.intp) if guards is None else np.flatnonzero(guards.sides)
+        self._sides = np.zeros(0) if guards is None else guards.sides[self._columns]
         self._offsets = np.zeros(0) if guards is None else guards.offsets[self._columns]
         self._guards, self._low, self._high = guards, low, high
-        self._problem = problem
+        self._problem, self._looks = problem, looks
         self.met: int | None = None
 
     def cut(self, start: float, x: Array, end: float, y: Array, dense: Dense) -> float | None:
@@ -78,12 +82,15 @@ class GuardWatch:
         """
         if not self._columns.size:
             return None
-        first = start + FIRST * (end - start)
-        times, states = np.array([start, *first, end]), np.vstack([x, dense(first), y])
+        first, *further = (start + shares * (end - start) for shares in self._looks)
+        times, states = np.concatenate([[start], first, [end]]), np.concatenate([x[None], dense(first), y[None]])
         look = Look(self._values, times, states, dense, -np.ones(self._columns.size))
-        if look.is_far() and (look.values[0] < 0).all():
+        if further and look.is_far() and (look.values[0] < 0).all():
             return None
-        look.add(start + LOOKS * (end - start))
+        for times in further:
+            look.add(times)
+        if look.values.max() < 0 and not look.denser():
+            return None
         self._refuse_none(look)
         if (look.values[0] >= 0).any():  # what is above zero by rounding may fall and rise again ere the first look
             look.add(start + NEARER * (look.times[1] - start))
@@ -149,8 +156,8 @@ class GuardWatch:
 
     def _values(self, times: Array, states: Array) -> Array:
         assert self._guards is not None  # noqa: S101 (asked only then)
-        values = self._guards.values(np.clip(times, self._low, self._high), states)
-        return np.asarray((values * self._guards.sides - self._guards.offsets)[:, self._columns])
+        values = self._guards.values(np.minimum(np.maximum(times, self._low), self._high), states)
+        return np.asarray(values[:, self._columns] * self._sides - self._offsets)
 
     def _time(self, look: Look, column: int, noise: float) -> float | None:
         """When a guard rises through zero; one that is above it from the start, by noise, has to fall first."""
@@ -175,8 +182,8 @@ class GuardWatch:
         polynomial through their values at some times, where their values beside it agree.
         """
         low, high, ulp = float(look.times[before]), float(look.times[row]), float(np.spacing(look.times[-1]))
-        course = Polynomial(low, high, look.at(np.minimum(low + (high - low) * points(DEGREE), high))[:, [column]])
-        root = _zero(lambda t: float(course(np.array([t]))[0, 0]), low, high, ulp)
+        nodes = look.at(np.minimum(low + (high - low) * points(DEGREE), high))[:, column]
+        root = _zero(course(low, high, nodes), low, high, ulp)
         beside = look.at(root + BESIDE * ulp * np.array([-1.0, 1.0]))[:, column]
         if root == high or beside[0] < 0 < beside[1]:
             return root
