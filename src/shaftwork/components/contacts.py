@@ -205,7 +205,8 @@ class HardStop(Component):
 
     Law: as of a `Backlash`, with limits of its own, of which one may be left out. Without c the stop is rigid, and the
     speed omega with which it is hit comes back as -restitution omega, until rounding hides the rebounds; up to
-    omega_rest it stays in contact, and never pulls. Modes: open, in contact, in contact backward. Source: Newton's law of impact.
+    omega_rest it stays in contact, and never pulls. Modes: open, in contact, in contact backward.
+    Source: Newton's law of impact.
     """
 
     upper: float | None = parameter("rad", "upper limit of the twist", default=None, latex=r"\varphi_+")

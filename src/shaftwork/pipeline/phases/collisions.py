@@ -92,15 +92,11 @@ class Collisions:
         regimes: combinations of modes.
         elements: of the network.
         impulses: follows what passes through gears that rub.
-        tick: how far in s rounding moves the time.
         together: whether what touches is thrown back in the same instant as what is hit, and not after it.
     """
 
-    def __init__(
-        self, regimes: Regimes, elements: Sequence[Element], impulses: Impulses, tick: float, *, together: bool
-    ) -> None:
-        self._regimes, self._elements, self._impulses = regimes, elements, impulses
-        self._tick, self._together = tick, together
+    def __init__(self, regimes: Regimes, elements: Sequence[Element], impulses: Impulses, *, together: bool) -> None:
+        self._regimes, self._elements, self._impulses, self._together = regimes, elements, impulses, together
         self._mobilities = Kept[tuple[Regime, tuple[tuple[int, int], ...]], Mobility](KEPT)
 
     def impact(self, t: float, moment: Moment, number: int, leave: Leave) -> Collision:
@@ -192,7 +188,7 @@ class Collisions:
 
     def _slipping(self, t: float, moment: Moment, after: Moment, least: float) -> dict[int, str]:
         """The modes of what rubs after an impact: it slips where the speed across it is more than the least."""
-        speeds = {k: self._across(t, after, k) for k in self._rubbing(moment)}
+        speeds = {k: after.across(k, t) for k in self._rubbing(moment)}
         return {
             k: next((to for side, to in ways if side * speeds[k] > least), moment.regime.modes[k])
             for k, ways in self._rubbing(moment).items()
@@ -227,11 +223,7 @@ class Collisions:
 
     def _opens(self, t: float, moment: Moment, contact: Contact) -> float:
         """The speed at which a contact opens."""
-        return contact.side * self._across(t, moment, contact.number)
-
-    @staticmethod
-    def _across(t: float, moment: Moment, number: int) -> float:
-        return moment.regime.assembly.across(number, t, moment.x, moment.regime.p)
+        return contact.side * moment.across(contact.number, t)
 
     def _nodes(self, moment: Moment, contact: Contact) -> tuple[int, int]:
         """The nodes of a contact, that first whose speed opens it."""
@@ -247,9 +239,8 @@ class Collisions:
 
     def _contacts(self, t: float, moment: Moment, number: int, leave: Leave) -> Iterator[Contact]:
         """Contacts that are closed or touch, freewheels, and the element that wants to close."""
-        regime, x = moment.regime, moment.x.tolist()
-        rates, now = regime.motion(t, x)
-        near = regime.limits(t + self._tick, regime.rounded(x, rates, self._tick))
+        regime, here = moment.regime, moment.course(t)
+        now, bands = here[3], regime.bands(here)
         for k, (element, name) in enumerate(zip(self._elements, regime.modes, strict=True)):
             modes = element.modes
             if (side := one_side(modes, name)) is not None:
@@ -258,12 +249,12 @@ class Collisions:
         for k, watched in regime.watched:
             closes, guard = watched.leave, watched.guard
             wanted = k == number and closes.to == leave.to
-            touches = watched.side * now[guard] > -CLEAR * abs(near[guard] - now[guard])
+            touches = watched.side * now[guard] > -CLEAR * bands[guard]
             takes_part = wanted or (k in overrun if closes.rebound is None else touches)
             side = one_side(self._elements[k].modes, closes.to) if takes_part and closes.to else None
             if side is not None:
                 closes = leave if wanted else closes
-                constants = (regime.assembly.constant(k, given, regime.p) for given in (closes.rebound, closes.rest))
+                constants = (regime.constant(k, given) for given in (closes.rebound, closes.rest))
                 yield Contact(k, side, regime.modes[k], closes.to, closes, *constants)
 
 

@@ -24,14 +24,13 @@ class Impacts:
     Args:
         regimes: combinations of modes.
         elements: of the network.
-        tick: how far in s rounding moves the time.
         together: whether what touches is hit in the same instant as what hits it.
     """
 
-    def __init__(self, regimes: Regimes, elements: Sequence[Element], tick: float, *, together: bool) -> None:
-        self._regimes, self._elements, self._tick = regimes, elements, tick
+    def __init__(self, regimes: Regimes, elements: Sequence[Element], *, together: bool) -> None:
+        self._regimes, self._elements = regimes, elements
         self._impulses = Impulses(regimes, elements)
-        self._collisions = Collisions(regimes, elements, self._impulses, tick, together=together)
+        self._collisions = Collisions(regimes, elements, self._impulses, together=together)
         self.gears = self._impulses.gears
 
     def meets(self, moment: Moment, t: float, to: Mode, number: int) -> float:
@@ -39,10 +38,12 @@ class Impacts:
         regime, modes = moment.regime, self._elements[number].modes
         if to.form in (modes.options[0].form, modes[regime.modes[number]].form):
             return 0.0
-        speed = regime.assembly.across(number, t, moment.x, regime.p)
+        speed = moment.across(number, t)
         speeds = moment.x[: len(regime.assembly.model.form.across_states)]
         least = NO_IMPACT * np.abs(speeds).max(initial=1.0)
-        if abs(speed) <= least or abs(speed) <= abs(speed - self._shortly_before(moment, t, number)):
+        # so long ago as its guard may be found late, and twice that to be sure
+        before = moment.moved(t, -2 * CLEAR * regime.tick).across(number, t)
+        if abs(speed) <= least or abs(speed) <= abs(speed - before):
             return 0.0
         try:
             joined = self._regimes.changed(moment, t, with_modes(regime.modes, {number: to.name}))
@@ -51,12 +52,6 @@ class Impacts:
         held, after = self._regimes.held(moment, t), self._regimes.held(joined, t)
         # between dampers alone a speed is whatever their torques make it: joining them stops no inertia
         return speed if any(abs(after[name] - value) > least for name, value in held.items()) else 0.0
-
-    def _shortly_before(self, moment: Moment, t: float, number: int) -> float:
-        """The speed across an element so long ago as its guard may be found late, twice that to be sure."""
-        regime, late = moment.regime, 2 * CLEAR * self._tick
-        rates = np.array(regime.motion(t, moment.x.tolist())[0])
-        return regime.assembly.across(number, t, moment.x - late * rates, regime.p)
 
     def fastest(self, t: float, moment: Moment, number: int, ended: Watched) -> tuple[int, Watched]:
         """Of what is hit at an instant in s what closes fastest, element and guard: impacts follow each other."""
@@ -106,7 +101,7 @@ class Impacts:
 
         Without it they would open and close for ever, each time as far beyond their limit as rounding hides it.
         """
-        regime, x = moment.regime, moment.x.tolist()
+        regime = moment.regime
         parted = [
             (k, made)
             for k, made in regime.watched
@@ -114,14 +109,11 @@ class Impacts:
         ]
         if not parted:
             return moment
-        rates, now = regime.motion(t, x)
-        near = regime.limits(t + self._tick, regime.rounded(x, rates, self._tick))
-        kept = {}
+        bands, kept = regime.bands(moment.course(t)), {}
         for k, made in parted:
             way = float(made.leave.when.diff(INTEGRAL))
-            speeds = (moment.x, moment.x + np.array(rates))
-            speed, later = (way * regime.assembly.across(k, t, at, regime.p) for at in speeds)
-            if speed**2 < 4 * (later - speed) * CLEAR * abs(near[made.guard] - now[made.guard]):
+            speed, later = (way * one.across(k, t) for one in (moment, moment.moved(t, 1.0)))
+            if speed**2 < 4 * (later - speed) * CLEAR * bands[made.guard]:
                 kept[k] = before[k]
         return self._regimes.changed(moment, t, with_modes(regime.modes, kept)) if kept else moment
 
@@ -133,7 +125,7 @@ class Impacts:
         if place is None or not slope:
             return moment
         x = moment.x.copy()
-        x[place] = -assembly.constant(number, leave.when.xreplace({INTEGRAL: Integer(0)}) / slope, moment.regime.p)
+        x[place] = -moment.regime.constant(number, leave.when.xreplace({INTEGRAL: Integer(0)}) / slope)
         return moment._replace(x=x)
 
     def _refuse_gain(
@@ -214,8 +206,7 @@ class Impacts:
         made = {**joins, **{k: ways[0][1] for k, ways in gives.items()}}
         while True:
             moment = self._regimes.taking(with_modes(before, made), t, held)
-            after = moment.regime
-            speeds = {k: after.assembly.across(k, t, moment.x, after.p) for k in gives}
+            speeds = {k: moment.across(k, t) for k in gives}
             ways = {k: [name for side, name in gives[k] if side * speeds[k] > 0] for k in gives}
             pressed = [k for k in gives if abs(speeds[k]) > least and not ways[k]]
             if not pressed:

@@ -81,7 +81,7 @@ class Impulses:
 
     def begins(self, moment: Moment, t: float) -> Start:
         """Where an impact begins, with the inputs of a time in s."""
-        return Start(moment, t, self._regimes.held(moment, t), {k: self.across(moment, t, k) for k in self.gears})
+        return Start(moment, t, self._regimes.held(moment, t), {k: moment.across(k, t) for k in self.gears})
 
     def stages(self, t: float, start: Start, blow: Callable[[Start, Sequence[Stage]], Blow]) -> tuple[Stage, ...]:
         """All parts of an impulse, of which the last leads to its end.
@@ -115,7 +115,7 @@ class Impulses:
             name: value + share * gain
             for (name, value), gain in zip(start.held.items(), self._gained(t, start, blow).values(), strict=True)
         }
-        speeds = {k: v + share * (self.across(blow.after, t, k) - v) for k, v in start.speeds.items()}
+        speeds = {k: v + share * (blow.after.across(k, t) - v) for k, v in start.speeds.items()}
         return Start(self._regimes.taking(modes, t, held), t, held, {**speeds, number: 0.0})
 
     def _in_modes(self, t: float, start: Start, modes: ModeNames) -> Start:
@@ -204,7 +204,7 @@ class Impulses:
         states = (made.x[: len(made.regime.assembly.model.states)] for made in (start.moment, after))
         least = NOTHING_OF * max(np.abs(x).max(initial=0.0) for x in states)
         for k, speed in start.speeds.items():
-            speeds = speed, self.across(after, t, k)
+            speeds = speed, after.across(k, t)
             for leave in self._elements[k].modes[start.moment.regime.modes[k]].leaves:
                 way = float(leave.when.diff(ACROSS))
                 began, ends = (0.0 if abs(speed) <= least else way * speed for speed in speeds)
@@ -258,7 +258,7 @@ class Impulses:
             impulses = self._impulses(t, stage.start, stage.blow)
             for k, began in stage.start.speeds.items():
                 name, passing = self._elements[k].part.name, stage.blow.passing.assembly
-                ends = self.across(stage.blow.after, t, k)
+                ends = stage.blow.after.across(k, t)
                 moment, time, speed = (stage.blow.after, t, ends) if ends else (*stage.start[:2], began)
                 # the speeds of a mesh are in proportion to that of its gear
                 mean = (began + stage.share / 2 * (ends - began)) / speed if speed else 0.0
@@ -266,11 +266,6 @@ class Impulses:
                 lost = sum(stage.share * impulses[branch] * mean * across for branch, across in pairs)
                 found[name] = found.get(name, 0.0) + float(lost)
         return found
-
-    @staticmethod
-    def across(moment: Moment, t: float, number: int) -> float:
-        """The speed across an element."""
-        return moment.regime.assembly.across(number, t, moment.x, moment.regime.p)
 
     def _impulses(self, t: float, start: Start, found: Blow) -> Array:
         """(branches,) what passes through every branch at once."""

@@ -14,7 +14,6 @@ from shaftwork.core.errors import no_value
 from shaftwork.integrate.problem import Reaction, SeriesError
 from shaftwork.pipeline.phases.elements import Element, ModeNames
 from shaftwork.pipeline.phases.moments import Change, Moment, Regime, clear_of_limit
-from shaftwork.pipeline.phases.rejoining import settled
 from shaftwork.pipeline.phases.settling import Settling
 
 # Of so many roundings of the time a guard may be late that is met together with another one.
@@ -129,7 +128,7 @@ class Passing:
     def _settled(self, met: int, t: float, x: Array) -> _Following | None:
         before = Moment(self.regime, x[: self._size].copy(), self.bands)
         self.refuse_missed(met, t, x)
-        moment, changes = settled(self._settling, t, t, before, met)
+        moment, changes = self._settling.settle(t, t, before, met)
         if moment.x is before.x:
             return moment.regime, moment.bands, changes
         self.beyond = moment, changes  # other states are other equations, or an impact in these
@@ -142,14 +141,13 @@ class Passing:
             SeriesError: the engine has not seen it.
             SimulationError: a law or a guard has no value.
         """
-        regime, bands, states = self.regime, self.bands, x[: self._size].tolist()
-        rates, now = regime.motion(t, states)
+        regime, bands = self.regime, self.bands
+        here = regime.course(t, x[: self._size].tolist())
+        now, before = here[3], regime.limits(*regime.later(here, -LATE * regime.tick))
         if any(map(math.isnan, now)):
-            law = regime.assembly.without_value(regime.p, regime.modes, np.array([t]), np.array([states]))
+            law = regime.assembly.without_value(regime.p, regime.modes, np.array([t]), np.array([here[1]]))
             if law is not None:
                 raise no_value(*law)
-        late = LATE * self._settling.tick
-        before = regime.limits(t - late, [v - late * rate for v, rate in zip(states, rates, strict=True)])
         for number, made in regime.watched:
             k = made.guard
             if k != met and min(made.side * now[k], made.side * before[k]) > bands[k]:
@@ -170,7 +168,8 @@ class Passing:
         if way is None:
             return None
         to, before = way.to, self.bands
-        now, near, later = to.around(t, x.tolist()[: self._size], self._settling.tick, self._settling.longest)
+        here = to.course(t, x.tolist()[: self._size])
+        now, near = here[3], to.limits(*to.beside(here))
         bands = [0.0] * len(now)
         for guard, side, other in way.watched:
             beyond, band = side * now[guard], abs(near[guard] - now[guard])
@@ -179,6 +178,7 @@ class Passing:
             bands[guard] = clear_of_limit(beyond, band)
         if way.side * now[met] < 0:
             return None
+        later = to.limits(*to.later(here, to.ahead(here[2])))
         if not way.side * (later[met] - now[met]) > 0:  # it is not left behind for good
             return None
         return to, bands, [Change(t, *way.change)]
