@@ -160,15 +160,13 @@ class Settling:
         found: list[tuple[Moment, list[Change]]] = []
         failed: list[SimulationError] = []
         ways = self._at_once(moment, after, named)
-        least = max(1, len({number for number, made in ways if made.leave.by_twist}))
         for first in ways:
             try:
                 found.append(self._consistent(t, after, moment, first))
             except SimulationError as error:
                 failed.append(error)
             else:
-                changes = found[-1][1]
-                if len(changes) == 1 or (len(changes) == least and not any(one.impact for one in changes)):
+                if len(found[-1][1]) == 1:
                     break  # none can be fewer
         if not found:
             raise failed[0]
@@ -180,7 +178,7 @@ class Settling:
         now, bands = regime.limits(t, moment.x.tolist()), moment.bands
         if bands and all(made.side * now[made.guard] < -NEAR * bands[made.guard] for _, made in others):
             return [named]
-        ways = [pair for _, pair in self._exceeded(moment, t, moment, (), repeats=1)[1]]
+        ways = [pair for _, pair in self._exceeded(moment, t, moment, (), in_order=True)[1]]
         if named not in ways and (not named[1].leave.by_torque or all(pair[1].leave.by_torque for pair in ways)):
             ways.append(named)
         return sorted(ways, key=moment.regime.watched.index)
@@ -233,11 +231,12 @@ class Settling:
                 faster to modes that are consistent, as a rule; but this always does where parts hold each other
                 (Murty, Linear Complementarity, 1988, section 4.1).
         """
-        moment, found = self._exceeded(moment, t, ended, still, repeats)
-        return moment, chosen(found, in_order=repeats > 0)
+        in_order = repeats > 0
+        moment, found = self._exceeded(moment, t, ended, still, in_order=in_order)
+        return moment, chosen(found, in_order=in_order)
 
     def _exceeded(
-        self, moment: Moment, t: float, ended: Moment, still: Sequence[Way], repeats: int
+        self, moment: Moment, t: float, ended: Moment, still: Sequence[Way], *, in_order: bool
     ) -> tuple[Moment, list[tuple[float, Way]]]:
         """The guards beyond their limits, or on them and about to go beyond, and how far; the moment with its bands.
 
@@ -246,8 +245,7 @@ class Settling:
             t: s.
             ended: the moment before any change.
             still: elements and guards that were found here already and change nothing.
-            repeats: how often modes have come back. After the second time, what comes back within its limit by itself,
-                at once, is no more beyond it.
+            in_order: whether the first one will be taken, and not the worst.
         """
         regime, here = moment.regime, moment.course(t)
         beside, now = regime.course(*regime.beside(here)), here[3]
@@ -265,15 +263,12 @@ class Settling:
                 on_limit.append(pair)
             elif value > 0:
                 beyond.append((value, pair))
-        if repeats > 1 and beyond:
-            soon = regime.limits(*regime.later(here, regime.ahead(here[2])))
-            beyond = [excess for excess in beyond if excess[1][1].side * soon[excess[1][1].guard] > 0]
         # impacts come first: torques are those of the motion after them
         hits = [excess for excess in beyond if not excess[1][1].leave.by_torque]
         if on_limit and not hits:
             soon_beyond = leaving(regime, here, beside, on_limit)
             hits = [excess for excess in soon_beyond if excess[1][1].leave.rebound is not None]
-            beyond = beyond + soon_beyond if repeats else beyond or soon_beyond
+            beyond = beyond + soon_beyond if in_order else beyond or soon_beyond
         return Moment(regime, moment.x, clear_of_limits(regime, now, bands)), hits or beyond
 
     def _follow(
