@@ -28,6 +28,8 @@ GEAR = ("driving forward", "driving backward", "driven forward", "driven backwar
 """The modes of a gear, in the order in which they are tried: a jam is the last way."""
 MOST_WAYS = 2000
 """So many combinations of what is at its bounds are tried."""
+TOUCHES = 1e-12
+"""A contact within this twist of its limit, rad, touches: rounding."""
 SLOW = 2.0
 """A contact is hit that closes by more than this many times what torques change in a step."""
 TINY = 1e-11
@@ -110,7 +112,7 @@ class Stepper:
                 return -most, most, 0.0, 0.0
             case "freewheel":
                 return 0.0, math.inf, 0.0, 0.0
-        side = 1.0 if x >= upper else -1.0 if x <= lower else 0.0
+        side = 1.0 if x > upper - TOUCHES else -1.0 if x < lower + TOUCHES else 0.0
         bounds = {1.0: (0.0, math.inf), -1.0: (-math.inf, 0.0), 0.0: (0.0, 0.0)}[side]
         if joint.kind == "soft":
             beyond = self.gaps[k] - (upper if side > 0 else lower)

@@ -100,7 +100,8 @@ def complementary(W: Array, q: Array) -> Array | None:
 
     W is symmetric and positive semidefinite, so it is the least square of what A lambda leaves of b with W = A' A,
     q = -A' b, solved by an active set. W lambda is unique, and so are speeds. Where lambda is not, as of contacts side
-    by side, it is the least one, which they share: their order says nothing.
+    by side, it is the least one, which they share: their order says nothing. Beside couplings that lose
+    power W is not symmetric: the same active set is sought, and None says as well that it was not found.
 
     Source: Lawson and Hanson, Solving Least Squares Problems, 1974, chapter 23.
     """
