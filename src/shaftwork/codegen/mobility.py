@@ -83,18 +83,6 @@ def _massless(form: StateForm) -> list[int]:
     return [branch for kind in WITHOUT_INERTIA for branch in form.tree.tree[kind]]
 
 
-def restituted(W: Array, opens: Array, shares: Array) -> Array:
-    """(m,) impulses of restitution: the shares that contacts give back, and what then keeps others from closing.
-
-    Args:
-        W: (m, m) as of a `Mobility`.
-        opens: (m,) speeds at which contacts open after the compression; none closes but by rounding.
-        shares: (m,) impulses that they give back.
-    """
-    further = complementary(W, np.maximum(opens, 0.0) + W @ shares)
-    return shares if further is None else shares + further
-
-
 def complementary(W: Array, q: Array) -> Array | None:
     """(m,) lambda >= 0 with w = W lambda + q >= 0 and lambda w = 0, or None where there is none.
 

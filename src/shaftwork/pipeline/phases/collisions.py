@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.mobility import ROUNDING, Mobility, complementary, restituted
+from shaftwork.codegen.mobility import Mobility, complementary
 from shaftwork.components.branches import ACROSS
 from shaftwork.components.modes import Leave, Modes
 from shaftwork.core.kept import Kept
@@ -41,8 +41,6 @@ KEPT = 64
 """Sets of contacts of which what impulses do is kept."""
 SAME = 1e-9
 """Speeds at which contacts close that differ by less than this fraction are the same."""
-MOST_FACTORS = 50
-"""So many steps find how far contacts give back an energy."""
 
 
 class Contact(NamedTuple):
@@ -154,19 +152,32 @@ class Collisions:
     ) -> tuple[Stage, ...]:
         """From the end of the compression on, until contacts have given back their shares (contacts,) of it.
 
-        Beside gears that rub it is the energy of which e^2 comes back (Stronge 1990), by impulses in the same ratio.
+        A gear that rubs answers impulses otherwise than on the way in, so it is the energy of the same way back that
+        tells how large they are (Stronge 1990). What they would let close is kept from it by impulses beside them.
         """
-        shares, energy = back * _pressed(compression), float(back**2 @ self._taken(t, contacts, compression))
+        shares, energy = back * _pressed(compression), self._returned(t, contacts, compression, back)
 
         def thrown(start: Start, made: Sequence[Stage]) -> Blow:
-            mobility, opens = self._mobility(t, start.moment, contacts)
-            impulses = restituted(mobility.W, opens, shares)
-            if self._impulses.gears:
-                left = energy + float((back > 0) @ self._taken(t, contacts, made))
-                impulses = _of_energy(mobility.W, opens, shares, max(left, 0.0))
-            return _blow(start, mobility, impulses)
+            left = energy
+            for begun, share in (*((stage.start, stage.share) for stage in made), (start, 0.0)):
+                mobility, opens = self._mobility(t, begun.moment, contacts)
+                impulses = _of_energy(left, shares, opens, mobility.W)
+                gives = share * impulses
+                left -= float(gives @ (opens + mobility.W @ gives / 2))
+            further = complementary(mobility.W, np.maximum(opens, 0.0) + mobility.W @ impulses)
+            return _blow(start, mobility, impulses if further is None else impulses + further)
 
         return self._impulses.stages(t, self._impulses.begins(compression[-1].blow.after, t), thrown)
+
+    def _returned(self, t: float, contacts: Sequence[Contact], stages: Sequence[Stage], back: Array) -> float:
+        """Energy in J that comes back by shares (contacts,) of all impulses, the last first, if all answers as then."""
+        energy, opens = 0.0, np.zeros(len(contacts))
+        for start, blow, share in reversed(stages):
+            impulses = back * share * blow.pressed
+            gains = self._mobility(t, start.moment, contacts)[0].W @ impulses
+            energy += float(impulses @ (opens + gains / 2))
+            opens += gains
+        return energy
 
     def _taken(self, t: float, contacts: Sequence[Contact], stages: Sequence[Stage]) -> Array:
         """(contacts,) energy in J that contacts take up: their impulses at the mean of their closing speeds."""
@@ -293,22 +304,13 @@ def _pressed(stages: Sequence[Stage]) -> Array:
     return np.asarray(np.sum([stage.share * stage.blow.pressed for stage in stages], axis=0))
 
 
-def _of_energy(W: Array, opens: Array, shares: Array, energy: float) -> Array:
-    """(contacts,) impulses of restitution in the ratio of shares (contacts,), by which these give back an energy in J.
-
-    The energy is a parabola of the factor of the shares, as long as the same contacts are pressed.
-    """
-    factor, linear = 1.0, float(shares @ opens)
-    for _ in range(MOST_FACTORS):
-        impulses = restituted(W, opens, factor * shares)
-        gives = float((impulses * (opens + W @ impulses / 2))[shares > 0].sum())
-        square = (gives - factor * linear) / factor**2
-        if not square > 0 or not energy > 0:  # both sides are held, or all has come back
-            break
-        before, factor = factor, 2 * energy / (linear + math.sqrt(linear**2 + 4 * square * energy))
-        if abs(factor - before) <= ROUNDING * factor:
-            break
-    return impulses if energy > 0 else np.zeros(len(opens))
+def _of_energy(energy: float, shares: Array, opens: Array, W: Array) -> Array:
+    """(contacts,) impulses in the ratio of shares (contacts,) by which contacts give back an energy in J."""
+    linear, square = float(shares @ opens), float(shares @ W @ shares)
+    if not square > 0:  # both sides are held, until a gear gives way
+        return shares if energy > 0 else 0 * shares
+    energy = max(energy, 0.0)
+    return shares * (2 * energy / (linear + math.sqrt(linear**2 + 2 * square * energy)) if energy else 0.0)
 
 
 def _sums(pairs: Iterable[tuple[str, float]]) -> dict[str, float]:
