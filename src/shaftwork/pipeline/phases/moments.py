@@ -11,9 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from shaftwork.codegen.code import Moves
 from shaftwork.codegen.elements import Array
 from shaftwork.components.laws import t as TIME
-from shaftwork.pipeline.phases.assemblies import Assembly, Limits, Motion
+from shaftwork.pipeline.phases.assemblies import Assembly, Limits, Motion, Near
 from shaftwork.pipeline.phases.elements import Element, ModeNames, Watched
 from shaftwork.pipeline.prepared import NOMINAL
 
@@ -67,6 +68,7 @@ class Regime:
         p: their parameters, numbers of modes among them.
         motion: rates and guards at an instant.
         limits: the guards alone.
+        near: the guards around an instant, by the `moves` of the states.
         sides: (guards,) on which each is met.
         sizes: nominal size of each state.
         watched: element and guard of everything that may end one of the modes.
@@ -78,6 +80,7 @@ class Regime:
     p: Array
     motion: Motion
     limits: Limits
+    near: Near
     sides: Array
     sizes: list[float]
     watched: tuple[tuple[int, Watched], ...]
@@ -100,7 +103,7 @@ class Regime:
         return partial(self.assembly.right_side, self.p)
 
     @cached_property
-    def _moves(self) -> list[tuple[float, float, float, float]]:
+    def moves(self) -> Moves:
         """Of each state a part of it and the least that rounding moves it, to both sides and not alike; the side; and
         how far a look ahead takes it.
         """
@@ -110,30 +113,9 @@ class Regime:
 
     def rounded(self, x: list[float], rates: list[float], tick: float) -> list[float]:
         """The states so far away as rounding may move them, and the time by a tick in s."""
-        changes = zip(x, rates, self._moves, strict=True)
+        changes = zip(x, rates, self.moves, strict=True)
         # all of it to the same side: what a tick moves must not make up for the rest
         return [v + part * abs(v) + least + way * tick * abs(rate) for v, rate, (part, least, way, _) in changes]
-
-    def around(self, t: float, x: list[float], tick: float, step: float) -> tuple[list[float], ...]:
-        """The guards at an instant, as far away from it as rounding may move it, and later along a straight line.
-
-        Every event asks for them: one loop does what `rounded` and `Settling.ahead` do.
-
-        Args:
-            t: time, s.
-            x: states.
-            tick: how far rounding moves the time, s.
-            step: the longest look ahead, s.
-        """
-        rates, now = self.motion(t, x)
-        beside = []
-        for v, rate, (part, least, way, reach) in zip(x, rates, self._moves, strict=True):
-            speed = abs(rate)
-            beside.append(v + part * abs(v) + least + way * tick * speed)
-            if speed and reach < step * speed:
-                step = reach / speed
-        later = [v + step * rate for v, rate in zip(x, rates, strict=True)]
-        return now, self.limits(t + tick, beside), self.limits(t + step, later)
 
 
 class Moment(NamedTuple):

@@ -132,7 +132,7 @@ class Settling:
                 found[k] = made.leave.to, made.guard
         if not found:
             return {}
-        now, others, _ = regime.around(t, x, self.tick, self.longest)
+        now, others, _ = regime.near(t, x, self.tick, regime.moves, self.longest)
         return {k: to for k, (to, guard) in found.items() if now[guard] == others[guard] == 0.0}
 
     def _fewest(self, t: float, after: float, moment: Moment, met: int | None) -> tuple[Moment, list[Change]]:
