@@ -51,11 +51,11 @@ def test_parameters_that_a_given_law_or_a_mode_replaces_are_not_listed() -> None
     assert ("time from which it acts no more", "brake") in listed  # in the laws of no mode, but in what ends them
     net = hoist()
     net.replace(sw.FrequencyDrive("motor", tau_k=2000.0, s_k=0.08, n_sync=1500, boost=0.2))
-    net.replace(sw.Backlash("gap", gap=0.1))
+    net.replace(sw.Backlash("gap", gap=0.1, omega_rest=1e-3))
     listed = {(row[1], row[2]) for row in rows(net.equations().document())}
     assert ("duration of the ramp", "motor") in listed
     assert ("frequency at which the boost ends", "motor") in listed
-    assert ("of rigid flanks, speed below which they stay together", "gap") in listed
+    assert ("of rigid flanks, speed up to which they stay together", "gap") in listed
 
 
 @pytest.mark.slow

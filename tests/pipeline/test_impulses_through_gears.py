@@ -134,6 +134,46 @@ def test_a_gear_that_locks_itself_holds_what_a_stop_would_throw_back(e: float) -
     assert sol.energy.lost_in["gear"] == pytest.approx(5.0 - impulse / 2.0, rel=1e-12)
 
 
+@cache
+def hammers(order: str, second: str) -> sw.Model:
+    """A hammer at one side of a gear at rest, and a second gap between its other side and another inertia."""
+    net = sw.Network("both sides")
+    for name, J in {"H": J_H, "B": J_B, "C": J_C, "D": 0.5}.items():
+        net.add(sw.Inertia(name, J=J), name)
+    parts = {
+        "1": (sw.Backlash("first", gap=0.2, restitution=0.5), "H", "B"),
+        "g": (sw.LossyGear("gear", ratio=2.0, efficiency=0.8), "B", "C"),
+        "2": (sw.Backlash("second", gap=0.2, restitution=0.5), *second),
+    }
+    for letter in order:
+        net.add(*parts[letter])
+    return net.compile()
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5])
+@pytest.mark.parametrize("order", ["1g2", "g21"])
+def test_equal_impacts_on_both_sides_of_a_gear_come_together_in_whatever_order(order: str, e: float) -> None:
+    """The hammer at b drives, as it gives more than the gear's own side takes: p1 = 3 - w, p2 = (3 - w / 2) / 2."""
+    values = {"first.restitution": e, "second.restitution": e}
+    sol = hammers(order, "DC").simulate(0.05, initial={"H.omega": 3.0, "D.omega": 3.0}, parameters=values)
+    w = (1.5 + 2.0 * 0.8 * 3.0) / ((J_C + 0.5) / 2.0 + 2.0 * 0.8 * (J_H + J_B))
+    speeds = {"H": 3.0 - (1 + e) * (3.0 - w), "B": (1 + e) * w, "D": 3.0 - (1 + e) * (3.0 - w / 2.0)}
+    assert [sol[f"{name}.omega"][-1] for name in speeds] == pytest.approx([*speeds.values()], rel=1e-12)
+    after = "rebound" if e else "in contact"
+    assert {event[1:] for event in sol.events if event[1] != "gear"} == {
+        (k, "open", after) for k in ("first", "second")
+    }
+
+
+@pytest.mark.parametrize("order", ["1g2", "g21"])
+def test_what_touches_behind_a_gear_is_taken_along_in_the_same_instant(order: str) -> None:
+    start = {"H.omega": 3.0, "second.phi": 0.1}
+    sol = hammers(order, "CD").simulate(0.05, initial=start, parameters={"second.restitution": 0.0})
+    w = 3.0 * J_H / (J_H + J_B + (J_C + 0.5) / (2.0**2 * 0.8))
+    assert sol["B.omega"][-1] == pytest.approx(1.5 * w, rel=1e-12)
+    assert sol["D.omega"][-1] == sol["C.omega"][-1] == pytest.approx(0.75 * w, rel=1e-12)
+
+
 @pytest.mark.slow
 def test_an_impact_through_a_gear_is_the_limit_of_a_stiff_contact() -> None:
     """Braked, at rest and turned round within it: the contact is damped 60 times as much as it takes not to swing."""

@@ -208,6 +208,25 @@ def test_no_engine_ends_a_series_of_bounces_early(
     np.testing.assert_allclose([hit[0] for hit in hits], wanted, atol=1e-4)
 
 
+def test_slow_bounces_are_those_of_a_fast_motion_in_another_time() -> None:
+    """With a torque smaller by 1e-8 all speeds are smaller by 1e-4, the fastest 2e-4 rad/s, all times longer by 1e4.
+
+    A speed across of up to 1e-8 rad/s is no impact, so the slow ones end after some thirty.
+    """
+    hits = []
+    for slower in (1.0, 1e4):
+        net = sw.Network("bounces")
+        net.add(sw.TorqueSource("weight", tau=5.0 / slower**2), "wheel")
+        net.add(sw.Inertia("J", J=2.0), "wheel")
+        net.add(sw.HardStop("stop", upper=0.7, restitution=0.7), "wheel")
+        sol = net.simulate(t_end=6.0 * slower, t_eval=2)
+        assert sol.events[-1][3] == "in contact"
+        hits.append([time / slower for time, *_ in sol.events])
+    fast, slow = hits
+    assert len(slow) >= 25
+    np.testing.assert_allclose(slow[:25], fast[:25], rtol=1e-6)
+
+
 @pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials"])
 def test_a_clutch_engages_at_the_time_and_the_speed_of_the_momentum_balance(engine: str) -> None:
     made = friction.Engagement(J1=2.0, J2=3.0, omega_1=100.0, omega_2=20.0, tau=50.0, tau_1=30.0, tau_2=-10.0)

@@ -176,7 +176,7 @@ class Instant:
 
 def _rest(part: Part) -> float:
     """The speed below which flanks stay together."""
-    return float(part.values.get("omega_rest", 1e-6)) if part.is_rigid else 0.0
+    return float(part.values.get("omega_rest", 0.0)) if part.is_rigid else 0.0
 
 
 def _teeth(part: Part, driving: float, driven: float) -> Iterator[Impulse]:

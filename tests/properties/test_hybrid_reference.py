@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -102,6 +103,8 @@ def part(name: str, joint: Joint) -> sw.Component:
             return sw.Backlash(name, gap=upper - lower, c=joint.c, d=joint.d)
         case "rigid", True:
             return sw.HardStop(name, lower=lower, upper=upper, **thrown)
+        case "rigid", False if lower != -upper:
+            return sw.HardStop(name, lower=lower, upper=upper, **thrown)
         case "rigid", False:
             return sw.Backlash(name, gap=upper - lower, **thrown)
         case "freewheel", _:
@@ -113,9 +116,9 @@ def part(name: str, joint: Joint) -> sw.Component:
     return (sw.Brake if joint.b < 0 else sw.Clutch)(name, tau=joint.tau, **times)
 
 
-def network(train: Train) -> sw.Network:
+def network(train: Train, impacts: Literal["in turn", "together"] = "in turn") -> sw.Network:
     """The train as a user wires it."""
-    net = sw.Network("train")
+    net = sw.Network("train", impacts=impacts)
     for k, J in enumerate(train.inertias):
         net.add(sw.Inertia(f"J{k}", J=J), f"n{k}")
     for k, joint in enumerate(train.joints):
@@ -131,11 +134,11 @@ def network(train: Train) -> sw.Network:
     return net
 
 
-def end(train: Train, engine: str = "auto") -> Array:
+def end(train: Train, engine: str = "auto", impacts: Literal["in turn", "together"] = "in turn") -> Array:
     """The speeds at the end by the library."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", sw.NetworkWarning)  # parts may be loose of each other
-        model = network(train).compile()
+        model = network(train, impacts).compile()
         speeds = {f"J{k}.omega": speed for k, speed in enumerate(train.speeds)}
         initial = {name: speed for name, speed in speeds.items() if name in model.states}  # gears give the others
         sol = model.simulate(train.t_end, rtol=1e-12, t_eval=2, engine=engine, initial=initial)

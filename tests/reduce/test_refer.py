@@ -297,7 +297,7 @@ def test_a_gap_closes_and_opens_as_in_the_train_where_the_reference_translates(f
     small = sw.reduce.refer(net, "x")
     (gap,) = (part for part in small.network.parts if part.name == "gap")
     assert isinstance(gap, sw.TranslationalBacklash)
-    rest = FLANKS[flanks].get("omega_rest", 1e-6)
+    rest = FLANKS[flanks].get("omega_rest", 0.0)
     assert (gap.gap, gap.v_rest) == pytest.approx((0.02 * 0.2, rest * 0.2), rel=1e-14)
     times = np.linspace(0.0, 1.0, 40)
     old, new = (each.simulate(1.0, rtol=1e-10, t_eval=times) for each in (net, small.network))

@@ -6,7 +6,8 @@ the step, and is estimated by halving it. Laws, with w the speed across a joint 
 
 - friction: |P| <= tau h, and P = tau h sign(w) where it slips;
 - freewheel: w <= 0, P >= 0, P w = 0;
-- rigid contact within its gap: nothing; beyond it w <= -e w_before, P >= 0, complementary;
+- rigid contact within its gap: nothing; beyond it w <= 0, P >= 0, complementary; where one is hit, it then gives back e
+  of its impulse, and again w <= 0 for all, by impulses that are no less than before (Poisson);
 - soft contact: P = h max(0, c x + d w);
 - gear: omega_a = ratio omega_b; impulses by the direction of the power, or both sides held.
 
@@ -27,6 +28,8 @@ GEAR = ("driving forward", "driving backward", "driven forward", "driven backwar
 """The modes of a gear, in the order in which they are tried: a jam is the last way."""
 MOST_WAYS = 2000
 """So many combinations of what is at its bounds are tried."""
+SLOW = 2.0
+"""A contact is hit that closes by more than this many times what torques change in a step."""
 TINY = 1e-11
 """A part of the largest speed or impulse that is rounding."""
 
@@ -85,7 +88,7 @@ class Stepper:
         laws = np.array([self._law(k, t, before) for k in range(len(self.switching))]).reshape(-1, 4)
         others = [modes for modes in itertools.product(GEAR, repeat=len(self.gears)) if modes != self.modes]
         for modes in (self.modes, *sorted(others, key=lambda modes: modes.count("stuck"))):
-            solution = self._solved(modes, gained, laws)
+            solution = self._solved(modes, gained, laws, self.R @ before)
             if solution is not None:
                 self.modes, (v, self.active) = modes, solution
                 break
@@ -107,14 +110,19 @@ class Stepper:
                 return -most, most, 0.0, 0.0
             case "freewheel":
                 return 0.0, math.inf, 0.0, 0.0
-        side = 1.0 if x > upper else -1.0 if x < lower else 0.0
+        side = 1.0 if x >= upper else -1.0 if x <= lower else 0.0
         bounds = {1.0: (0.0, math.inf), -1.0: (-math.inf, 0.0), 0.0: (0.0, 0.0)}[side]
         if joint.kind == "soft":
             beyond = self.gaps[k] - (upper if side > 0 else lower)
             slope = joint.c * h / 2 + joint.d
             return (*bounds, -joint.c * beyond / slope, 1 / (h * slope)) if side else (0.0, 0.0, 0.0, 0.0)
-        back = joint.restitution * w if side * w > 0 and joint.restitution * abs(w) > joint.rest else 0.0
-        return *bounds, -back, 0.0
+        return *bounds, 0.0, 0.0
+
+    def _thrown(self, w: Array, gains: Array, P: Array) -> Array:
+        """(m,) the share of impulses P that contacts give back which are hit at speeds w, and gain some in a step."""
+        e, rest = (np.array([getattr(joint, name) for joint in self.switching]) for name in ("restitution", "rest"))
+        # what closes no faster than torques make it within a step is pressed, not hit
+        return np.where((e * np.abs(w) > rest + SLOW * np.abs(gains)) & (w * P > 0), e, 0.0)
 
     def _answer(self, modes: tuple[str, ...]) -> tuple[Array, Array]:
         """From momenta (n,) to speeds, then multipliers of the gears, and the same from impulses."""
@@ -138,11 +146,21 @@ class Stepper:
             self._answers[modes] = inverse, inverse @ self.R.T
         return self._answers[modes]
 
-    def _solved(self, modes: tuple[str, ...], gained: Array, laws: Array) -> tuple[Array, list[int]] | None:
-        """Speeds at the end of a step in some modes of gears, with what is at which bound; None where none agree."""
+    def _solved(self, modes: tuple[str, ...], gained: Array, laws: Array, w: Array) -> tuple[Array, list[int]] | None:
+        """Speeds at the end of a step in some modes of gears, with what is at which bound; None where none agree.
+
+        Args:
+            modes: of the gears.
+            gained: (n,) momenta without impulses.
+            laws: (m, 4) as of `Bounded`.
+            w: (m,) speeds across what switches before the step.
+        """
         inverse, by_impulses = self._answer(modes)
         free = inverse @ gained
-        found = Bounded(self.R @ by_impulses[: self.n], self.R @ free[: self.n], laws).solved(self.active)
+        W, w0 = self.R @ by_impulses[: self.n], self.R @ free[: self.n]
+        found = Bounded(W, w0, laws).solved(self.active)
+        if found is not None and (thrown := self._thrown(w, w0 - w, found[0])).any():
+            found = Bounded(W, w0, _at_least(laws, (1 + thrown) * found[0])).solved(found[1])
         if found is None:
             return None
         P, active = found
@@ -165,6 +183,16 @@ class Stepper:
             if way * v[joint.a] < -TINY * scale or side * torque_ < -TINY * size:
                 return False
         return True
+
+
+def _at_least(laws: Array, P: Array) -> Array:
+    """(m, 4) laws in which what presses without a compliance does so by impulses (m,) or more."""
+    laws = laws.copy()
+    presses = (np.isinf(laws[:, :2]).sum(axis=1) == 1) & (laws[:, 3] == 0)
+    for bound in (0, 1):
+        raised = presses & np.isfinite(laws[:, bound])
+        laws[raised, bound] = P[raised]
+    return laws
 
 
 class Bounded:

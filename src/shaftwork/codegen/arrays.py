@@ -49,8 +49,11 @@ class BoundArrays:
     """An `ArrayProgram` for one parameter vector."""
 
     def __init__(self, program: ArrayProgram, p: Array, part: LinearPart) -> None:
+        p = p.copy() if p.flags.writeable else p
+        p.flags.writeable = False  # so that what laws read of it is looked up once
         self.program, self.p, self.part = program, p, part
-        self._has_slopes, self._controls = bool(part.B1.nnz), program.inputs.controls
+        self._A, self._B, self._B1, self._C, self._D = part.factors
+        self._has_slopes, self._controls = not self._B1.is_zero, program.inputs.controls
         loops = program.loop_places
         form = program.form
         owners = tuple(dict.fromkeys(form.graph.part_of(law).name for law in form.loop_laws)) if form.waves else ()
@@ -75,7 +78,7 @@ class BoundArrays:
 
     def full(self) -> tuple[Array, Array, Array] | None:
         """A, B and C in full where x' = A x + B u and y = C x; None where more enters."""
-        if self.loops is not None or self._has_slopes or self.part.D.nnz:
+        if self.loops is not None or self._has_slopes or not self._D.is_zero:
             return None
         return self.part.A.toarray(), self.part.B.toarray(), self.part.C.toarray()
 
@@ -85,13 +88,15 @@ class BoundArrays:
 
     def _outputs(self, t: Any, x: Array) -> Array:
         """Outputs y where there are no loops."""
-        inputs, part = self.program.inputs, self.part
-        y: Array = part.C @ x[: inputs.states]
-        if part.D.nnz:  # only inputs of time alone and controlled sources reach the outputs: else there is a loop
+        inputs = self.program.inputs
+        y = self._C @ x[: inputs.states]
+        if (
+            not self._D.is_zero
+        ):  # only inputs of time alone and controlled sources reach the outputs: else there is a loop
             first = inputs.values(t, np.zeros((inputs.outputs, *x.shape[1:])), x, self.p)
-            y = y + part.D @ _where(inputs.of_time, first)
+            y = y + self._D @ _where(inputs.of_time, first)
             if self._controls.size:
-                y = y + part.D @ _where(inputs.controlled, inputs.values(t, y, x, self.p))
+                y = y + self._D @ _where(inputs.controlled, inputs.values(t, y, x, self.p))
         return y
 
     def switches(self, t: Array, x: Array) -> Array:
@@ -106,23 +111,34 @@ class BoundArrays:
 
     def rates(self, t: Any, x: Array, y: Array, u: Array) -> Array:
         """x' from the states and the inputs that go with them."""
-        rate: Array = self.part.A @ x[: self.part.A.shape[0]] + self.part.B @ u
+        rate = self._A @ x[: self.program.inputs.states] + self._B @ u
         if self._has_slopes:
             slopes = self.program.inputs.time_slopes(t, y, x, self.p)
-            rate = rate + self.part.B1 @ _where(self.program.inputs.of_time, slopes)
+            rate = rate + self._B1 @ _where(self.program.inputs.of_time, slopes)
         return rate
 
     def jacobian(self, t: float, x: Array) -> Any:
         """d rhs / d x as scipy.sparse.csc_array (n, n)."""
         if self.loops is not None:
             return self.loops.jacobian(t, x)
-        inputs, part = self.program.inputs, self.part
+        A, B, slope = self._with_slopes(t, x)
+        return sparse.csc_array(A + B @ slope)
+
+    def _with_slopes(self, t: float, x: Array) -> tuple[Any, Any, Any]:
+        """A, B and the slopes (m, n) of the inputs by the states: full arrays or of scipy.sparse."""
+        inputs, part, controls = self.program.inputs, self.part, self._controls
         y, _ = self.values(t, x)
+        if self._A.full is not None and self._B.full is not None and self._C.full is not None:
+            full = inputs.along(t, y, x, self.p, self._C.full, np.eye(inputs.states))
+            if controls.size:
+                full = full + inputs.along(t, y, x, self.p, part.D[:, controls] @ full[controls])
+            if np.isfinite(full).all():  # else only the states on which an infinite slope depends are to see it
+                return self._A.full, self._B.full, full
         by_y, by_x = inputs.slopes(t, y, x, self.p)
         slope = by_y @ part.C + by_x
-        if self._controls.size:
-            slope = slope + by_y @ (part.D[:, self._controls] @ slope[self._controls])
-        return sparse.csc_array(part.A + part.B @ slope)
+        if controls.size:
+            slope = slope + by_y @ (part.D[:, controls] @ slope[controls])
+        return part.A, part.B, slope
 
     def rational(self) -> tuple[Array, Array, Callable[[float], Array]] | None:
         """The equations x' = A x + G v(t) of a linear network without any rounding, v(t) in floats.
@@ -166,7 +182,7 @@ class BoundArrays:
         if before is not None:
             step = step - inputs.values(before, zero, x, self.p)
         made = x.copy()
-        made[: inputs.states] += self.part.B1 @ (step * inputs.of_time)  # what arrives by waves follows the states
+        made[: inputs.states] += self._B1 @ (step * inputs.of_time)  # what arrives by waves follows the states
         return made
 
 

@@ -189,7 +189,15 @@ def _of_links(form: StateForm, rows: Mapping[int, Row]) -> GainMatrix:
 
 def potential_matrix(form: StateForm) -> GainMatrix:
     """(nodes, branches): the across variable of every node from those of the tree branches."""
+    return _of_nodes(form, form.tree.potentials)
+
+
+def share_matrix(form: StateForm) -> GainMatrix:
+    """(nodes, branches): what passes through the tree branches where a unit is put in at a node."""
+    return _of_nodes(form, form.tree.shares)
+
+
+def _of_nodes(form: StateForm, rows: Sequence[Row | None]) -> GainMatrix:
     shape = (len(form.graph.nodes), len(form.graph.branches))
-    rows = enumerate(form.tree.potentials)
-    entries = [(node, tree, gain) for node, row in rows if row is not None for tree, gain in row.items()]
+    entries = [(node, tree, gain) for node, row in enumerate(rows) if row is not None for tree, gain in row.items()]
     return GainMatrix(form.graph, entries, shape)

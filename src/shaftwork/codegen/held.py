@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from scipy.sparse.linalg import splu
 from shaftwork.codegen.arrays import ArrayProgram, BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.matrices import LinearPart
+from shaftwork.codegen.products import Factor
 from shaftwork.codegen.stores import Stores
 from shaftwork.reduction.form import StateForm
 
@@ -43,70 +45,74 @@ class Joints:
         self.places = np.array([form.laws.index(branch) for branch in branches], dtype=np.intp)
         loops = sparse.csr_array(part.loops)[list(form.across_states)][:, list(branches)]
         none = sparse.csr_array((len(branches), size - across))
-        self._G = sparse.csr_array(sparse.hstack([loops.T, none]))
-        self._B = sparse.csc_array(part.B)[:, self.places]
-        followers = _followers(self._G)
-        self.independent = followers is not None and not self._B[across:].nnz
+        G = sparse.csr_array(sparse.hstack([loops.T, none]))
+        B = sparse.csc_array(part.B)[:, self.places]
+        followers = _followers(G)
+        self.independent = followers is not None and not B[across:].nnz
         """Whether each of them holds inertias that the others do not."""
-        if not self.independent:
+        if followers is None or not self.independent:
             return
-        found = followers or {}
-        self._solver = splu(sparse.csc_array(self._G @ self._B)) if found else None
-        alike = sparse.lil_array(sparse.eye_array(size))
-        for place, row in found.items():
-            alike[place, place] = 0.0
-            alike[place, list(row)] = list(row.values())
-        self._alike = sparse.csr_array(alike)
+        reactions, alike = _reactions(G, B), _alike(followers, size)
+        self._B, self._reactions, self._alike = Factor(B), Factor(reactions), Factor(alike)
+        joined = alike @ (sparse.eye_array(size, format="csr") + B @ reactions)
         others = sparse.diags_array(np.where(np.isin(np.arange(part.B.shape[1]), self.places), 0.0, 1.0))
-        self.moving = replace(part, A=self._held(part.A), B=self._held(part.B @ others), B1=self._held(part.B1))
+        self.moving = replace(part, A=joined @ part.A, B=joined @ part.B @ others, B1=joined @ part.B1)
         """The equations with what holds moving as one, to which its own laws add nothing."""
 
     def reactions(self, rates: Array) -> Array:
         """(h,) or (h, k): what cancels rates (n,) or (n, k) in the speeds across."""
-        return self._cancel(self._G @ rates)
-
-    def _cancel(self, across: Array) -> Array:
-        """(h,) or (h, k): what cancels changes of the speeds across."""
-        return across if self._solver is None else np.asarray(-self._solver.solve(across))
+        return self._reactions @ rates
 
     def alike(self, x: Array) -> Array:
         """States or rates in which what is held follows the others to the last bit."""
-        return np.asarray(self._alike @ x)
+        return self._alike @ x
 
     def met(self, x: Array) -> Array:
         """(n,) the states after an inelastic impact that joins what is held: every momentum is kept."""
         return self.alike(x + self._B @ self.reactions(x))
 
-    def _held(self, matrix: Any) -> Any:
-        """A matrix of rates with the reactions to them."""
-        across = self._G @ matrix
-        met = np.unique(sparse.csr_array(across).indices)
-        reactions = sparse.csr_array((len(self.places), matrix.shape[1])).tolil()
-        if met.size:
-            reactions[:, met] = self._cancel(across[:, met].toarray())
-        return sparse.csr_array(self._alike @ (matrix + self._B @ sparse.csr_array(reactions)))
+
+def _reactions(G: Any, B: Any) -> Any:
+    """(h, n) sparse: R with G (1 + B R) = 0."""
+    met = np.unique(G.indices)
+    if not met.size:
+        return sparse.csr_array(G.shape)
+    solved = sparse.coo_array(-splu(sparse.csc_array(G @ B)).solve(G[:, met].toarray()))
+    return sparse.csr_array((solved.data, (solved.row, met[solved.col])), shape=G.shape)
+
+
+def _alike(followers: Mapping[int, Mapping[int, float]], size: int) -> Any:
+    """(n, n) sparse: each follower from the states that it follows, the others as they are."""
+    entries = [(1.0, place, place) for place in range(size) if place not in followers]
+    entries += [(gain, place, column) for place, row in followers.items() for column, gain in row.items()]
+    gains, rows, columns = zip(*entries, strict=True) if entries else ((), (), ())
+    return sparse.csr_array((np.array(gains), (rows, columns)), shape=(size, size))
 
 
 def _followers(G: Any) -> Mapping[int, Mapping[int, float]] | None:
     """For each row of G x = 0 a state that follows from others, and its gains; None where rows depend on each other."""
     found: dict[int, dict[int, float]] = {}
-    for k in range(G.shape[0]):
+    followed: dict[int, dict[int, None]] = {}  # by state, those that follow it
+    starts, columns, gains_of = G.indptr.tolist(), G.indices.tolist(), G.data.tolist()
+    for first, last in pairwise(starts):
         row: dict[int, float] = {}
-        first, last = G.indptr[k : k + 2]
-        for column, gain in zip(G.indices[first:last].tolist(), G.data[first:last].tolist(), strict=True):
+        for column, gain in zip(columns[first:last], gains_of[first:last], strict=True):
             for place, share in found[column].items() if column in found else ((column, 1.0),):
                 row[place] = row.get(place, 0.0) + gain * share
-        size = max(map(abs, G.data[first:last]), default=0.0)
+        size = max(map(abs, gains_of[first:last]), default=0.0)
         row = {column: gain for column, gain in row.items() if abs(gain) > SMALL * size}
         if not row:
             return None
         pivot = max(row, key=lambda column: abs(row[column]))
         gains = {column: -gain / row[pivot] for column, gain in row.items() if column != pivot}
-        for known in found.values():
-            share = known.pop(pivot, 0.0)
-            for column, gain in gains.items() if share else ():
-                known[column] = known.get(column, 0.0) + share * gain
+        followers = [*followed.pop(pivot, ())]
+        for place in followers:
+            share = found[place].pop(pivot)
+            for column, gain in gains.items():
+                found[place][column] = found[place].get(column, 0.0) + share * gain
         found[pivot] = gains
+        for column in gains:
+            followed.setdefault(column, {}).update(dict.fromkeys((*followers, pivot)))
     return found
 
 

@@ -89,6 +89,7 @@ class Inputs:
             elif group.made_of.template.reads:
                 self.of_time[group.inputs], self.controlled[group.inputs] = False, True
         self.controls = np.flatnonzero(self.controlled)
+        self._last: tuple[Array, tuple[tuple[Any, ...], ...]] = np.empty(0), ()
 
     def _group(self, made: TemplateGroup, place: Any, output: Any, integral: Any) -> _Group:
         is_wave = made.template.is_history
@@ -112,6 +113,16 @@ class Inputs:
             tuple(function(slope(law, symbol)) for symbol in (TIME, ACROSS, INTEGRAL, *reads)),
         )
 
+    def _parameters(self, p: Array) -> tuple[tuple[Any, ...], ...]:
+        """What the laws of each group read of parameters; of the last that nobody can change it is kept."""
+        last = self._last
+        if last[0] is p:
+            return last[1]
+        found = tuple(tuple(p[group.made_of.places]) for group in self._groups)
+        if not p.flags.writeable:
+            self._last = p, found
+        return found
+
     def values(self, t: Any, y: Array, x: Array, p: Array) -> Array:
         """u (m,) at time t from outputs y and states x; with t (k,), y (outputs, k) and x (n, k) it is (m, k)."""
         return self._evaluate(lambda group: group.value, t, y, x, p)
@@ -126,10 +137,10 @@ class Inputs:
         by_x: list[tuple[Array, Index, Index]] = []
         t = np.float64(t)
         with np.errstate(all="ignore"):
-            for group in self._groups:
+            for group, parameters in zip(self._groups, self._parameters(p), strict=True):
                 if not (group.outputs.size or group.reads.size):
                     continue
-                read, free = _read(group, y, x, p), np.zeros(group.inputs.size)
+                read, free = _read(group, y, x, parameters), np.zeros(group.inputs.size)
                 _, across, integral, *others = (None if f is None else f(t, *read) + free for f in group.slopes)
                 if across is not None:
                     by_y.append((across, group.inputs, group.outputs))
@@ -153,13 +164,13 @@ class Inputs:
         result = np.zeros((self.size, by_y.shape[1], *x.shape[1:]))
         t = np.float64(t)
         with np.errstate(all="ignore"):
-            for group in self._groups:
+            for group, parameters in zip(self._groups, self._parameters(p), strict=True):
                 if not (group.outputs.size or group.reads.size):
                     continue
                 _, across, integral, *others = group.slopes
                 moved = ((across, group.outputs, by_y), (integral, group.integrals, by_x))
                 reads = ((function, places, by_y) for function, places in zip(others, group.reads, strict=True))
-                read = _read(group, y, x, p)
+                read = _read(group, y, x, parameters)
                 for function, places, by in (*moved, *reads):
                     if function is not None and places.size and by is not None:
                         made = function(t, *read) + np.zeros((group.inputs.size, *x.shape[1:]))
@@ -184,10 +195,10 @@ class Inputs:
         """
         rows: list[Array] = []
         with np.errstate(all="ignore"):
-            for group in self._groups:
+            for group, parameters in zip(self._groups, self._parameters(p), strict=True):
                 if not group.moving:
                     continue
-                read, free = _read(group, y, x, p), np.zeros((group.inputs.size, t.size))
+                read, free = _read(group, y, x, parameters), np.zeros((group.inputs.size, t.size))
                 for function, levels in group.switches:
                     value = function(t, *read) + free
                     rows.append((value - levels[:, None, None]).reshape(-1, t.size))
@@ -202,8 +213,8 @@ class Inputs:
             x: (n,) states.
             p: parameter vector.
         """
-        for group in self._groups:
-            read = _read(group, y, x, p)
+        for group, parameters in zip(self._groups, self._parameters(p), strict=True):
+            read = _read(group, y, x, parameters)
             for k, place in enumerate(group.inputs.tolist()):
                 own = [np.float64(t), *(np.float64(value if np.ndim(value) == 0 else value[k]) for value in read)]
                 if any(is_rough(function, own) for function in (group.value, *group.slopes) if function is not None):
@@ -214,13 +225,13 @@ class Inputs:
         result = np.zeros((self.size, *np.shape(x)[1:]))
         t = np.float64(t)  # of Python's floats the cube root of -1 is complex, and 1 / 0 an exception
         with np.errstate(all="ignore"):  # a law that has no value is NaN here; the engines say when and where
-            for group in self._groups:
+            for group, parameters in zip(self._groups, self._parameters(p), strict=True):
                 function = pick(group)
                 if group.arrives:
                     if function is group.value and group.integrals[-1] < len(x):
                         result[group.inputs] = x[group.integrals]
                 elif function is not None:
-                    result[group.inputs] = function(t, *_read(group, y, x, p))
+                    result[group.inputs] = function(t, *_read(group, y, x, parameters))
         return result
 
 
@@ -229,14 +240,16 @@ def is_linear(law: Expr, reads: Sequence[Symbol]) -> bool:
     return not (any(slope(law, read).has(*reads, TIME) for read in reads) or jumps(law, *reads))
 
 
-def _read(group: _Group, y: Array, x: Array, p: Array) -> tuple[Any, ...]:
+def _read(group: _Group, y: Array, x: Array, parameters: tuple[Any, ...]) -> tuple[Any, ...]:
     """What the laws of a group read: across variables, integrals, what is of other branches, parameters."""
     across = y[group.outputs] if group.outputs.size else 0.0
     known = group.integrals.size and group.integrals[-1] < len(x)  # not the waves, where none are given
     integral = x[group.integrals] if known else 0.0
-    parameters = p[group.made_of.places]
-    others = (y[places] for places in group.reads)
-    return (across, integral, *others, *(parameters if x.ndim == 1 else parameters[..., None]))
+    if x.ndim > 1:
+        parameters = tuple(row[:, None] for row in parameters)
+    if not len(group.reads):
+        return (across, integral, *parameters)
+    return (across, integral, *(y[places] for places in group.reads), *parameters)
 
 
 def _arguments(template: BranchTemplate) -> tuple[Symbol, ...]:

@@ -12,6 +12,7 @@ from scipy import sparse
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
+from shaftwork.codegen.products import Factor
 from shaftwork.codegen.recovery import History
 from shaftwork.codegen.stores import Stores
 
@@ -75,7 +76,7 @@ class _Columns(History):
 
 
 class ReadingMatrices:
-    """Quantities as sparse matrices of states and inputs, for who reads them again and again, at few times at once.
+    """Quantities as matrices of states and inputs, for who reads them again and again, at few times at once.
 
     Law: q = X x + U u + R x' + S u', with the inputs and rates that go with the states.
 
@@ -89,12 +90,13 @@ class ReadingMatrices:
         self._sizes = states, inputs, states, inputs
         width = max(1, LARGEST_BLOCK // max(1, len(bound.program.form.graph.branches)))
         self._matrices = [
-            sparse.hstack(
-                [
-                    sparse.csr_array(np.array([read(columns) for read in reads]))
-                    for columns in self._columns(bound, place, width)
-                ],
-                format="csr",
+            Factor(
+                sparse.hstack(
+                    [
+                        sparse.csr_array(np.array([read(columns) for read in reads]))
+                        for columns in self._columns(bound, place, width)
+                    ]
+                )
             )
             for place in range(4)
         ]
@@ -112,10 +114,10 @@ class ReadingMatrices:
         """(quantities, k) the quantities along a history."""
         by_state, by_input, by_rate, by_slope = self._matrices
         read = by_state @ history.x[: self._sizes[0]] + by_input @ history.values[1]
-        if by_rate.nnz or by_slope.nnz:
+        if not (by_rate.is_zero and by_slope.is_zero):
             _, slopes, rate = history.inputs
             read = read + by_rate @ rate + by_slope @ slopes
-        return np.asarray(read)
+        return read
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from sympy import Add, Expr, Symbol
 
 from shaftwork.codegen.code import vectorised_list
 from shaftwork.codegen.elements import Array
+from shaftwork.codegen.products import Factor
 from shaftwork.components.laws import t as TIME
 
 Values = Callable[[Array, Array], Array]
@@ -69,4 +70,5 @@ class ManyExpressions:
         entries = numbers[: len(self._rows)], (self._rows, self._columns)
         matrix, constants = sparse.csr_array(entries, shape=(self._count, self._size)), np.zeros((self._count, 1))
         np.add.at(constants[:, 0], self._constant_rows, numbers[len(self._rows) :])
-        return lambda quantities: np.asarray(matrix @ quantities + constants)
+        factor = Factor(matrix)
+        return lambda quantities: factor @ quantities + constants

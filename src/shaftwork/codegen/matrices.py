@@ -12,6 +12,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -21,6 +22,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from shaftwork.codegen.elements import Coefficients, cutset_matrix, inverse_of_fractions, loop_matrix, potential_matrix
+from shaftwork.codegen.products import Factor
 from shaftwork.core.errors import CompileError
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
@@ -59,6 +61,11 @@ class LinearPart:
     loops: Any
     cutsets: Any
     coefficients: Array
+
+    @cached_property
+    def factors(self) -> tuple[Factor, ...]:
+        """A, B, B1, C and D for many products with one state each."""
+        return tuple(map(Factor, (self.A, self.B, self.B1, self.C, self.D)))
 
 
 class MatrixAssembly:

@@ -2,11 +2,12 @@
 
 Impulses lambda at pairs of nodes change the speeds v of inertias at once, and no torque counts beside them:
 
-    M (v' - v) = R' lambda,    u = R v + R_E e,    u' = u + W lambda,    W = R M^-1 R',
+    M (v' - v) = S' lambda,    u = R v + R_E e,    u' = u + W lambda,    W = R M^-1 S',
 
 with M the inertias in the states and of all that turns with them, R and R_E the speeds across the pairs from those of
-the states and from prescribed ones. Contacts press and never pull: lambda >= 0, w = W lambda + q >= 0, lambda w = 0, a
-linear complementarity problem. Source: Brogliato, Nonsmooth Mechanics, 2016, section 5.
+the states and from prescribed ones, and S the shares of impulses that arrive at the states: R itself but where a
+coupling loses power. Contacts press and never pull: lambda >= 0, w = W lambda + q >= 0, lambda w = 0, a linear
+complementarity problem. Source: Brogliato, Nonsmooth Mechanics, 2016, section 5.
 """
 
 from __future__ import annotations
@@ -35,24 +36,26 @@ class Mobility:
     """The answer of a network to impulses at pairs of nodes.
 
     Args:
-        form: the equations, in which no coupling loses power.
+        form: the equations.
         bound: the same with their parameters.
         nodes: (nodes, branches) the across variables of nodes from those of tree branches.
+        shares: (nodes, branches) what passes through tree branches where a unit is put in at nodes.
         pairs: first and second node of each pair; +lambda raises the speed of the first one.
     """
 
-    def __init__(self, form: StateForm, bound: BoundArrays, nodes: Array, pairs: Sequence[tuple[int, int]]) -> None:
+    def __init__(
+        self, form: StateForm, bound: BoundArrays, nodes: Array, shares: Array, pairs: Sequence[tuple[int, int]]
+    ) -> None:
         part, k = bound.part, bound.part.coefficients
         across, links, massless = list(form.across_states), list(form.dependent_across), _massless(form)
-        rows = np.array([_row(nodes, plus) - _row(nodes, minus) for plus, minus in pairs]).reshape(len(pairs), -1)
+        rows, pushes = _rows(nodes, pairs), _rows(shares, pairs)
         self.has_inertia: NDArray[np.bool_] = ~(rows[:, massless] != 0).any(axis=1)
         """(pairs,) whether the speeds of inertias and prescribed ones tell the speed across; else no impulse passes."""
-        rows[~self.has_inertia] = 0.0
-        self._R, self._driven = rows[:, across], rows[:, list(form.across_inputs)]
-        loops = part.loops[across][:, links].toarray()
-        mass = np.diag(k[across]) + loops * k[links] @ loops.T
-        self._answers = np.linalg.solve(mass, self._R.T)
-        self.W = self._R @ self._answers
+        rows[~self.has_inertia] = pushes[~self.has_inertia] = 0.0
+        loops, cutsets = part.loops[across][:, links].toarray(), part.cutsets[across][:, links].toarray()
+        mass = np.diag(k[across]) + cutsets * k[links] @ loops.T
+        self._pushes, self._answers = pushes, np.linalg.solve(mass, pushes[:, across].T)
+        self.W = rows[:, across] @ self._answers
         """(pairs, pairs) changes of the speeds across by unit impulses."""
 
     def moved(self, x: Array, impulses: Array) -> Array:
@@ -61,9 +64,14 @@ class Mobility:
         new[: len(self._answers)] += self._answers @ impulses
         return new
 
-    def given(self, speeds: Array, impulses: Array) -> Array:
-        """(inputs,) energy in J that prescribed speeds (inputs,) give in impulses (pairs,)."""
-        return np.asarray(-speeds * (impulses @ self._driven))
+    def through(self, impulses: Array) -> Array:
+        """(branches,) what of impulses (pairs,) passes through tree branches, beside what dependent inertias take."""
+        return np.asarray(impulses @ self._pushes)
+
+
+def _rows(nodes: Array, pairs: Sequence[tuple[int, int]]) -> Array:
+    rows = [_row(nodes, plus) - _row(nodes, minus) for plus, minus in pairs]
+    return np.array(rows).reshape(len(pairs), -1)
 
 
 def _row(nodes: Array, node: int) -> Array:
@@ -75,20 +83,16 @@ def _massless(form: StateForm) -> list[int]:
     return [branch for kind in WITHOUT_INERTIA for branch in form.tree.tree[kind]]
 
 
-def impulses_of_impact(W: Array, opens: Array, back: Array) -> Array | None:
-    """(m,) impulses of compression and restitution, or None where nothing keeps contacts from closing.
+def restituted(W: Array, opens: Array, shares: Array) -> Array:
+    """(m,) impulses of restitution: the shares that contacts give back, and what then keeps others from closing.
 
     Args:
         W: (m, m) as of a `Mobility`.
-        opens: (m,) speeds at which contacts open before the impact.
-        back: (m,) the share of its impulse that each gives back.
+        opens: (m,) speeds at which contacts open after the compression; none closes but by rounding.
+        shares: (m,) impulses that they give back.
     """
-    impulses = complementary(W, opens)
-    if impulses is None or not back.any():
-        return impulses
-    impulses = (1 + back) * impulses
-    further = complementary(W, opens + W @ impulses)
-    return None if further is None else impulses + further
+    further = complementary(W, np.maximum(opens, 0.0) + W @ shares)
+    return shares if further is None else shares + further
 
 
 def complementary(W: Array, q: Array) -> Array | None:

@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
-from shaftwork.codegen.elements import Array, GainMatrix, potential_matrix
+from shaftwork.codegen.elements import Array, GainMatrix, potential_matrix, share_matrix
 from shaftwork.codegen.matrices import LinearPart
 from shaftwork.codegen.mobility import Mobility
 from shaftwork.codegen.recovery import History
@@ -140,11 +140,12 @@ class Stores:
 
     def mobility(self, bound: BoundArrays, pairs: Sequence[tuple[int, int]]) -> Mobility:
         """The answer to impulses at pairs of nodes."""
-        return Mobility(self._form, bound, self._nodes(bound.p).toarray(), pairs)
+        nodes, shares = (matrix(bound.p).toarray() for matrix in self._nodes)
+        return Mobility(self._form, bound, nodes, shares, pairs)
 
     @cached_property
-    def _nodes(self) -> GainMatrix:
-        return potential_matrix(self._form)
+    def _nodes(self) -> tuple[GainMatrix, GainMatrix]:
+        return potential_matrix(self._form), share_matrix(self._form)
 
     def impulses(self, bound: BoundArrays, gained: Mapping[str, float]) -> Array:
         """(branches,) what passes through every branch at once where stores gain so much; of a coupling its lambda.
@@ -174,7 +175,9 @@ class Stores:
         values = inputs.values(t, np.zeros(inputs.outputs), np.zeros(len(self._states)), bound.p)
         return np.where(inputs.of_time, values, 0.0)
 
-    def given(self, bound: BoundArrays, u: Array, gained: Mapping[str, float]) -> dict[str, float]:
+    def given(
+        self, bound: BoundArrays, u: Array, gained: Mapping[str, float], further: Array | float = 0.0
+    ) -> dict[str, float]:
         """What ideal sources give at once, in J by part, where stores gain so much in these equations.
 
         Law: E = -w psi_W - e i_E: a torque times the angle by which its source turns, and a speed times the impulse
@@ -184,16 +187,16 @@ class Stores:
             bound: the equations with their parameters.
             u: (inputs,) torques w and speeds e of the sources.
             gained: by every store, by name.
+            further: (branches,) impulses that pass beside those that stores take.
         """
         form, found = self._form, dict[str, float]()
         laws, speeds = np.split(u, [len(form.laws)])
         pairs: list[tuple[int, float]] = []
         if form.dependent_through:
             pairs += zip(form.laws, laws * self.turns(bound, gained)[list(form.laws)], strict=True)
-        if form.dependent_across:
-            pairs += zip(
-                form.across_inputs, speeds * self.impulses(bound, gained)[list(form.across_inputs)], strict=True
-            )
+        if form.across_inputs:
+            impulses = self.impulses(bound, gained) + further
+            pairs += zip(form.across_inputs, speeds * impulses[list(form.across_inputs)], strict=True)
         for branch, taken in pairs:
             part = form.graph.part_of(branch).name
             found[part] = found.get(part, 0.0) - float(taken)

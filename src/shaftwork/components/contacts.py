@@ -31,8 +31,8 @@ def _restitution() -> Any:
 
 
 def _rest(unit: str = "rad/s", latex: str = r"\omega_r") -> Any:
-    meaning = "of rigid flanks, speed below which they stay together"
-    return parameter(unit, meaning, above=0, default=1e-6, latex=latex)
+    meaning = "of rigid flanks, speed up to which they stay together"
+    return parameter(unit, meaning, at_least=0, default=0.0, latex=latex)
 
 
 def _refuse_mixed(part: Any) -> None:
@@ -204,8 +204,9 @@ class HardStop(Component):
     """A stop at a limit of the twist of node a against node b, or against the frame, counted from the start.
 
     Law: as of a `Backlash`, with limits of its own, of which one may be left out. Without c the stop is rigid, and the
-    speed omega with which it is hit comes back as -restitution omega; below omega_rest it stays in contact, and never
-    pulls. Modes: open, in contact, in contact backward. Source: Newton's law of impact.
+    speed omega with which it is hit comes back as -restitution omega, until rounding hides the rebounds; up to
+    omega_rest it stays in contact, and never pulls. Modes: open, in contact, in contact backward.
+    Source: Newton's law of impact.
     """
 
     upper: float | None = parameter("rad", "upper limit of the twist", default=None, latex=r"\varphi_+")

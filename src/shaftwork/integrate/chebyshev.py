@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -14,6 +15,16 @@ from shaftwork.integrate.problem import Array
 def points(degree: int) -> Array:
     """(degree + 1,) Chebyshev points of [0, 1] with both ends: interpolation there is exact and well conditioned."""
     made = (1 - np.cos(np.pi * np.arange(degree + 1) / degree)) / 2
+    made.flags.writeable = False
+    return made
+
+
+@lru_cache(maxsize=16)
+def _weights(degree: int) -> Array:
+    """(degree + 1,) what each point counts in the barycentric formula."""
+    made = np.ones(degree + 1)
+    made[1::2] = -1.0
+    made[[0, -1]] /= 2
     made.flags.writeable = False
     return made
 
@@ -36,10 +47,32 @@ class Polynomial:
 
     def __call__(self, times: Array) -> Array:
         """States (k, n) at times (k,)."""
-        apart = ((times - self.start) / (self.end - self.start))[:, None] - points(len(self.nodes) - 1)
-        shares = (-1.0) ** np.arange(len(self.nodes)) / np.where(apart == 0.0, 1.0, apart)
-        shares[:, [0, -1]] /= 2
-        rows, columns = np.nonzero(apart == 0.0)
-        shares[rows] = 0.0
-        shares[rows, columns] = 1.0
+        degree = len(self.nodes) - 1
+        apart = ((times - self.start) / (self.end - self.start))[:, None] - points(degree)
+        if apart.all():
+            shares = _weights(degree) / apart
+        else:
+            shares = _weights(degree) / np.where(apart == 0.0, 1.0, apart)
+            rows, columns = np.nonzero(apart == 0.0)
+            shares[rows] = 0.0
+            shares[rows, columns] = 1.0
         return np.asarray(shares @ self.nodes / shares.sum(axis=1)[:, None])
+
+
+def course(start: float, end: float, nodes: Array) -> Callable[[float], float]:
+    """One value of a step at single times, from what it is at its Chebyshev points; source as for `Polynomial`."""
+    degree = nodes.size - 1
+    known: list[tuple[float, float, float]] = list(
+        zip(points(degree).tolist(), _weights(degree).tolist(), nodes.tolist(), strict=True)
+    )
+
+    def value(time: float) -> float:
+        place, above, below = (time - start) / (end - start), 0.0, 0.0
+        for point, weight, node in known:
+            if place == point:
+                return node
+            share = weight / (place - point)
+            above, below = above + share * node, below + share
+        return above / below
+
+    return value

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Protocol
 
@@ -9,7 +10,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from shaftwork.core.errors import no_value
-from shaftwork.integrate.chebyshev import Polynomial, points
+from shaftwork.integrate.chebyshev import course, points
 from shaftwork.integrate.crossings import FIRST, LOOKS, Look, tolerance
 from shaftwork.integrate.problem import Array, DaeProblem, Explain, Guards, Problem
 
@@ -18,6 +19,11 @@ Dense = Callable[[Array], Array]
 # What the tolerance moves a guard, as part of its course in a run of a few steps, may be no more.
 KNOWN, BRIEF = 1e-5, 100
 
+# Where a step is looked at, beside its ends.
+INSIDE = np.sort(np.append(FIRST, LOOKS))
+# A guard that is farther from its limit than it moves in so many ends of steps of a multistep method is not met between
+# them.
+ENDS = 4
 # No step is shorter than so many rounding units of the time.
 CLEARANCE = 8
 # A step that meets a guard is looked at in panels that are halved towards it, so many times; Gauss' nodes in each.
@@ -53,14 +59,18 @@ class GuardWatch:
         problem: what is being solved.
         low: the earliest time in s at which inputs are read.
         high: the latest.
+        multistep: whether each step continues the polynomial through the ends of the steps before it.
     """
 
-    def __init__(self, problem: Guarded, low: float, high: float) -> None:
+    def __init__(self, problem: Guarded, low: float, high: float, *, multistep: bool = False) -> None:
         guards = problem.guards
         self._columns = np.zeros(0, dtype=np.intp) if guards is None else np.flatnonzero(guards.sides)
+        self._sides = np.zeros(0) if guards is None else guards.sides[self._columns]
         self._offsets = np.zeros(0) if guards is None else guards.offsets[self._columns]
         self._guards, self._low, self._high = guards, low, high
-        self._problem = problem
+        self._problem, self._multistep = problem, multistep
+        self._watched = list(zip(*(made.tolist() for made in (self._columns, self._sides, self._offsets)), strict=True))
+        self._ends: list[tuple[float, list[float]]] = []
         self.met: int | None = None
 
     def cut(self, start: float, x: Array, end: float, y: Array, dense: Dense) -> float | None:
@@ -76,14 +86,13 @@ class GuardWatch:
         Raises:
             SimulationError: a guard has no value there.
         """
-        if not self._columns.size:
+        if not self._columns.size or (self._multistep and self._is_far(start, end, y)):
             return None
-        first = start + FIRST * (end - start)
-        times, states = np.array([start, *first, end]), np.vstack([x, dense(first), y])
+        inside = start + INSIDE * (end - start)
+        times, states = np.concatenate([[start], inside, [end]]), np.concatenate([x[None], dense(inside), y[None]])
         look = Look(self._values, times, states, dense, -np.ones(self._columns.size))
-        if look.is_far() and (look.values[0] < 0).all():
+        if look.values.max() < 0 and not look.denser():
             return None
-        look.add(start + LOOKS * (end - start))
         self._refuse_none(look)
         if (look.values[0] >= 0).any():  # what is above zero by rounding may fall and rise again ere the first look
             look.add(start + NEARER * (look.times[1] - start))
@@ -97,6 +106,20 @@ class GuardWatch:
             return None
         time, self.met = min(known)
         return min(max(time, start + CLEARANCE * float(np.spacing(abs(end)))), end)
+
+    def _is_far(self, start: float, end: float, y: Array) -> bool:
+        """Whether the ends of the last steps tell that none of them comes near a guard."""
+        if not self._ends or self._ends[-1][0] != start:  # the method has begun anew
+            self._ends = []
+        assert self._guards is not None  # noqa: S101 (asked only then)
+        values = self._guards.at(min(max(end, self._low), self._high), y.tolist())
+        watched = [values[k] * side - offset for k, side, offset in self._watched]
+        self._ends = [*self._ends[1 - ENDS :], (end, watched)]
+        if len(self._ends) < ENDS or any(map(math.isnan, watched)):
+            return False
+        return all(
+            max(course) < min(course) - max(course) for course in zip(*(row for _, row in self._ends), strict=True)
+        )
 
     def beyond(self, t: float, x: Array) -> int | None:
         """The guard that is farthest beyond its limit at a time in s with the state (n,); None where none is."""
@@ -149,8 +172,8 @@ class GuardWatch:
 
     def _values(self, times: Array, states: Array) -> Array:
         assert self._guards is not None  # noqa: S101 (asked only then)
-        values = self._guards.values(np.clip(times, self._low, self._high), states)
-        return np.asarray((values * self._guards.sides - self._guards.offsets)[:, self._columns])
+        values = self._guards.values(np.minimum(np.maximum(times, self._low), self._high), states)
+        return np.asarray(values[:, self._columns] * self._sides - self._offsets)
 
     def _time(self, look: Look, column: int, noise: float) -> float | None:
         """When a guard rises through zero; one that is above it from the start, by noise, has to fall first."""
@@ -175,8 +198,8 @@ class GuardWatch:
         polynomial through their values at some times, where their values beside it agree.
         """
         low, high, ulp = float(look.times[before]), float(look.times[row]), float(np.spacing(look.times[-1]))
-        course = Polynomial(low, high, look.at(np.minimum(low + (high - low) * points(DEGREE), high))[:, [column]])
-        root = _zero(lambda t: float(course(np.array([t]))[0, 0]), low, high, ulp)
+        nodes = look.at(np.minimum(low + (high - low) * points(DEGREE), high))[:, column]
+        root = _zero(course(low, high, nodes), low, high, ulp)
         beside = look.at(root + BESIDE * ulp * np.array([-1.0, 1.0]))[:, column]
         if root == high or beside[0] < 0 < beside[1]:
             return root

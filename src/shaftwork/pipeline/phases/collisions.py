@@ -10,29 +10,39 @@ For one contact that is Newton's law, u'' = -e u. No impact gains energy, whatev
 which the kinetic energy is least, and mu = (1 - e) lambda would leave as much as there was before. Friction, brakes and
 clutches pass torques that are limited, and no impulse.
 
+Where a gear rubs, an impact is followed along its impulses, see `impulses`, and beside them all it is the energy that
+contacts have taken up of which e^2 comes back.
+
 Source: Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts, 1996, chapter 8.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.mobility import Mobility, impulses_of_impact
+from shaftwork.codegen.mobility import ROUNDING, Mobility, complementary, restituted
 from shaftwork.components.branches import ACROSS
 from shaftwork.components.modes import Leave, Modes
+from shaftwork.core.kept import Kept
 from shaftwork.network.graph import GROUND
 from shaftwork.pipeline.phases.elements import Element, ModeNames
-from shaftwork.pipeline.phases.moments import CLEAR, Moment
+from shaftwork.pipeline.phases.impulses import Blow, Impulses, Stage, Start
+from shaftwork.pipeline.phases.moments import CLEAR, Moment, Regime
 from shaftwork.pipeline.phases.regimes import Regimes, with_modes
 
 # A speed across what is joined, as part of the largest one or of one, up to which it is an error of the run, no impact.
 NO_IMPACT = 1e-8
+KEPT = 64
+"""Sets of contacts of which what impulses do is kept."""
 SAME = 1e-9
 """Speeds at which contacts close that differ by less than this fraction are the same."""
+MOST_FACTORS = 50
+"""So many steps find how far contacts give back an energy."""
 
 
 class Contact(NamedTuple):
@@ -76,50 +86,95 @@ class Collision(NamedTuple):
 
 
 class Collisions:
-    """Solves impacts where no coupling loses power.
+    """Solves impacts.
 
     Args:
         regimes: combinations of modes.
         elements: of the network.
-        tick: how far in s rounding moves the time.
+        impulses: follows what passes through gears that rub.
         together: whether what touches is thrown back in the same instant as what is hit, and not after it.
     """
 
-    def __init__(self, regimes: Regimes, elements: Sequence[Element], tick: float, *, together: bool) -> None:
-        self._regimes, self._elements, self._tick, self._together = regimes, elements, tick, together
+    def __init__(self, regimes: Regimes, elements: Sequence[Element], impulses: Impulses, *, together: bool) -> None:
+        self._regimes, self._elements, self._impulses, self._together = regimes, elements, impulses, together
+        self._mobilities = Kept[tuple[Regime, tuple[tuple[int, int], ...]], Mobility](KEPT)
 
-    def impact(self, t: float, moment: Moment, number: int, leave: Leave) -> Collision | None:
-        """The impact of an element that closes; None where nothing stops what is prescribed.
+    def impact(self, t: float, moment: Moment, number: int, leave: Leave) -> Collision:
+        """The impact of an element that closes.
 
         Args:
             t: time in s at which inputs are read.
             moment: what was before.
             number: of the element.
             leave: by which it closes.
+
+        Raises:
+            NetworkError: nothing stops what is prescribed; says what contradicts what.
         """
         contacts = self._in_turn(t, moment, [*self._contacts(t, moment, number, leave)])
-        loose = self._apart(t, moment, contacts, {number: leave.to})
-        assembly, pairs = loose.regime.assembly, [self._nodes(loose, contact) for contact in contacts]
-        mobility = assembly.stores.mobility(assembly.bound(loose.regime.p), pairs)
-        before = self._opening(t, moment, contacts, mobility)
+        before = np.array([self._opens(t, moment, contact) for contact in contacts])
         back = np.array([self._restitution(c, u) for c, u in zip(contacts, before.tolist(), strict=True)])
-        opens = self._opening(t, loose, contacts, mobility)
-        impulses = impulses_of_impact(mobility.W, opens, back)
-        if impulses is None:
-            return None
-        after, then = loose._replace(x=mobility.moved(loose.x, impulses)), opens + mobility.W @ impulses
+        stages = self._compressed(t, moment, contacts, {number: leave.to})
+        if back.any():
+            stages += self._thrown_back(t, contacts, stages, back)
+        after = stages[-1].blow.after
+        impulses, (_, opens) = _pressed(stages), self._mobility(t, after, contacts)
         least = NO_IMPACT * max(1.0, np.abs(before).max(initial=0.0))
         hit = [c for c, i in zip(contacts, impulses, strict=True) if c.leave and (i > 0 or c.number == number)]
-        closed = [c for c, u in zip(contacts, then, strict=True) if u <= least and (c.leave is None or c in hit)]
+        closed = [c for c, u in zip(contacts, opens, strict=True) if u <= least and (c.leave is None or c in hit)]
         modes = {c.number: c.joined for c in closed} | self._slipping(t, moment, after, least)
-        owners = [self._elements[contact.number].part.name for contact in contacts]
+        owners = (self._elements[contact.number].part.name for contact in contacts)
+        lost = zip(owners, self._taken(t, contacts, stages).tolist(), strict=True)
         return Collision(
-            self._regimes.changed(after, t, with_modes(loose.regime.modes, modes)),
+            self._regimes.changed(after, t, with_modes(after.regime.modes, modes)),
             tuple(c for c in hit if c in closed),
             tuple(c for c in hit if c not in closed),
-            _sums(owners, (-impulses * (opens + then) / 2).tolist()),
-            self._given(t, loose, mobility, impulses),
+            _sums([*lost, *self._impulses.lost(t, stages).items()]),
+            self._impulses.given(t, stages),
         )
+
+    def _compressed(
+        self, t: float, moment: Moment, contacts: Sequence[Contact], wanted: Mapping[int, str]
+    ) -> tuple[Stage, ...]:
+        """Until nothing closes any more, with all contacts open; where nothing stops them, joined is what wants to."""
+
+        def compressed(start: Start, _: Sequence[Stage]) -> Blow:
+            mobility, opens = self._mobility(t, start.moment, contacts)
+            impulses = complementary(mobility.W, opens)
+            if impulses is not None:
+                return _blow(start, mobility, impulses)
+            joined = self._regimes.changed(start.moment, t, with_modes(start.moment.regime.modes, wanted))
+            return Blow(joined, joined.regime, np.zeros(len(contacts)))
+
+        loose = self._apart(t, moment, contacts, wanted)
+        return self._impulses.stages(t, self._impulses.begins(loose, t), compressed)
+
+    def _thrown_back(
+        self, t: float, contacts: Sequence[Contact], compression: tuple[Stage, ...], back: Array
+    ) -> tuple[Stage, ...]:
+        """From the end of the compression on, until contacts have given back their shares (contacts,) of it.
+
+        Beside gears that rub it is the energy of which e^2 comes back (Stronge 1990), by impulses in the same ratio.
+        """
+        shares, energy = back * _pressed(compression), float(back**2 @ self._taken(t, contacts, compression))
+
+        def thrown(start: Start, made: Sequence[Stage]) -> Blow:
+            mobility, opens = self._mobility(t, start.moment, contacts)
+            impulses = restituted(mobility.W, opens, shares)
+            if self._impulses.gears:
+                left = energy + float((back > 0) @ self._taken(t, contacts, made))
+                impulses = _of_energy(mobility.W, opens, shares, max(left, 0.0))
+            return _blow(start, mobility, impulses)
+
+        return self._impulses.stages(t, self._impulses.begins(compression[-1].blow.after, t), thrown)
+
+    def _taken(self, t: float, contacts: Sequence[Contact], stages: Sequence[Stage]) -> Array:
+        """(contacts,) energy in J that contacts take up: their impulses at the mean of their closing speeds."""
+        taken = np.zeros(len(contacts))
+        for start, blow, share in stages:
+            began, ends = ([self._opens(t, one, c) for c in contacts] for one in (start.moment, blow.after))
+            taken -= share * blow.pressed * (np.array(began) + share / 2 * np.subtract(ends, began))
+        return taken
 
     def _apart(self, t: float, moment: Moment, contacts: Sequence[Contact], wanted: Mapping[int, str]) -> Moment:
         """The moment with all contacts open, and what rubs slipping; joined is what wants to be and never opens."""
@@ -133,22 +188,19 @@ class Collisions:
 
     def _slipping(self, t: float, moment: Moment, after: Moment, least: float) -> dict[int, str]:
         """The modes of what rubs after an impact: it slips where the speed across it is more than the least."""
-        speeds = {k: self._across(t, after, k) for k in self._rubbing(moment)}
+        speeds = {k: after.across(k, t) for k in self._rubbing(moment)}
         return {
             k: next((to for side, to in ways if side * speeds[k] > least), moment.regime.modes[k])
             for k, ways in self._rubbing(moment).items()
         }
 
-    def _opening(self, t: float, moment: Moment, contacts: Sequence[Contact], mobility: Mobility) -> Array:
-        """(contacts,) the speeds at which contacts open; zero where no impulse passes."""
-        return np.where(mobility.has_inertia, [self._opens(t, moment, contact) for contact in contacts], 0.0)
-
-    def _given(self, t: float, loose: Moment, mobility: Mobility, impulses: Array) -> dict[str, float]:
-        """Energy in J that prescribed speeds give, by part."""
-        assembly, p = loose.regime.assembly, loose.regime.p
-        form, sources = assembly.model.form, assembly.stores.sources(assembly.bound(p), t)
-        energies = mobility.given(sources[len(form.laws) :], impulses)
-        return _sums([form.graph.part_of(branch).name for branch in form.across_inputs], energies.tolist())
+    def _mobility(self, t: float, moment: Moment, contacts: Sequence[Contact]) -> tuple[Mobility, Array]:
+        """The answer to impulses of contacts, and the speeds at which they open; zero where no impulse passes."""
+        regime, pairs = moment.regime, tuple(self._nodes(moment, contact) for contact in contacts)
+        stores, p = regime.assembly.stores, regime.p
+        mobility = self._mobilities((regime, pairs), lambda: stores.mobility(regime.assembly.bound(p), pairs))
+        opens = [self._opens(t, moment, contact) for contact in contacts]
+        return mobility, np.where(mobility.has_inertia, opens, 0.0)
 
     def _in_turn(self, t: float, moment: Moment, contacts: list[Contact]) -> list[Contact]:
         """The contacts that take part: of those that throw back only the fastest, but if all do so together."""
@@ -171,11 +223,7 @@ class Collisions:
 
     def _opens(self, t: float, moment: Moment, contact: Contact) -> float:
         """The speed at which a contact opens."""
-        return contact.side * self._across(t, moment, contact.number)
-
-    @staticmethod
-    def _across(t: float, moment: Moment, number: int) -> float:
-        return moment.regime.assembly.across(number, t, moment.x, moment.regime.p)
+        return contact.side * moment.across(contact.number, t)
 
     def _nodes(self, moment: Moment, contact: Contact) -> tuple[int, int]:
         """The nodes of a contact, that first whose speed opens it."""
@@ -191,9 +239,8 @@ class Collisions:
 
     def _contacts(self, t: float, moment: Moment, number: int, leave: Leave) -> Iterator[Contact]:
         """Contacts that are closed or touch, freewheels, and the element that wants to close."""
-        regime, x = moment.regime, moment.x.tolist()
-        rates, now = regime.motion(t, x)
-        near = regime.limits(t + self._tick, regime.rounded(x, rates, self._tick))
+        regime, here = moment.regime, moment.course(t)
+        now, bands = here[3], regime.bands(here)
         for k, (element, name) in enumerate(zip(self._elements, regime.modes, strict=True)):
             modes = element.modes
             if (side := one_side(modes, name)) is not None:
@@ -202,12 +249,12 @@ class Collisions:
         for k, watched in regime.watched:
             closes, guard = watched.leave, watched.guard
             wanted = k == number and closes.to == leave.to
-            touches = watched.side * now[guard] > -CLEAR * abs(near[guard] - now[guard])
+            touches = watched.side * now[guard] > -CLEAR * bands[guard]
             takes_part = wanted or (k in overrun if closes.rebound is None else touches)
             side = one_side(self._elements[k].modes, closes.to) if takes_part and closes.to else None
             if side is not None:
                 closes = leave if wanted else closes
-                constants = (regime.assembly.constant(k, given, regime.p) for given in (closes.rebound, closes.rest))
+                constants = (regime.constant(k, given) for given in (closes.rebound, closes.rest))
                 yield Contact(k, side, regime.modes[k], closes.to, closes, *constants)
 
 
@@ -235,9 +282,38 @@ def freewheels(elements: Sequence[Element], modes: ModeNames) -> dict[int, str]:
     }
 
 
-def _sums(names: Sequence[str], values: Sequence[float]) -> dict[str, float]:
+def _blow(start: Start, mobility: Mobility, impulses: Array) -> Blow:
+    """What impulses (contacts,) lead to."""
+    after = start.moment._replace(x=mobility.moved(start.moment.x, impulses))
+    return Blow(after, after.regime, impulses, mobility.through(impulses))
+
+
+def _pressed(stages: Sequence[Stage]) -> Array:
+    """(contacts,) the impulses of all stages."""
+    return np.asarray(np.sum([stage.share * stage.blow.pressed for stage in stages], axis=0))
+
+
+def _of_energy(W: Array, opens: Array, shares: Array, energy: float) -> Array:
+    """(contacts,) impulses of restitution in the ratio of shares (contacts,), by which these give back an energy in J.
+
+    The energy is a parabola of the factor of the shares, as long as the same contacts are pressed.
+    """
+    factor, linear = 1.0, float(shares @ opens)
+    for _ in range(MOST_FACTORS):
+        impulses = restituted(W, opens, factor * shares)
+        gives = float((impulses * (opens + W @ impulses / 2))[shares > 0].sum())
+        square = (gives - factor * linear) / factor**2
+        if not square > 0 or not energy > 0:  # both sides are held, or all has come back
+            break
+        before, factor = factor, 2 * energy / (linear + math.sqrt(linear**2 + 4 * square * energy))
+        if abs(factor - before) <= ROUNDING * factor:
+            break
+    return impulses if energy > 0 else np.zeros(len(opens))
+
+
+def _sums(pairs: Iterable[tuple[str, float]]) -> dict[str, float]:
     """The sums of values by name, without zeros."""
     sums: dict[str, float] = {}
-    for name, value in zip(names, values, strict=True):
+    for name, value in pairs:
         sums[name] = sums.get(name, 0.0) + value
     return {name: value for name, value in sums.items() if value}

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from shaftwork.pipeline.phases.elements import Watched
-from shaftwork.pipeline.phases.moments import ROUNDINGS, Course, Moment, Regime
+from shaftwork.pipeline.phases.moments import ROUNDINGS, Course, Regime
 
 # What a look ahead gains must be more than so many rounding units.
 FEW = 4
@@ -14,20 +12,19 @@ Way = tuple[int, Watched]
 """An element and a guard that may end its mode."""
 
 
-def leaving(regime: Regime, step: float, here: Course, beside: Course, on_limit: list[Way]) -> list[tuple[float, Way]]:
+def leaving(regime: Regime, here: Course, beside: Course, on_limit: list[Way]) -> list[tuple[float, Way]]:
     """Of guards on their limit those that are about to go beyond it, and how far, as surely as rounding tells.
 
     Args:
         regime: the modes.
-        step: how far ahead to look, s.
-        here: time, states, rates and guards of the moment.
-        beside: the same, rounding away from it.
+        here: the course at the moment.
+        beside: rounding away from it.
         on_limit: elements and guards.
     """
-    further = _bent if regime.bends else later
+    step = regime.ahead(here[2])
     ways, beyond = (here, beside), list[tuple[float, Way]]()
     for _ in range(2):  # where nothing moves yet, its acceleration tells
-        ways = further(regime, step, ways[0]), further(regime, step, ways[1])
+        ways = _further(regime, step, ways[0]), _further(regime, step, ways[1])
         moving = []
         for pair in on_limit:
             watched, k = pair[1], pair[1].guard
@@ -42,27 +39,15 @@ def leaving(regime: Regime, step: float, here: Course, beside: Course, on_limit:
     return beyond
 
 
-def moved(moment: Moment, t: float, step: float) -> Moment:
-    """The same modes a little later or earlier, in s, along a straight line."""
-    if not step:
-        return moment
-    rates, _ = moment.regime.motion(t, moment.x.tolist())
-    return moment._replace(x=moment.x + step * np.array(rates))
-
-
-def later(regime: Regime, step: float, course: Course) -> Course:
-    """A step further along a straight line."""
-    t, x, rates, _ = course
-    states = [v + step * rate for v, rate in zip(x, rates, strict=True)]
-    return t + step, states, *regime.motion(t + step, states)
-
-
-def _bent(regime: Regime, step: float, course: Course) -> Course:
-    """A step further along a parabola (Heun): a prescribed speed bends, so what it is compared with must bend too."""
-    t, x, rates, _ = course
-    _, _, ends, _ = later(regime, step, course)
-    states = [v + step * (rate + end) / 2 for v, rate, end in zip(x, rates, ends, strict=True)]
-    return t + step, states, *regime.motion(t + step, states)
+def _further(regime: Regime, step: float, here: Course) -> Course:
+    """A step further along a straight line; where a prescribed speed bends along a parabola, as all do then (Heun)."""
+    ends = regime.course(*regime.later(here, step))
+    if not regime.bends:
+        return ends
+    t, x, rates, _ = here
+    return regime.course(
+        t + step, [v + step * (rate + end) / 2 for v, rate, end in zip(x, rates, ends[2], strict=True)]
+    )
 
 
 def chosen(found: list[tuple[float, Way]], *, in_order: bool) -> Way | None:

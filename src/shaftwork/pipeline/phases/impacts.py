@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
@@ -25,14 +24,13 @@ class Impacts:
     Args:
         regimes: combinations of modes.
         elements: of the network.
-        tick: how far in s rounding moves the time.
         together: whether what touches is hit in the same instant as what hits it.
     """
 
-    def __init__(self, regimes: Regimes, elements: Sequence[Element], tick: float, *, together: bool) -> None:
-        self._regimes, self._elements, self._tick = regimes, elements, tick
-        self._collisions = Collisions(regimes, elements, tick, together=together)
+    def __init__(self, regimes: Regimes, elements: Sequence[Element], *, together: bool) -> None:
+        self._regimes, self._elements = regimes, elements
         self._impulses = Impulses(regimes, elements)
+        self._collisions = Collisions(regimes, elements, self._impulses, together=together)
         self.gears = self._impulses.gears
 
     def meets(self, moment: Moment, t: float, to: Mode, number: int) -> float:
@@ -40,10 +38,12 @@ class Impacts:
         regime, modes = moment.regime, self._elements[number].modes
         if to.form in (modes.options[0].form, modes[regime.modes[number]].form):
             return 0.0
-        speed = regime.assembly.across(number, t, moment.x, regime.p)
+        speed = moment.across(number, t)
         speeds = moment.x[: len(regime.assembly.model.form.across_states)]
         least = NO_IMPACT * np.abs(speeds).max(initial=1.0)
-        if abs(speed) <= least or abs(speed) <= abs(speed - self._shortly_before(moment, t, number)):
+        # so long ago as its guard may be found late, and twice that to be sure
+        before = moment.moved(t, -2 * CLEAR * regime.tick).across(number, t)
+        if abs(speed) <= least or abs(speed) <= abs(speed - before):
             return 0.0
         try:
             joined = self._regimes.changed(moment, t, with_modes(regime.modes, {number: to.name}))
@@ -53,15 +53,9 @@ class Impacts:
         # between dampers alone a speed is whatever their torques make it: joining them stops no inertia
         return speed if any(abs(after[name] - value) > least for name, value in held.items()) else 0.0
 
-    def _shortly_before(self, moment: Moment, t: float, number: int) -> float:
-        """The speed across an element so long ago as its guard may be found late, twice that to be sure."""
-        regime, late = moment.regime, 2 * CLEAR * self._tick
-        rates = np.array(regime.motion(t, moment.x.tolist())[0])
-        return regime.assembly.across(number, t, moment.x - late * rates, regime.p)
-
     def fastest(self, t: float, moment: Moment, number: int, ended: Watched) -> tuple[int, Watched]:
         """Of what is hit at an instant in s what closes fastest, element and guard: impacts follow each other."""
-        if self.gears or ended.leave.rebound is None:
+        if ended.leave.rebound is None:
             return number, ended
         contact = self._collisions.fastest(t, moment, number, ended.leave)
         if contact is None or contact.number == number:
@@ -69,60 +63,9 @@ class Impacts:
         return next(pair for pair in moment.regime.watched if pair[1].leave is contact.leave)
 
     def hit(self, t: float, after: float, moment: Moment, number: int, leave: Leave) -> tuple[Moment, list[Change]]:
-        """An impact: the element is joined for an instant, and for good where nothing throws it back.
-
-        Law: v = v_joined + e (v_joined - v_before), which gives e times the speed back and keeps every momentum; with
-        gears that rub as in `Impulses`.
-        """
-        if not self.gears:
-            return self._hit_at_once(t, after, moment, number, leave)
-        regime = moment.regime
-        closes = regime.assembly.across(number, after, moment.x, regime.p)
-        speed = abs(closes)
-        share, rest = (regime.assembly.constant(number, given, regime.p) for given in (leave.rebound, leave.rest))
-        held, apart = self._regimes.held(moment, after), {number: regime.modes[number]}
-        # what moves more slowly than the rest of an impact stays as it is: two contacts would part and meet for ever
-        least = max(rest, NO_IMPACT * speed)
-
-        def joined(start: Start, _: Sequence[Stage]) -> Blow:
-            if closes * self._impulses.across(start.moment, after, number) < 0:  # a gear has jammed, and it opens
-                return Blow(start.moment, start.moment.regime)
-            met = self._joined(start.moment.regime.modes, start.held, after, {number: leave.to}, least)
-            return Blow(met, met.regime)
-
-        stages = self._impulses.stages(after, self._impulses.begins(moment, after), joined, apart)
-        new = stages[-1].blow.after
-        plastic = self._regimes.held(new, after)
-        # nothing throws back what has no inertia: a damper's end against a stop
-        moved = any(abs(plastic[name] - value) > NO_IMPACT * speed for name, value in held.items())
-        rebound = leave.rebound is not None and moved and share * speed > rest
-        if rebound:
-            try:
-                stages += self._thrown_back(after, stages, number, leave.to, share, apart)
-            except NetworkError:  # a gear that locks itself holds what would come back
-                rebound = False
-        given, lost = self._impulses.given(after, stages), self._impulses.lost(after, stages)
-        element = self._elements[number]
-        lost[element.part.name] = lost.get(element.part.name, 0.0) + self._impulses.work(after, number, stages)
-        modes = regime.modes[number], leave.to
-        hits = Change(t, element, *modes, rebound, impact=True, given=given, lost=lost)
-        new = stages[-1].blow.after
-        if not rebound:
-            new = self._at_limit(new, number, leave)
-        new = self._kept(after, regime.modes, new)
-        changes = [hits, *self._differences(t, regime.modes, new.regime.modes, {number})]
-        self._refuse_gain(t, moment, held, self._regimes.held(new, after), hits)
-        return new, changes
-
-    def _hit_at_once(
-        self, t: float, after: float, moment: Moment, number: int, leave: Leave
-    ) -> tuple[Moment, list[Change]]:
-        """An impact of all contacts that touch, where no gear passes it on by its direction."""
+        """An impact of all contacts that touch: each is joined, or for an instant where it is thrown back."""
         regime, held = moment.regime, self._regimes.held(moment, after)
         found = self._collisions.impact(after, moment, number, leave)
-        if found is None:  # its equations say what contradicts what
-            new = self._regimes.changed(moment, after, with_modes(regime.modes, {number: leave.to}))
-            return new, [Change(t, self._elements[number], regime.modes[number], leave.to, impact=True)]
         new, hits = found.after, list[Change]()
         for contact in sorted((*found.stays, *found.thrown), key=lambda contact: contact.number != number):
             rebound = contact in found.thrown
@@ -158,7 +101,7 @@ class Impacts:
 
         Without it they would open and close for ever, each time as far beyond their limit as rounding hides it.
         """
-        regime, x = moment.regime, moment.x.tolist()
+        regime = moment.regime
         parted = [
             (k, made)
             for k, made in regime.watched
@@ -166,14 +109,11 @@ class Impacts:
         ]
         if not parted:
             return moment
-        rates, now = regime.motion(t, x)
-        near = regime.limits(t + self._tick, regime.rounded(x, rates, self._tick))
-        kept = {}
+        bands, kept = regime.bands(moment.course(t)), {}
         for k, made in parted:
             way = float(made.leave.when.diff(INTEGRAL))
-            speeds = (moment.x, moment.x + np.array(rates))
-            speed, later = (way * regime.assembly.across(k, t, at, regime.p) for at in speeds)
-            if speed**2 < 4 * (later - speed) * CLEAR * abs(near[made.guard] - now[made.guard]):
+            speed, later = (way * one.across(k, t) for one in (moment, moment.moved(t, 1.0)))
+            if speed**2 < 4 * (later - speed) * CLEAR * bands[made.guard]:
                 kept[k] = before[k]
         return self._regimes.changed(moment, t, with_modes(regime.modes, kept)) if kept else moment
 
@@ -185,40 +125,8 @@ class Impacts:
         if place is None or not slope:
             return moment
         x = moment.x.copy()
-        x[place] = -assembly.constant(number, leave.when.xreplace({INTEGRAL: Integer(0)}) / slope, moment.regime.p)
+        x[place] = -moment.regime.constant(number, leave.when.xreplace({INTEGRAL: Integer(0)}) / slope)
         return moment._replace(x=x)
-
-    def _thrown_back(
-        self, t: float, pressed: tuple[Stage, ...], number: int, to: str, share: float, apart: Mapping[int, str]
-    ) -> tuple[Stage, ...]:
-        """From the end of the compression on, until what it took up comes back but for the loss.
-
-        Law: the work that comes back is e^2 of what was taken up (Stronge 1990), which is Newton's share e of the speed
-        as long as no gear turns round. Speeds change as they would if the same impulse closed what now parts.
-        """
-        last, work = pressed[-1], self._impulses.work
-        first = self._impulses.across(pressed[0].start.moment, t, number)
-
-        def thrown(start: Start, made: Sequence[Stage]) -> Blow:
-            moment = start.moment
-            modes = moment.regime.modes
-            ways = moment, self._regimes.taking(modes, t, last.start.held)
-            closing = max(ways, key=lambda one: abs(self._impulses.across(one, t, number)))
-            speed, now = (self._impulses.across(one, t, number) for one in (closing, moment))
-            if not abs(speed) > NO_IMPACT * abs(first):  # both sides are held
-                return Blow(moment, moment.regime)
-            begun = self._impulses.begins(closing, t)
-            joined = self._regimes.changed(closing, t, with_modes(modes, {number: to}))
-            closed = work(t, number, (Stage(begun, Blow(joined, joined.regime), 1.0),))
-            left = share**2 * work(t, number, pressed) + work(t, number, made)
-            gains = math.sqrt((now / speed) ** 2 + max(left, 0.0) / closed) - abs(now / speed)
-            gains *= math.copysign(1.0, speed * first)
-            after = self._regimes.held(joined, t)
-            parts = {name: v + gains * (after[name] - begun.held[name]) for name, v in start.held.items()}
-            return Blow(self._regimes.taking(modes, t, parts), joined.regime)
-
-        compressed = self._regimes.changed(last.blow.after, t, with_modes(last.blow.after.regime.modes, apart))
-        return self._impulses.stages(t, self._impulses.begins(compressed, t), thrown, apart)
 
     def _refuse_gain(
         self, t: float, moment: Moment, before: Mapping[str, float], after: Mapping[str, float], hits: Change
@@ -260,7 +168,7 @@ class Impacts:
         held = self._regimes.held(stages[0].blow.after, after)
         passes = any(abs(v - begins.held[name]) > NO_IMPACT * max(abs(v), 1.0) for name, v in held.items())
         if passes and (self._impulses.gears or self.limited(regime.modes)):
-            stages = self._impulses.stages(after, begins, pulled, {})
+            stages = self._impulses.stages(after, begins, pulled)
         new, given = stages[-1].blow.after, self._impulses.given(after, stages, before)
         at_once = Impact(t, "", given, self._impulses.lost(after, stages))
         return new, self._differences(t, regime.modes, new.regime.modes), at_once
@@ -298,8 +206,7 @@ class Impacts:
         made = {**joins, **{k: ways[0][1] for k, ways in gives.items()}}
         while True:
             moment = self._regimes.taking(with_modes(before, made), t, held)
-            after = moment.regime
-            speeds = {k: after.assembly.across(k, t, moment.x, after.p) for k in gives}
+            speeds = {k: moment.across(k, t) for k in gives}
             ways = {k: [name for side, name in gives[k] if side * speeds[k] > 0] for k in gives}
             pressed = [k for k in gives if abs(speeds[k]) > least and not ways[k]]
             if not pressed:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.recovery import History, into
+from shaftwork.codegen.recovery import History
 from shaftwork.components.branches import ACROSS, through_of
 from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError, SimulationError
@@ -34,10 +34,19 @@ Held = Mapping[str, float]
 
 
 class Blow(NamedTuple):
-    """What an impulse leads to, and the modes in which it passes."""
+    """What an impulse leads to.
+
+    Args:
+        after: what follows.
+        passing: the modes in which it passes.
+        pressed: (contacts,) the impulses of contacts that are open in these modes.
+        through: (branches,) what of them passes through tree branches.
+    """
 
     after: Moment
     passing: Regime
+    pressed: Array = np.zeros(0)
+    through: Array | float = 0.0
 
 
 class Start(NamedTuple):
@@ -72,18 +81,15 @@ class Impulses:
 
     def begins(self, moment: Moment, t: float) -> Start:
         """Where an impact begins, with the inputs of a time in s."""
-        return Start(moment, t, self._regimes.held(moment, t), {k: self.across(moment, t, k) for k in self.gears})
+        return Start(moment, t, self._regimes.held(moment, t), {k: moment.across(k, t) for k in self.gears})
 
-    def stages(
-        self, t: float, start: Start, blow: Callable[[Start, Sequence[Stage]], Blow], apart: Mapping[int, str]
-    ) -> tuple[Stage, ...]:
+    def stages(self, t: float, start: Start, blow: Callable[[Start, Sequence[Stage]], Blow]) -> tuple[Stage, ...]:
         """All parts of an impulse, of which the last leads to its end.
 
         Args:
             t: time after it in s at which inputs are read.
             start: before it.
             blow: the rest of it from a start on, all in the modes that gears have there, and after what stages.
-            apart: modes in which a stage starts of elements that are joined in it.
 
         Raises:
             SimulationError: gears come to rest again and again.
@@ -95,7 +101,7 @@ class Impulses:
             made.append(Stage(start, found, share))
             if number < 0:
                 return tuple(made)
-            modes = self._at_rest(with_modes(found.after.regime.modes, apart), number)
+            modes = self._at_rest(found.after.regime.modes, number)
             start = self._reached(t, made[-1], modes, number)
         raise SimulationError(
             f"'{self._elements[number].name}' comes to rest again and again in one impact at t = {t:.9g} s. Give the "
@@ -109,7 +115,7 @@ class Impulses:
             name: value + share * gain
             for (name, value), gain in zip(start.held.items(), self._gained(t, start, blow).values(), strict=True)
         }
-        speeds = {k: v + share * (self.across(blow.after, t, k) - v) for k, v in start.speeds.items()}
+        speeds = {k: v + share * (blow.after.across(k, t) - v) for k, v in start.speeds.items()}
         return Start(self._regimes.taking(modes, t, held), t, held, {**speeds, number: 0.0})
 
     def _in_modes(self, t: float, start: Start, modes: ModeNames) -> Start:
@@ -198,7 +204,7 @@ class Impulses:
         states = (made.x[: len(made.regime.assembly.model.states)] for made in (start.moment, after))
         least = NOTHING_OF * max(np.abs(x).max(initial=0.0) for x in states)
         for k, speed in start.speeds.items():
-            speeds = speed, self.across(after, t, k)
+            speeds = speed, after.across(k, t)
             for leave in self._elements[k].modes[start.moment.regime.modes[k]].leaves:
                 way = float(leave.when.diff(ACROSS))
                 began, ends = (0.0 if abs(speed) <= least else way * speed for speed in speeds)
@@ -238,7 +244,9 @@ class Impulses:
             for time, weight in ((t, late), (before, 1.0 - late)):
                 if time is None:
                     continue
-                for part, energy in stores.given(bound, stores.sources(bound, time), gained).items():
+                for part, energy in stores.given(
+                    bound, stores.sources(bound, time), gained, stage.blow.through
+                ).items():
                     found[part] = found.get(part, 0.0) + stage.share * weight * energy
             jumped = then
         return found
@@ -250,7 +258,7 @@ class Impulses:
             impulses = self._impulses(t, stage.start, stage.blow)
             for k, began in stage.start.speeds.items():
                 name, passing = self._elements[k].part.name, stage.blow.passing.assembly
-                ends = self.across(stage.blow.after, t, k)
+                ends = stage.blow.after.across(k, t)
                 moment, time, speed = (stage.blow.after, t, ends) if ends else (*stage.start[:2], began)
                 # the speeds of a mesh are in proportion to that of its gear
                 mean = (began + stage.share / 2 * (ends - began)) / speed if speed else 0.0
@@ -259,24 +267,10 @@ class Impulses:
                 found[name] = found.get(name, 0.0) + float(lost)
         return found
 
-    def work(self, t: float, number: int, stages: Sequence[Stage]) -> float:
-        """The work in J that an impulse does against an element: what passes, at the mean of the speeds across it."""
-        total = 0.0
-        for start, blow, share in stages:
-            passes = _into(blow.passing.assembly, number, self._impulses(t, start, blow), blow.passing.p)
-            began, ends = (self.across(moment, t, number) for moment in (start.moment, blow.after))
-            total += share * passes * (began + share / 2 * (ends - began))
-        return total
-
-    @staticmethod
-    def across(moment: Moment, t: float, number: int) -> float:
-        """The speed across an element."""
-        return moment.regime.assembly.across(number, t, moment.x, moment.regime.p)
-
     def _impulses(self, t: float, start: Start, found: Blow) -> Array:
         """(branches,) what passes through every branch at once."""
         assembly, p = found.passing.assembly, found.passing.p
-        return assembly.stores.impulses(assembly.bound(p), self._gained(t, start, found))
+        return assembly.stores.impulses(assembly.bound(p), self._gained(t, start, found)) + found.through
 
 
 def _turns(mode: Mode) -> bool:
@@ -291,14 +285,6 @@ def _guard(assembly: Assembly, number: int, leave: Leave, impulses: Array, p: Ar
         share = leave.when.diff(through_of(graph.branches[branch].template.label))
         total += assembly.constant(number, share, p) * float(impulses[branch]) if share else 0.0
     return total
-
-
-def _into(assembly: Assembly, number: int, impulses: Array, p: Array) -> float:
-    """What passes into an element at the first end of its speed, of impulses (branches,)."""
-    element = assembly.elements[number]
-    part = assembly.parts[element.part.name]
-    port = element.modes.ends[0] if element.modes.ends else part.component.ports[0].name
-    return float(into(part, port, impulses, assembly.model.form, p))
 
 
 def _meshes(assembly: Assembly, name: str) -> list[int]:

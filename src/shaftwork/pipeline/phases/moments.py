@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
+from sympy import Expr
 
 from shaftwork.codegen.code import Moves
 from shaftwork.codegen.elements import Array
@@ -29,6 +30,9 @@ EPS = float(np.finfo(float).eps)
 # the run.
 AHEAD, AHEAD_OF_RUN = 1e-3, 1e-7
 GOLDEN = (5**0.5 - 1) / 2
+
+Course = tuple[float, list[float], list[float], list[float]]
+"""Time, states, their rates, and guards."""
 
 
 class Change(NamedTuple):
@@ -72,6 +76,8 @@ class Regime:
         sides: (guards,) on which each is met.
         sizes: nominal size of each state.
         watched: element and guard of everything that may end one of the modes.
+        tick: how far in s rounding moves the time.
+        longest: how far in s the further course is looked at, at most.
         ways: by guard, where it leads; found when it is first met.
     """
 
@@ -84,6 +90,8 @@ class Regime:
     sides: Array
     sizes: list[float]
     watched: tuple[tuple[int, Watched], ...]
+    tick: float
+    longest: float
     ways: dict[int, Any] = field(default_factory=dict)
 
     @cached_property
@@ -111,11 +119,37 @@ class Regime:
         pairs = zip(parts, self.sizes, strict=True)
         return [(part, part * size / NOMINAL, math.copysign(1.0, part), AHEAD * size) for part, size in pairs]
 
-    def rounded(self, x: list[float], rates: list[float], tick: float) -> list[float]:
-        """The states so far away as rounding may move them, and the time by a tick in s."""
-        changes = zip(x, rates, self.moves, strict=True)
+    def constant(self, number: int, expression: Expr | None) -> float:
+        """A number that is made of an element's parameters."""
+        return self.assembly.constant(number, expression, self.p)
+
+    def course(self, t: float, x: list[float]) -> Course:
+        """Rates and guards at a time in s, behind time and states."""
+        return t, x, *self.motion(t, x)
+
+    def beside(self, here: Course) -> tuple[float, list[float]]:
+        """The time and the states as far away as rounding may move them."""
+        t, x, rates, _ = here
+        each, tick = zip(x, rates, self.moves, strict=True), self.tick
         # all of it to the same side: what a tick moves must not make up for the rest
-        return [v + part * abs(v) + least + way * tick * abs(rate) for v, rate, (part, least, way, _) in changes]
+        return t + tick, [v + part * abs(v) + least + way * tick * abs(rate) for v, rate, (part, least, way, _) in each]
+
+    def bands(self, here: Course) -> list[float]:
+        """How far rounding moves each guard."""
+        return [abs(near - now) for near, now in zip(self.limits(*self.beside(here)), here[3], strict=True)]
+
+    def ahead(self, rates: list[float]) -> float:
+        """How far in s the further course is looked at: no state moves there by more than a part of its size."""
+        step = self.longest
+        for rate, (*_, reach) in zip(rates, self.moves, strict=True):
+            if rate and reach < step * abs(rate):
+                step = reach / abs(rate)
+        return step
+
+    def later(self, here: Course, step: float) -> tuple[float, list[float]]:
+        """The time and the states a step in s further along a straight line."""
+        t, x, rates, _ = here
+        return t + step, [v + step * rate for v, rate in zip(x, rates, strict=True)]
 
 
 class Moment(NamedTuple):
@@ -124,6 +158,18 @@ class Moment(NamedTuple):
     regime: Regime
     x: Array
     bands: Sequence[float] = ()
+
+    def course(self, t: float) -> Course:
+        """The course at a time in s."""
+        return self.regime.course(t, self.x.tolist())
+
+    def across(self, number: int, t: float) -> float:
+        """The speed across an element at a time in s."""
+        return self.regime.assembly.across(number, t, self.x, self.regime.p)
+
+    def moved(self, t: float, step: float) -> Moment:
+        """The same modes a step in s later or earlier, along a straight line."""
+        return self._replace(x=self.x + step * np.array(self.course(t)[2])) if step else self
 
 
 def clear_of_limit(beyond: float, band: float) -> float:
@@ -148,7 +194,3 @@ def clear_of_limits(regime: Regime, now: Sequence[float], bands: Sequence[float]
         k = watched.guard
         made[k] = clear_of_limit(watched.side * now[k], bands[k])
     return made
-
-
-Course = tuple[float, list[float], list[float], list[float]]
-"""Time, states, their rates, and guards."""

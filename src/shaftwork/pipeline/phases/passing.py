@@ -14,7 +14,6 @@ from shaftwork.core.errors import no_value
 from shaftwork.integrate.problem import Reaction, SeriesError
 from shaftwork.pipeline.phases.elements import Element, ModeNames
 from shaftwork.pipeline.phases.moments import Change, Moment, Regime, clear_of_limit
-from shaftwork.pipeline.phases.rejoining import settled
 from shaftwork.pipeline.phases.settling import Settling
 
 # Of so many roundings of the time a guard may be late that is met together with another one.
@@ -125,7 +124,7 @@ class Passing:
     def _settled(self, met: int, t: float, x: Array) -> _Following | None:
         before = Moment(self.regime, x[: self._size].copy(), self.bands)
         self.refuse_missed(met, t, x)
-        moment, changes = settled(self._settling, t, t, before, met)
+        moment, changes = self._settling.settle(t, t, before, met)
         if moment.x is before.x:
             return moment.regime, moment.bands, changes
         self.beyond = moment, changes  # other states are other equations, or an impact in these
@@ -138,14 +137,13 @@ class Passing:
             SeriesError: the engine has not seen it.
             SimulationError: a law or a guard has no value.
         """
-        regime, bands, states = self.regime, self.bands, x[: self._size].tolist()
-        rates, now = regime.motion(t, states)
+        regime, bands = self.regime, self.bands
+        here = regime.course(t, x[: self._size].tolist())
+        now, before = here[3], regime.limits(*regime.later(here, -LATE * regime.tick))
         if any(map(math.isnan, now)):
-            law = regime.assembly.without_value(regime.p, regime.modes, np.array([t]), np.array([states]))
+            law = regime.assembly.without_value(regime.p, regime.modes, np.array([t]), np.array([here[1]]))
             if law is not None:
                 raise no_value(*law)
-        late = LATE * self._settling.tick
-        before = regime.limits(t - late, [v - late * rate for v, rate in zip(states, rates, strict=True)])
         for number, made in regime.watched:
             k = made.guard
             if k != met and min(made.side * now[k], made.side * before[k]) > bands[k]:
@@ -166,8 +164,7 @@ class Passing:
         if way is None:
             return None
         to, before = way.to, self.bands
-        tick, longest = self._settling.tick, self._settling.longest
-        now, near, later = to.near(t, x.tolist()[: self._size], tick, to.moves, longest)
+        now, near, later = to.near(t, x.tolist()[: self._size], to.tick, to.moves, to.longest)
         bands = [0.0] * len(now)
         for guard, side, other in way.watched:
             beyond, band = side * now[guard], abs(near[guard] - now[guard])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -13,7 +14,7 @@ from shaftwork.components.branches import INTEGRAL
 from shaftwork.core.errors import NetworkError, ParameterError
 from shaftwork.pipeline.ending import Ending
 from shaftwork.pipeline.phases.elements import Element, ModeNames
-from shaftwork.pipeline.phases.moments import Moment, Regime
+from shaftwork.pipeline.phases.moments import AHEAD_OF_RUN, ROUNDINGS, Moment, Regime
 from shaftwork.pipeline.phases.starts import begins_anew
 from shaftwork.reduction.cancelling import jamming
 
@@ -30,12 +31,14 @@ class Regimes:
     Args:
         phases: the sets of equations.
         values: parameters that differ from the network's.
+        span: start and end of the run, s.
         own: whether each has equations of its own, also where there are many.
     """
 
-    def __init__(self, phases: Phases, values: Mapping[str, float], *, own: bool) -> None:
+    def __init__(self, phases: Phases, values: Mapping[str, float], span: tuple[float, float], *, own: bool) -> None:
         self._phases, self._values = phases, dict(values)
         self._own = own
+        self._times = ROUNDINGS * math.ulp(max(map(abs, span))), AHEAD_OF_RUN * (span[1] - span[0])
         self._made: dict[ModeNames, Regime] = {}
 
     def regime(self, modes: ModeNames) -> Regime:
@@ -58,6 +61,7 @@ class Regimes:
                 assembly.sides(modes),
                 assembly.sizes(p),
                 assembly.watched(modes),
+                *self._times,
             )
             self._made.setdefault(modes, made)  # another thread may have been first
         return self._made[modes]
@@ -145,7 +149,7 @@ def refuse_beyond(regime: Regime, elements: Sequence[Element], t: float, x: Arra
         if made.leave.rebound is None or not beyond > BEYOND:
             continue
         slope = float(when.diff(INTEGRAL))
-        limit = -slope * regime.assembly.constant(number, when.xreplace({INTEGRAL: Integer(0)}), regime.p)
+        limit = -slope * regime.constant(number, when.xreplace({INTEGRAL: Integer(0)}))
         raise ParameterError(
             f"{type(element.part.component).__name__} '{element.name}' would start at a twist of "
             f"{limit + slope * beyond:.9g} rad, {'above its upper' if slope > 0 else 'below its lower'} limit of "

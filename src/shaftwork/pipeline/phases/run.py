@@ -27,7 +27,6 @@ from shaftwork.pipeline.phases.assemblies import Assembly
 from shaftwork.pipeline.phases.moments import Change, Moment, Regime
 from shaftwork.pipeline.phases.passing import Passing, Phase
 from shaftwork.pipeline.phases.phases import FOLLOWING, Phases
-from shaftwork.pipeline.phases.rejoining import settled
 from shaftwork.pipeline.phases.settling import Settling
 from shaftwork.pipeline.phases.starts import refuse_incomplete, warn_of_what_may_have_begun
 from shaftwork.pipeline.phases.wave_run import WaveRun
@@ -148,7 +147,7 @@ class Run:
         after = self._instants(moment).sides(start)[1]
         if after != ending.read and moment.regime.assembly.model.form.has_impulses:
             moment, changes, _ = self.settling.jumped(start, moment, ending.read, after)
-        moment, further = settled(self.settling, start, after, moment, None)
+        moment, further = self.settling.settle(start, after, moment, None)
         return moment, [*changes, *further]
 
     def choose(self) -> tuple[str, str]:
@@ -178,7 +177,7 @@ class Run:
 
     def _settle(self, t: float, moment: Moment, met: int | None) -> Moment:
         after = self._instants(moment).sides(t)[1]
-        moment, changes = settled(self.settling, t, after, moment, met)
+        moment, changes = self.settling.settle(t, after, moment, met)
         self.note(t, changes)
         return moment
 

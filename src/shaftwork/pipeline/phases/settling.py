@@ -9,21 +9,15 @@ from dataclasses import replace
 from itertools import islice
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.pipeline.phases.commutation import commutations
-from shaftwork.pipeline.phases.courses import Way, chosen, later, leaving, moved
+from shaftwork.pipeline.phases.courses import Way, chosen, leaving
 from shaftwork.pipeline.phases.elements import ModeNames, Watched
 from shaftwork.pipeline.phases.impacts import Impacts
 from shaftwork.pipeline.phases.moments import (
-    AHEAD,
-    AHEAD_OF_RUN,
-    ROUNDINGS,
     Change,
     Moment,
-    Regime,
     clear_of_limits,
     together,
 )
@@ -53,13 +47,9 @@ class Settling:
         self, phases: Phases, values: Mapping[str, float], span: tuple[float, float], *, own: bool = True
     ) -> None:
         self._phases, self.elements = phases, phases.elements
-        self._regimes = Regimes(phases, values, own=own)
+        self._regimes = Regimes(phases, values, span, own=own)
         self.regime, self.held, self.resumed = self._regimes.regime, self._regimes.held, self._regimes.resumed
-        self.longest = AHEAD_OF_RUN * (span[1] - span[0])
-        """How far ahead in s the further course is looked at, at most."""
-        self.tick = ROUNDINGS * math.ulp(max(map(abs, span)))
-        """How far in s rounding moves the time."""
-        self._impacts = Impacts(self._regimes, self.elements, self.tick, together=phases.netlist.impacts == "together")
+        self._impacts = Impacts(self._regimes, self.elements, together=phases.netlist.impacts == "together")
         self.jumped = self._impacts.jumped
 
     def started(self, t: float, x: Array) -> Moment:
@@ -105,12 +95,30 @@ class Settling:
         Raises:
             SimulationError: no modes are consistent; names the pair that changes for ever.
         """
+        before = moment.regime
+        ends = met is not None or self.ends(moment._replace(bands=()), after, moment.x)
+        resting = self._resting(moment, after) if ends else {}
+        if not resting:
+            return self._settled(t, after, moment, met)
+        # Who carries is told anew. A law that falls at once would tell a way in which nothing moves: of two frictions
+        # one has given way at rest, and now the other one does, backward. Once it moves, the first one has less torque
+        # than it holds at rest, and would move forward instead, which the other one does not let it.
+        joined, begun = self._joined(t, after, moment, resting)
+        new, changes = self._settled(t, after, joined, None)
+        if new.regime.modes == before.modes:  # rounding hides what was met
+            leaves = [(k, watched.leave) for k, watched in before.watched if watched.guard == met]
+            same = (watched.guard for k, watched in joined.regime.watched if (k, watched.leave) in leaves)
+            new, changes = self._settled(t, after, joined, next(same, None))
+        return new, together([*begun, *changes])
+
+    def _settled(self, t: float, after: float, moment: Moment, met: int | None) -> tuple[Moment, list[Change]]:
+        """The same where nothing rests by now; what does so then is joined, in the order of the network."""
         new, changes = self._fewest(t, after, moment, met)
         resting = self._resting(new, after) if changes else {}
         if not resting:
             return new, changes
         try:  # joined all at once: what was slipping a change ago must not tell who carries
-            joined = self._regimes.changed(new, after, with_modes(new.regime.modes, resting))
+            joined, at_once = self._joined(t, after, new, resting)
             held, further = self._consistent(t, after, joined, None)
         except (NetworkError, SimulationError):
             return new, changes
@@ -119,21 +127,26 @@ class Settling:
             return new, changes
         if held.regime.modes == new.regime.modes:
             return new, together(changes) or changes
-        at_once = [Change(t, self.elements[k], new.regime.modes[k], name) for k, name in resting.items()]
         return held, together([*changes, *at_once, *further])
+
+    def _joined(self, t: float, after: float, moment: Moment, joins: Mapping[int, str]) -> tuple[Moment, list[Change]]:
+        """The same instant with elements in modes in which they hold, and the changes to these."""
+        modes = moment.regime.modes
+        changes = [Change(t, self.elements[k], modes[k], name) for k, name in joins.items()]
+        return self._regimes.changed(moment, after, with_modes(modes, joins)), changes
 
     def _resting(self, moment: Moment, t: float) -> dict[int, str]:
         """Elements that slip, with no speed across them as others hold their ends, and the modes in which they hold."""
-        regime, x = moment.regime, moment.x.tolist()
-        found = {}
+        regime, found = moment.regime, {}
         for k, made in regime.watched:
             modes, name = self.elements[k].modes, regime.modes[k]
             if made.leave.to and name in (slips for _, slips in modes[made.leave.to].gives_way):
                 found[k] = made.leave.to, made.guard
         if not found:
             return {}
-        now, others, _ = regime.near(t, x, self.tick, regime.moves, self.longest)
-        return {k: to for k, (to, guard) in found.items() if now[guard] == others[guard] == 0.0}
+        here = moment.course(t)
+        now, near = here[3], regime.limits(*regime.beside(here))
+        return {k: to for k, (to, guard) in found.items() if now[guard] == near[guard] == 0.0}
 
     def _fewest(self, t: float, after: float, moment: Moment, met: int | None) -> tuple[Moment, list[Change]]:
         """Of several guards that are met at one instant, rounding tells which of them ends the phase.
@@ -147,15 +160,13 @@ class Settling:
         found: list[tuple[Moment, list[Change]]] = []
         failed: list[SimulationError] = []
         ways = self._at_once(moment, after, named)
-        least = max(1, len({number for number, made in ways if made.leave.by_twist}))
         for first in ways:
             try:
                 found.append(self._consistent(t, after, moment, first))
             except SimulationError as error:
                 failed.append(error)
             else:
-                changes = found[-1][1]
-                if len(changes) == 1 or (len(changes) == least and not any(one.impact for one in changes)):
+                if len(found[-1][1]) == 1:
                     break  # none can be fewer
         if not found:
             raise failed[0]
@@ -167,7 +178,7 @@ class Settling:
         now, bands = regime.limits(t, moment.x.tolist()), moment.bands
         if bands and all(made.side * now[made.guard] < -NEAR * bands[made.guard] for _, made in others):
             return [named]
-        ways = [pair for _, pair in self._exceeded(moment, t, moment, (), repeats=1)[1]]
+        ways = [pair for _, pair in self._exceeded(moment, t, moment, (), in_order=True)[1]]
         if named not in ways and (not named[1].leave.by_torque or all(pair[1].leave.by_torque for pair in ways)):
             ways.append(named)
         return sorted(ways, key=moment.regime.watched.index)
@@ -220,11 +231,12 @@ class Settling:
                 faster to modes that are consistent, as a rule; but this always does where parts hold each other
                 (Murty, Linear Complementarity, 1988, section 4.1).
         """
-        moment, found = self._exceeded(moment, t, ended, still, repeats)
-        return moment, chosen(found, in_order=repeats > 0)
+        in_order = repeats > 0
+        moment, found = self._exceeded(moment, t, ended, still, in_order=in_order)
+        return moment, chosen(found, in_order=in_order)
 
     def _exceeded(
-        self, moment: Moment, t: float, ended: Moment, still: Sequence[Way], repeats: int
+        self, moment: Moment, t: float, ended: Moment, still: Sequence[Way], *, in_order: bool
     ) -> tuple[Moment, list[tuple[float, Way]]]:
         """The guards beyond their limits, or on them and about to go beyond, and how far; the moment with its bands.
 
@@ -233,14 +245,11 @@ class Settling:
             t: s.
             ended: the moment before any change.
             still: elements and guards that were found here already and change nothing.
-            repeats: how often modes have come back. After the second time, what comes back within its limit by itself,
-                at once, is no more beyond it.
+            in_order: whether the first one will be taken, and not the worst.
         """
-        regime, x = moment.regime, moment.x.tolist()
-        rates, now = regime.motion(t, x)
-        rounded = regime.rounded(x, rates, self.tick)
-        others, near = regime.motion(t + self.tick, rounded)
-        bands = [abs(n - g) for n, g in zip(near, now, strict=True)]
+        regime, here = moment.regime, moment.course(t)
+        beside, now = regime.course(*regime.beside(here)), here[3]
+        bands = [abs(near - guard) for near, guard in zip(beside[3], now, strict=True)]
         wide = bands
         if ended.bands and ended.regime.assembly is regime.assembly:
             wide = list(map(max, bands, ended.bands))
@@ -254,25 +263,13 @@ class Settling:
                 on_limit.append(pair)
             elif value > 0:
                 beyond.append((value, pair))
-        if repeats > 1 and beyond:
-            soon = later(regime, self.ahead(regime, rates), (t, x, rates, now))[3]
-            beyond = [excess for excess in beyond if excess[1][1].side * soon[excess[1][1].guard] > 0]
         # impacts come first: torques are those of the motion after them
         hits = [excess for excess in beyond if not excess[1][1].leave.by_torque]
         if on_limit and not hits:
-            courses = (t, x, rates, now), (t + self.tick, rounded, others, near)
-            soon_beyond = leaving(regime, self.ahead(regime, rates), *courses, on_limit)
+            soon_beyond = leaving(regime, here, beside, on_limit)
             hits = [excess for excess in soon_beyond if excess[1][1].leave.rebound is not None]
-            beyond = beyond + soon_beyond if repeats else beyond or soon_beyond
+            beyond = beyond + soon_beyond if in_order else beyond or soon_beyond
         return Moment(regime, moment.x, clear_of_limits(regime, now, bands)), hits or beyond
-
-    def ahead(self, regime: Regime, rates: list[float]) -> float:
-        """How far in s the further course is looked at."""
-        step = self.longest
-        for rate, size in zip(rates, regime.sizes, strict=True):
-            if rate and AHEAD * size < step * abs(rate):
-                step = AHEAD * size / abs(rate)
-        return step
 
     def _follow(
         self, t: float, after: float, moment: Moment, number: int, ended: Watched, tried: int = 0
@@ -303,10 +300,8 @@ class Settling:
     def _anew(self, moment: Moment, t: float, number: int) -> str:
         """The mode of an element in which a motion would start, other than the one that ends."""
         regime, before = moment.regime, moment.regime.modes[number]
-        step = self.ahead(regime, regime.motion(t, moment.x.tolist())[0])
-        for late in (0.0, step):  # by rounding, what ends the mode may not be true yet
-            x = moved(moment, t, late).x
-            to = regime.assembly.start_of(number, before, t + late, x, regime.p)
+        for late in (0.0, regime.ahead(moment.course(t)[2])):  # by rounding, what ends the mode may not be true yet
+            to = regime.assembly.start_of(number, before, t + late, moment.moved(t, late).x, regime.p)
             if to:
                 return to
         element = self.elements[number]
@@ -323,27 +318,23 @@ class Settling:
         """
         number, ended = self._impacts.fastest(after, moment, number, ended)
         since = 0.0 if ended.leave.rebound is None else self._since(after, moment, ended)
-        new, changes = self._impacts.hit(t, after, moved(moment, after, -since), number, ended.leave)
+        new, changes = self._impacts.hit(t, after, moment.moved(after, -since), number, ended.leave)
         if not changes[0].rebound:
-            return moved(new, after, since), changes
-        old, made, x = moment.regime, new.regime, new.x
-        share = old.assembly.constant(number, ended.leave.rebound, old.p)
-        speed = old.assembly.across(number, after, moment.x, old.p)
-        late = ended.side * old.limits(after, moment.x.tolist())[ended.guard]
-        rates = made.motion(after, x.tolist())[0]
-        step = self.ahead(made, rates)
-        later = made.assembly.across(number, after + step, x + step * np.array(rates), made.p)
-        pushed = math.copysign(1.0, speed) * (later - made.assembly.across(number, after, x, made.p)) / step
+            return new.moved(after, since), changes
+        share, speed = moment.regime.constant(number, ended.leave.rebound), moment.across(number, after)
+        late = ended.side * moment.course(after)[3][ended.guard]
+        step = new.regime.ahead(new.course(after)[2])
+        later = new.moved(after, step).across(number, after + step)
+        pushed = math.copysign(1.0, speed) * (later - new.across(number, after)) / step
         if 0 < (1 - share**2) * speed**2 < 4 * late * pushed:
             return self._impacts.hit(t, after, moment, number, replace(ended.leave, rebound=None))
-        return moved(new, after, since), changes
+        return new.moved(after, since), changes
 
     def _since(self, t: float, moment: Moment, met: Watched) -> float:
         """How long ago, in s, a guard passed through zero along a straight line."""
-        regime, x = moment.regime, moment.x.tolist()
-        rates, now = regime.motion(t, x)
-        step, beyond = self.ahead(regime, rates), met.side * now[met.guard]
-        gain = met.side * later(regime, step, (t, x, rates, now))[3][met.guard] - beyond
+        regime, here = moment.regime, moment.course(t)
+        step, beyond = regime.ahead(here[2]), met.side * here[3][met.guard]
+        gain = met.side * regime.limits(*regime.later(here, step))[met.guard] - beyond
         return beyond * step / gain if 0 < beyond < gain else 0.0
 
     def _commutated(self, moment: Moment, t: float, modes: ModeNames) -> tuple[Moment, dict[int, str]]:

@@ -1,0 +1,41 @@
+"""Products of one matrix with many vectors, one after another: as a full array where that is quicker than sparse."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from shaftwork.codegen.elements import Array
+
+FULL = 16_000
+"""Multiplications up to which a full array is quicker: a product of scipy.sparse takes 5 us before it begins."""
+
+
+class Factor:
+    """A matrix (n, m) that multiplies states or inputs again and again.
+
+    Args:
+        matrix: as an array or one of scipy.sparse.
+    """
+
+    def __init__(self, matrix: Any) -> None:
+        self.sparse = sparse.csr_array(matrix)
+        self.full: Array | None = self.sparse.toarray() if np.prod(self.sparse.shape) <= FULL else None
+        """The full array, where it is small enough."""
+        self.is_zero = not self.sparse.nnz
+        """Whether it has no entry."""
+
+    def __matmul__(self, other: Array) -> Array:
+        """Its product with (m,) or (m, k)."""
+        full = self.full
+        if full is None or (other.ndim == 2 and full.size * other.shape[1] > FULL):
+            return np.asarray(self.sparse @ other)
+        # zeros times an infinite torque would make all speeds NaN, and not those alone on which it acts
+        square = other.dot(other) if other.ndim == 1 else np.vdot(other, other)
+        return full.dot(other) if isfinite(square) else np.asarray(self.sparse @ other)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Factor, (self.sparse,)
