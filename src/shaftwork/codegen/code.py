@@ -24,6 +24,8 @@ VECTORISED = {**vars(np), "reduce": reduce, **NUMERICAL}
 SHARED = re.compile(r"\bs\d+\b")
 KEPT = 4096
 """Functions of single laws that are kept: the same ones come back in every set of equations."""
+Moves = Sequence[tuple[float, float, float, float]]
+"""How states move; see `around`."""
 
 
 class _Real:
@@ -121,15 +123,16 @@ def bindable(
     parameters: Mapping[str, Sequence[Symbol]],
     first: Sequence[Expr],
     second: Sequence[Expr],
-) -> Callable[..., tuple[Callable[..., Any], Callable[..., Any]]]:
+) -> Callable[..., tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]]:
     """Two lists of expressions as functions of floats, for values of the parameters that are given once.
 
-    The one gives both lists, the other the second alone; a value that is none is nan.
+    The first one gives both lists, the second one the second list alone, and the third one is `around` in code of its
+    own; a value that is none is nan.
 
     Args:
-        arguments: by names for the code, a symbol or those of the floats in a list.
+        arguments: a symbol and those of the floats in a list, by names for the code.
         parameters: the same, of what is bound.
-        first: expressions.
+        first: expressions; those of `around` are the rates of the floats in the list.
         second: expressions.
     """
     both = (*first, *second)
@@ -138,14 +141,58 @@ def bindable(
     printer.known |= own.known
     shared = _shared(printer, both)
     lists = [[printer.doprint(made) for made in made_of] for made_of in (first, second)]
-    given = {**arguments, **parameters}
+    given, (t, x) = {**arguments, **parameters}, arguments
+    slow = f"second({', '.join(given)})"
+    (whole, found), (alone, last) = (_evaluated(shared, some) for some in (lists, lists[1:]))
+    beside = [f"start = {t}", *read, *whole, f"rates, now = {found}", *_moved(t, x, len(first), alone, last)]
     inner = [
-        *_guarded("both", arguments, read, shared, lists, f"first({', '.join(given)}), second({', '.join(given)})"),
-        *_guarded("one", arguments, read, shared, lists[1:], f"second({', '.join(given)})"),
-        "return both, one",
+        *_guarded(f"both({t}, {x})", [*read, *whole, f"return {found}"], f"first({', '.join(given)}), {slow}"),
+        *_guarded(f"one({t}, {x})", [*read, *alone, f"return {last}"], slow),
+        *_guarded(f"near({t}, {x}, tick, moves, most)", beside, f"around(both, one, start, {x}, tick, moves, most)"),
+        "return both, one, near",
     ]
-    names = {**SCALAR, "first": branchwise(given, first), "second": branchwise(given, second)}
+    names = {**SCALAR, "first": branchwise(given, first), "second": branchwise(given, second), "around": around}
     return _compiled("bind", tuple(parameters), [*bound, *inner], names)
+
+
+def around(
+    both: Callable[..., Any], one: Callable[..., Any], t: float, x: list[float], tick: float, moves: Moves, most: float
+) -> tuple[list[float], list[float], list[float]]:
+    """Values at an instant, as far away from it as rounding may move it, and later along a straight line.
+
+    Args:
+        both: rates of the states, and the values.
+        one: the values alone.
+        t: time.
+        x: states.
+        tick: how far rounding moves the time.
+        moves: of each state a part of it and the least that rounding moves it, the side, and how far the line takes it.
+        most: the longest time along the line.
+    """
+    (rates, now), beside, step = both(t, x), [], most
+    for value, rate, (part, least, side, reach) in zip(x, rates, moves, strict=True):
+        # all of it to the same side: what a tick moves must not make up for the rest
+        beside.append(value + part * abs(value) + least + side * tick * abs(rate))
+        if rate and reach < step * abs(rate):
+            step = reach / abs(rate)
+    later = [value + step * rate for value, rate in zip(x, rates, strict=True)]
+    return now, one(t + tick, beside), one(t + step, later)
+
+
+def _moved(t: str, x: str, count: int, alone: list[str], values: str) -> list[str]:
+    """The lines of `around` behind the rates, without loops and calls: they are run at every event."""
+    lines = ["step = most"]
+    for k in range(count):
+        lines += [
+            f"value, rate{k}, (part, least, side, reach) = {x}[{k}], rates[{k}], moves[{k}]",
+            f"speed = abs(rate{k})",
+            f"{x}{k} = value + part * abs(value) + least + side * tick * speed",
+            "if speed and reach < step * speed:",
+            "    step = reach / speed",
+        ]
+    later = [f"{x}{k} = {x}[{k}] + step * rate{k}" for k in range(count)]
+    lines += [f"{t} = start + tick", *alone, f"beside = {values}"]
+    return [*lines, f"{t} = start + step", *later, *alone, f"return now, beside, {values}"]
 
 
 def branchwise(
@@ -172,15 +219,17 @@ def branchwise(
     return function
 
 
-def _guarded(
-    name: str, arguments: Iterable[str], read: list[str], shared: Mapping[str, str], lists: list[list[str]], slow: str
-) -> list[str]:
-    """The lines of a function that returns lists, found more slowly where Python's functions raise."""
+def _evaluated(shared: Mapping[str, str], lists: list[list[str]]) -> tuple[list[str], str]:
+    """The lines that evaluate what stands in lists more than once, and the lists."""
     needed = _needed(shared, [text for texts in lists for text in texts])
-    found = ", ".join(f"[{', '.join(texts)}]" for texts in lists)
-    lines = [*read, *(f"{part} = {shared[part]}" for part in shared if part in needed), f"return {found}"]
+    lines = [f"{part} = {shared[part]}" for part in shared if part in needed]
+    return lines, ", ".join(f"[{', '.join(texts)}]" for texts in lists)
+
+
+def _guarded(head: str, lines: list[str], slow: str) -> list[str]:
+    """The lines of a function that returns what is found more slowly where Python's functions raise."""
     return [
-        f"def {name}({', '.join(arguments)}):",
+        f"def {head}:",
         "    try:",
         *(f"        {line}" for line in lines),
         "    except (ArithmeticError, ValueError):",

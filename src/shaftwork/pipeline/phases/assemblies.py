@@ -13,7 +13,7 @@ from scipy import sparse
 from sympy import Expr, Symbol
 
 from shaftwork.codegen.arrays import BoundArrays
-from shaftwork.codegen.code import bindable, is_rough, vectorised
+from shaftwork.codegen.code import Moves, around, bindable, is_rough, vectorised
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.linear_readings import ReadingMatrices
 from shaftwork.codegen.many import ManyExpressions
@@ -51,6 +51,7 @@ CLOCK = 1e-20
 
 Motion = Callable[[float, list[float]], tuple[list[float], list[float]]]
 Limits = Callable[[float, list[float]], list[float]]
+Near = Callable[[float, list[float], float, Moves, float], tuple[list[float], list[float], list[float]]]
 
 
 class Assembly:
@@ -325,8 +326,8 @@ class Assembly:
             self._sides[modes] = sides
         return self._sides[modes]
 
-    def motion(self, p: Array) -> tuple[Motion, Limits]:
-        """Rates and guards together, and guards alone, from a time in s and a list of states, for a single instant."""
+    def motion(self, p: Array) -> tuple[Motion, Limits, Near]:
+        """Rates and guards together, guards alone, and guards `around` an instant, from a time in s and states."""
         if self._rows is not None:
             return self._scalar(p.tolist())
         bound, guards = self.bound(p), self.guards(p)
@@ -334,10 +335,13 @@ class Assembly:
         def limits(t: float, x: list[float]) -> list[float]:
             return guards(np.array([t]), np.array([x]))[0].tolist()  # type: ignore[no-any-return]
 
-        return lambda t, x: (bound.rhs(t, np.array(x)).tolist(), limits(t, x)), limits
+        def motion(t: float, x: list[float]) -> tuple[list[float], list[float]]:
+            return bound.rhs(t, np.array(x)).tolist(), limits(t, x)
+
+        return motion, limits, partial(around, motion, limits)
 
     @cached_property
-    def _scalar(self) -> Callable[[list[float]], tuple[Motion, Limits]]:
+    def _scalar(self) -> Callable[[list[float]], tuple[Motion, Limits, Near]]:
         rows = self._rows
         assert rows is not None  # noqa: S101 (asked only then)
         return bindable({"t": TIME, "x": rows.states}, {"p": rows.parameters}, rows.rates, self._expressions)

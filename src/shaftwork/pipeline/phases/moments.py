@@ -12,9 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from sympy import Expr
 
+from shaftwork.codegen.code import Moves
 from shaftwork.codegen.elements import Array
 from shaftwork.components.laws import t as TIME
-from shaftwork.pipeline.phases.assemblies import Assembly, Limits, Motion
+from shaftwork.pipeline.phases.assemblies import Assembly, Limits, Motion, Near
 from shaftwork.pipeline.phases.elements import Element, ModeNames, Watched
 from shaftwork.pipeline.prepared import NOMINAL
 
@@ -71,6 +72,7 @@ class Regime:
         p: their parameters, numbers of modes among them.
         motion: rates and guards at an instant.
         limits: the guards alone.
+        near: the guards around an instant, by the `moves` of the states.
         sides: (guards,) on which each is met.
         sizes: nominal size of each state.
         watched: element and guard of everything that may end one of the modes.
@@ -84,6 +86,7 @@ class Regime:
     p: Array
     motion: Motion
     limits: Limits
+    near: Near
     sides: Array
     sizes: list[float]
     watched: tuple[tuple[int, Watched], ...]
@@ -108,11 +111,13 @@ class Regime:
         return partial(self.assembly.right_side, self.p)
 
     @cached_property
-    def _rounding(self) -> list[tuple[float, float, float]]:
-        """Of each state a part of it and the least that rounding moves it, to both sides and not alike; the side."""
+    def moves(self) -> Moves:
+        """Of each state a part of it and the least that rounding moves it, to both sides and not alike; the side; and
+        how far a look ahead takes it.
+        """
         parts = [(-1) ** k * (0.5 + k * GOLDEN % 1) * ROUNDINGS * EPS for k in range(len(self.sizes))]
         pairs = zip(parts, self.sizes, strict=True)
-        return [(part, part * size / NOMINAL, math.copysign(1.0, part)) for part, size in pairs]
+        return [(part, part * size / NOMINAL, math.copysign(1.0, part), AHEAD * size) for part, size in pairs]
 
     def constant(self, number: int, expression: Expr | None) -> float:
         """A number that is made of an element's parameters."""
@@ -125,9 +130,9 @@ class Regime:
     def beside(self, here: Course) -> tuple[float, list[float]]:
         """The time and the states as far away as rounding may move them."""
         t, x, rates, _ = here
-        changes, tick = zip(x, rates, self._rounding, strict=True), self.tick
+        each, tick = zip(x, rates, self.moves, strict=True), self.tick
         # all of it to the same side: what a tick moves must not make up for the rest
-        return t + tick, [v + part * abs(v) + least + way * tick * abs(rate) for v, rate, (part, least, way) in changes]
+        return t + tick, [v + part * abs(v) + least + way * tick * abs(rate) for v, rate, (part, least, way, _) in each]
 
     def bands(self, here: Course) -> list[float]:
         """How far rounding moves each guard."""
@@ -136,9 +141,9 @@ class Regime:
     def ahead(self, rates: list[float]) -> float:
         """How far in s the further course is looked at: no state moves there by more than a part of its size."""
         step = self.longest
-        for rate, size in zip(rates, self.sizes, strict=True):
-            if rate and AHEAD * size < step * abs(rate):
-                step = AHEAD * size / abs(rate)
+        for rate, (*_, reach) in zip(rates, self.moves, strict=True):
+            if rate and reach < step * abs(rate):
+                step = reach / abs(rate)
         return step
 
     def later(self, here: Course, step: float) -> tuple[float, list[float]]:

@@ -85,7 +85,8 @@ class Passing:
         """The modes that go on, and how far rounding moves each guard."""
         self._note: Callable[[float, list[Change]], None] | None = note
         self._size = moment.x.size
-        self._starts = [(start, moment.regime)]
+        self.phases = [Phase(start, self.regime.modes, self.regime.p)]
+        """The phases so far."""
         self._reactions: list[Reaction] = []
         self._suited: set[Regime] = set()
         self.beyond: tuple[Moment, list[Change]] | None = None
@@ -108,15 +109,10 @@ class Passing:
             self._suited.add(regime)
         self.regime, self.bands = regime, bands
         self._note(t, changes)
-        self._starts.append((t, regime))
+        self.phases.append(Phase(t, regime.modes, regime.p))
         reaction = Reaction(regime.p, regime.ends, bands, regime.equations)
         self._reactions.append(reaction)
         return reaction
-
-    @property
-    def phases(self) -> tuple[Phase, ...]:
-        """The phases so far."""
-        return tuple(Phase(start, regime.modes, regime.p) for start, regime in self._starts)
 
     def close(self) -> None:
         """Let go of who is told: the run is over, and only made once more for its dense output.
@@ -168,8 +164,7 @@ class Passing:
         if way is None:
             return None
         to, before = way.to, self.bands
-        here = to.course(t, x.tolist()[: self._size])
-        now, near = here[3], to.limits(*to.beside(here))
+        now, near, later = to.near(t, x.tolist()[: self._size], to.tick, to.moves, to.longest)
         bands = [0.0] * len(now)
         for guard, side, other in way.watched:
             beyond, band = side * now[guard], abs(near[guard] - now[guard])
@@ -178,7 +173,6 @@ class Passing:
             bands[guard] = clear_of_limit(beyond, band)
         if way.side * now[met] < 0:
             return None
-        later = to.limits(*to.later(here, to.ahead(here[2])))
         if not way.side * (later[met] - now[met]) > 0:  # it is not left behind for good
             return None
         return to, bands, [Change(t, *way.change)]

@@ -96,7 +96,7 @@ class Run:
         self.jumps: list[Impact] = []
         self.engine, self.why, self.steps = "", "", 0
         self.waves: WaveRun | None = None
-        self._soon = [0 for _ in CHATTER]
+        self._soon = [0] * len(CHATTER)
 
     def march(self, initial: Mapping[str, float] | None) -> None:
         """Go through all phases from the start values."""
@@ -192,7 +192,7 @@ class Run:
         passed = (t - self.changes[-1].time) / (self.demand.span[1] - self.demand.span[0]) if self.changes else 1.0
         self.changes += changes
         if passed >= SELDOM:
-            self._soon = [0 for _ in CHATTER]
+            self._soon = [0] * len(CHATTER)
             return
         for number, (most, part) in enumerate(CHATTER):
             self._soon[number] = self._soon[number] + 1 if passed < part else 0
@@ -236,7 +236,7 @@ class Run:
         if self.demand.t_eval is not None and t in trajectory.t[-1:] and t < self.demand.span[1]:
             # an output at an event belongs to the next phase, which has it too
             trajectory = replace(trajectory, t=trajectory.t[:-1], x=trajectory.x[:-1])
-        self.spans.append(Span(regime.assembly, trajectory, passing.phases))
+        self.spans.append(Span(regime.assembly, trajectory, tuple(passing.phases)))
         met, sides = trajectory.met, self._instants(moment).sides(t)
         if met is not None and passing.beyond is not None and sides == (t, t):
             moment, changes = passing.beyond

@@ -7,12 +7,14 @@ x = (states, h, dh/dt), and everything that is read at an instant is read as wit
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
+from shaftwork.codegen.code import around
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.waves import WaveSystem
-from shaftwork.pipeline.phases.assemblies import Assembly, Limits, Motion
+from shaftwork.pipeline.phases.assemblies import Assembly, Limits, Motion, Near
 from shaftwork.pipeline.prepared import NOMINAL
 
 RATE = "rate of "
@@ -48,8 +50,8 @@ class WaveAssembly(Assembly):
         impedances, _ = WaveSystem(self.bound(p)).lines
         return [*super().sizes(p), *(2 * NOMINAL * np.repeat(impedances, 2)).tolist(), *np.zeros(2 * impedances.size)]
 
-    def motion(self, p: Array) -> tuple[Motion, Limits]:
-        """Rates and guards together, and guards alone, for a single instant."""
+    def motion(self, p: Array) -> tuple[Motion, Limits, Near]:
+        """Rates and guards together, guards alone, and guards `around` an instant."""
         bound, guards = self.bound(p), self.guards(p)
         count = len(self.ends)
         still = [0.0] * count
@@ -60,4 +62,4 @@ class WaveAssembly(Assembly):
         def motion(t: float, x: list[float]) -> tuple[list[float], list[float]]:
             return [*bound.rhs(t, np.array(x)).tolist(), *x[-count:], *still], limits(t, x)
 
-        return motion, limits
+        return motion, limits, partial(around, motion, limits)
