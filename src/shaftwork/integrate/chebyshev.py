@@ -19,16 +19,6 @@ def points(degree: int) -> Array:
     return made
 
 
-@lru_cache(maxsize=16)
-def _weights(degree: int) -> Array:
-    """(degree + 1,) what each point counts in the barycentric formula."""
-    made = np.ones(degree + 1)
-    made[1::2] = -1.0
-    made[[0, -1]] /= 2
-    made.flags.writeable = False
-    return made
-
-
 @dataclass(frozen=True)
 class Polynomial:
     """The states of one step by the barycentric formula.
@@ -47,31 +37,29 @@ class Polynomial:
 
     def __call__(self, times: Array) -> Array:
         """States (k, n) at times (k,)."""
-        degree = len(self.nodes) - 1
-        apart = ((times - self.start) / (self.end - self.start))[:, None] - points(degree)
-        if apart.all():
-            shares = _weights(degree) / apart
-        else:
-            shares = _weights(degree) / np.where(apart == 0.0, 1.0, apart)
-            rows, columns = np.nonzero(apart == 0.0)
-            shares[rows] = 0.0
-            shares[rows, columns] = 1.0
+        apart = ((times - self.start) / (self.end - self.start))[:, None] - points(len(self.nodes) - 1)
+        shares = (-1.0) ** np.arange(len(self.nodes)) / np.where(apart == 0.0, 1.0, apart)
+        shares[:, [0, -1]] /= 2
+        rows, columns = np.nonzero(apart == 0.0)
+        shares[rows] = 0.0
+        shares[rows, columns] = 1.0
         return np.asarray(shares @ self.nodes / shares.sum(axis=1)[:, None])
 
 
 def course(start: float, end: float, nodes: Array) -> Callable[[float], float]:
     """One value of a step at single times, from what it is at its Chebyshev points; source as for `Polynomial`."""
-    degree = nodes.size - 1
+    signs = (-1.0) ** np.arange(nodes.size)
+    signs[[0, -1]] /= 2
     known: list[tuple[float, float, float]] = list(
-        zip(points(degree).tolist(), _weights(degree).tolist(), nodes.tolist(), strict=True)
+        zip(points(nodes.size - 1).tolist(), signs.tolist(), nodes.tolist(), strict=True)
     )
 
     def value(time: float) -> float:
         place, above, below = (time - start) / (end - start), 0.0, 0.0
-        for point, weight, node in known:
+        for point, sign, node in known:
             if place == point:
                 return node
-            share = weight / (place - point)
+            share = sign / (place - point)
             above, below = above + share * node, below + share
         return above / below
 

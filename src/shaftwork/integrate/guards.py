@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -19,11 +18,8 @@ Dense = Callable[[Array], Array]
 # What the tolerance moves a guard, as part of its course in a run of a few steps, may be no more.
 KNOWN, BRIEF = 1e-5, 100
 
-# Where a step is looked at, beside its ends.
-INSIDE = np.sort(np.append(FIRST, LOOKS))
-# A guard that is farther from its limit than it moves in so many ends of steps of a multistep method is not met between
-# them.
-ENDS = 4
+# Where a step is looked at, one after another while a guard may be met; or all at once, where that costs no more.
+BY_AND_BY, AT_ONCE = (FIRST, LOOKS), (np.sort(np.append(FIRST, LOOKS)),)
 # No step is shorter than so many rounding units of the time.
 CLEARANCE = 8
 # A step that meets a guard is looked at in panels that are halved towards it, so many times; Gauss' nodes in each.
@@ -59,18 +55,16 @@ class GuardWatch:
         problem: what is being solved.
         low: the earliest time in s at which inputs are read.
         high: the latest.
-        multistep: whether each step continues the polynomial through the ends of the steps before it.
+        looks: parts of a step at which it is looked at.
     """
 
-    def __init__(self, problem: Guarded, low: float, high: float, *, multistep: bool = False) -> None:
+    def __init__(self, problem: Guarded, low: float, high: float, looks: Sequence[Array] = BY_AND_BY) -> None:
         guards = problem.guards
         self._columns = np.zeros(0, dtype=np.intp) if guards is None else np.flatnonzero(guards.sides)
         self._sides = np.zeros(0) if guards is None else guards.sides[self._columns]
         self._offsets = np.zeros(0) if guards is None else guards.offsets[self._columns]
         self._guards, self._low, self._high = guards, low, high
-        self._problem, self._multistep = problem, multistep
-        self._watched = list(zip(*(made.tolist() for made in (self._columns, self._sides, self._offsets)), strict=True))
-        self._ends: list[tuple[float, list[float]]] = []
+        self._problem, self._looks = problem, looks
         self.met: int | None = None
 
     def cut(self, start: float, x: Array, end: float, y: Array, dense: Dense) -> float | None:
@@ -86,11 +80,15 @@ class GuardWatch:
         Raises:
             SimulationError: a guard has no value there.
         """
-        if not self._columns.size or (self._multistep and self._is_far(start, end, y)):
+        if not self._columns.size:
             return None
-        inside = start + INSIDE * (end - start)
-        times, states = np.concatenate([[start], inside, [end]]), np.concatenate([x[None], dense(inside), y[None]])
+        first, *further = (start + shares * (end - start) for shares in self._looks)
+        times, states = np.concatenate([[start], first, [end]]), np.concatenate([x[None], dense(first), y[None]])
         look = Look(self._values, times, states, dense, -np.ones(self._columns.size))
+        if further and look.is_far() and (look.values[0] < 0).all():
+            return None
+        for times in further:
+            look.add(times)
         if look.values.max() < 0 and not look.denser():
             return None
         self._refuse_none(look)
@@ -106,20 +104,6 @@ class GuardWatch:
             return None
         time, self.met = min(known)
         return min(max(time, start + CLEARANCE * float(np.spacing(abs(end)))), end)
-
-    def _is_far(self, start: float, end: float, y: Array) -> bool:
-        """Whether the ends of the last steps tell that none of them comes near a guard."""
-        if not self._ends or self._ends[-1][0] != start:  # the method has begun anew
-            self._ends = []
-        assert self._guards is not None  # noqa: S101 (asked only then)
-        values = self._guards.at(min(max(end, self._low), self._high), y.tolist())
-        watched = [values[k] * side - offset for k, side, offset in self._watched]
-        self._ends = [*self._ends[1 - ENDS :], (end, watched)]
-        if len(self._ends) < ENDS or any(map(math.isnan, watched)):
-            return False
-        return all(
-            max(course) < min(course) - max(course) for course in zip(*(row for _, row in self._ends), strict=True)
-        )
 
     def beyond(self, t: float, x: Array) -> int | None:
         """The guard that is farthest beyond its limit at a time in s with the state (n,); None where none is."""

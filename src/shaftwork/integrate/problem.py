@@ -86,14 +86,12 @@ class Guards:
 
     Args:
         values: from times (k,) and states (k, n) to (k, m).
-        at: the same for a single instant, from a list of states to a list.
         sides: (m,) 1 where the rise of a value through zero ends the phase, -1 where its fall does, 0 where neither.
         offsets: (m,) how far it has to go beyond zero: more than rounding moves it, or it would end where it begins.
         sizes: (m,) of the values where the phase begins.
     """
 
     values: Callable[[Array, Array], Array]
-    at: Callable[[float, list[float]], list[float]]
     sides: Array
     offsets: Array
     sizes: Array

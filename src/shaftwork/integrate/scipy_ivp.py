@@ -14,7 +14,7 @@ from shaftwork.integrate.cancellation import cancellation
 from shaftwork.integrate.crossings import Crossings
 from shaftwork.integrate.dop853 import Dop853
 from shaftwork.integrate.engines import ENGINES
-from shaftwork.integrate.guards import LEAST, SHORTER, GuardWatch
+from shaftwork.integrate.guards import AT_ONCE, LEAST, SHORTER, GuardWatch
 from shaftwork.integrate.inner import StepPolynomial, StepPolynomials
 from shaftwork.integrate.pieces import (
     GuardedFunctions,
@@ -141,7 +141,7 @@ def _piece(
     problem: Problem, piece: Piece, x: Array, method: Method, max_steps: int, pace: Pace, longest: float
 ) -> _Run:
     guard, crossings = GuardedFunctions(problem, piece), Crossings(problem, piece)
-    watch = GuardWatch(problem, piece.low, piece.high)
+    watch = GuardWatch(problem, piece.low, piece.high, AT_ONCE)
     times, states = [piece.start], [x]
     inner: list[StepPolynomial] = []
     counted, shortest = np.zeros(2, dtype=int), LEAST * (problem.t_end - problem.t0)

@@ -32,10 +32,11 @@ from shaftwork.integrate.pieces import (
 )
 from shaftwork.integrate.problem import Array, DaeProblem, Problem, Trajectory, tightened
 from shaftwork.integrate.sparsity import Pattern
-from shaftwork.integrate.sundials_steps import DEGREES, Inside, Opened
 
 Method = Literal["BDF", "Adams"]
 
+# SUNDIALS interpolates inside a step by a polynomial of at most this degree.
+DEGREES = {"BDF": 5, "Adams": 12}
 # Up to here a dense factorisation beats SuperLU. A band solver is not used: the binding passes its Jacobian as a full
 # matrix, which costs more than the factorisation saves.
 LARGEST_DENSE = 100
@@ -47,7 +48,55 @@ MOST_KEPT = 1_000_000
 FINEST = ENGINES["sundials"].finest
 
 
-Opener = Callable[[Piece, Array], Opened]
+@dataclass(frozen=True)
+class _Opened:
+    """A SUNDIALS solver at the start of a piece.
+
+    Args:
+        solver: CVODE or IDA, with its first step still to take.
+        start: (n,) consistent start state.
+        guard: what CVODE calls.
+        outgrown: whether the solver must be opened anew, because its pattern misses entries of the Jacobian.
+        degree: of its polynomials inside a step, at most.
+    """
+
+    solver: Any
+    start: Array
+    guard: GuardedFunctions | None = None
+    outgrown: Callable[[], bool] = lambda: False
+    degree: int = DEGREES["BDF"]
+
+    def inside(self, times: Array) -> Array:
+        """States (k, n) at times (k,) inside the last step."""
+        return np.array([self.solver.step(time).y.copy() for time in times]).reshape(times.size, self.start.size)
+
+
+class _Inside:
+    """The states inside the last step: for many times from a polynomial, as each costs a call of SUNDIALS.
+
+    Args:
+        opened: the solver.
+        start: of the step, s.
+        x: (n,) state there.
+        end: of the step, s.
+        y: (n,) state there.
+    """
+
+    def __init__(self, opened: _Opened, start: float, x: Array, end: float, y: Array) -> None:
+        self._opened, self._ends, self._states = opened, (start, end), (x, y)
+        self._made: Polynomial | None = None
+
+    def __call__(self, times: Array) -> Array:
+        if self._made is None:
+            if times.size < self._opened.degree - 1:
+                return self._opened.inside(times)
+            (start, end), (x, y) = self._ends, self._states
+            inner = self._opened.inside(start + (end - start) * points(self._opened.degree)[1:-1])
+            self._made = Polynomial(start, end, np.vstack([x, inner, y]))
+        return self._made(times)
+
+
+Opener = Callable[[Piece, Array], _Opened]
 Opening = Callable[[float], Opener]
 """From the part of its tolerance with which a problem is solved."""
 
@@ -99,7 +148,7 @@ def _require(purpose: str) -> None:
         raise MissingExtraError("scikit-sundae", "stiff", purpose)
 
 
-def _open_cvode(problem: Problem, piece: Piece, x: Array, method: Method, pattern: Pattern) -> Opened:
+def _open_cvode(problem: Problem, piece: Piece, x: Array, method: Method, pattern: Pattern) -> _Opened:
     from sksundae.cvode import CVODE
 
     guard = GuardedFunctions(problem, piece)
@@ -118,7 +167,7 @@ def _open_cvode(problem: Problem, piece: Piece, x: Array, method: Method, patter
         warnings.filterwarnings("ignore", message="Custom sparse Jacobian")
         solver = CVODE(rhs, **options)
     solver.init_step(piece.start, x)
-    return Opened(solver, x, guard, lambda: pattern.grown, DEGREES[method])
+    return _Opened(solver, x, guard, lambda: pattern.grown, DEGREES[method])
 
 
 def _first_change(problem: Problem, x: Array, rates: Array) -> float:
@@ -146,7 +195,7 @@ def _linear_solver(guard: GuardedFunctions, piece: Piece, x: Array, pattern: Pat
     return {"linsolver": "sparse", "sparsity": order, "jacfn": fill_sparse}
 
 
-def _open_ida(problem: DaeProblem, piece: Piece, x: Array) -> Opened:
+def _open_ida(problem: DaeProblem, piece: Piece, x: Array) -> _Opened:
     from sksundae.ida import IDA
 
     def residual(t: float, y: Array, derivative: Array, found: Array) -> None:
@@ -166,7 +215,7 @@ def _open_ida(problem: DaeProblem, piece: Piece, x: Array) -> Opened:
     except RuntimeError as error:
         reason = f"IDA found no consistent initial values ({error})"
         raise failure(problem, "sundials", piece.start, x, reason) from error
-    return Opened(solver, start.y.copy())
+    return _Opened(solver, start.y.copy())
 
 
 @dataclass(frozen=True)
@@ -211,23 +260,22 @@ def _attempt(problem: Problem | DaeProblem, open_solver: Opener, ask: Ask) -> Ma
     left, pace = problem.max_steps, Pace(problem)
     for piece in pieces(problem):
         opened, crossings = open_solver(piece, start_of_piece(problem, piece, x)), Crossings(problem, piece)
-        watch = GuardWatch(problem, piece.low, piece.high, multistep=True)
-        x, t, longest, taken = opened.start, piece.start, np.inf, 0
+        watch = GuardWatch(problem, piece.low, piece.high)
+        x, t, longest = opened.start, piece.start, np.inf
         found.append((x, []))
         while t < piece.end:
             if left <= 0:
                 raise failure(problem, "sundials", t, x, used_up(problem))
             end, state = _step(problem, piece, opened, t, x, longest)
             # Its formulas meet a law at the ends of steps alone, so that a step may be cut off at a switch.
-            taken += 1  # the order grows by one with each step
-            inside = Inside(opened, t, x, end, state, min(opened.degree, taken + 1))
+            inside = _Inside(opened, t, x, end, state)
             stop = watch.cut(t, x, end, state, inside)
             cut = crossings.cut(t, x, end, state, inside, again=False)
             stops = stop is not None and (cut is None or stop <= cut)
             shortest = LEAST * (problem.t_end - problem.t0)
             if stop is not None and stops and end - t > shortest and not watch.follows(t, x, stop, inside):
                 longest, left = (end - t) / SHORTER, left - 1
-                opened, taken = open_solver(replace(piece, start=t), x), 0
+                opened = open_solver(replace(piece, start=t), x)
                 x = opened.start
                 continue
             whole, end = end, stop if stop is not None and stops else end if cut is None else cut
@@ -244,15 +292,15 @@ def _attempt(problem: Problem | DaeProblem, open_solver: Opener, ask: Ask) -> Ma
             if stops and t < piece.end:
                 return found, watch.met
             if t < piece.end and (cut is not None or opened.outgrown()):
-                opened, taken = open_solver(replace(piece, start=t), x), 0
+                opened = open_solver(replace(piece, start=t), x)
                 x = opened.start
-            elif inside.used:
+            elif within.size or problem.switches is not None or problem.guards is not None:
                 opened.solver.step(end)  # after an interpolation SUNDIALS gives the end of the step once more
     return found, None
 
 
 def _step(
-    problem: Problem | DaeProblem, piece: Piece, opened: Opened, t: float, x: Array, longest: float
+    problem: Problem | DaeProblem, piece: Piece, opened: _Opened, t: float, x: Array, longest: float
 ) -> tuple[float, Array]:
     """End in s and state (n,) there of the next step from a time and state, which is `longest` s long at most."""
     stop = min(piece.end, t + longest)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import cache, cached_property, partial
 from operator import methodcaller
 from typing import TYPE_CHECKING, Any
@@ -228,14 +227,14 @@ class Assembly:
             t_end=span[1],
             atol=np.concatenate([same.atol, sizes]),
             sides=times.sides,
-            guards=replace(guards, offsets=np.array(moment.bands), sizes=now),
+            guards=Guards(guards.values, guards.sides, np.array(moment.bands), now),
         )
 
     def _problem(self, p: Array, modes: ModeNames) -> Problem:
         """What is the same in all phases of these modes; the rest is empty."""
         bound, (_, known), clocks, size = partial(self.bound, p), self._rates(p), self.clocks, len(self.model.states)
         owners = {made.guard: k for (k, _), found in self._watched.items() for made in found}
-        guards, limits, none = self.guards(p), self.motion(p)[1], np.empty(0)
+        guards, none = self.guards(p), np.empty(0)
         values = guards if not clocks else lambda t, y: guards(t, y[:, :size])
         return Problem(
             rhs=self.right_side(p),
@@ -245,7 +244,7 @@ class Assembly:
             t_end=0.0,
             names=(*self.model.states, *(f"limit of {self.elements[owners[k]].name}" for k in clocks)),
             atol=self.prepared(p).atol,
-            guards=Guards(values, lambda t, y: limits(t, y[:size]), self.sides(modes), none, none),
+            guards=Guards(values, self.sides(modes), none, none),
             switches=(lambda t, y: bound().switches(t, y[:, :size])) if self.model.arrays.inputs.switching else None,
             symbolic=cache(lambda: None if self.program is None else self.program.bind(p)),
             explain=lambda t, y: self.without_value(p, modes, t, y[:, :size]),
