@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -44,23 +43,3 @@ class Polynomial:
         shares[rows] = 0.0
         shares[rows, columns] = 1.0
         return np.asarray(shares @ self.nodes / shares.sum(axis=1)[:, None])
-
-
-def course(start: float, end: float, nodes: Array) -> Callable[[float], float]:
-    """One value of a step at single times, from what it is at its Chebyshev points; source as for `Polynomial`."""
-    signs = (-1.0) ** np.arange(nodes.size)
-    signs[[0, -1]] /= 2
-    known: list[tuple[float, float, float]] = list(
-        zip(points(nodes.size - 1).tolist(), signs.tolist(), nodes.tolist(), strict=True)
-    )
-
-    def value(time: float) -> float:
-        place, above, below = (time - start) / (end - start), 0.0, 0.0
-        for point, sign, node in known:
-            if place == point:
-                return node
-            share = sign / (place - point)
-            above, below = above + share * node, below + share
-        return above / below
-
-    return value

@@ -184,22 +184,20 @@ class Look:
             every: follow the others too where one has left: they may have left before.
         """
         for _ in range(FOLLOWED):
-            if not every and self._left().any():
+            if self._left().any() and not every:
                 return True
-            if not self.denser():
+            if not self._denser():
                 break
         return bool(self._left().any())
 
     def _left(self) -> NDArray[np.bool_]:
         return np.asarray((self.values * self._sides < 0) | ((self._sides == 0) & (np.abs(self.values) > 0)))
 
-    def denser(self) -> bool:
-        """Add the vertices of parabolas through three points of each switch that may reach zero there, if any."""
+    def _denser(self) -> bool:
+        """Add the vertices of parabolas through three points of each switch that may reach zero there."""
         height = self.values * self._sides
         inner = height[1:-1]
         middle, columns = np.nonzero((inner > 0) & (inner <= height[:-2]) & (inner <= height[2:]))
-        if not middle.size:
-            return False
         (ta, tb, tc), (a, b, c) = (
             (self.times[middle], self.times[middle + 1], self.times[middle + 2]),
             (height[middle, columns], height[middle + 1, columns], height[middle + 2, columns]),

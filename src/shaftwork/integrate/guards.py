@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 from scipy.optimize import brentq
 
 from shaftwork.core.errors import no_value
-from shaftwork.integrate.chebyshev import course, points
+from shaftwork.integrate.chebyshev import Polynomial, points
 from shaftwork.integrate.crossings import FIRST, LOOKS, Look, tolerance
 from shaftwork.integrate.problem import Array, DaeProblem, Explain, Guards, Problem
 
@@ -18,8 +18,6 @@ Dense = Callable[[Array], Array]
 # What the tolerance moves a guard, as part of its course in a run of a few steps, may be no more.
 KNOWN, BRIEF = 1e-5, 100
 
-# Where a step is looked at, one after another while a guard may be met; or all at once, where that costs no more.
-BY_AND_BY, AT_ONCE = (FIRST, LOOKS), (np.sort(np.append(FIRST, LOOKS)),)
 # No step is shorter than so many rounding units of the time.
 CLEARANCE = 8
 # A step that meets a guard is looked at in panels that are halved towards it, so many times; Gauss' nodes in each.
@@ -55,16 +53,14 @@ class GuardWatch:
         problem: what is being solved.
         low: the earliest time in s at which inputs are read.
         high: the latest.
-        looks: parts of a step at which it is looked at.
     """
 
-    def __init__(self, problem: Guarded, low: float, high: float, looks: Sequence[Array] = BY_AND_BY) -> None:
+    def __init__(self, problem: Guarded, low: float, high: float) -> None:
         guards = problem.guards
         self._columns = np.zeros(0, dtype=np.intp) if guards is None else np.flatnonzero(guards.sides)
-        self._sides = np.zeros(0) if guards is None else guards.sides[self._columns]
         self._offsets = np.zeros(0) if guards is None else guards.offsets[self._columns]
         self._guards, self._low, self._high = guards, low, high
-        self._problem, self._looks = problem, looks
+        self._problem = problem
         self.met: int | None = None
 
     def cut(self, start: float, x: Array, end: float, y: Array, dense: Dense) -> float | None:
@@ -82,15 +78,12 @@ class GuardWatch:
         """
         if not self._columns.size:
             return None
-        first, *further = (start + shares * (end - start) for shares in self._looks)
-        times, states = np.concatenate([[start], first, [end]]), np.concatenate([x[None], dense(first), y[None]])
+        first = start + FIRST * (end - start)
+        times, states = np.array([start, *first, end]), np.vstack([x, dense(first), y])
         look = Look(self._values, times, states, dense, -np.ones(self._columns.size))
-        if further and look.is_far() and (look.values[0] < 0).all():
+        if look.is_far() and (look.values[0] < 0).all():
             return None
-        for times in further:
-            look.add(times)
-        if look.values.max() < 0 and not look.denser():
-            return None
+        look.add(start + LOOKS * (end - start))
         self._refuse_none(look)
         if (look.values[0] >= 0).any():  # what is above zero by rounding may fall and rise again ere the first look
             look.add(start + NEARER * (look.times[1] - start))
@@ -156,8 +149,8 @@ class GuardWatch:
 
     def _values(self, times: Array, states: Array) -> Array:
         assert self._guards is not None  # noqa: S101 (asked only then)
-        values = self._guards.values(np.minimum(np.maximum(times, self._low), self._high), states)
-        return np.asarray(values[:, self._columns] * self._sides - self._offsets)
+        values = self._guards.values(np.clip(times, self._low, self._high), states)
+        return np.asarray((values * self._guards.sides - self._guards.offsets)[:, self._columns])
 
     def _time(self, look: Look, column: int, noise: float) -> float | None:
         """When a guard rises through zero; one that is above it from the start, by noise, has to fall first."""
@@ -182,8 +175,8 @@ class GuardWatch:
         polynomial through their values at some times, where their values beside it agree.
         """
         low, high, ulp = float(look.times[before]), float(look.times[row]), float(np.spacing(look.times[-1]))
-        nodes = look.at(np.minimum(low + (high - low) * points(DEGREE), high))[:, column]
-        root = _zero(course(low, high, nodes), low, high, ulp)
+        course = Polynomial(low, high, look.at(np.minimum(low + (high - low) * points(DEGREE), high))[:, [column]])
+        root = _zero(lambda t: float(course(np.array([t]))[0, 0]), low, high, ulp)
         beside = look.at(root + BESIDE * ulp * np.array([-1.0, 1.0]))[:, column]
         if root == high or beside[0] < 0 < beside[1]:
             return root

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -58,9 +57,9 @@ class GuardedFunctions:
     def rhs(self, t: float, x: Array) -> Array:
         """The right-hand side, asked inside the piece."""
         derivative = self._problem.rhs(min(max(t, self._low), self._high), x)
-        # The square is a cheap test that cannot miss a NaN or an infinity. A trial stage that is too bold may meet one
+        # The sum is a cheap test that cannot miss a NaN or an infinity. A trial stage that is too bold may meet one
         # and recover with a smaller step, so it is only remembered here.
-        if not isfinite(derivative.dot(derivative)):
+        if not np.isfinite(derivative.sum()):
             self.not_finite = (t, x.copy(), derivative)
         return derivative
 

@@ -1,21 +1,19 @@
-"""The engine that is always there: adaptive methods of scipy, stepped piece by piece."""
+"""The engine that is always there: scipy's adaptive methods, stepped piece by piece."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import isfinite
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+from scipy.integrate import DOP853, OdeSolution, Radau
 
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.cancellation import cancellation
 from shaftwork.integrate.crossings import Crossings
-from shaftwork.integrate.dop853 import Dop853
 from shaftwork.integrate.engines import ENGINES
-from shaftwork.integrate.guards import AT_ONCE, LEAST, SHORTER, GuardWatch
-from shaftwork.integrate.inner import StepPolynomial, StepPolynomials
+from shaftwork.integrate.guards import LEAST, SHORTER, GuardWatch
 from shaftwork.integrate.pieces import (
     GuardedFunctions,
     Pace,
@@ -29,12 +27,11 @@ from shaftwork.integrate.pieces import (
     used_up,
 )
 from shaftwork.integrate.problem import Array, Problem, Trajectory, tightened
-from shaftwork.integrate.radau import RadauSteps
 from shaftwork.integrate.stiffness import bound_of_decay, jacobians, rates
 
 Method = Literal["DOP853", "Radau"]
 
-Steps = Dop853 | RadauSteps
+METHODS: dict[str, Any] = {"DOP853": DOP853, "Radau": Radau}
 
 FINEST = ENGINES["scipy"].finest
 
@@ -141,66 +138,74 @@ def _piece(
     problem: Problem, piece: Piece, x: Array, method: Method, max_steps: int, pace: Pace, longest: float
 ) -> _Run:
     guard, crossings = GuardedFunctions(problem, piece), Crossings(problem, piece)
-    watch = GuardWatch(problem, piece.low, piece.high, AT_ONCE)
+    watch = GuardWatch(problem, piece.low, piece.high)
     times, states = [piece.start], [x]
-    inner: list[StepPolynomial] = []
-    counted, shortest = np.zeros(2, dtype=int), LEAST * (problem.t_end - problem.t0)
+    interpolants: list[Any] = []
+    retired, shortest = np.zeros(2, dtype=int), LEAST * (problem.t_end - problem.t0)
     try:
         solver = _solver(problem, piece, x, method, guard, longest)
         while times[-1] < piece.end:
-            if len(inner) >= max_steps:
+            if len(interpolants) >= max_steps:
                 raise failure(problem, "scipy", solver.t, solver.y, used_up(problem))
             _advance(problem, solver, method, guard, times[-1], states[-1])
             if (objection := pace.objection(solver.t, rests=crossings.rests)) is not None:
                 raise failure(problem, "scipy", solver.t, solver.y, f"{method}: {objection}")
-            dense = solver.inside()
-            end = watch.cut(times[-1], states[-1], solver.t, solver.y, dense)
-            cut = crossings.cut(times[-1], states[-1], solver.t, solver.y, dense)
+            dense = solver.dense_output()
+            end = watch.cut(times[-1], states[-1], solver.t, solver.y, _rows(dense))
+            cut = crossings.cut(times[-1], states[-1], solver.t, solver.y, _rows(dense))
             if end is not None and (cut is None or end <= cut):
-                counted += solver.nfev, solver.njev
-                if not watch.follows(times[-1], states[-1], end, dense) and solver.t - times[-1] > shortest:
+                if not watch.follows(times[-1], states[-1], end, _rows(dense)) and solver.t - times[-1] > shortest:
+                    retired += solver.nfev, solver.njev
                     rest, brief = replace(piece, start=times[-1]), (solver.t - times[-1]) / SHORTER
                     solver = _solver(problem, rest, states[-1], method, guard, brief)
                     continue
-                inner.append(dense)
+                interpolants.append(dense)
                 times.append(end)
-                states.append(dense(np.array([end]))[0])
+                states.append(np.asarray(dense(end)))
                 break
             if cut is None or cut == solver.t:
-                inner.append(dense)
+                interpolants.append(dense)
                 times.append(solver.t)
                 states.append(solver.y)
-            if cut is not None or solver.finished:
-                counted += solver.nfev, solver.njev
-            if times[-1] < piece.end and (cut is not None or solver.finished):
+            if cut is not None or solver.status == "finished":
+                retired += solver.nfev, solver.njev
+            if times[-1] < piece.end and (cut is not None or solver.status == "finished"):
                 end = piece.end if cut is None or cut == solver.t else cut
                 solver = _solver(problem, replace(piece, start=times[-1], end=end), states[-1], method, guard, longest)
     except SimulationError:
         raise
     except (ValueError, RuntimeError) as error:  # a factorisation that met a NaN, or a singular one
         raise failure(problem, "scipy", times[-1], states[-1], f"{method}: {error}", guard) from error
-    calls, jacobians = counted.tolist()
-    counts = {"steps": len(inner), "rhs": calls, "jacobians": jacobians}
+    solution = OdeSolution(times, interpolants)
+    calls, jacobians = retired.tolist()
+    counts = {"steps": len(interpolants), "rhs": calls, "jacobians": jacobians}
     met = watch.met if times[-1] < piece.end else None
-    return _Run(np.array(times), np.array(states), StepPolynomials(inner), counts, met)
+    return _Run(np.array(times), np.array(states), _rows(solution), counts, met)
 
 
-def _advance(problem: Problem, solver: Steps, method: Method, guard: GuardedFunctions, t: float, x: Array) -> None:
+def _advance(problem: Problem, solver: Any, method: Method, guard: GuardedFunctions, t: float, x: Array) -> None:
     """Take one step from a time in s and a state (n,).
 
     Raises:
         SimulationError: it failed; says when and why.
     """
-    if reason := solver.step():
+    if np.isnan(getattr(solver, "h_abs", 0.0)):  # scipy would look for a first step without end
+        raise failure(problem, "scipy", t, x, f"{method}: no first step was found", guard)
+    reason = str(solver.step() or "")
+    if solver.status == "failed":
         good = x if np.isfinite(x).all() else solver.y
         raise failure(problem, "scipy", t, good, f"{method}: {reason}", guard)
-    if not isfinite(solver.y.sum()):
+    if not np.isfinite(solver.y.sum()):
         raise failure(problem, "scipy", solver.t, solver.y, f"{method}: the state is not finite", guard)
 
 
-def _solver(problem: Problem, piece: Piece, x: Array, method: Method, guard: GuardedFunctions, longest: float) -> Steps:
-    rtol, atol = max(problem.rtol, FINEST), problem.atol
-    if method == "DOP853":
-        return Dop853(guard.rhs, piece.start, x, piece.end, rtol, atol, longest)
-    jacobian = None if problem.jacobian is None else guard.jacobian
-    return RadauSteps(guard.rhs, jacobian, piece.start, x, piece.end, rtol, atol, longest)
+def _rows(dense: Callable[[Array], Array]) -> Callable[[Array], Array]:
+    """Dense output with a row for each time, where scipy's has a column."""
+    return lambda times: np.asarray(dense(times)).T
+
+
+def _solver(problem: Problem, piece: Piece, x: Array, method: Method, guard: GuardedFunctions, longest: float) -> Any:
+    options: dict[str, Any] = {"rtol": max(problem.rtol, FINEST), "atol": problem.atol, "max_step": longest}
+    if method != "DOP853" and problem.jacobian is not None:
+        options["jac"] = guard.jacobian
+    return METHODS[method](guard.rhs, piece.start, x, piece.end, **options)
