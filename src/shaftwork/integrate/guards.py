@@ -69,7 +69,8 @@ class GuardWatch:
         self._offsets = np.zeros(0) if guards is None else guards.offsets[self._columns]
         self._guards, self._low, self._high = guards, low, high
         self._problem, self._multistep = problem, multistep
-        self._watched = list(zip(*(made.tolist() for made in (self._columns, self._sides, self._offsets)), strict=True))
+        watched = (self._columns, self._sides, self._offsets) if multistep else ()
+        self._watched = list(zip(*(made.tolist() for made in watched), strict=True))
         self._ends: list[tuple[float, list[float]]] = []
         self.met: int | None = None
 

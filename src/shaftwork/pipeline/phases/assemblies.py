@@ -175,7 +175,9 @@ class Assembly:
         if not isinstance(readings, NamedReadings):
             return lambda _, states: states.T
         bound, reads = self.bound(p), [methodcaller("quantity", wanted) for wanted in readings.quantities]
-        matrices = self._matrices(bound.part, lambda: ReadingMatrices(bound, reads))
+        return self._reading(bound, self._matrices(bound.part, lambda: ReadingMatrices(bound, reads)))
+
+    def _reading(self, bound: Any, matrices: ReadingMatrices) -> Callable[[Array, Array], Array]:
         return lambda times, states: matrices(History(bound, times, states))
 
     def _read_at(self, t: float, x: Array, p: Array) -> list[float]:
@@ -216,7 +218,7 @@ class Assembly:
         Its states are those of the model and, behind them, the integrals of the guards in `clocks`.
         """
         p, modes, x = moment.regime.p, moment.regime.modes, moment.x
-        same = self._problems((modes, p.tobytes()), lambda: self._problem(p, modes))
+        same = self._problems((modes, p.tobytes()), lambda: self._problem(p, modes, moment.regime.limits))
         guards, sizes = same.guards, self._sizes(p, x, span) if self.clocks else np.empty(0)
         assert guards is not None  # noqa: S101 (which `_problem` gives)
         now = np.abs(moment.regime.limits(span[0], x.tolist()))
@@ -230,11 +232,11 @@ class Assembly:
             guards=replace(guards, offsets=np.array(moment.bands), sizes=now),
         )
 
-    def _problem(self, p: Array, modes: ModeNames) -> Problem:
+    def _problem(self, p: Array, modes: ModeNames, limits: Limits) -> Problem:
         """What is the same in all phases of these modes; the rest is empty."""
         bound, (_, known), clocks, size = partial(self.bound, p), self._rates(p), self.clocks, len(self.model.states)
         owners = {made.guard: k for (k, _), found in self._watched.items() for made in found}
-        guards, limits, none = self.guards(p), self.motion(p)[1], np.empty(0)
+        guards, none = self.guards(p), np.empty(0)
         values = guards if not clocks else lambda t, y: guards(t, y[:, :size])
         return Problem(
             rhs=self.right_side(p),
