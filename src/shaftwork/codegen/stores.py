@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -21,8 +22,12 @@ from shaftwork.codegen.elements import Array, GainMatrix, potential_matrix
 from shaftwork.codegen.matrices import LinearPart
 from shaftwork.codegen.mobility import Mobility
 from shaftwork.codegen.recovery import History
+from shaftwork.core.kept import Kept
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm, store_name
+
+KEPT = 64
+"""Answers to impulses that are kept."""
 
 
 class Stores:
@@ -45,6 +50,7 @@ class Stores:
         self.through = tuple(name for name, k in made.items() if form.graph.branches[k].template.kind is kind)
         """Those of the names that are torques of springs or currents of inductors."""
         self._states = [state.name for state in form.states]
+        self._mobilities = Kept[tuple[Any, ...], Mobility](KEPT)
         self._map: tuple[LinearPart, Array] | None = None
         self._dense: tuple[LinearPart, Array, Array] | None = None
         self._maps: tuple[LinearPart, Array, Array] | None = None
@@ -139,8 +145,12 @@ class Stores:
         return max((abs(float(bound.part.coefficients[k]) * held[name]) for name, k in inertias), default=0.0)
 
     def mobility(self, bound: BoundArrays, pairs: Sequence[tuple[int, int]]) -> Mobility:
-        """The answer to impulses at pairs of nodes."""
-        return Mobility(self._form, bound, self._nodes(bound.p).toarray(), pairs)
+        """The answer to impulses at pairs of nodes; a ball bounces on the same floor again and again."""
+
+        def make() -> Mobility:
+            return Mobility(self._form, bound, self._nodes(bound.p).toarray(), pairs)
+
+        return self._mobilities((bound.part, *pairs), make)
 
     @cached_property
     def _nodes(self) -> GainMatrix:
