@@ -140,7 +140,7 @@ class HeldArrays(BoundArrays):
 
     def __init__(self, program: ArrayProgram, p: Array, part: LinearPart, joints: Joints) -> None:
         super().__init__(program, p, part)
-        self.joints, self._moving = joints, BoundArrays(program, p, joints.moving)
+        self.joints, self._moving = joints, BoundArrays(program, p, joints.moving, full=True)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return HeldArrays, (self.program, self.p, self.part, self.joints)

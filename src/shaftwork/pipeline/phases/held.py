@@ -105,11 +105,13 @@ class HeldAssembly(Assembly):
         _, by_state, by_input = self._factors
 
         def quick(times: Array, states: Array) -> Array:
-            x = states.T
-            u = bound.others(times, x)
+            one = len(times) == 1
+            x = states[0] if one else states.T
+            u = bound.others(times[0] if one else times, x)
             if not isfinite(np.vdot(u, u)):
                 return slow(times, states)  # which says what has no value
-            return by_state @ x + by_input @ u
+            read = by_state @ x + by_input @ u
+            return read[:, None] if one else read
 
         return quick
 
