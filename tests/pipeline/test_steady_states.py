@@ -257,7 +257,7 @@ def test_an_angle_that_is_recorded_alone_may_turn_on_in_a_steady_state() -> None
     net = drive(sympy.Integer(5))
     plain, recorded = net.compile().steady_state(), net.compile(angles=("J1",)).steady_state()
     assert recorded["J1.phi"] == 0.0
-    assert {name: recorded[name] for name in plain} == pytest.approx(plain, rel=1e-9)
+    assert recorded.items() >= plain.items()
 
 
 @pytest.mark.parametrize(

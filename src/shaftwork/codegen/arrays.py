@@ -46,14 +46,22 @@ class ArrayProgram:
 
 
 class BoundArrays:
-    """An `ArrayProgram` for one parameter vector."""
+    """An `ArrayProgram` for one parameter vector.
 
-    def __init__(self, program: ArrayProgram, p: Array, part: LinearPart) -> None:
+    Args:
+        program: the equations.
+        p: parameters.
+        part: their matrices.
+        full: whether small matrices are multiplied in full: quicker, but what cancels may leave rounding.
+    """
+
+    def __init__(self, program: ArrayProgram, p: Array, part: LinearPart, *, full: bool = False) -> None:
         p = p.copy() if p.flags.writeable else p
         p.flags.writeable = False  # so that what laws read of it is looked up once
         self.program, self.p, self.part = program, p, part
-        self._A, self._B, self._B1, self._C, self._D = part.factors
-        self._has_slopes, self._controls = not self._B1.is_zero, program.inputs.controls
+        factors: tuple[Any, ...] = part.factors if full else tuple(made.sparse for made in part.factors)
+        self._A, self._B, self._B1, self._C, self._D = factors
+        self._has_slopes, self._controls = bool(part.B1.nnz), program.inputs.controls
         loops = program.loop_places
         form = program.form
         owners = tuple(dict.fromkeys(form.graph.part_of(law).name for law in form.loop_laws)) if form.waves else ()
@@ -78,7 +86,7 @@ class BoundArrays:
 
     def full(self) -> tuple[Array, Array, Array] | None:
         """A, B and C in full where x' = A x + B u and y = C x; None where more enters."""
-        if self.loops is not None or self._has_slopes or not self._D.is_zero:
+        if self.loops is not None or self._has_slopes or self.part.D.nnz:
             return None
         return self.part.A.toarray(), self.part.B.toarray(), self.part.C.toarray()
 
@@ -89,10 +97,8 @@ class BoundArrays:
     def _outputs(self, t: Any, x: Array) -> Array:
         """Outputs y where there are no loops."""
         inputs = self.program.inputs
-        y = self._C @ x[: inputs.states]
-        if (
-            not self._D.is_zero
-        ):  # only inputs of time alone and controlled sources reach the outputs: else there is a loop
+        y: Array = self._C @ x[: inputs.states]
+        if self.part.D.nnz:  # only inputs of time alone and controlled sources reach the outputs: else there is a loop
             first = inputs.values(t, np.zeros((inputs.outputs, *x.shape[1:])), x, self.p)
             y = y + self._D @ _where(inputs.of_time, first)
             if self._controls.size:
@@ -111,7 +117,7 @@ class BoundArrays:
 
     def rates(self, t: Any, x: Array, y: Array, u: Array) -> Array:
         """x' from the states and the inputs that go with them."""
-        rate = self._A @ x[: self.program.inputs.states] + self._B @ u
+        rate: Array = self._A @ x[: self.program.inputs.states] + self._B @ u
         if self._has_slopes:
             slopes = self.program.inputs.time_slopes(t, y, x, self.p)
             rate = rate + self._B1 @ _where(self.program.inputs.of_time, slopes)
@@ -128,12 +134,13 @@ class BoundArrays:
         """A, B and the slopes (m, n) of the inputs by the states: full arrays or of scipy.sparse."""
         inputs, part, controls = self.program.inputs, self.part, self._controls
         y, _ = self.values(t, x)
-        if self._A.full is not None and self._B.full is not None and self._C.full is not None:
-            full = inputs.along(t, y, x, self.p, self._C.full, np.eye(inputs.states))
+        A, B, _, C, _ = (made.full for made in part.factors)
+        if A is not None and B is not None and C is not None:
+            full = inputs.along(t, y, x, self.p, C, np.eye(inputs.states))
             if controls.size:
                 full = full + inputs.along(t, y, x, self.p, part.D[:, controls] @ full[controls])
             if np.isfinite(full).all():  # else only the states on which an infinite slope depends are to see it
-                return self._A.full, self._B.full, full
+                return A, B, full
         by_y, by_x = inputs.slopes(t, y, x, self.p)
         slope = by_y @ part.C + by_x
         if controls.size:

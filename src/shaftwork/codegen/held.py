@@ -56,7 +56,9 @@ class Joints:
         self._B, self._reactions, self._alike = Factor(B), Factor(reactions), Factor(alike)
         joined = alike @ (sparse.eye_array(size, format="csr") + B @ reactions)
         others = sparse.diags_array(np.where(np.isin(np.arange(part.B.shape[1]), self.places), 0.0, 1.0))
-        self.moving = replace(part, A=joined @ part.A, B=joined @ part.B @ others, B1=joined @ part.B1)
+        self.moving = replace(
+            part, A=joined @ part.A, B=joined @ part.B @ others, B1=joined @ part.B1, C=part.C @ alike
+        )
         """The equations with what holds moving as one, to which its own laws add nothing."""
 
     def reactions(self, rates: Array) -> Array:
@@ -66,6 +68,16 @@ class Joints:
     def alike(self, x: Array) -> Array:
         """States or rates in which what is held follows the others to the last bit."""
         return self._alike @ x
+
+    def read(self, by_state: Any, by_input: Any, part: LinearPart) -> tuple[Factor, Factor]:
+        """What reads states and inputs (q, n) and (q, m), of scipy.sparse, with the reactions among the inputs.
+
+        It reads the inputs without the laws of what holds.
+        """
+        react = by_input[:, self.places] @ self._reactions.sparse
+        return Factor(by_state @ self._alike.sparse + react @ part.A @ self._alike.sparse), Factor(
+            by_input + react @ part.B
+        )
 
     def met(self, x: Array) -> Array:
         """(n,) the states after an inelastic impact that joins what is held: every momentum is kept."""
@@ -128,7 +140,7 @@ class HeldArrays(BoundArrays):
 
     def __init__(self, program: ArrayProgram, p: Array, part: LinearPart, joints: Joints) -> None:
         super().__init__(program, p, part)
-        self.joints, self._moving = joints, BoundArrays(program, p, joints.moving)
+        self.joints, self._moving = joints, BoundArrays(program, p, joints.moving, full=True)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return HeldArrays, (self.program, self.p, self.part, self.joints)
@@ -143,6 +155,12 @@ class HeldArrays(BoundArrays):
     def rates(self, t: Any, x: Array, y: Array, u: Array) -> Array:
         """x', in which what is held moves as one."""
         return self.joints.alike(super().rates(t, x, y, u))
+
+    def others(self, t: Any, x: Array) -> Array:
+        """Inputs u without those of what holds."""
+        u = self._moving.values(t, x)[1]
+        u[self.joints.places] = 0.0
+        return u
 
     def rhs(self, t: Any, x: Array) -> Array:
         """x' at time t."""

@@ -101,6 +101,12 @@ class ReadingMatrices:
             for place in range(4)
         ]
 
+    @property
+    def plain(self) -> tuple[Any, Any] | None:
+        """X and U of scipy.sparse; None where rates are read as well."""
+        by_state, by_input, by_rate, by_slope = self._matrices
+        return (by_state.sparse, by_input.sparse) if by_rate.is_zero and by_slope.is_zero else None
+
     def _columns(self, bound: BoundArrays, place: int, width: int) -> Iterator[_Columns]:
         """One column for each of what is given at a place: states, inputs, rates of states, rates of inputs."""
         for first in range(0, max(self._sizes[place], 1), width):

@@ -51,11 +51,13 @@ class ManyExpressions:
     def bind(self, p: Array) -> Values:
         """The expressions with a parameter vector."""
         sums, others, function, parameters = self._sums(p), self._others, self._function, p.tolist()
+        if not others:
+            return lambda _, quantities: sums(quantities).T
 
         def values(times: Array, quantities: Array) -> Array:
             made = sums(quantities)
             with np.errstate(all="ignore"):
-                found = function(times, *quantities, *parameters) if others else ()
+                found = function(times, *quantities, *parameters)
                 for row, value in zip(others, found, strict=True):
                     made[row] = value
             return made.T

@@ -1,4 +1,8 @@
-"""Products of one matrix with many vectors, one after another: as a full array where that is quicker than sparse."""
+"""Products of one matrix with many vectors, one after another: as a full array where that is quicker than sparse.
+
+BLAS fuses multiplication and addition, so that the difference of two equal terms is the rounding of one of them, and no
+zero. Hence only who bears that takes full arrays, and what is read at many times stays sparse.
+"""
 
 from __future__ import annotations
 
@@ -30,12 +34,10 @@ class Factor:
 
     def __matmul__(self, other: Array) -> Array:
         """Its product with (m,) or (m, k)."""
-        full = self.full
-        if full is None or (other.ndim == 2 and full.size * other.shape[1] > FULL):
-            return np.asarray(self.sparse @ other)
         # zeros times an infinite torque would make all speeds NaN, and not those alone on which it acts
-        square = other.dot(other) if other.ndim == 1 else np.vdot(other, other)
-        return full.dot(other) if isfinite(square) else np.asarray(self.sparse @ other)
+        if self.full is None or other.ndim > 1 or not isfinite(other.dot(other)):
+            return np.asarray(self.sparse @ other)
+        return np.asarray(self.full.dot(other))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Factor, (self.sparse,)

@@ -175,7 +175,9 @@ class Assembly:
         if not isinstance(readings, NamedReadings):
             return lambda _, states: states.T
         bound, reads = self.bound(p), [methodcaller("quantity", wanted) for wanted in readings.quantities]
-        matrices = self._matrices(bound.part, lambda: ReadingMatrices(bound, reads))
+        return self._reading(bound, self._matrices(bound.part, lambda: ReadingMatrices(bound, reads)))
+
+    def _reading(self, bound: Any, matrices: ReadingMatrices) -> Callable[[Array, Array], Array]:
         return lambda times, states: matrices(History(bound, times, states))
 
     def _read_at(self, t: float, x: Array, p: Array) -> list[float]:

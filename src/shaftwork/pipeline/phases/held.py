@@ -12,11 +12,16 @@ from copy import copy
 from dataclasses import replace
 from functools import partial
 from itertools import chain
+from math import isfinite
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.held import HeldArrays, HeldStores, Joints
+from shaftwork.codegen.linear_readings import ReadingMatrices
 from shaftwork.codegen.matrices import LinearPart
+from shaftwork.codegen.products import Factor
 from shaftwork.core.kept import Kept
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.graph import GROUND
@@ -57,6 +62,7 @@ class HeldAssembly(Assembly):
         joining = (element.number for element, law in zip(elements, laws, strict=True) if law is not None)
         self._joining = [self._places[number] for number in joining if number in self._places]
         self._joints: tuple[LinearPart, Joints] | None = None
+        self._factors: tuple[LinearPart, Factor, Factor] | None = None
         self._found: dict[bytes, dict[str, Any]] = {}
         _ = self._many, self.clocks  # made once for all
 
@@ -64,7 +70,9 @@ class HeldAssembly(Assembly):
         """The equations in which the elements of these numbers hold."""
         made = copy(self)
         held = [law for k in numbers if (law := self._laws[k]) is not None]
-        vars(made).update(_held=held, _joints=None, _rates_made=Kept(KEPT_RATES), _problems=Kept(KEPT_RATES))
+        vars(made).update(
+            _held=held, _joints=None, _factors=None, _rates_made=Kept(KEPT_RATES), _problems=Kept(KEPT_RATES)
+        )
         return made
 
     def joints(self, p: Array) -> Joints:
@@ -83,10 +91,29 @@ class HeldAssembly(Assembly):
         p = moment.regime.p
         return replace(problem, jacobian=self.slopes(partial(self.prepared(p).bound.with_laws, p)))
 
-    def guards(self, p: Array) -> Callable[[Array, Array], Array]:
-        """All guards; rounding gives no speed to what holds."""
-        values, joints = super().guards(p), self.joints(p)
-        return lambda times, states: values(times, joints.alike(states.T).T)
+    def _reading(self, bound: HeldArrays, matrices: ReadingMatrices) -> Callable[[Array, Array], Array]:
+        """What guards are made of; in two products where there are no rates in it, as it is asked for most of all."""
+        exact = super()._reading(bound, matrices)
+
+        def slow(times: Array, states: Array) -> Array:
+            return exact(times, bound.joints.alike(states.T).T)  # rounding gives no speed to what holds
+
+        if matrices.plain is None or bound.part.B1.nnz:
+            return slow
+        if self._factors is None or self._factors[0] is not bound.part:
+            self._factors = bound.part, *bound.joints.read(*matrices.plain, bound.part)
+        _, by_state, by_input = self._factors
+
+        def quick(times: Array, states: Array) -> Array:
+            one = len(times) == 1
+            x = states[0] if one else states.T
+            u = bound.others(times[0] if one else times, x)
+            if not isfinite(np.vdot(u, u)):
+                return slow(times, states)  # which says what has no value
+            read = by_state @ x + by_input @ u
+            return read[:, None] if one else read
+
+        return quick
 
     def bound(self, p: Array) -> HeldArrays:
         """The equations with their parameters."""

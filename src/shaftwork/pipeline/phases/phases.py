@@ -17,6 +17,7 @@ from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.phases.assemblies import Assembly
 from shaftwork.pipeline.phases.elements import ModeNames, elements_of
 from shaftwork.pipeline.phases.held import MANY, HeldAssembly, holds, laws_that_hold
+from shaftwork.pipeline.phases.regimes import with_modes
 from shaftwork.pipeline.phases.resting import at_rest
 from shaftwork.pipeline.phases.wave_assembly import WaveAssembly
 from shaftwork.pipeline.waves import engine_of_waves
@@ -94,11 +95,9 @@ class Phases:
         if len(self._holding) < MANY:
             return self.assembly(modes)
         held = tuple(k for k in self._holding if self._form(k, modes) != self._form(k, self.first))
-        free = tuple(
-            first if k in held else name for k, (name, first) in enumerate(zip(modes, self.first, strict=True))
-        )
-        forms = tuple("" if k in self._holding else self._form(k, modes) for k in range(len(modes)))
+        forms = tuple(self._form(k, modes) for k in self._lasting)
         if forms not in self._wholes:
+            free = with_modes(modes, {k: self.first[k] for k in held})
             model = self.assembly(free).model
             laws = laws_that_hold(model, self.elements)
             self._wholes[forms] = None if laws is None else HeldAssembly(model, self.elements, laws)
@@ -114,6 +113,11 @@ class Phases:
     def _holding(self) -> tuple[int, ...]:
         """Elements for which a reaction may stand."""
         return tuple(k for k, element in enumerate(self.elements) if holds(element))
+
+    @cached_property
+    def _lasting(self) -> tuple[int, ...]:
+        """All other elements."""
+        return tuple(k for k in range(len(self.elements)) if k not in self._holding)
 
     def _form(self, number: int, modes: ModeNames) -> str:
         return self.elements[number].modes[modes[number]].form
