@@ -360,12 +360,12 @@ def jamming(joint: sw.Component, ratio: float, inertias: tuple[float, float, flo
         ),
         # the motor drives the gear less than its load, which goes on by the freewheel when the gear has stopped
         (
-            jamming(sw.Freewheel("joint"), 2.0, (3.0, 0.1, 1.0), (-0.5 + 4.0 * sw.t, 8.8)),
+            jamming(sw.Freewheel("joint"), 2.0, (3.0, 0.04, 1.0), (-0.5 + 4.0 * sw.t, 8.8)),
             2.0,
             -2.0,
-            0.235,
-            lambda s: -1.0 + (2.0 * 0.235**2 + (8.8 / 1.94 - 0.5) * 0.235) / (0.2 + 2.0 / 0.97) + 8.8 / 3.0 * s,
-            lambda s: (0.44 * s + 2.0 * s**2) / (0.1 + 1.0 / (2.0**2 * 0.97)),
+            0.169,
+            lambda s: -1.0 + (2.0 * 0.169**2 + (8.8 / 1.94 - 0.5) * 0.169) / (0.08 + 2.0 / 0.97) + 8.8 / 3.0 * s,
+            lambda s: (0.176 * s + 2.0 * s**2) / (0.04 + 1.0 / (2.0**2 * 0.97)),
         ),
     ],
     ids=["friction", "freewheel"],
@@ -382,6 +382,17 @@ def test_what_slips_behind_a_gear_that_jams_keeps_slipping(
     assert sol["hung.omega"][-1] == pytest.approx(hung(0.1), rel=1e-9)
     assert sol["J1.omega"][-1] == pytest.approx(driven(0.1), rel=1e-9)
     assert sol.energy_residual < 1e-9
+
+
+def test_a_gear_does_not_jam_where_a_freewheel_opens_and_lets_it_turn_on() -> None:
+    """The load alone would jam it from 0.235 s on; without it J1 can brake J2, faster than the load follows."""
+    model = jamming(sw.Freewheel("joint"), 2.0, (3.0, 0.1, 1.0), (-0.5 + 4.0 * sw.t, 8.8))
+    speeds = {"J1.omega": -2.0, "J2.omega": -1.0, "hung.omega": -1.0}
+    sol = model.simulate(0.3, initial={name: speeds[name] for name in model.states if name in speeds})
+    before = -1.0 + (2.0 * 0.235**2 + (8.8 / 1.94 - 0.5) * 0.235) / (0.2 + 2.0 / 0.97)
+    assert ("joint", "locked", "free") in {event[1:] for event in sol.events}
+    assert sol["J2.omega"][-1] == pytest.approx(before + (0.44 * 0.065 + 2.0 * 0.065**2) / 0.1, rel=1e-9)
+    assert sol["hung.omega"][-1] == pytest.approx(before + 8.8 / 3.0 * 0.065, rel=1e-9)
 
 
 def test_a_source_that_jumps_through_zero_gives_in_each_direction_of_power_its_impulse_times_its_mean_speed() -> None:

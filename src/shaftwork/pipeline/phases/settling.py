@@ -357,8 +357,10 @@ class Settling:
         leads = (leave for leave in element.modes[to].leaves if leave.to not in ("", before))
         # neither the other flank nor a time to come is there
         ways = [{number: leave.to} for leave in leads if leave.rebound is None and not leave.by_twist]
-        for k, limited in self._impacts.limited(modes).items():
-            ways += [{number: to, k: name} for _, name in limited if k != number]
+        limited = self._impacts.limited(modes).items()
+        yields = [{number: to, k: name} for k, sides in limited for _, name in sides if k != number]
+        # a gear jams only where nothing beside it gives way
+        ways = [*yields, *ways] if number in self._impacts.gears else [*ways, *yields]
         for k in self._impacts.gears:
             ways += [{number: to, k: leave.to} for leave in self.elements[k].modes[modes[k]].leaves if k != number]
         for new in islice(filter(self._regimes.possible, (with_modes(modes, way) for way in ways)), tried, None):
