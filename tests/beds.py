@@ -20,7 +20,7 @@ VALUES = {
     "PullOutDrive": {"tau_k": 5.0, "s_k": 0.3, "n_sync": 60.0, "overspeed": 2.0, "efficiency": 0.9},
     "SpeedController": {"omega_ref": 4.0, "k_p": 1.0, "t_i": 3.0, "tau_max": 50.0},
     "CoulombLoad": {"tau": 2.0, "omega_s": 0.3},
-    "HardStop": {"upper": 0.1, "c": 5.0},
+    "HardStop": {"upper": 0.1, "c": 5.0, "omega_rest": 1e-3},
     "LossyGear": {"ratio": 2.5, "efficiency": 0.8},
     "DCMachine": {"k": 0.4, "R": 1.5, "L": 0.3},
     "SpeedSource": {"omega": sympy.sin(3 * sw.t)},

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 from contextlib import suppress
 from dataclasses import replace
-from functools import cache
 
 from shaftwork.core.errors import MissingExtraError, ParameterError, SimulationError
 from shaftwork.integrate.engines import ADAMS, ENGINES, INNER
@@ -151,7 +150,6 @@ def check(name: str) -> None:
         raise ParameterError(f"There is no engine {name!r} here. Take one of: auto, {', '.join(ENGINES)}.{only}")
 
 
-@cache
 def load(name: str) -> Engine:
     """The function of an engine.
 
