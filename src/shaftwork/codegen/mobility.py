@@ -71,7 +71,7 @@ class Mobility:
 
 def _rows(nodes: Array, pairs: Sequence[tuple[int, int]]) -> Array:
     rows = [_row(nodes, plus) - _row(nodes, minus) for plus, minus in pairs]
-    return np.array(rows).reshape(len(pairs), -1)
+    return np.array(rows).reshape(len(pairs), nodes.shape[1])
 
 
 def _row(nodes: Array, node: int) -> Array:

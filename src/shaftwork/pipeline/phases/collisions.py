@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -112,40 +113,71 @@ class Collisions:
         contacts = self._in_turn(t, moment, [*self._contacts(t, moment, number, leave)])
         before = np.array([self._opens(t, moment, contact) for contact in contacts])
         back = np.array([self._restitution(c, u) for c, u in zip(contacts, before.tolist(), strict=True)])
-        stages = self._compressed(t, moment, contacts, {number: leave.to})
+        modes = moment.regime.modes
+        stages = self._compressed(t, self._apart(t, moment, modes, contacts, {number: leave.to}), contacts)
         if back.any():
             stages += self._thrown_back(t, contacts, stages, back)
-        after = stages[-1].blow.after
-        impulses, (_, opens) = _pressed(stages), self._mobility(t, after, contacts)
         least = NO_IMPACT * max(1.0, np.abs(before).max(initial=0.0))
-        hit = [c for c, i in zip(contacts, impulses, strict=True) if c.leave and (i > 0 or c.number == number)]
-        closed = [c for c, u in zip(contacts, opens, strict=True) if u <= least and (c.leave is None or c in hit)]
-        modes = {c.number: c.joined for c in closed} | self._slipping(t, moment, after, least)
+        hit = [c for c, i in zip(contacts, _pressed(stages), strict=True) if c.leave and (i > 0 or c.number == number)]
+        after, closed = self._ended(t, modes, contacts, stages, least, hit)
         owners = (self._elements[contact.number].part.name for contact in contacts)
         lost = zip(owners, self._taken(t, contacts, stages).tolist(), strict=True)
         return Collision(
-            self._regimes.changed(after, t, with_modes(after.regime.modes, modes)),
+            after,
             tuple(c for c in hit if c in closed),
             tuple(c for c in hit if c not in closed),
             _sums([*lost, *self._impulses.lost(t, stages).items()]),
             self._impulses.given(t, stages),
         )
 
-    def _compressed(
-        self, t: float, moment: Moment, contacts: Sequence[Contact], wanted: Mapping[int, str]
-    ) -> tuple[Stage, ...]:
-        """Until nothing closes any more, with all contacts open; where nothing stops them, joined is what wants to."""
+    def pulled(
+        self, before: float, t: float, moment: Moment, modes: ModeNames, least: float
+    ) -> tuple[Moment, tuple[Stage, ...]]:
+        """What follows where prescribed speeds jump or gears jam: what is closed takes it up or opens.
+
+        Args:
+            before, t: times in s just before and just after it, at which inputs are read.
+            moment: what was before.
+            modes: that are to go on.
+            least: speed up to which an element stays as it is.
+        """
+        contacts = [*self._lasting(modes)]
+        start = self._apart(before, moment, modes, contacts)
+        stages = self._compressed(t, start, contacts)
+        hit = [c for c, i in zip(contacts, _pressed(stages), strict=True) if i > 0]
+        return self._ended(t, modes, contacts, stages, least, hit)[0], stages
+
+    def _ended(
+        self,
+        t: float,
+        before: ModeNames,
+        contacts: Sequence[Contact],
+        stages: Sequence[Stage],
+        least: float,
+        hit: Sequence[Contact],
+    ) -> tuple[Moment, list[Contact]]:
+        """What follows stages, and the contacts that are closed then: of those that were open only what was hit."""
+        after = stages[-1].blow.after
+        opens = self._mobility(t, after, contacts)[1]
+        closed = [c for c, u in zip(contacts, opens, strict=True) if u <= least and (c.leave is None or c in hit)]
+        modes = {c.number: c.joined for c in closed} | self._slipping(t, before, after, least)
+        return self._regimes.changed(after, t, with_modes(after.regime.modes, modes)), closed
+
+    def _compressed(self, t: float, begins: Start, contacts: Sequence[Contact]) -> tuple[Stage, ...]:
+        """Until nothing closes any more, with all contacts open; where nothing stops them, what closes is joined."""
 
         def compressed(start: Start, _: Sequence[Stage]) -> Blow:
-            mobility, opens = self._mobility(t, start.moment, contacts)
+            modes = start.moment.regime.modes
+            moment = start.moment if start.t == t else self._regimes.taking(modes, t, start.held)
+            mobility, opens = self._mobility(t, moment, contacts)
             impulses = complementary(mobility.W, opens)
             if impulses is not None:
-                return _blow(start, mobility, impulses)
-            joined = self._regimes.changed(start.moment, t, with_modes(start.moment.regime.modes, wanted))
+                return _blow(moment, mobility, impulses)
+            closing = {c.number: c.joined for c, u in zip(contacts, opens, strict=True) if u < 0}
+            joined = self._regimes.changed(moment, t, with_modes(modes, closing))
             return Blow(joined, joined.regime, np.zeros(len(contacts)))
 
-        loose = self._apart(t, moment, contacts, wanted)
-        return self._impulses.stages(t, self._impulses.begins(loose, t), compressed)
+        return self._impulses.stages(t, begins, compressed)
 
     def _thrown_back(
         self, t: float, contacts: Sequence[Contact], compression: tuple[Stage, ...], back: Array
@@ -165,7 +197,7 @@ class Collisions:
                 gives = share * impulses
                 left -= float(gives @ (opens + mobility.W @ gives / 2))
             further = complementary(mobility.W, np.maximum(opens, 0.0) + mobility.W @ impulses)
-            return _blow(start, mobility, impulses if further is None else impulses + further)
+            return _blow(start.moment, mobility, impulses if further is None else impulses + further)
 
         return self._impulses.stages(t, self._impulses.begins(compression[-1].blow.after, t), thrown)
 
@@ -187,22 +219,29 @@ class Collisions:
             taken -= share * blow.pressed * (np.array(began) + share / 2 * np.subtract(ends, began))
         return taken
 
-    def _apart(self, t: float, moment: Moment, contacts: Sequence[Contact], wanted: Mapping[int, str]) -> Moment:
+    def _apart(
+        self,
+        t: float,
+        moment: Moment,
+        modes: ModeNames,
+        contacts: Sequence[Contact],
+        wanted: Mapping[int, str] = MappingProxyType({}),
+    ) -> Start:
         """The moment with all contacts open, and what rubs slipping; joined is what wants to be and never opens."""
-        modes = {k: ways[0][1] for k, ways in self._rubbing(moment).items()} | {c.number: c.apart for c in contacts}
-        modes = {**wanted, **modes}
-        return self._regimes.taking(with_modes(moment.regime.modes, modes), t, self._regimes.held(moment, t))
+        apart = {k: ways[0][1] for k, ways in self._rubbing(modes).items()} | {c.number: c.apart for c in contacts}
+        loose = with_modes(modes, {**wanted, **apart})
+        return self._impulses.begins(self._regimes.taking(loose, t, self._regimes.held(moment, t)), t)
 
-    def _rubbing(self, moment: Moment) -> dict[int, tuple[tuple[float, str], ...]]:
+    def _rubbing(self, modes: ModeNames) -> dict[int, tuple[tuple[float, str], ...]]:
         """Elements that hold by torques limited on both sides, with the modes to which these lead."""
-        return {k: ways for k, ways in limited(self._elements, moment.regime.modes).items() if len(ways) > 1}
+        return {k: ways for k, ways in limited(self._elements, modes).items() if len(ways) > 1}
 
-    def _slipping(self, t: float, moment: Moment, after: Moment, least: float) -> dict[int, str]:
+    def _slipping(self, t: float, before: ModeNames, after: Moment, least: float) -> dict[int, str]:
         """The modes of what rubs after an impact: it slips where the speed across it is more than the least."""
-        speeds = {k: after.across(k, t) for k in self._rubbing(moment)}
+        speeds = {k: after.across(k, t) for k in self._rubbing(before)}
         return {
-            k: next((to for side, to in ways if side * speeds[k] > least), moment.regime.modes[k])
-            for k, ways in self._rubbing(moment).items()
+            k: next((to for side, to in ways if side * speeds[k] > least), before[k])
+            for k, ways in self._rubbing(before).items()
         }
 
     def _mobility(self, t: float, moment: Moment, contacts: Sequence[Contact]) -> tuple[Mobility, Array]:
@@ -252,21 +291,28 @@ class Collisions:
         """Contacts that are closed or touch, freewheels, and the element that wants to close."""
         regime, here = moment.regime, moment.course(t)
         now, bands = here[3], regime.bands(here)
-        for k, (element, name) in enumerate(zip(self._elements, regime.modes, strict=True)):
-            modes = element.modes
-            if (side := one_side(modes, name)) is not None:
-                yield Contact(k, side, modes[name].gives_way[0][1], name)
-        overrun = freewheels(self._elements, regime.modes)
+        lasting = [*self._lasting(regime.modes)]
+        yield from lasting
         for k, watched in regime.watched:
             closes, guard = watched.leave, watched.guard
             wanted = k == number and closes.to == leave.to
-            touches = watched.side * now[guard] > -CLEAR * bands[guard]
-            takes_part = wanted or (k in overrun if closes.rebound is None else touches)
-            side = one_side(self._elements[k].modes, closes.to) if takes_part and closes.to else None
-            if side is not None:
+            touches = closes.rebound is not None and watched.side * now[guard] > -CLEAR * bands[guard]
+            side = one_side(self._elements[k].modes, closes.to) if (wanted or touches) and closes.to else None
+            if side is not None and not any(c.number == k and c.joined == closes.to for c in lasting):
                 closes = leave if wanted else closes
                 constants = (regime.constant(k, given) for given in (closes.rebound, closes.rest))
                 yield Contact(k, side, regime.modes[k], closes.to, closes, *constants)
+
+    def _lasting(self, modes: ModeNames) -> Iterator[Contact]:
+        """Contacts that are closed, and freewheels."""
+        for k, (element, name) in enumerate(zip(self._elements, modes, strict=True)):
+            own = element.modes
+            if (side := one_side(own, name)) is not None:
+                yield Contact(k, side, own[name].gives_way[0][1], name)
+            for leave in own[name].leaves:
+                side = one_side(own, leave.to) if leave.to and leave.when == ACROSS else None
+                if side is not None:
+                    yield Contact(k, side, name, leave.to, leave)
 
 
 def one_side(modes: Modes, name: str) -> float | None:
@@ -282,20 +328,9 @@ def limited(elements: Sequence[Element], modes: ModeNames) -> dict[int, tuple[tu
     return {k: ways for k, ways in found.items() if ways}
 
 
-def freewheels(elements: Sequence[Element], modes: ModeNames) -> dict[int, str]:
-    """Elements that let their ends turn one way alone, while they do, and the modes in which they hold them."""
-    pairs = enumerate(zip(elements, modes, strict=True))
-    leaves = ((k, leave, element.modes) for k, (element, name) in pairs for leave in element.modes[name].leaves)
-    return {
-        k: leave.to
-        for k, leave, own in leaves
-        if leave.to and leave.when == ACROSS and one_side(own, leave.to) is not None
-    }
-
-
-def _blow(start: Start, mobility: Mobility, impulses: Array) -> Blow:
+def _blow(moment: Moment, mobility: Mobility, impulses: Array) -> Blow:
     """What impulses (contacts,) lead to."""
-    after = start.moment._replace(x=mobility.moved(start.moment.x, impulses))
+    after = moment._replace(x=mobility.moved(moment.x, impulses))
     return Blow(after, after.regime, impulses, mobility.through(impulses))
 
 

@@ -11,9 +11,9 @@ from shaftwork.codegen.observer import Impact
 from shaftwork.components.branches import INTEGRAL
 from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError, SimulationError
-from shaftwork.pipeline.phases.collisions import NO_IMPACT, Collisions, freewheels, limited
+from shaftwork.pipeline.phases.collisions import NO_IMPACT, Collisions, limited
 from shaftwork.pipeline.phases.elements import Element, ModeNames, Watched
-from shaftwork.pipeline.phases.impulses import Blow, Impulses, Stage, Start
+from shaftwork.pipeline.phases.impulses import Blow, Impulses, Stage
 from shaftwork.pipeline.phases.moments import CLEAR, Change, Moment
 from shaftwork.pipeline.phases.regimes import Regimes, with_modes
 
@@ -92,9 +92,7 @@ class Impacts:
         least = NO_IMPACT * max([1.0, *(abs(held[name]) for name in moment.regime.assembly.stores.names)])
         if all(abs(stopped[name] - value) <= least for name, value in held.items()):
             return new
-        before, modes = moment.regime.modes, new.regime.modes
-        joins = {k: name for k, (_, name) in self._pairs(modes) if name != before[k] and k in self.gears}
-        return self._joined(modes, held, t, joins, least)
+        return self._collisions.pulled(t, t, moment, new.regime.modes, least)[0]
 
     def _kept(self, t: float, before: ModeNames, moment: Moment) -> Moment:
         """Contacts that part in an impact of others, and are pushed back before they could be found again, stay closed.
@@ -157,19 +155,14 @@ class Impacts:
             after: the same just after it.
         """
         regime, begins = moment.regime, self._impulses.begins(moment, before)
-
-        def pulled(start: Start, _: Sequence[Stage]) -> Blow:
-            new = self._joined(start.moment.regime.modes, start.held, after, {}, NO_IMPACT)
-            return Blow(new, new.regime)
-
-        x = regime.assembly.bound(regime.p).impulse(moment.x, before, after)
-        stages: tuple[Stage, ...] = (Stage(begins, Blow(moment._replace(x=x), regime), 1.0),)
+        new = moment._replace(x=regime.assembly.bound(regime.p).impulse(moment.x, before, after))
+        stages: tuple[Stage, ...] = (Stage(begins, Blow(new, regime), 1.0),)
         # where springs alone take the jump up no impulse passes, and rounding would tell the way of it through gears
-        held = self._regimes.held(stages[0].blow.after, after)
+        held = self._regimes.held(new, after)
         passes = any(abs(v - begins.held[name]) > NO_IMPACT * max(abs(v), 1.0) for name, v in held.items())
-        if passes and (self._impulses.gears or self.limited(regime.modes)):
-            stages = self._impulses.stages(after, begins, pulled)
-        new, given = stages[-1].blow.after, self._impulses.given(after, stages, before)
+        if passes and (self.gears or self.limited(regime.modes)):
+            new, stages = self._collisions.pulled(before, after, moment, regime.modes, NO_IMPACT)
+        given = self._impulses.given(after, stages, before)
         at_once = Impact(t, "", given, self._impulses.lost(after, stages))
         return new, self._differences(t, regime.modes, new.regime.modes), at_once
 
@@ -188,31 +181,3 @@ class Impacts:
             for k, (element, name) in self._pairs(after)
             if k not in besides and name != before[k]
         ]
-
-    def _joined(
-        self, before: ModeNames, held: Mapping[str, float], t: float, joins: Mapping[int, str], least: float
-    ) -> Moment:
-        """After an inelastic impact. What holds by a limited torque slips in it; contacts are pressed, not pulled.
-
-        Args:
-            before: modes.
-            held: all that was stored.
-            t: time in s at which inputs are read.
-            joins: elements that become joined, and their modes.
-            least: speed up to which an element stays as it is.
-        """
-        joined = {k: before[k] for k in self.limited(before)} | freewheels(self._elements, before)
-        gives = {k: self._elements[k].modes[name].gives_way for k, name in joined.items() if k not in joins}
-        made = {**joins, **{k: ways[0][1] for k, ways in gives.items()}}
-        while True:
-            moment = self._regimes.taking(with_modes(before, made), t, held)
-            speeds = {k: moment.across(k, t) for k in gives}
-            ways = {k: [name for side, name in gives[k] if side * speeds[k] > 0] for k in gives}
-            pressed = [k for k in gives if abs(speeds[k]) > least and not ways[k]]
-            if not pressed:
-                break
-            for k in pressed:
-                made[k] = joined[k]
-                del gives[k]
-        made |= {k: ways[k][0] if abs(speeds[k]) > least else before[k] for k in gives}
-        return self._regimes.changed(moment, t, with_modes(before, made))
