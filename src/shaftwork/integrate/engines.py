@@ -32,9 +32,7 @@ class EngineEntry:
     @property
     def installed(self) -> bool:
         """Whether the library it needs can be imported."""
-        # looked for at every phase of a motion; what is imported is found quickly
-        name = self.library
-        return name is None or name in sys.modules or importlib.util.find_spec(name) is not None
+        return self.library is None or importlib.util.find_spec(self.library) is not None
 
 
 # Below these tolerances scipy's methods only warn, SUNDIALS refuses (near the rounding of numbers), the rounding in the
