@@ -57,6 +57,25 @@ def test_friction_and_a_brake_hold_together_what_each_of_them_can(first: str, en
     assert sol["J.omega"][-1] == pytest.approx((20.0**2 - 17.0**2) / 2 - 10.0 * 3.0, abs=1e-8)
 
 
+@pytest.mark.parametrize("speed", [0.5, -0.5])
+@pytest.mark.parametrize("order", ["brake worm", "worm brake"])
+def test_a_brake_and_a_worm_that_have_stopped_hold_as_from_rest(order: str, speed: float) -> None:
+    parts = {
+        "brake": (sw.Brake("brake", tau=25.0), "shaft"),
+        "worm": (sw.LossyGear("worm", ratio=30.0, efficiency=0.45, efficiency_back=-0.2), "shaft", "drum"),
+    }
+    net = sw.Network("hoist")
+    net.add(sw.Inertia("J", J=0.3), "shaft")
+    net.add(sw.TorqueSource("motor", tau=sw.Step(-20.0, start=1.0, before=20.0)), "shaft")
+    for name in order.split():
+        net.add(*parts[name])
+    net.add(sw.TorqueSource("load", tau=-98.0), "drum")
+    stopped, rested = (net.simulate(2.0, initial={"J.omega": w}).at([0.5, 1.5]) for w in (speed, 0.0))
+    for name in ("J.omega", "brake.tau", "worm.tau_a", "worm.tau_b"):
+        assert stopped[name] == pytest.approx(rested[name], abs=EXACT)
+    assert not stopped["J.omega"].any()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_friction_that_has_given_way_at_rest_holds_again_what_a_brake_lets_go(engine: str) -> None:

@@ -140,7 +140,7 @@ class Settling:
         regime, found = moment.regime, {}
         for k, made in regime.watched:
             modes, name = self.elements[k].modes, regime.modes[k]
-            if made.leave.to and name in (slips for _, slips in modes[made.leave.to].gives_way):
+            if made.leave.to and any(back.by_torque and back.to == name for back in modes[made.leave.to].leaves):
                 found[k] = made.leave.to, made.guard
         if not found:
             return {}
