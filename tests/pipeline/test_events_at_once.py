@@ -131,3 +131,70 @@ def test_a_switch_that_will_open_again_does_not_stay_open_in_place_of_a_short_ci
     net.add(sw.Switch("switch", t_on=0.5, t_off=1.5), "p", "e")
     with pytest.raises(sw.SimulationError, match=r"'switch' can neither stay open nor become closed at t = 0\.5 s"):
         net.simulate(2.0)
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_an_instant_has_one_event_of_a_part_however_the_parts_are_named(order: int) -> None:
+    """At 1 s the motor turns round, and the worm brakes: the clutch slips, and how it came to that is nobody's event.
+
+    Before, all turns as one: 20 N m at 30 : 1 with half of it lost. From 1 s on J w' = -500 N m behind the clutch.
+    """
+    parts = [
+        (sw.Inertia("motor", J=0.3), "a"),
+        (sw.TorqueSource("torque", tau=sw.Step(-25.0, start=1.0, before=20.0)), "a"),
+        (sw.LossyGear("worm", ratio=30.0, efficiency=0.5, efficiency_back=-0.2), "a", "b"),
+        (sw.Inertia("wheel", J=1.0), "b"),
+        (sw.Clutch("clutch", tau=500.0), "b", "c"),
+        (sw.Inertia("drum", J=2000.0), "c"),
+    ]
+    net = sw.Network("jams")
+    for part in parts[::order]:
+        net.add(*part)
+    sol = net.simulate(1.1)
+    at_once = [event[1:] for event in sol.events if event[0] == 1.0]
+    assert sorted(at_once) == [
+        ("clutch", "engaged", "slipping backward"),
+        ("worm", "driving forward", "driven forward"),
+    ]
+    reached = 20.0 * 30.0 * 0.5 / (2001.0 + 0.3 * 30.0**2 * 0.5)
+    assert sol["drum.omega"][-1] == pytest.approx(reached - 500.0 / 2000.0 * 0.1, rel=1e-9)
+
+
+@pytest.mark.parametrize("ratio", [1.5, 1.7, 2.0, 3.0])
+@pytest.mark.parametrize("engine", ["heyoka", "scipy", "scipy-radau"])
+def test_two_clutches_that_lock_a_planetary_gear_share_a_torque_whatever_its_ratio(engine: str, ratio: float) -> None:
+    """The weak one gives way at its 1 N m, and the other holds on: all turn as one, 0.9 w' = -35 t."""
+    net = sw.Network("locked")
+    for name, J, node in (("carrier", 0.5, "c"), ("sun", 0.2, "s"), ("ring", 0.2, "r")):
+        net.add(sw.Inertia(name, J=J), node)
+    net.add(sw.PlanetaryGear("gear", ratio=ratio), "s", "c", "r")
+    net.add(sw.Clutch("weak", tau=1.0), "s", "c")
+    net.add(sw.Clutch("strong", tau=30.0), "s", "c")
+    net.add(sw.TorqueSource("torque", tau=-35.0 * sw.t), "r")
+    sol = net.simulate(0.2, engine=engine, rtol=1e-10)
+    assert sol["carrier.omega"][-1] == pytest.approx(-35.0 * 0.02 / 0.9, rel=1e-9)
+    assert sol["sun.omega"][-1] == pytest.approx(sol["carrier.omega"][-1], rel=1e-12)
+
+
+@pytest.mark.parametrize(("clutch", "brake", "reached"), [(1.0, 2.0, 0.0), (2.0, 1.0, 0.25), (1.0, 1.0, 0.0)])
+@pytest.mark.parametrize("first", ["clutch", "brake"])
+def test_a_source_at_rest_lets_a_clutch_and_a_brake_hold_together(
+    first: str, clutch: float, brake: float, reached: float
+) -> None:
+    parts = {"clutch": (sw.Clutch("clutch", tau=clutch), "s", "a"), "brake": (sw.Brake("brake", tau=brake), "a")}
+    net = sw.Network("beside a source")
+    net.add(sw.SpeedSource("drive", omega=sw.Step(2.0, start=0.25)), "s")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    for name in sorted(parts, key=lambda name: name != first):
+        net.add(*parts[name])
+    assert net.simulate(0.5)["J.omega"][-1] == pytest.approx(reached, abs=1e-12)
+
+
+@pytest.mark.parametrize("kind", [sw.Brake, sw.Clutch])
+def test_a_torque_that_is_infinite_where_it_holds_is_refused(kind: type[sw.Brake]) -> None:
+    net = sw.Network("infinite")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.Inertia("K", J=1.0), "b")
+    net.add(kind("grip", tau=1 / sw.omega), "a", "b")
+    with pytest.raises(sw.CompileError, match=r"law of 'grip' has no finite value at zero speed, where it is"):
+        net.simulate(1.0)

@@ -174,7 +174,7 @@ class Start:
         of_kind, x = self._of_kind[is_across], self._x
         free = of_kind & ~self._fixed
         constants = np.array([self._constant(*demand) for demand in demands])
-        rows = np.array([row.by_state for _, row in demands]).reshape(-1, x.size)
+        rows = np.array([row.by_state for _, row in demands]).reshape(len(demands), x.size)
         values = np.array([self._values[quantity.name] for quantity, _ in demands])
         slopes = np.abs(np.where(of_kind, rows, 0.0))
         movable = free & (slopes > INDEPENDENT * slopes.max(axis=1, keepdims=True, initial=0.0)).any(axis=0)
@@ -268,7 +268,7 @@ class Start:
             others = ", ".join(other for other in self._values if other != name) or "its sources"
             raise ParameterError(
                 f"The start value {name} = {self._values[name]:g} contradicts {others}: with them it would be "
-                f"{reached:g}. {self._names.advice(name)}"
+                f"{reached:g}. Leave it out. {self._names.advice(name)}"
             )
 
     def _refused(self, name: str, why: str) -> ParameterError:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import sparse
-from sympy import Expr, Symbol
+from sympy import Expr, Integer, Symbol
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.code import Moves, around, bindable, is_rough, vectorised
@@ -22,6 +22,7 @@ from shaftwork.codegen.recovery import History
 from shaftwork.codegen.stores import Stores
 from shaftwork.codegen.timeline import Timeline
 from shaftwork.codegen.valueless import first_missing, in_words, rough, without_value
+from shaftwork.components.branches import ACROSS
 from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Mode
@@ -33,6 +34,7 @@ from shaftwork.integrate.problem import Guards, Problem, changed
 from shaftwork.network.graph import GraphPart
 from shaftwork.pipeline.phases.elements import Element, ModeNames, Watched
 from shaftwork.pipeline.phases.rates import rates_of
+from shaftwork.pipeline.phases.resting import rests
 from shaftwork.pipeline.phases.shown import Shown
 from shaftwork.pipeline.prepared import Prepared
 from shaftwork.reduction.readings import NamedReadings, Readings
@@ -103,8 +105,17 @@ class Assembly:
     def _leaves(self, number: int, readings: Readings, part: GraphPart, mode: Mode) -> Iterator[Watched]:
         """The guards of a mode; what another mode of the element has is shared, with the other sign as well."""
         taken: list[int] = []
+        element = self.elements[number].modes
+        # through gears a speed that is always zero is one but for rounding, which would tell which way a friction slips
+        still = {ACROSS: Integer(0)} if rests(self.model.form, part, element) else {}
         for leave in mode.leaves:
-            when = readings.guard(part, self.elements[number].modes, leave.when)
+            try:
+                when = readings.guard(part, element, leave.when.xreplace(still))
+            except ValueError as error:  # sympy's, of a minimum or maximum of what is infinite
+                raise CompileError(
+                    f"A law of '{self.elements[number].name}' has no finite value at zero speed, where it is "
+                    f"{mode.words}. Take one that has, as 1 / (0.1 + omega**2) has for 1 / omega**2."
+                ) from error
             for side, expression in ((1.0, when), (-1.0, -when)):
                 known = self._known.get((number, expression))
                 if known is not None and known not in taken:

@@ -19,8 +19,7 @@ Source: Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts, 1996,
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from types import MappingProxyType
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +28,7 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.mobility import Mobility, complementary
 from shaftwork.components.branches import ACROSS
 from shaftwork.components.modes import Leave, Modes
+from shaftwork.core.errors import SimulationError
 from shaftwork.core.kept import Kept
 from shaftwork.network.graph import GROUND
 from shaftwork.pipeline.phases.elements import Element, ModeNames
@@ -109,12 +109,21 @@ class Collisions:
 
         Raises:
             NetworkError: nothing stops what is prescribed; says what contradicts what.
+            SimulationError: flanks without a gap between them lose nothing.
         """
-        contacts = self._in_turn(t, moment, [*self._contacts(t, moment, number, leave)])
+        touching = [*self._contacts(t, moment, number, leave)]
+        contacts = self._in_turn(t, moment, touching)
         before = np.array([self._opens(t, moment, contact) for contact in contacts])
         back = np.array([self._restitution(c, u) for c, u in zip(contacts, before.tolist(), strict=True)])
+        self._refuse_no_gap(
+            t, {c.number for c, share in zip(contacts, back.tolist(), strict=True) if share >= 1}, touching
+        )
         modes = moment.regime.modes
-        stages = self._compressed(t, self._apart(t, moment, modes, contacts, {number: leave.to}), contacts)
+        begins, stages = self._apart(t, moment, modes, contacts), tuple[Stage, ...]()
+        if all(contact.number != number for contact in contacts):  # it carries both ways, as a switch that closes
+            stages = self._joined(t, begins, {number: leave.to}, contacts)
+            begins = self._impulses.begins(stages[-1].blow.after, t)
+        stages += self._compressed(t, begins, contacts)
         if back.any():
             stages += self._thrown_back(t, contacts, stages, back)
         least = NO_IMPACT * max(1.0, np.abs(before).max(initial=0.0))
@@ -129,6 +138,15 @@ class Collisions:
             _sums([*lost, *self._impulses.lost(t, stages).items()]),
             self._impulses.given(t, stages),
         )
+
+    def _refuse_no_gap(self, t: float, elastic: Collection[int], touching: Sequence[Contact]) -> None:
+        numbers = [contact.number for contact in touching]
+        for number in elastic:
+            if numbers.count(number) > 1:
+                raise SimulationError(
+                    f"The flanks of '{self._elements[number].name}' have no gap between them and hit each other for "
+                    f"ever at t = {t:.9g} s, as they lose nothing. Give it a gap, or a restitution below 1."
+                )
 
     def pulled(
         self, before: float, t: float, moment: Moment, modes: ModeNames, least: float
@@ -179,6 +197,19 @@ class Collisions:
 
         return self._impulses.stages(t, begins, compressed)
 
+    def joined(self, t: float, moment: Moment, joins: Mapping[int, str]) -> Moment:
+        """What follows where elements are joined at once, by what impulses it takes."""
+        return self._joined(t, self._impulses.begins(moment, t), joins, ())[-1].blow.after
+
+    def _joined(
+        self, t: float, begins: Start, joins: Mapping[int, str], contacts: Sequence[Contact]
+    ) -> tuple[Stage, ...]:
+        def joined(start: Start, _: Sequence[Stage]) -> Blow:
+            made = self._regimes.changed(start.moment, t, with_modes(start.moment.regime.modes, joins))
+            return Blow(made, made.regime, np.zeros(len(contacts)))
+
+        return self._impulses.stages(t, begins, joined)
+
     def _thrown_back(
         self, t: float, contacts: Sequence[Contact], compression: tuple[Stage, ...], back: Array
     ) -> tuple[Stage, ...]:
@@ -217,19 +248,14 @@ class Collisions:
         for start, blow, share in stages:
             began, ends = ([self._opens(t, one, c) for c in contacts] for one in (start.moment, blow.after))
             taken -= share * blow.pressed * (np.array(began) + share / 2 * np.subtract(ends, began))
-        return taken
+        # what opens before others close it comes late, and gives nothing: the sum alone is physics
+        least = np.maximum(taken, 0.0)
+        return least * (taken.sum() / least.sum()) if least.any() else taken
 
-    def _apart(
-        self,
-        t: float,
-        moment: Moment,
-        modes: ModeNames,
-        contacts: Sequence[Contact],
-        wanted: Mapping[int, str] = MappingProxyType({}),
-    ) -> Start:
-        """The moment with all contacts open, and what rubs slipping; joined is what wants to be and never opens."""
+    def _apart(self, t: float, moment: Moment, modes: ModeNames, contacts: Sequence[Contact]) -> Start:
+        """The moment in some modes, but with all contacts open, and what rubs slipping."""
         apart = {k: ways[0][1] for k, ways in self._rubbing(modes).items()} | {c.number: c.apart for c in contacts}
-        loose = with_modes(modes, {**wanted, **apart})
+        loose = with_modes(modes, apart)
         return self._impulses.begins(self._regimes.taking(loose, t, self._regimes.held(moment, t)), t)
 
     def _rubbing(self, modes: ModeNames) -> dict[int, tuple[tuple[float, str], ...]]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import combinations
+from itertools import chain, combinations
 
 from shaftwork.components.branches import ACROSS
 from shaftwork.pipeline.phases.collisions import NO_IMPACT
-from shaftwork.pipeline.phases.elements import Element
+from shaftwork.pipeline.phases.elements import Element, ModeNames
 from shaftwork.pipeline.phases.moments import Moment
 from shaftwork.pipeline.phases.regimes import Regimes, with_modes
 
@@ -39,15 +39,19 @@ def commutations(
 
     if not cuts_off(plain):
         return
+    for pairs in takeovers(elements, modes):
+        if regimes.possible(changed := with_modes(modes, pairs)):
+            other = regimes.changed(moment, t, changed)
+            if not cuts_off(other):
+                yield other, pairs
+
+
+def takeovers(elements: Sequence[Element], modes: ModeNames) -> Iterator[dict[int, str]]:
+    """Diodes and freewheels that may begin to conduct at one instant, with the modes in which they do."""
     ways = [
         (k, leave.to)
         for k, name in enumerate(modes)
         for leave in elements[k].modes[name].leaves
         if leave.when == ACROSS and leave.to
     ]
-    for count in range(1, AT_ONCE + 1):
-        for pairs in map(dict, combinations(ways, count)):
-            if regimes.possible(changed := with_modes(modes, pairs)):
-                other = regimes.changed(moment, t, changed)
-                if not cuts_off(other):
-                    yield other, pairs
+    return chain.from_iterable(map(dict, combinations(ways, count)) for count in range(1, AT_ONCE + 1))

@@ -67,15 +67,17 @@ class Impacts:
         regime, held = moment.regime, self._regimes.held(moment, after)
         found = self._collisions.impact(after, moment, number, leave)
         new, hits = found.after, list[Change]()
-        for contact in sorted((*found.stays, *found.thrown), key=lambda contact: contact.number != number):
-            rebound = contact in found.thrown
+        contacts = sorted((*found.stays, *found.thrown), key=lambda contact: contact.number != number)
+        made = [(c.number, c.apart, c.joined, c in found.thrown, c.leave) for c in contacts]
+        if all(contact.number != number for contact in contacts):  # it carries both ways, as a switch that closes
+            made.insert(0, (number, regime.modes[number], new.regime.modes[number], False, None))
+        for k, apart, joined, rebound, way in made:
             energies = {} if hits else {"given": found.given, "lost": found.lost}
-            element = self._elements[contact.number]
-            hits.append(Change(t, element, contact.apart, contact.joined, rebound, impact=True, **energies))
-            if not rebound and contact.leave is not None:
-                new = self._at_limit(new, contact.number, contact.leave)
+            hits.append(Change(t, self._elements[k], apart, joined, rebound, impact=True, **energies))
+            if not rebound and way is not None:
+                new = self._at_limit(new, k, way)
         new = self._kept(after, regime.modes, new)
-        besides = {contact.number for contact in (*found.stays, *found.thrown)}
+        besides = {k for k, *_ in made}
         changes = [*hits, *self._differences(t, regime.modes, new.regime.modes, besides)]
         self._refuse_gain(t, moment, held, self._regimes.held(new, after), hits[0])
         return new, changes
@@ -113,7 +115,7 @@ class Impacts:
             speed, later = (way * one.across(k, t) for one in (moment, moment.moved(t, 1.0)))
             if speed**2 < 4 * (later - speed) * CLEAR * bands[made.guard]:
                 kept[k] = before[k]
-        return self._regimes.changed(moment, t, with_modes(regime.modes, kept)) if kept else moment
+        return self._collisions.joined(t, moment, kept) if kept else moment
 
     @staticmethod
     def _at_limit(moment: Moment, number: int, leave: Leave) -> Moment:

@@ -74,6 +74,19 @@ class Regimes:
             return False
         return True
 
+    def joinable(self, modes: ModeNames, joins: Mapping[int, str]) -> Mapping[int, str]:
+        """Of elements and the modes in which they hold all that agree, the first before the others.
+
+        Beside a prescribed speed that is zero by now not all of them can.
+        """
+        if self.possible(with_modes(modes, joins)):
+            return joins
+        held: dict[int, str] = {}
+        for k, name in joins.items():
+            if self.possible(with_modes(modes, {**held, k: name})):
+                held[k] = name
+        return held
+
     def held(self, moment: Moment, t: float) -> dict[str, float]:
         """All that is stored, and what arrives by waves, by name."""
         assembly, p = moment.regime.assembly, moment.regime.p

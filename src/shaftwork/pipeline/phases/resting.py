@@ -35,12 +35,12 @@ def at_rest(netlist: Netlist, form: StateForm) -> Netlist:
 
 def _held(form: StateForm, part: GraphPart, element: Modes, choice: Choice) -> Choice:
     """What is chosen for an element, in the form of rest where it has one and is at rest."""
-    rests = (mode.at_rest for mode in element.options if mode.form == choice.form and mode.at_rest is not None)
-    other = next(rests, None)
-    return replace(choice, form=other) if other is not None and _rests(form, part, element) else choice
+    forms = (mode.at_rest for mode in element.options if mode.form == choice.form and mode.at_rest is not None)
+    other = next(forms, None)
+    return replace(choice, form=other) if other is not None and rests(form, part, element) else choice
 
 
-def _rests(form: StateForm, part: GraphPart, element: Modes) -> bool:
+def rests(form: StateForm, part: GraphPart, element: Modes) -> bool:
     """Whether no branch of the tree but rigid joints is on the way from one end of an element to the other."""
     first, second = (_potential(form, part, end) for end in part.ends_of(element))
     if first is None or second is None:

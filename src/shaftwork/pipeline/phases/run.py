@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -16,7 +17,7 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.observer import Impact
 from shaftwork.codegen.timeline import Timeline
-from shaftwork.core.errors import AccuracyWarning, SimulationError
+from shaftwork.core.errors import AccuracyWarning, ParameterError, SimulationError
 from shaftwork.core.notices import warn
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import Problem, SeriesError, StickingError, Trajectory, changed
@@ -24,9 +25,12 @@ from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.ending import Ending
 from shaftwork.pipeline.implicit import PRESCRIBED, at_rest
 from shaftwork.pipeline.phases.assemblies import Assembly
+from shaftwork.pipeline.phases.collisions import NO_IMPACT
+from shaftwork.pipeline.phases.commutation import takeovers
 from shaftwork.pipeline.phases.moments import Change, Moment, Regime
 from shaftwork.pipeline.phases.passing import Passing, Phase
 from shaftwork.pipeline.phases.phases import FOLLOWING, Phases
+from shaftwork.pipeline.phases.regimes import with_modes
 from shaftwork.pipeline.phases.settling import Settling
 from shaftwork.pipeline.phases.starts import refuse_incomplete, warn_of_what_may_have_begun
 from shaftwork.pipeline.phases.wave_run import WaveRun
@@ -113,14 +117,7 @@ class Run:
         if isinstance(initial, Ending):
             found = self._resumed(initial)
         elif initial is not None or not begins:
-            regime = self.settling.regime(self.phases.first)
-            assembly, p = regime.assembly, regime.p
-            if isinstance(initial, Mapping) and initial and start != 0:
-                refuse_incomplete(assembly.stores.names, initial, start)
-            x, waves = start_of(assembly.model, assembly.prepared(p), initial, self.demand.span)
-            x = self._beside_waves(regime, x, waves)
-            after = self.timeline(assembly, p).sides(start)[1]
-            found = self.settling.settle(start, after, self.settling.started(after, x), None)
+            found = self._started(initial)
             if initial is None:
                 begins.append(found)
         else:
@@ -131,6 +128,35 @@ class Run:
                 warn_of_what_may_have_begun(element.name, element.modes, mode, start)
         self.note(start, changes)
         return moment
+
+    def _started(self, initial: Mapping[str, float] | None) -> tuple[Moment, list[Change]]:
+        """The states and modes at the start, and what changes there; currents may need diodes that conduct."""
+        try:
+            return self._joined(initial, {})
+        except ParameterError:
+            phases, start = self.phases, self.demand.span[0]
+            if not initial:
+                raise
+            for joins in takeovers(phases.elements, phases.first):
+                if not self.settling.possible(with_modes(phases.first, joins)):
+                    continue
+                with suppress(ParameterError, SimulationError):
+                    found = self._joined(initial, joins)
+                    held = self.settling.held(found[0], start)
+                    if all(abs(held.get(k, v) - v) <= NO_IMPACT * max(abs(v), 1.0) for k, v in initial.items()):
+                        return found
+            raise
+
+    def _joined(self, initial: Mapping[str, float] | None, joins: Mapping[int, str]) -> tuple[Moment, list[Change]]:
+        """The same with start values read in the equations in which some elements join something."""
+        start, regime = self.demand.span[0], self.settling.regime(with_modes(self.phases.first, joins))
+        assembly, p = regime.assembly, regime.p
+        if isinstance(initial, Mapping) and initial and start != 0:
+            refuse_incomplete(assembly.stores.names, initial, start)
+        x, waves = start_of(assembly.model, assembly.prepared(p), initial, self.demand.span)
+        x = self._beside_waves(regime, x, waves)
+        after = self.timeline(assembly, p).sides(start)[1]
+        return self.settling.settle(start, after, self.settling.started(after, x, joins), None)
 
     def _beside_waves(self, regime: Regime, x: Array, start: WaveStart | CarriedWaves | None) -> Array:
         """The states at the start, and behind them what arrives by waves, if there are any."""

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from shaftwork.codegen.elements import Array
@@ -50,9 +51,9 @@ class Settling:
         self._regimes = Regimes(phases, values, span, own=own)
         self.regime, self.held, self.resumed = self._regimes.regime, self._regimes.held, self._regimes.resumed
         self._impacts = Impacts(self._regimes, self.elements, together=phases.netlist.impacts == "together")
-        self.jumped = self._impacts.jumped
+        self.jumped, self.possible = self._impacts.jumped, self._regimes.possible
 
-    def started(self, t: float, x: Array) -> Moment:
+    def started(self, t: float, x: Array, joins: Mapping[int, str] = MappingProxyType({})) -> Moment:
         """The modes in which a motion starts, from the states of the equations in which no mode joins anything.
 
         An element that nothing else lets start in its mode, as a friction that a prescribed speed is about to turn,
@@ -61,13 +62,14 @@ class Settling:
         Args:
             t: time in s at which inputs are read.
             x: (n,) states.
+            joins: elements that do join something in these equations, and the modes in which they do.
 
         Raises:
             ParameterError: a twist lies beyond a rigid limit.
         """
-        loose = self.regime(self._phases.first)
+        loose = self.regime(with_modes(self._phases.first, joins))
         refuse_beyond(loose, self.elements, t, x)
-        modes, wanted = loose.modes, loose.assembly.first_modes(t, x, loose.p)
+        modes, wanted = loose.modes, with_modes(loose.assembly.first_modes(t, x, loose.p), joins)
         if self._regimes.possible(wanted):
             modes = wanted
         else:
@@ -131,9 +133,9 @@ class Settling:
 
     def _joined(self, t: float, after: float, moment: Moment, joins: Mapping[int, str]) -> tuple[Moment, list[Change]]:
         """The same instant with elements in modes in which they hold, and the changes to these."""
-        modes = moment.regime.modes
-        changes = [Change(t, self.elements[k], modes[k], name) for k, name in joins.items()]
-        return self._regimes.changed(moment, after, with_modes(modes, joins)), changes
+        modes, held = moment.regime.modes, self._regimes.joinable(moment.regime.modes, joins)
+        changes = [Change(t, self.elements[k], modes[k], name) for k, name in held.items()]
+        return self._regimes.changed(moment, after, with_modes(modes, held)), changes
 
     def _resting(self, moment: Moment, t: float) -> dict[int, str]:
         """Elements that slip, with no speed across them as others hold their ends, and the modes in which they hold."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property, partial
+from itertools import chain, groupby
+from operator import attrgetter
 
 import numpy as np
 
@@ -12,7 +14,7 @@ from shaftwork.codegen.observer import Impact, ModelObserver
 from shaftwork.codegen.phase_observer import PhaseObserver, Stretch, Stretches
 from shaftwork.pipeline.phases.assemblies import Assembly
 from shaftwork.pipeline.phases.elements import Element, ModeNames
-from shaftwork.pipeline.phases.moments import Change
+from shaftwork.pipeline.phases.moments import Change, together
 from shaftwork.pipeline.phases.passing import Phase
 from shaftwork.pipeline.phases.run import Run, Span
 from shaftwork.pipeline.phases.wave_run import WaveRun
@@ -142,9 +144,10 @@ def _sums(first: Mapping[str, float], second: Mapping[str, float]) -> dict[str, 
 
 
 def _events(changes: Iterable[Change]) -> Iterator[tuple[float, str, str, str]]:
-    """Changes in words: what says the same before and after is none."""
+    """Changes in words, of each element one at an instant: what says the same before and after is none."""
     words: dict[tuple[Element, str, str, bool], tuple[str, str, str]] = {}
-    for time, element, before, after, rebound, *_ in changes:
+    at_once = (together([*made]) for _, made in groupby(changes, attrgetter("time")))
+    for time, element, before, after, rebound, *_ in chain.from_iterable(at_once):
         key = element, before, after, rebound
         if key not in words:
             was, now = element.modes[before].words, "rebound" if rebound else element.modes[after].words
