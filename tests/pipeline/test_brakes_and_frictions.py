@@ -454,3 +454,18 @@ def test_a_stribeck_friction_between_two_wheels_breaks_away_with_every_engine(en
     sol = net.simulate(0.4, engine=engine, t_eval=2)
     # stuck until the torque on J1 less what J2 takes of it is 12 N m; the times are of four engines
     assert [time for time, *_ in sol.events] == pytest.approx([0.028085166, 0.167445, 0.202162], rel=3e-6)
+
+
+@pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials", "scipy-radau"])
+@pytest.mark.parametrize("tau", [1.0 - sw.Step(1.0, 0.2), sw.Table([0.0, 0.2, 0.4], [0.0, 1.0, 0.0])])
+def test_an_engine_does_not_follow_the_rounding_of_a_torque_that_is_zero(engine: str, tau: Any) -> None:
+    """Both sides of the clutch turn alike, so it carries nothing, and from then on it holds nothing."""
+    net = sw.Network("alike")
+    net.add(sw.Inertia("A", J=0.7), "a")
+    net.add(sw.Inertia("B", J=2.1), "b")
+    net.add(sw.TorqueSource("T", tau=sympy.sin(8 * sw.t)), "a")
+    net.add(sw.TorqueSource("U", tau=3 * sympy.sin(8 * sw.t)), "b")
+    net.add(sw.Clutch("clutch", tau=tau), "a", "b")
+    sol = net.simulate(0.6, engine=engine)
+    assert sol["A.omega"][-1] == pytest.approx((1 - math.cos(4.8)) / 8 / 0.7, rel=1e-6)
+    assert sol.statistics["steps"] < 1000

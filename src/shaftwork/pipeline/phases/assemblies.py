@@ -47,6 +47,8 @@ KEPT = 64
 """Parameter vectors whose matrices are kept."""
 SAMPLES = 64
 """Times at which a guard is looked at to know its size."""
+SOON, MORE = 1e-9, 1e3
+"""What changes within this part of a phase by more than its largest value over this is nothing but rounding."""
 CLOCK = 1e-20
 """What a clock counts: heyoka's tolerance is relative to the largest state, which this must never be."""
 
@@ -230,7 +232,7 @@ class Assembly:
         """
         p, modes, x = moment.regime.p, moment.regime.modes, moment.x
         same = self._problems((modes, p.tobytes()), lambda: self._problem(p, modes))
-        guards, sizes = same.guards, self._sizes(p, x, span) if self.clocks else np.empty(0)
+        guards, sizes = same.guards, self._sizes(moment, span) if self.clocks else np.empty(0)
         assert guards is not None  # noqa: S101 (which `_problem` gives)
         now = np.abs(moment.regime.limits(span[0], x.tolist()))
         return changed(
@@ -323,11 +325,15 @@ class Assembly:
         """The right-hand side and what engines find out about it, for all phases with these parameters."""
         return self._rates_made(p.tobytes(), lambda: (rates_of(self.model, self.bound(p), self.motion(p)[0], p), {}))
 
-    def _sizes(self, p: Array, x: Array, span: tuple[float, float]) -> Array:
+    def _sizes(self, moment: Moment, span: tuple[float, float]) -> Array:
         """The size of each clock over a phase, as far as the time alone tells."""
-        times = np.linspace(*span, SAMPLES)
-        largest = np.abs(self.guards(p)(times, np.tile(x, (SAMPLES, 1)))).max(axis=0)[list(self.clocks)]
-        return CLOCK * np.where(largest > 0, largest, 1.0) * (span[1] - span[0])
+        length = span[1] - span[0]
+        times = np.linspace(span[0], span[1] - SOON * length, SAMPLES)
+        pairs = np.concatenate([times, times + SOON * length])
+        values = self.guards(moment.regime.p)(pairs, np.tile(moment.x, (pairs.size, 1)))[:, list(self.clocks)]
+        largest, changes = np.abs(values).max(axis=0), np.abs(values[:SAMPLES] - values[SAMPLES:]).max(axis=0)
+        # what is another number at once is rounding, and an engine that followed it would not get on
+        return CLOCK * np.where(largest > MORE * changes, largest, 1.0) * length
 
     def sides(self, modes: ModeNames) -> Array:
         """(guards,) the side of each guard that ends one of the modes."""
