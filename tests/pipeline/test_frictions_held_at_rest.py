@@ -74,6 +74,27 @@ def test_a_brake_and_a_worm_that_have_stopped_hold_as_from_rest(order: str, spee
     for name in ("J.omega", "brake.tau", "worm.tau_a", "worm.tau_b"):
         assert stopped[name] == pytest.approx(rested[name], abs=EXACT)
     assert not stopped["J.omega"].any()
+    assert stopped["brake.tau"][1] == pytest.approx(0.0, abs=EXACT)  # the worm alone holds the load
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("order", [("near", "far"), ("far", "near")])
+def test_at_rest_the_load_alone_tells_who_carries_also_as_it_falls(order: tuple[str, str], engine: str) -> None:
+    """The far brake sits behind a gear of 2 : 1 that turns it the other way round."""
+    parts = {"near": (sw.Brake("near", tau=100.0), "wheel"), "far": (sw.Brake("far", tau=40.0), "behind")}
+    least = {"near": 100.0, "far": 80.0}[order[0]]
+    loads = [0.0, 150.0, 20.0, -150.0, -20.0, 150.0]
+    net = pulled(sw.Table([0.0, 1.0, 2.0, 3.0, 4.0, 5.0], loads))
+    net.add(sw.Gear("gear", ratio=-2.0), "behind", "wheel")
+    for name in order:
+        net.add(*parts[name])
+    times = np.linspace(0.0, 5.0, 41) + 0.01
+    shown = net.simulate(5.2, engine=engine).at(times)
+    load = np.interp(times, range(6), loads)
+    carried = {"near": shown["near.tau"], "far": -2.0 * shown["far.tau"]}
+    np.testing.assert_allclose(carried[order[0]], np.clip(load, -least, least), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(carried["near"] + carried["far"], load, rtol=0, atol=1e-9)
+    assert not shown["J.omega"].any()
 
 
 @pytest.mark.slow

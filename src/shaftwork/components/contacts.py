@@ -127,8 +127,9 @@ class Backlash(Component):
     phi < -gap/2, and 0 between, with phi the twist and omega the speed of node a against node b. A contact never
     pulls: flanks that part faster than they spring back have let go. Beyond gap/2 by x they store c x^2 / 2; what d
     takes is lost, and what they have not given back when they let go. Without c the flanks are rigid, and the speed
-    omega with which they meet comes back as -restitution omega. Modes: open, in contact, in contact backward.
-    Source: Marinkovic 2012, (12)-(16); restitution: Newton; energy: Willems 1972.
+    omega with which they meet comes back as -restitution omega; `Network(impacts=...)` says what those do that touch
+    while others are hit. Contact on one side only is a `HardStop` between two nodes. Modes: open, in contact, in
+    contact backward. Source: Marinkovic 2012, (12)-(16); restitution: Newton; energy: Willems 1972.
     """
 
     gap: float = parameter("rad", "whole free twist", at_least=0, latex=r"\Delta")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from sympy import (
     Abs,
     Basic,
@@ -54,6 +56,7 @@ def wraps(node: Basic) -> bool:
     return isinstance(node, atan2) or (isinstance(node, atan | asin | acos | acot | asec | acsc) and node.has(*TURNING))
 
 
+@lru_cache(maxsize=1024)
 def slope(expression: Expr, symbol: Symbol) -> Expr:
     """Partial derivative of a law where it is smooth.
 

@@ -25,7 +25,7 @@ from shaftwork.codegen.valueless import first_missing, in_words, rough, without_
 from shaftwork.components.branches import ACROSS
 from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME
-from shaftwork.components.modes import Mode
+from shaftwork.components.modes import Mode, Modes
 from shaftwork.components.pieces import pieces_degree
 from shaftwork.core.errors import CompileError
 from shaftwork.core.kept import Kept
@@ -34,7 +34,7 @@ from shaftwork.integrate.problem import Guards, Problem, changed
 from shaftwork.network.graph import GraphPart
 from shaftwork.pipeline.phases.elements import Element, ModeNames, Watched
 from shaftwork.pipeline.phases.rates import rates_of
-from shaftwork.pipeline.phases.resting import rests
+from shaftwork.pipeline.phases.resting import holds_at_rest, rests
 from shaftwork.pipeline.phases.shown import Shown
 from shaftwork.pipeline.prepared import Prepared
 from shaftwork.reduction.readings import NamedReadings, Readings
@@ -78,6 +78,8 @@ class Assembly:
         self._readings = readings = NamedReadings(model.form) if rows is None else Readings(model.form, rows)
         self._parameters = tuple(Symbol(name, real=True) for name in model.parameters)
         self.parts = {part.name: part for part in model.form.graph.parts}
+        self.resting = {k for k, e in enumerate(elements) if rests(model.form, self.parts[e.part.name], e.modes)}
+        """Elements of which others hold both ends."""
         for number, element in enumerate(elements):
             part = self.parts[element.part.name]
             for mode in element.modes.options:
@@ -109,10 +111,13 @@ class Assembly:
         taken: list[int] = []
         element = self.elements[number].modes
         # through gears a speed that is always zero is one but for rounding, which would tell which way a friction slips
-        still = {ACROSS: Integer(0)} if rests(self.model.form, part, element) else {}
+        still = {ACROSS: Integer(0)} if number in self.resting else {}
         for leave in mode.leaves:
             try:
                 when = readings.guard(part, element, leave.when.xreplace(still))
+                if still and leave.when in (ACROSS, -ACROSS):
+                    # what has given way at rest holds again before the one that holds it is pressed the other way
+                    when = leave.when.xreplace({ACROSS: self._holding(readings, part, element)})
             except ValueError as error:  # sympy's, of a minimum or maximum of what is infinite
                 raise CompileError(
                     f"A law of '{self.elements[number].name}' has no finite value at zero speed, where it is "
@@ -129,6 +134,11 @@ class Assembly:
                 self._known.setdefault((number, when), watched.guard)
             taken.append(watched.guard)
             yield watched
+
+    def _holding(self, readings: Readings, part: GraphPart, element: Modes) -> Expr:
+        """The torque of the one friction that holds an element at rest, with the sign that its own would have."""
+        branch, sign = holds_at_rest(self.model.form, part, element) or (-1, 0.0)
+        return int(sign) * readings.through(branch) if sign else Integer(0)
 
     def watched(self, modes: ModeNames) -> tuple[tuple[int, Watched], ...]:
         """Element and guard of everything that may end one of the modes."""
@@ -204,9 +214,9 @@ class Assembly:
         """The mode of an element in which a motion would start, besides one; empty where it would start in none."""
         return self._shown.start_of(number, besides, t, self._read_at(t, x, p), p)
 
-    def across(self, number: int, t: float, x: Array, p: Array) -> float:
-        """The speed across an element."""
-        return self._shown.across(number, t, self._read_at(t, x, p), p)
+    def across(self, numbers: Sequence[int], t: float, x: Array, p: Array) -> list[float]:
+        """The speeds across elements."""
+        return self._shown.across(numbers, t, self._read_at(t, x, p), p) if numbers else []
 
     def twist(self, number: int) -> int | None:
         """The state that is the twist of an element, or None where none is."""

@@ -113,7 +113,7 @@ class Collisions:
         """
         touching = [*self._contacts(t, moment, number, leave)]
         contacts = self._in_turn(t, moment, touching)
-        before = np.array([self._opens(t, moment, contact) for contact in contacts])
+        before = np.array(_opens(t, moment, contacts))
         back = np.array([self._restitution(c, u) for c, u in zip(contacts, before.tolist(), strict=True)])
         self._refuse_no_gap(
             t, {c.number for c, share in zip(contacts, back.tolist(), strict=True) if share >= 1}, touching
@@ -246,7 +246,7 @@ class Collisions:
         """(contacts,) energy in J that contacts take up: their impulses at the mean of their closing speeds."""
         taken = np.zeros(len(contacts))
         for start, blow, share in stages:
-            began, ends = ([self._opens(t, one, c) for c in contacts] for one in (start.moment, blow.after))
+            began, ends = (_opens(t, one, contacts) for one in (start.moment, blow.after))
             taken -= share * blow.pressed * (np.array(began) + share / 2 * np.subtract(ends, began))
         # what opens before others close it comes late, and gives nothing: the sum alone is physics
         least = np.maximum(taken, 0.0)
@@ -264,10 +264,10 @@ class Collisions:
 
     def _slipping(self, t: float, before: ModeNames, after: Moment, least: float) -> dict[int, str]:
         """The modes of what rubs after an impact: it slips where the speed across it is more than the least."""
-        speeds = {k: after.across(k, t) for k in self._rubbing(before)}
+        rubbing = self._rubbing(before)
+        speeds = dict(zip(rubbing, after.speeds([*rubbing], t), strict=True))
         return {
-            k: next((to for side, to in ways if side * speeds[k] > least), before[k])
-            for k, ways in self._rubbing(before).items()
+            k: next((to for side, to in ways if side * speeds[k] > least), before[k]) for k, ways in rubbing.items()
         }
 
     def _mobility(self, t: float, moment: Moment, contacts: Sequence[Contact]) -> tuple[Mobility, Array]:
@@ -275,12 +275,11 @@ class Collisions:
         regime, pairs = moment.regime, tuple(self._nodes(moment, contact) for contact in contacts)
         stores, p = regime.assembly.stores, regime.p
         mobility = self._mobilities((regime, pairs), lambda: stores.mobility(regime.assembly.bound(p), pairs))
-        opens = [self._opens(t, moment, contact) for contact in contacts]
-        return mobility, np.where(mobility.has_inertia, opens, 0.0)
+        return mobility, np.where(mobility.has_inertia, _opens(t, moment, contacts), 0.0)
 
     def _in_turn(self, t: float, moment: Moment, contacts: list[Contact]) -> list[Contact]:
         """The contacts that take part: of those that throw back only the fastest, but if all do so together."""
-        speeds = {c: -self._opens(t, moment, c) for c in contacts}
+        speeds = {c: -opens for c, opens in zip(contacts, _opens(t, moment, contacts), strict=True)}
         thrown = [speed for c, speed in speeds.items() if self._restitution(c, -speed)]
         if self._together or not thrown:
             return contacts
@@ -294,12 +293,9 @@ class Collisions:
             t, moment, number, leave: as in `impact`.
         """
         contacts = self._in_turn(t, moment, [*self._contacts(t, moment, number, leave)])
-        thrown = (c for c in contacts if self._restitution(c, self._opens(t, moment, c)))
+        opens = _opens(t, moment, contacts)
+        thrown = (c for c, speed in zip(contacts, opens, strict=True) if self._restitution(c, speed))
         return min(thrown, key=lambda contact: contact.number != number, default=None)
-
-    def _opens(self, t: float, moment: Moment, contact: Contact) -> float:
-        """The speed at which a contact opens."""
-        return contact.side * moment.across(contact.number, t)
 
     def _nodes(self, moment: Moment, contact: Contact) -> tuple[int, int]:
         """The nodes of a contact, that first whose speed opens it."""
@@ -352,6 +348,12 @@ def limited(elements: Sequence[Element], modes: ModeNames) -> dict[int, tuple[tu
     """Elements that join by a torque that is limited, with the sides on which it is and the modes there."""
     found = {k: element.modes[name].gives_way for k, (element, name) in enumerate(zip(elements, modes, strict=True))}
     return {k: ways for k, ways in found.items() if ways}
+
+
+def _opens(t: float, moment: Moment, contacts: Sequence[Contact]) -> list[float]:
+    """The speeds at which contacts open."""
+    speeds = moment.speeds([contact.number for contact in contacts], t)
+    return [contact.side * speed for contact, speed in zip(contacts, speeds, strict=True)]
 
 
 def _blow(moment: Moment, mobility: Mobility, impulses: Array) -> Blow:

@@ -81,7 +81,8 @@ class Impulses:
 
     def begins(self, moment: Moment, t: float) -> Start:
         """Where an impact begins, with the inputs of a time in s."""
-        return Start(moment, t, self._regimes.held(moment, t), {k: moment.across(k, t) for k in self.gears})
+        speeds = dict(zip(self.gears, moment.speeds(self.gears, t), strict=True))
+        return Start(moment, t, self._regimes.held(moment, t), speeds)
 
     def stages(self, t: float, start: Start, blow: Callable[[Start, Sequence[Stage]], Blow]) -> tuple[Stage, ...]:
         """All parts of an impulse, of which the last leads to its end.

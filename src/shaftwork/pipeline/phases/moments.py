@@ -165,7 +165,11 @@ class Moment(NamedTuple):
 
     def across(self, number: int, t: float) -> float:
         """The speed across an element at a time in s."""
-        return self.regime.assembly.across(number, t, self.x, self.regime.p)
+        return self.speeds((number,), t)[0]
+
+    def speeds(self, numbers: Sequence[int], t: float) -> list[float]:
+        """The speeds across elements at a time in s."""
+        return self.regime.assembly.across(numbers, t, self.x, self.regime.p)
 
     def moved(self, t: float, step: float) -> Moment:
         """The same modes a step in s later or earlier, along a straight line."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import chain
@@ -12,7 +13,7 @@ from shaftwork.network.graph import GROUND, GraphPart
 from shaftwork.network.netlist import Netlist
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.gains import Number, add
+from shaftwork.reduction.gains import Number, add, value_of
 
 
 def at_rest(netlist: Netlist, form: StateForm) -> Netlist:
@@ -42,15 +43,40 @@ def _held(form: StateForm, part: GraphPart, element: Modes, choice: Choice) -> C
 
 def rests(form: StateForm, part: GraphPart, element: Modes) -> bool:
     """Whether no branch of the tree but rigid joints is on the way from one end of an element to the other."""
+    return joints_across(form, part, element) is not None
+
+
+def joints_across(form: StateForm, part: GraphPart, element: Modes) -> Mapping[int, float] | None:
+    """The rigid joints on the way from one end of an element to the other, by branch, with the speed across the element
+    for one across each of them; None where other branches of the tree are on it.
+    """
     first, second = (_potential(form, part, end) for end in part.ends_of(element))
     if first is None or second is None:
-        return False
-    ways = dict.fromkeys(chain(first, second))
-    return all(
-        form.graph.branches[tree].template.kind is Kind.COUPLING
-        or add(first.get(tree, 0), -second.get(tree, 0), []) == 0
-        for tree in ways
-    )
+        return None
+    ways = {tree: add(first.get(tree, 0), -second.get(tree, 0), []) for tree in dict.fromkeys(chain(first, second))}
+    joints = {tree: value_of(share) for tree, share in ways.items() if share != 0}
+    rigid = all(form.graph.branches[tree].template.kind is Kind.COUPLING for tree in joints)
+    return joints if rigid else None
+
+
+def holds_at_rest(form: StateForm, part: GraphPart, element: Modes) -> tuple[int, float] | None:
+    """The branch of the one friction that holds an element at rest, and the sign of its speed for that of the element.
+
+    None where nothing, or more than one, does.
+    """
+    joints = joints_across(form, part, element) or {}
+    holders = {
+        branch: share
+        for branch, share in joints.items()
+        if any(_rubs(modes) for modes in form.graph.part_of(branch).modes)
+    }
+    (branch, share), *others = [*holders.items(), (-1, 0.0)]
+    return (branch, math.copysign(1.0, share)) if len(others) == 1 else None
+
+
+def _rubs(modes: Modes) -> bool:
+    """Whether a mode holds by a torque that is limited on both sides."""
+    return any(len(mode.gives_way) > 1 for mode in modes.options)
 
 
 def _potential(form: StateForm, part: GraphPart, end: End) -> Mapping[int, Number] | None:

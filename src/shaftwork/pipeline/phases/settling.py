@@ -148,7 +148,8 @@ class Settling:
             return {}
         here = moment.course(t)
         now, near = here[3], regime.limits(*regime.beside(here))
-        return {k: to for k, (to, guard) in found.items() if now[guard] == near[guard] == 0.0}
+        still = regime.assembly.resting
+        return {k: to for k, (to, guard) in found.items() if k in still or now[guard] == near[guard] == 0.0}
 
     def _fewest(self, t: float, after: float, moment: Moment, met: int | None) -> tuple[Moment, list[Change]]:
         """Of several guards that are met at one instant, rounding tells which of them ends the phase.

@@ -56,12 +56,16 @@ class Shown:
         """The mode of an element in which a motion would start, besides one; empty where it would start in none."""
         return self._start(number, besides, t, self._at(t, read, p))
 
-    def across(self, number: int, t: float, read: Sequence[float], p: Array) -> float:
-        """The speed across an element, which is asked for at every impact: in plain floats, and without the others."""
+    def across(self, numbers: Sequence[int], t: float, read: Sequence[float], p: Array) -> list[float]:
+        """The speeds across elements, which are asked for at every impact: in plain floats, and without the others."""
+        parameters = p.tolist()
+        return [float(self._speed(number)(parameters)[1](t, read)[0]) for number in numbers]
+
+    def _speed(self, number: int) -> Callable[..., Any]:
         if number not in self._speeds:
             given = {"t": TIME, "read": self._readings.symbols}
             self._speeds[number] = bindable(given, {"p": self._parameters}, (), (self._expression(number, ACROSS),))
-        return float(self._speeds[number](p.tolist())[1](t, read)[0])
+        return self._speeds[number]
 
     def _at(self, t: float, read: Sequence[float], p: Array) -> Sequence[Any]:
         return self.function(t, *read, *p.tolist())  # type: ignore[no-any-return]
