@@ -137,8 +137,11 @@ class Assembly:
 
     def _holding(self, readings: Readings, part: GraphPart, element: Modes) -> Expr:
         """The torque of the one friction that holds an element at rest, with the sign that its own would have."""
-        branch, sign = holds_at_rest(self.model.form, part, element) or (-1, 0.0)
-        return int(sign) * readings.through(branch) if sign else Integer(0)
+        holder = holds_at_rest(self.model.form, part, element)
+        if holder is None:
+            return Integer(0)
+        branch, sign = holder
+        return int(sign) * readings.through(branch)
 
     def watched(self, modes: ModeNames) -> tuple[tuple[int, Watched], ...]:
         """Element and guard of everything that may end one of the modes."""

@@ -70,8 +70,10 @@ def holds_at_rest(form: StateForm, part: GraphPart, element: Modes) -> tuple[int
         for branch, share in joints.items()
         if any(_rubs(modes) for modes in form.graph.part_of(branch).modes)
     }
-    (branch, share), *others = [*holders.items(), (-1, 0.0)]
-    return (branch, math.copysign(1.0, share)) if len(others) == 1 else None
+    if len(holders) != 1:
+        return None
+    ((branch, share),) = holders.items()
+    return branch, math.copysign(1.0, share)
 
 
 def _rubs(modes: Modes) -> bool:
