@@ -60,6 +60,11 @@ class Leave:
         return self._reads(THROUGH)
 
     @cached_property
+    def by_speed(self) -> bool:
+        """Whether the mode ends as the speed across the element passes through zero."""
+        return self.when in (ACROSS, -ACROSS)
+
+    @cached_property
     def by_twist(self) -> bool:
         """Whether twists and the time alone end the mode, whatever else changes at that instant."""
         return self.rebound is None and not self._reads(ACROSS) and not self._reads(THROUGH)

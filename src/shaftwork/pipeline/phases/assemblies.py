@@ -115,7 +115,7 @@ class Assembly:
         for leave in mode.leaves:
             try:
                 when = readings.guard(part, element, leave.when.xreplace(still))
-                if still and leave.when in (ACROSS, -ACROSS):
+                if still and leave.by_speed:
                     # what has given way at rest holds again before the one that holds it is pressed the other way
                     when = leave.when.xreplace({ACROSS: self._holding(readings, part, element)})
             except ValueError as error:  # sympy's, of a minimum or maximum of what is infinite

@@ -62,6 +62,21 @@ def together(changes: list[Change]) -> list[Change]:
     return [change for change in made.values() if change.before != change.after]
 
 
+def without_detours(changes: list[Change]) -> list[Change]:
+    """Changes of one instant without those by which an element came back to a mode; but an impact stays."""
+    if len(changes) == 1 or any(change.impact for change in changes):
+        return changes
+    kept: list[Change] = []
+    for change in changes:
+        own = [earlier for earlier in kept if earlier.element is change.element]
+        back = next((k for k, earlier in enumerate(own) if earlier.before == change.after), None)
+        dropped = [] if back is None else own[back:]
+        kept = [earlier for earlier in kept if earlier not in dropped]
+        if back is None:
+            kept.append(change)
+    return kept
+
+
 @dataclass(frozen=True, eq=False)
 class Regime:
     """A combination of modes with everything that it takes to go on in it; made once for a run.

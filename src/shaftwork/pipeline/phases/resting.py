@@ -60,25 +60,17 @@ def joints_across(form: StateForm, part: GraphPart, element: Modes) -> Mapping[i
 
 
 def holds_at_rest(form: StateForm, part: GraphPart, element: Modes) -> tuple[int, float] | None:
-    """The branch of the one friction that holds an element at rest, and the sign of its speed for that of the element.
+    """The branch of the friction that alone holds an element at rest, and the sign of its speed for the element's.
 
-    None where nothing, or more than one, does.
+    None where nothing does, or another part that has modes, or several.
     """
     joints = joints_across(form, part, element) or {}
-    holders = {
-        branch: share
-        for branch, share in joints.items()
-        if any(_rubs(modes) for modes in form.graph.part_of(branch).modes)
-    }
+    holders = {branch: share for branch, share in joints.items() if form.graph.part_of(branch).modes}
     if len(holders) != 1:
         return None
     ((branch, share),) = holders.items()
-    return branch, math.copysign(1.0, share)
-
-
-def _rubs(modes: Modes) -> bool:
-    """Whether a mode holds by a torque that is limited on both sides."""
-    return any(len(mode.gives_way) > 1 for mode in modes.options)
+    rubs = any(len(mode.gives_way) > 1 for modes in form.graph.part_of(branch).modes for mode in modes.options)
+    return (branch, math.copysign(1.0, share)) if rubs else None
 
 
 def _potential(form: StateForm, part: GraphPart, end: End) -> Mapping[int, Number] | None:

@@ -143,13 +143,17 @@ class Settling:
         for k, made in regime.watched:
             modes, name = self.elements[k].modes, regime.modes[k]
             if made.leave.to and any(back.by_torque and back.to == name for back in modes[made.leave.to].leaves):
-                found[k] = made.leave.to, made.guard
+                found[k] = made
         if not found:
             return {}
         here = moment.course(t)
         now, near = here[3], regime.limits(*regime.beside(here))
         still = regime.assembly.resting
-        return {k: to for k, (to, guard) in found.items() if k in still or now[guard] == near[guard] == 0.0}
+        return {
+            k: made.leave.to
+            for k, made in found.items()
+            if (k in still and made.leave.by_speed) or now[made.guard] == near[made.guard] == 0.0
+        }
 
     def _fewest(self, t: float, after: float, moment: Moment, met: int | None) -> tuple[Moment, list[Change]]:
         """Of several guards that are met at one instant, rounding tells which of them ends the phase.

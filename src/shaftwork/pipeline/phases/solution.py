@@ -14,7 +14,7 @@ from shaftwork.codegen.observer import Impact, ModelObserver
 from shaftwork.codegen.phase_observer import PhaseObserver, Stretch, Stretches
 from shaftwork.pipeline.phases.assemblies import Assembly
 from shaftwork.pipeline.phases.elements import Element, ModeNames
-from shaftwork.pipeline.phases.moments import Change, together
+from shaftwork.pipeline.phases.moments import Change, without_detours
 from shaftwork.pipeline.phases.passing import Phase
 from shaftwork.pipeline.phases.run import Run, Span
 from shaftwork.pipeline.phases.wave_run import WaveRun
@@ -144,9 +144,9 @@ def _sums(first: Mapping[str, float], second: Mapping[str, float]) -> dict[str, 
 
 
 def _events(changes: Iterable[Change]) -> Iterator[tuple[float, str, str, str]]:
-    """Changes in words, of each element one at an instant: what says the same before and after is none."""
+    """Changes in words, without those that lead nowhere: what says the same before and after is none."""
     words: dict[tuple[Element, str, str, bool], tuple[str, str, str]] = {}
-    at_once = (together([*made]) for _, made in groupby(changes, attrgetter("time")))
+    at_once = (without_detours([*made]) for _, made in groupby(changes, attrgetter("time")))
     for time, element, before, after, rebound, *_ in chain.from_iterable(at_once):
         key = element, before, after, rebound
         if key not in words:
