@@ -55,7 +55,7 @@ KINDS = st.lists(st.sampled_from(["friction", "load", "brake", "clutch"]), min_s
 
 @pytest.mark.slow
 @given(KINDS)
-@share_of_examples(0.1)
+@share_of_examples(0.05)
 def test_reactions_lead_to_the_motion_of_the_equations_of_each_combination(kinds: tuple[str, ...]) -> None:
     model = chain(kinds).compile()
     own, one = (model.simulate(0.5, rtol=1e-10, engine=engine, t_eval=11) for engine in ("heyoka", "scipy"))

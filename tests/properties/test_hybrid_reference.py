@@ -147,7 +147,7 @@ def end(train: Train, engine: str = "auto", impacts: Literal["in turn", "togethe
 
 @pytest.mark.slow
 @given(st.integers(0, 10**6))
-@share_of_examples(0.5)
+@share_of_examples(0.3)
 def test_a_random_hybrid_motion_ends_where_matrix_exponentials_lead(seed: int) -> None:
     train = Draw(seed).train()
     try:

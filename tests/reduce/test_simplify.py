@@ -222,7 +222,7 @@ def test_a_massless_end_and_a_shaft_without_a_spring_are_named() -> None:
 @pytest.mark.slow
 def test_the_peaks_that_are_compared_lie_between_the_output_times_too() -> None:
     """As many masses as there are: with the output times far apart both must find the peak of the closed form."""
-    net = chain([1.0, 2.0], [1e8])
+    net = chain([1.0, 2.0], [1.1e6])
     lost = sw.reduce.simplify(net, 2, "c0").compare(10.0, engine="exact", t_eval=np.linspace(0.0, 10.0, 7))
     peak = 2 * 1.0 * 2.0 / 3.0  # twice what accelerates the mass beyond
     assert lost.peaks == pytest.approx((peak, peak), rel=1e-9)
