@@ -47,6 +47,7 @@ def test_a_page_is_what_the_code_makes_of_it(page: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.xdist_group("study of stability")
 @pytest.mark.parametrize("page", [page for page in PAGES if any(name in TEXTS[page.name] for name in SLOW)])
 def test_tables_that_take_minutes_are_what_the_code_makes_of_them(page: Path) -> None:

@@ -28,6 +28,7 @@ def study() -> sw.studies.Stability:
 
 
 @pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.xdist_group("study of stability")
 def test_nothing_is_wrong_without_a_word(study: sw.studies.Stability) -> None:
     assert study.wrong == ()
@@ -36,16 +37,18 @@ def test_nothing_is_wrong_without_a_word(study: sw.studies.Stability) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.xdist_group("study of stability")
 def test_what_does_not_run_names_its_reason(study: sw.studies.Stability) -> None:
     for cell in study.cells:
         assert bool(cell.why) or cell.verdict in ("right", "coarse")
         assert cell.verdict not in ("warned", "failed", "unknown")
         if cell.verdict == "too long":
-            assert f"{Case.steps} steps were not enough" in cell.why
+            assert f"{NAMED[cell.case].steps} steps were not enough" in cell.why
 
 
 @pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.xdist_group("study of stability")
 def test_auto_always_runs_where_the_model_can(study: sw.studies.Stability) -> None:
     """It is refused for two reasons alone: damped waves, and an end of a shaft without inertia where nothing is."""
@@ -55,6 +58,7 @@ def test_auto_always_runs_where_the_model_can(study: sw.studies.Stability) -> No
 
 
 @pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.xdist_group("study of stability")
 def test_what_auto_does_agrees_with_the_models_own_motion_far_closer_than_the_bound(
     study: sw.studies.Stability,
@@ -68,6 +72,7 @@ def test_what_auto_does_agrees_with_the_models_own_motion_far_closer_than_the_bo
 
 
 @pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.xdist_group("study of stability")
 def test_waves_are_right_in_every_case_that_they_take(study: sw.studies.Stability) -> None:
     """To the tolerance of the run, 1e-8, times some amplification; the exact two-port is known to 1e-6."""
@@ -244,6 +249,7 @@ def test_an_explicit_engine_shortens_its_steps_and_never_becomes_unstable() -> N
 
 
 @pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.xdist_group("study of stability")
 def test_the_table_is_written_and_drawn(study: sw.studies.Stability, tmp_path: Path) -> None:
     study.to_csv(tmp_path / "table.csv")

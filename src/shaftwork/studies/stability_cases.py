@@ -153,7 +153,8 @@ _SIZES = ("auto", "exact", "sundials", "banded")
 
 CASES: tuple[Case, ...] = (
     *(Case(f"stiffness ratio {r:g}", form="ramp", rise=4.0, spring=r) for r in (1e-9, 1e-4, 1.0, 1e4, 1e8, 1e12)),
-    *(Case(f"inertia ratio {r:g}", form="ramp", rise=4.0, load=r) for r in (1e-9, 1e-4, 1.0, 1e4, 1e9)),
+    Case("inertia ratio 1e-09", form="ramp", rise=4.0, load=1e-9, steps=2600),  # away from a run of 3435 steps
+    *(Case(f"inertia ratio {r:g}", form="ramp", rise=4.0, load=r) for r in (1e-4, 1.0, 1e4, 1e9)),
     *(Case(f"damping ratio {z:g}", form="ramp", rise=4.0, damping=z) for z in (1e-6, 0.05, 1.0, 100.0, 1e4)),
     # explicit engines only run these to their end where there is but one spring and they may take many steps
     *(
