@@ -17,7 +17,7 @@ from tests.faults.growth import train
 
 ROOT = Path(__file__).parents[2]
 CALLS = {"compile": 60, **dict.fromkeys(("heyoka", "scipy", "exact", "wave", "phases", "modes"), 200)}
-CALLS |= dict.fromkeys(("sundials", "scipy-radau", "banded"), 100)
+CALLS |= dict.fromkeys(("sundials", "scipy-radau", "banded"), 100) | {"phases": 400}
 BOUND = 2.0
 """MiB by which memory may grow from a fifth of the calls to all of them; measured are 0.1."""
 BOUND_OF_CODE = 12.0

@@ -383,7 +383,7 @@ def pressed() -> sw.Model:
 @pytest.mark.slow
 def test_contacts_that_part_each_other_come_to_rest() -> None:
     """Two that push the same inertia the same way: an impact of either parts the other, by ever less."""
-    runs = {engine: pressed().simulate(3.0, engine=engine, t_eval=2) for engine in ENGINES}
+    runs = {engine: pressed().simulate(3.0, engine=engine, t_eval=2) for engine in ("heyoka", "scipy")}
     for engine, sol in runs.items():
         assert len(sol.events) < 1000
         assert sol.energy_residual < 1e-8, engine
