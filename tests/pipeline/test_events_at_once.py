@@ -134,7 +134,7 @@ def test_a_switch_that_will_open_again_does_not_stay_open_in_place_of_a_short_ci
 
 
 @pytest.mark.parametrize("order", [1, -1])
-def test_an_instant_has_one_event_of_a_part_however_the_parts_are_named(order: int) -> None:
+def test_modes_entered_and_left_at_one_instant_are_no_events_however_the_parts_are_named(order: int) -> None:
     """At 1 s the motor turns round, and the worm brakes: the clutch slips, and how it came to that is nobody's event.
 
     Before, all turns as one: 20 N m at 30 : 1 with half of it lost. From 1 s on J w' = -500 N m behind the clutch.

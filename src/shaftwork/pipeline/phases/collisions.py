@@ -119,8 +119,9 @@ class Collisions:
             t, {c.number for c, share in zip(contacts, back.tolist(), strict=True) if share >= 1}, touching
         )
         modes = moment.regime.modes
-        begins, stages = self._apart(t, moment, modes, contacts), tuple[Stage, ...]()
+        begins, stages, both_ways = self._apart(t, moment, modes, contacts), tuple[Stage, ...](), tuple[Contact, ...]()
         if all(contact.number != number for contact in contacts):  # it carries both ways, as a switch that closes
+            both_ways = (Contact(number, 0.0, modes[number], leave.to),)
             stages = self._joined(t, begins, {number: leave.to}, contacts)
             begins = self._impulses.begins(stages[-1].blow.after, t)
         stages += self._compressed(t, begins, contacts)
@@ -133,7 +134,7 @@ class Collisions:
         lost = zip(owners, self._taken(t, contacts, stages).tolist(), strict=True)
         return Collision(
             after,
-            tuple(c for c in hit if c in closed),
+            (*both_ways, *(c for c in hit if c in closed)),
             tuple(c for c in hit if c not in closed),
             _sums([*lost, *self._impulses.lost(t, stages).items()]),
             self._impulses.given(t, stages),

@@ -68,16 +68,15 @@ class Impacts:
         found = self._collisions.impact(after, moment, number, leave)
         new, hits = found.after, list[Change]()
         contacts = sorted((*found.stays, *found.thrown), key=lambda contact: contact.number != number)
-        made = [(c.number, c.apart, c.joined, c in found.thrown, c.leave) for c in contacts]
-        if all(contact.number != number for contact in contacts):  # it carries both ways, as a switch that closes
-            made.insert(0, (number, regime.modes[number], new.regime.modes[number], False, None))
-        for k, apart, joined, rebound, way in made:
+        for contact in contacts:
+            rebound = contact in found.thrown
             energies = {} if hits else {"given": found.given, "lost": found.lost}
-            hits.append(Change(t, self._elements[k], apart, joined, rebound, impact=True, **energies))
-            if not rebound and way is not None:
-                new = self._at_limit(new, k, way)
+            element = self._elements[contact.number]
+            hits.append(Change(t, element, contact.apart, contact.joined, rebound, impact=True, **energies))
+            if not rebound and contact.leave is not None:
+                new = self._at_limit(new, contact.number, contact.leave)
         new = self._kept(after, regime.modes, new)
-        besides = {k for k, *_ in made}
+        besides = {contact.number for contact in contacts}
         changes = [*hits, *self._differences(t, regime.modes, new.regime.modes, besides)]
         self._refuse_gain(t, moment, held, self._regimes.held(new, after), hits[0])
         return new, changes
