@@ -26,6 +26,7 @@ from shaftwork.codegen.matrices import LinearPart
 from shaftwork.codegen.products import Factor
 from shaftwork.codegen.stores import Stores
 from shaftwork.reduction.form import StateForm
+from shaftwork.reduction.held_rows import HeldRows
 
 SMALL = 1e-12
 """A part of the largest entry of a row that is the rounding of its elimination."""
@@ -43,6 +44,7 @@ class Joints:
     def __init__(self, form: StateForm, part: LinearPart, branches: Sequence[int]) -> None:
         across, size = len(form.across_states), len(form.states)
         self.places = np.array([form.laws.index(branch) for branch in branches], dtype=np.intp)
+        self._branches = tuple(branches)
         loops = sparse.csr_array(part.loops)[list(form.across_states)][:, list(branches)]
         none = sparse.csr_array((len(branches), size - across))
         G = sparse.csr_array(sparse.hstack([loops.T, none]))
@@ -54,7 +56,7 @@ class Joints:
             return
         reactions, alike = _reactions(G, B), _alike(followers, size)
         self._B, self._reactions, self._alike = Factor(B), Factor(reactions), Factor(alike)
-        joined = alike @ (sparse.eye_array(size, format="csr") + B @ reactions)
+        self._joined = joined = sparse.csr_array(alike @ (sparse.eye_array(size, format="csr") + B @ reactions))
         others = sparse.diags_array(np.where(np.isin(np.arange(part.B.shape[1]), self.places), 0.0, 1.0))
         self.moving = replace(
             part, A=joined @ part.A, B=joined @ part.B @ others, B1=joined @ part.B1, C=part.C @ alike
@@ -79,9 +81,24 @@ class Joints:
             by_input + react @ part.B
         )
 
+    def entries(self, rows: HeldRows) -> Array:
+        """(k,) the numbers of the symbols in rows: those of P and of R."""
+        held = {branch: k for k, branch in enumerate(self._branches)}
+        made = np.zeros(len(rows.symbols))
+        made[: len(rows.joins)] = _at(self._joined, [*rows.joins])
+        found = [(k, (held[branch], place)) for k, (branch, place) in enumerate(rows.reactions) if branch in held]
+        made[[len(rows.joins) + k for k, _ in found]] = _at(self._reactions.sparse, [place for _, place in found])
+        return made
+
     def met(self, x: Array) -> Array:
         """(n,) the states after an inelastic impact that joins what is held: every momentum is kept."""
         return self.alike(x + self._B @ self.reactions(x))
+
+
+def _at(matrix: Any, places: Sequence[tuple[int, int]]) -> Array:
+    """(k,) entries of one of scipy.sparse."""
+    rows, columns = np.array(places, dtype=np.intp).reshape(-1, 2).T
+    return np.asarray(matrix[rows, columns], dtype=float).ravel() if rows.size else np.empty(0)
 
 
 def _reactions(G: Any, B: Any) -> Any:

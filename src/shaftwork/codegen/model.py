@@ -74,8 +74,12 @@ class CompiledModel:
     @cached_property
     def rows(self) -> Rows | None:
         """The state equations as expressions, or None where the network is too large or too closely coupled."""
+        return self.rows_of(_sets_of_equations(self.form.graph))
+
+    def rows_of(self, sets: int) -> Rows | None:
+        """The same where the motion may lead through so many sets of equations; none where no part changes its mode."""
         states, branches = len(self.form.states), len(self.form.graph.branches)
-        switches = 0 < _sets_of_equations(self.form.graph) <= FEW_SETS
+        switches = 0 < sets <= FEW_SETS
         most = (SWITCHING_STATES, SWITCHING_BRANCHES) if switches else (SCALAR_STATES, SCALAR_BRANCHES)
         if self.form.waves or states > most[0] or branches > most[1]:
             return None

@@ -194,6 +194,8 @@ class _Run:
             return False
         self.reactions.append((time, reaction.equations))
         self._p[: reaction.p.size] = reaction.p
+        if reaction.x is not None:
+            self._x[: reaction.x.size] = reaction.x
         self._guard(reaction.ends, reaction.offsets)
         self.program.weigh(self.integrator)
         return True

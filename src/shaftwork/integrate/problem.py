@@ -101,16 +101,18 @@ class Reaction(NamedTuple):
     """How a run goes on past a guard in the same equations.
 
     Args:
-        p: (p,) parameters from there on.
+        p: (p,) what the program is made of from there on.
         ends: number and side of each guard that ends the phase from there on.
         offsets: (m,) of all guards.
         equations: makes the right-hand side from there on.
+        x: (n,) the first states, where they are others than those in which the guard was met.
     """
 
     p: Array
     ends: Sequence[tuple[int, float]]
     offsets: Sequence[float]
     equations: Callable[[], Callable[[float, Array], Array]]
+    x: Array | None = None
 
 
 # An engine with a tolerance may be off by this many times of it, 1e-6 at the usual one: errors add up over its steps.

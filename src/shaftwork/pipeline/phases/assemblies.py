@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache, cached_property, partial
 from operator import methodcaller
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import sparse
-from sympy import Expr, Integer, Symbol
+from sympy import Expr, Symbol
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.code import Moves, around, bindable, is_rough, vectorised
@@ -19,25 +19,24 @@ from shaftwork.codegen.many import ManyExpressions
 from shaftwork.codegen.matrices import LinearPart
 from shaftwork.codegen.observer import Quantities
 from shaftwork.codegen.recovery import History
+from shaftwork.codegen.scalar import ScalarProgram
 from shaftwork.codegen.stores import Stores
 from shaftwork.codegen.timeline import Timeline
 from shaftwork.codegen.valueless import first_missing, in_words, rough, without_value
-from shaftwork.components.branches import ACROSS
 from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME
-from shaftwork.components.modes import Mode, Modes
 from shaftwork.components.pieces import pieces_degree
 from shaftwork.core.errors import CompileError
 from shaftwork.core.kept import Kept
 from shaftwork.integrate.engines import available
 from shaftwork.integrate.problem import Guards, Problem, changed
-from shaftwork.network.graph import GraphPart
-from shaftwork.pipeline.phases.elements import Element, ModeNames, Watched
+from shaftwork.pipeline.phases.elements import Element, ModeNames
 from shaftwork.pipeline.phases.rates import rates_of
-from shaftwork.pipeline.phases.resting import holds_at_rest, rests
 from shaftwork.pipeline.phases.shown import Shown
+from shaftwork.pipeline.phases.watch import Watch
 from shaftwork.pipeline.prepared import Prepared
 from shaftwork.reduction.readings import NamedReadings, Readings
+from shaftwork.reduction.rows import Rows
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.model import Model
@@ -63,28 +62,30 @@ class Assembly:
     Args:
         model: the compiled equations.
         elements: of the network.
-        forms: of each element; None for one of which all are in one, and then no expressions in states tell what guards
-            read.
+        forms: of each element; None for one of which all are in one.
+        rows: of all of them, where some are in one; without these no expressions in states tell what guards read.
     """
 
-    def __init__(self, model: Model, elements: Sequence[Element], forms: Sequence[str | None]) -> None:
+    def __init__(
+        self,
+        model: Model,
+        elements: Sequence[Element],
+        forms: Sequence[str | None],
+        rows: Rows | None = None,
+    ) -> None:
         self.model, self.elements = model, elements
+        self.whole: Assembly = self
+        """Where what holds is numbers in the equations: those in which nothing does, of which these are a copy."""
         self.stores, self.quantities = Stores(model.form), Quantities(model.form)
         self._places = {name: k for k, name in enumerate(model.parameters)}
-        self._expressions: list[Expr] = []
-        self._known: dict[tuple[int, Expr], int] = {}
-        self._watched: dict[tuple[int, str], tuple[Watched, ...]] = {}
-        self._rows = rows = None if None in forms else model.rows
+        self._rows = rows = model.rows if rows is None and None not in forms else rows
         self._readings = readings = NamedReadings(model.form) if rows is None else Readings(model.form, rows)
-        self._parameters = tuple(Symbol(name, real=True) for name in model.parameters)
+        names = tuple(Symbol(name, real=True) for name in model.parameters)
+        self._parameters = names if rows is None else rows.parameters
         self.parts = {part.name: part for part in model.form.graph.parts}
-        self.resting = {k for k, e in enumerate(elements) if rests(model.form, self.parts[e.part.name], e.modes)}
-        """Elements of which others hold both ends."""
-        for number, element in enumerate(elements):
-            part = self.parts[element.part.name]
-            for mode in element.modes.options:
-                if forms[number] in (None, mode.form):
-                    self._watched[number, mode.name] = tuple(self._leaves(number, readings, part, mode))
+        found = Watch(model.form, elements, forms, readings)
+        self.resting, self.watched, self.sides = found.resting, found.watched, found.sides
+        self._expressions, self._owners = found.expressions, found.owners
         self._shown = Shown(elements, self.parts, readings, self._parameters)
         if rows is None:
             _ = self._shown.function  # so that all quantities are known before any function of them is made
@@ -94,8 +95,6 @@ class Assembly:
         self._guards_made = Kept[bytes, Callable[[Array, Array], Array]](KEPT)
         self._problems = Kept[tuple[ModeNames, bytes], Problem](KEPT)
         self._translated = Kept[tuple[int, Expr], Expr](KEPT)
-        self._sides: dict[ModeNames, Array] = {}
-        self._ends: dict[ModeNames, tuple[tuple[int, Watched], ...]] = {}
         self._numbers = [self._places[element.number] for element in elements if element.number in self._places]
 
     def arriving(self, x: Array) -> dict[str, float]:  # noqa: ARG002
@@ -106,48 +105,13 @@ class Assembly:
         """The states with which the equations take up what was stored, with the inputs of a time in s."""
         return self.stores.states(self.bound(p), t, held)
 
-    def _leaves(self, number: int, readings: Readings, part: GraphPart, mode: Mode) -> Iterator[Watched]:
-        """The guards of a mode; what another mode of the element has is shared, with the other sign as well."""
-        taken: list[int] = []
-        element = self.elements[number].modes
-        # through gears a speed that is always zero is one but for rounding, which would tell which way a friction slips
-        still = {ACROSS: Integer(0)} if number in self.resting else {}
-        for leave in mode.leaves:
-            try:
-                when = readings.guard(part, element, leave.when.xreplace(still))
-                if still and leave.by_speed:
-                    # what has given way at rest holds again before the one that holds it is pressed the other way
-                    when = leave.when.xreplace({ACROSS: self._holding(readings, part, element)})
-            except ValueError as error:  # sympy's, of a minimum or maximum of what is infinite
-                raise CompileError(
-                    f"A law of '{self.elements[number].name}' has no finite value at zero speed, where it is "
-                    f"{mode.words}. Take one that has, as 1 / (0.1 + omega**2) has for 1 / omega**2."
-                ) from error
-            for side, expression in ((1.0, when), (-1.0, -when)):
-                known = self._known.get((number, expression))
-                if known is not None and known not in taken:
-                    watched = Watched(known, side, leave)
-                    break
-            else:
-                self._expressions.append(when)
-                watched = Watched(len(self._expressions) - 1, 1.0, leave)
-                self._known.setdefault((number, when), watched.guard)
-            taken.append(watched.guard)
-            yield watched
+    def holds_by_numbers(self, number: int) -> bool:  # noqa: ARG002
+        """Whether an element holds and gives way in these equations, by other numbers in explicit rows."""
+        return False
 
-    def _holding(self, readings: Readings, part: GraphPart, element: Modes) -> Expr:
-        """The torque of the one friction that holds an element at rest, with the sign that its own would have."""
-        holder = holds_at_rest(self.model.form, part, element)
-        if holder is None:
-            return Integer(0)
-        branch, sign = holder
-        return int(sign) * readings.through(branch)
-
-    def watched(self, modes: ModeNames) -> tuple[tuple[int, Watched], ...]:
-        """Element and guard of everything that may end one of the modes."""
-        if modes not in self._ends:
-            self._ends[modes] = tuple((k, made) for k, name in enumerate(modes) for made in self._watched[k, name])
-        return self._ends[modes]
+    def taking_over(self, x: Array, p: Array) -> Array | None:  # noqa: ARG002
+        """The states of other numbers in the same rows, or None where an impact leads there."""
+        return x
 
     @property
     def guards_shown(self) -> tuple[Expr, ...]:
@@ -173,6 +137,10 @@ class Assembly:
                 p[self._places[name]] = value
         return p
 
+    def values(self, p: Array) -> Array:
+        """The parameters and what else the rows are made of."""
+        return p
+
     def prepared(self, p: Array) -> Prepared:
         """What the numbers of modes do not enter, for the other parameters."""
         plain = p.copy()
@@ -188,7 +156,7 @@ class Assembly:
         return self._guards_made(p.tobytes(), lambda: self._guards(p))
 
     def _guards(self, p: Array) -> Callable[[Array, Array], Array]:
-        expressions, read = self._many.bind(p), self._read(p)
+        expressions, read = self._many.bind(self.values(p)), self._read(p)
         return lambda times, states: expressions(times, read(times, states))
 
     @cached_property
@@ -211,15 +179,15 @@ class Assembly:
 
     def first_modes(self, t: float, x: Array, p: Array) -> ModeNames:
         """The mode of each element in which a motion starts, in the equations in which nothing is joined by a mode."""
-        return self._shown.first_modes(t, self._read_at(t, x, p), p)
+        return self._shown.first_modes(t, self._read_at(t, x, p), self.values(p))
 
     def start_of(self, number: int, besides: str, t: float, x: Array, p: Array) -> str:
         """The mode of an element in which a motion would start, besides one; empty where it would start in none."""
-        return self._shown.start_of(number, besides, t, self._read_at(t, x, p), p)
+        return self._shown.start_of(number, besides, t, self._read_at(t, x, p), self.values(p))
 
     def across(self, numbers: Sequence[int], t: float, x: Array, p: Array) -> list[float]:
         """The speeds across elements."""
-        return self._shown.across(numbers, t, self._read_at(t, x, p), p) if numbers else []
+        return self._shown.across(numbers, t, self._read_at(t, x, p), self.values(p)) if numbers else []
 
     def twist(self, number: int) -> int | None:
         """The state that is the twist of an element, or None where none is."""
@@ -261,7 +229,6 @@ class Assembly:
     def _problem(self, p: Array, modes: ModeNames) -> Problem:
         """What is the same in all phases of these modes; the rest is empty."""
         bound, (_, known), clocks, size = partial(self.bound, p), self._rates(p), self.clocks, len(self.model.states)
-        owners = {made.guard: k for (k, _), found in self._watched.items() for made in found}
         guards, none = self.guards(p), np.empty(0)
         values = guards if not clocks else lambda t, y: guards(t, y[:, :size])
         return Problem(
@@ -270,11 +237,11 @@ class Assembly:
             x0=none,
             t0=0.0,
             t_end=0.0,
-            names=(*self.model.states, *(f"limit of {self.elements[owners[k]].name}" for k in clocks)),
+            names=(*self.model.states, *(f"limit of {self.elements[self._owners[k]].name}" for k in clocks)),
             atol=self.prepared(p).atol,
             guards=Guards(values, self.sides(modes), none, none),
             switches=(lambda t, y: bound().switches(t, y[:, :size])) if self.model.arrays.inputs.switching else None,
-            symbolic=cache(lambda: None if self.program is None else self.program.bind(p)),
+            symbolic=cache(lambda: None if self.program is None else self.program.bind(self.values(p))),
             explain=lambda t, y: self.without_value(p, modes, t, y[:, :size]),
             rough=lambda t, y: self._rough(p, modes, t, y[:, :size]),
             found=known,
@@ -330,13 +297,22 @@ class Assembly:
             function = vectorised(symbols, self._expressions[made.guard])
             known = np.array([*self._read(p)(times, states)]).reshape(-1, times.size)
             for time, values in zip(times, known.T, strict=True):
-                if is_rough(function, (time, *values, *p)):
+                if is_rough(function, (time, *values, *self.values(p))):
                     return float(time), in_words(self.elements[number].part, made.leave.when)
         return law
 
     def _rates(self, p: Array) -> tuple[Callable[[float, Array], Array], dict[str, Any]]:
         """The right-hand side and what engines find out about it, for all phases with these parameters."""
-        return self._rates_made(p.tobytes(), lambda: (rates_of(self.model, self.bound(p), self.motion(p)[0], p), {}))
+        return self._rates_made(p.tobytes(), lambda: (self._right_side(p), {}))
+
+    def _right_side(self, p: Array) -> Callable[[float, Array], Array]:
+        scalar = self.whole.scalar
+        return self.bound(p).rhs if scalar is None else rates_of(scalar, self.motion(p)[0], self.values(p))
+
+    @cached_property
+    def scalar(self) -> ScalarProgram | None:
+        """The right-hand side in scalar code, where there are rows."""
+        return self.model.scalar
 
     def _sizes(self, moment: Moment, span: tuple[float, float]) -> Array:
         """The size of each clock over a phase, as far as the time alone tells."""
@@ -348,19 +324,10 @@ class Assembly:
         # what is another number at once is rounding, and an engine that followed it would not get on
         return CLOCK * np.where(largest > MORE * changes, largest, 1.0) * length
 
-    def sides(self, modes: ModeNames) -> Array:
-        """(guards,) the side of each guard that ends one of the modes."""
-        if modes not in self._sides:
-            sides = np.zeros(len(self._expressions))
-            for _, made in self.watched(modes):
-                sides[made.guard] = made.side
-            self._sides[modes] = sides
-        return self._sides[modes]
-
     def motion(self, p: Array) -> tuple[Motion, Limits, Near]:
         """Rates and guards together, guards alone, and guards `around` an instant, from a time in s and states."""
         if self._rows is not None:
-            return self._scalar(p.tolist())
+            return self.whole.motions(self.values(p).tolist())
         bound, guards = self.bound(p), self.guards(p)
 
         def limits(t: float, x: list[float]) -> list[float]:
@@ -372,7 +339,8 @@ class Assembly:
         return motion, limits, partial(around, motion, limits)
 
     @cached_property
-    def _scalar(self) -> Callable[[list[float]], tuple[Motion, Limits, Near]]:
+    def motions(self) -> Callable[[list[float]], tuple[Motion, Limits, Near]]:
+        """What makes `motion` of the values of all parameters."""
         rows = self._rows
         assert rows is not None  # noqa: S101 (asked only then)
         return bindable({"t": TIME, "x": rows.states}, {"p": rows.parameters}, rows.rates, self._expressions)
@@ -381,16 +349,21 @@ class Assembly:
         """The nominal size of each state."""
         return self.prepared(p).atol.tolist()  # type: ignore[no-any-return]
 
-    @cached_property
+    @property
     def program(self) -> Any:
         """The heyoka program with the guards as its events, or None where there can be none."""
+        return self.whole.series
+
+    @cached_property
+    def series(self) -> Any:
+        """The same, made where it is kept."""
         if (rows := self._rows) is None or not (rows.states or self.clocks) or not available("heyoka"):
             return None
         from shaftwork.codegen.heyoka import build
 
         states = (*rows.states, *(Symbol(f"clock {k}", real=True) for k in self.clocks))
         rates = (*rows.rates, *(CLOCK * self._expressions[k] for k in self.clocks))
-        changing = [rows.parameters[place] for place in self._numbers]
+        changing = [*(rows.parameters[place] for place in self._numbers), *rows.parameters[len(self._places) :]]
         try:
             return build(states, TIME, rows.parameters, rates, tuple(self._expressions), changing)
         except CompileError:

@@ -31,13 +31,11 @@ from shaftwork.components.modes import Leave, Modes
 from shaftwork.core.errors import SimulationError
 from shaftwork.core.kept import Kept
 from shaftwork.network.graph import GROUND
-from shaftwork.pipeline.phases.elements import Element, ModeNames
+from shaftwork.pipeline.phases.elements import NO_IMPACT, Element, ModeNames
 from shaftwork.pipeline.phases.impulses import Blow, Impulses, Stage, Start
 from shaftwork.pipeline.phases.moments import CLEAR, Moment, Regime
 from shaftwork.pipeline.phases.regimes import Regimes, with_modes
 
-# A speed across what is joined, as part of the largest one or of one, up to which it is an error of the run, no impact.
-NO_IMPACT = 1e-8
 KEPT = 64
 """Sets of contacts of which what impulses do is kept."""
 SAME = 1e-9
@@ -177,10 +175,23 @@ class Collisions:
     ) -> tuple[Moment, list[Contact]]:
         """What follows stages, and the contacts that are closed then: of those that were open only what was hit."""
         after = stages[-1].blow.after
-        opens = self._mobility(t, after, contacts)[1]
+        mobility, opens = self._mobility(t, after, contacts)
         closed = [c for c, u in zip(contacts, opens, strict=True) if u <= least and (c.leave is None or c in hit)]
-        modes = {c.number: c.joined for c in closed} | self._slipping(t, before, after, least)
-        return self._regimes.changed(after, t, with_modes(after.regime.modes, modes)), closed
+        modes = with_modes(after.regime.modes, self._slipping(t, before, after, least))
+        massless = {c.number for c, tells in zip(contacts, mobility.has_inertia, strict=True) if not tells}
+        kept = [c for c in closed if c.number not in massless or c.leave is not None]
+        new, apart = (
+            self._regimes.changed(after, t, with_modes(modes, {c.number: c.joined for c in some}))
+            for some in (closed, kept)
+        )
+        # what has closed before beside a massless node may pull now: it opens, and closes again where it is pressed
+        pulls = len(kept) < len(closed) and self._differs(t, new, apart, least)
+        return (apart, kept) if pulls else (new, closed)
+
+    def _differs(self, t: float, one: Moment, other: Moment, least: float) -> bool:
+        """Whether speeds at two moments of the same time are not the same."""
+        held, others = self._regimes.held(one, t), self._regimes.held(other, t)
+        return any(abs(value - others[name]) > least for name, value in held.items())
 
     def _compressed(self, t: float, begins: Start, contacts: Sequence[Contact]) -> tuple[Stage, ...]:
         """Until nothing closes any more, with all contacts open; where nothing stops them, what closes is joined."""

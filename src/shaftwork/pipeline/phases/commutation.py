@@ -2,56 +2,134 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from itertools import chain, combinations
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
+from itertools import chain, combinations, islice
 
-from shaftwork.components.branches import ACROSS
-from shaftwork.pipeline.phases.collisions import NO_IMPACT
-from shaftwork.pipeline.phases.elements import Element, ModeNames
-from shaftwork.pipeline.phases.moments import Moment
-from shaftwork.pipeline.phases.regimes import Regimes, with_modes
+from sympy import Expr
 
-AT_ONCE = 2
-"""So many diodes may begin to conduct at one instant: those of a bridge."""
+from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH
+from shaftwork.components.laws import t as TIME
+from shaftwork.components.modes import Leave, Modes
+from shaftwork.core.errors import NetworkError
+from shaftwork.pipeline.phases.courses import Way
+from shaftwork.pipeline.phases.elements import NO_IMPACT, Element, ModeNames
+from shaftwork.pipeline.phases.moments import Change, Moment
+from shaftwork.pipeline.phases.regimes import Regimes, anew, with_modes
+
+MOST = 500
+"""So many sets of diodes are tried at one instant, the smallest first: all of a circuit with eight of them."""
 
 
-def commutations(
-    regimes: Regimes, elements: Sequence[Element], t: float, moment: Moment, plain: Moment
-) -> Iterator[tuple[Moment, dict[int, str]]]:
-    """Modes in which all torques of springs and currents of inductors go on, with the elements that let them.
+class Commutation:
+    """Finds what diodes and freewheels do where currents and torques would be cut off.
 
     Args:
         regimes: combinations of modes.
         elements: of the network.
-        t: time in s at which inputs are read.
-        moment: what was before.
-        plain: the modes that are wanted, in which some of that may be cut off.
+        beyond: what ends modes at once, of a moment and a time in s.
     """
-    names = plain.regime.assembly.stores.through
-    if plain.x is moment.x or not names:
-        return
-    held, modes = regimes.held(moment, t), plain.regime.modes
-    least = NO_IMPACT * sum(abs(held[name]) for name in names)
 
-    def cuts_off(other: Moment) -> bool:
-        stored = regimes.held(other, t)
-        return sum(abs(stored[name] - held[name]) for name in names) > least
+    def __init__(
+        self, regimes: Regimes, elements: Sequence[Element], beyond: Callable[[Moment, float], list[Way]]
+    ) -> None:
+        self._regimes, self._elements, self._beyond = regimes, elements, beyond
 
-    if not cuts_off(plain):
-        return
-    for pairs in takeovers(elements, modes):
-        if regimes.possible(changed := with_modes(modes, pairs)):
-            other = regimes.changed(moment, t, changed)
-            if not cuts_off(other):
-                yield other, pairs
+    def commutated(self, moment: Moment, t: float, modes: ModeNames) -> tuple[Moment, dict[int, str]]:
+        """The modes that are wanted, and what then takes over a torque or current that they would cut off."""
+        plain = self._regimes.changed(moment, t, modes)
+        names = plain.regime.assembly.stores.through
+        if plain.x is not moment.x and names and not self._keeps(t, moment, plain, names):
+            for other, changed in self._keeping(t, moment, modes, takeovers(self._elements, modes), names):
+                if not self._beyond(other, t):
+                    return other, changed
+        return plain, {}
+
+    def switched(
+        self, t: float, after: float, moment: Moment, number: int, to: str
+    ) -> tuple[Moment, list[Change]] | None:
+        """A switch changes, with all others whose time it is too, and diodes so that all that is stored goes on.
+
+        None where that is not possible: a current is cut off, or a capacitor is charged at once.
+        """
+        modes, changed = moment.regime.modes, {number: to}
+        now, bands = moment.regime.limits(after, moment.x.tolist()), moment.bands
+        for k, made in moment.regime.watched:
+            met = by_time(made.leave) and made.side * now[made.guard] >= -(bands[made.guard] if bands else 0.0)
+            if k not in changed and met and is_switch(self._elements[k].modes):
+                changed[k] = made.leave.to or anew(self._elements, moment, after, k)
+        new_modes, names = with_modes(modes, changed), moment.regime.assembly.stores.names
+        ways = [*_begins(self._elements, new_modes), *_ends(self._elements, new_modes)]
+        for new, led in self._keeping(after, moment, new_modes, _sets(ways, 0), names):
+            if not any(is_one_way(self._elements[k].modes) for k, _ in self._beyond(new, after)):
+                return new, [Change(t, self._elements[k], modes[k], name) for k, name in (changed | led).items()]
+        return None
+
+    def _keeping(
+        self, t: float, moment: Moment, modes: ModeNames, sets: Iterable[dict[int, str]], names: Sequence[str]
+    ) -> Iterator[tuple[Moment, dict[int, str]]]:
+        """Of modes with other ones of diodes those in which what is stored under some names goes on."""
+        for pairs in islice(sets, MOST):
+            with suppress(NetworkError):
+                other = self._regimes.changed(moment, t, with_modes(modes, pairs))
+                if self._keeps(t, moment, other, names):
+                    yield other, pairs
+
+    def _keeps(self, t: float, moment: Moment, other: Moment, names: Sequence[str]) -> bool:
+        """Whether what is stored under some names, torques or speeds, is the same in other modes."""
+        if other.x is moment.x:
+            return True
+        before, after, through = (
+            self._regimes.held(moment, t),
+            self._regimes.held(other, t),
+            moment.regime.assembly.stores.through,
+        )
+        for kind in ([name for name in names if name in through], [name for name in names if name not in through]):
+            least = NO_IMPACT * sum(abs(before[name]) for name in kind)
+            if sum(abs(after[name] - before[name]) for name in kind) > least:
+                return False
+        return True
 
 
 def takeovers(elements: Sequence[Element], modes: ModeNames) -> Iterator[dict[int, str]]:
     """Diodes and freewheels that may begin to conduct at one instant, with the modes in which they do."""
-    ways = [
-        (k, leave.to)
-        for k, name in enumerate(modes)
-        for leave in elements[k].modes[name].leaves
-        if leave.when == ACROSS and leave.to
-    ]
-    return chain.from_iterable(map(dict, combinations(ways, count)) for count in range(1, AT_ONCE + 1))
+    return _sets(_begins(elements, modes), 1)
+
+
+def _sets(ways: Sequence[tuple[int, str]], least: int) -> Iterator[dict[int, str]]:
+    sizes = range(least, len(ways) + 1)
+    return chain.from_iterable(map(dict, combinations(ways, size)) for size in sizes)
+
+
+def _begins(elements: Sequence[Element], modes: ModeNames) -> list[tuple[int, str]]:
+    """Diodes and freewheels that do not conduct, with the modes in which they do."""
+    return _led(elements, modes, ACROSS)
+
+
+def _ends(elements: Sequence[Element], modes: ModeNames) -> list[tuple[int, str]]:
+    """Those that conduct, with the modes in which they do not."""
+    return _led(elements, modes, -THROUGH)
+
+
+def _led(elements: Sequence[Element], modes: ModeNames, when: Expr) -> list[tuple[int, str]]:
+    pairs = ((k, leave) for k, name in enumerate(modes) for leave in elements[k].modes[name].leaves)
+    return [(k, leave.to) for k, leave in pairs if leave.when == when and leave.to and is_one_way(elements[k].modes)]
+
+
+def is_one_way(modes: Modes) -> bool:
+    """Whether an element is a diode or a freewheel: it joins by a torque of one sign, as soon as speeds let it."""
+    joined = [mode for mode in modes.options if mode.form != modes.options[0].form]
+    rebounds = any(leave.rebound is not None for mode in modes.options for leave in mode.leaves)
+    return not rebounds and any(len(mode.gives_way) == 1 for mode in joined)
+
+
+def is_switch(modes: Modes) -> bool:
+    """Whether an element joins its ends whatever passes: a time or a law says when it does."""
+    first, *others = modes.options
+    joined = [mode for mode in others if mode.form != first.form]
+    return bool(joined) and not modes.passes_on and not any(mode.gives_way for mode in joined)
+
+
+def by_time(leave: Leave) -> bool:
+    """Whether the time alone ends a mode."""
+    return leave.by_twist and not leave.when.has(INTEGRAL) and leave.when.has(TIME)

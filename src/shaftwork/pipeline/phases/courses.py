@@ -12,7 +12,9 @@ Way = tuple[int, Watched]
 """An element and a guard that may end its mode."""
 
 
-def leaving(regime: Regime, here: Course, beside: Course, on_limit: list[Way]) -> list[tuple[float, Way]]:
+def leaving(
+    regime: Regime, here: Course, beside: Course, on_limit: list[Way], *, again: bool
+) -> list[tuple[float, Way]]:
     """Of guards on their limit those that are about to go beyond it, and how far, as surely as rounding tells.
 
     Args:
@@ -20,10 +22,11 @@ def leaving(regime: Regime, here: Course, beside: Course, on_limit: list[Way]) -
         here: the course at the moment.
         beside: rounding away from it.
         on_limit: elements and guards.
+        again: whether modes have come back: then what hardly moves yet stays as it is, and its motion will tell.
     """
     step = regime.ahead(here[2])
     ways, beyond = (here, beside), list[tuple[float, Way]]()
-    for _ in range(2):  # where nothing moves yet, its acceleration tells
+    for _ in range(1 if again else 2):  # where nothing moves yet, its acceleration tells
         ways = _further(regime, step, ways[0]), _further(regime, step, ways[1])
         moving = []
         for pair in on_limit:

@@ -13,6 +13,9 @@ from shaftwork.network.graph import GraphPart
 if TYPE_CHECKING:
     from shaftwork.pipeline.model import Model
 
+# A speed across what is joined, as part of the largest one or of one, up to which it is an error of the run, no impact.
+NO_IMPACT = 1e-8
+
 ModeNames = tuple[str, ...]
 """The mode of every element of a network, in their order."""
 

@@ -10,25 +10,28 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import chain
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from sympy import Float
 
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.held import HeldArrays, HeldStores, Joints
 from shaftwork.codegen.linear_readings import ReadingMatrices
 from shaftwork.codegen.matrices import LinearPart
 from shaftwork.codegen.products import Factor
+from shaftwork.codegen.scalar import ScalarProgram
 from shaftwork.core.kept import Kept
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.graph import GROUND
 from shaftwork.network.templates import Kind
 from shaftwork.pipeline.phases.assemblies import Assembly
-from shaftwork.pipeline.phases.elements import Element, ModeNames
+from shaftwork.pipeline.phases.elements import NO_IMPACT, Element, ModeNames
 from shaftwork.reduction.form import StateForm
+from shaftwork.reduction.held_rows import HeldRows, groups, held_places
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.model import Model
@@ -50,20 +53,22 @@ class HeldAssembly(Assembly):
     """
 
     def __init__(self, model: Model, elements: Sequence[Element], laws: Sequence[int | None]) -> None:
+        self._entries = _entries(model, elements, laws)
         forms = [
             choice.form if law is None else None
             for law, choice in zip(
                 laws, chain.from_iterable(item.choices for item in model.netlist.placed), strict=True
             )
         ]
-        super().__init__(model, elements, forms)
+        super().__init__(model, elements, forms, None if self._entries is None else self._entries.rows)
         self.stores = HeldStores(model.form)
-        self._whole, self._laws, self._held = self, laws, list[int]()
+        self._laws, self._held = laws, list[int]()
         joining = (element.number for element, law in zip(elements, laws, strict=True) if law is not None)
         self._joining = [self._places[number] for number in joining if number in self._places]
         self._joints: tuple[LinearPart, Joints] | None = None
         self._factors: tuple[LinearPart, Factor, Factor] | None = None
         self._found: dict[bytes, dict[str, Any]] = {}
+        self._holds: tuple[Joints, Array] | None = None
         _ = self._many, self.clocks  # made once for all
 
     def holding(self, numbers: tuple[int, ...]) -> HeldAssembly:
@@ -71,9 +76,43 @@ class HeldAssembly(Assembly):
         made = copy(self)
         held = [law for k in numbers if (law := self._laws[k]) is not None]
         vars(made).update(
-            _held=held, _joints=None, _factors=None, _rates_made=Kept(KEPT_RATES), _problems=Kept(KEPT_RATES)
+            _held=held,
+            _joints=None,
+            _factors=None,
+            _holds=None,
+            _guards_made=Kept(KEPT_RATES),
+            _rates_made=Kept(KEPT_RATES),
+            _problems=Kept(KEPT_RATES),
         )
         return made
+
+    def holds_by_numbers(self, number: int) -> bool:
+        """Whether an element holds and gives way by other numbers in explicit rows."""
+        return self._entries is not None and self._laws[number] is not None
+
+    def taking_over(self, x: Array, p: Array) -> Array | None:
+        """The states in which all comes to one speed that holds, or None where an impact leads there."""
+        met = self.joints(p).met(x)
+        return met if np.abs(met - x).max() <= NO_IMPACT * max(np.abs(x).max(), 1.0) else None
+
+    @property
+    def has_rows(self) -> bool:
+        """Whether what holds is numbers in explicit rows, for which heyoka has a program."""
+        return self._entries is not None
+
+    @cached_property
+    def scalar(self) -> ScalarProgram | None:
+        """The right-hand side in scalar code, where there are rows."""
+        return None if self._entries is None else ScalarProgram(self._entries.rows)
+
+    def values(self, p: Array) -> Array:
+        """The parameters and what holds."""
+        if self._entries is None:
+            return p
+        joints = self.joints(p)
+        if self._holds is None or self._holds[0] is not joints:
+            self._holds = joints, joints.entries(self._entries)
+        return np.concatenate([p, self._holds[1]])
 
     def joints(self, p: Array) -> Joints:
         """What holds, for parameters; the last is kept."""
@@ -84,7 +123,7 @@ class HeldAssembly(Assembly):
 
     def alike(self, modes: ModeNames) -> tuple[Assembly, ModeNames]:
         """What is the same for the choice of an engine: whether an element holds or slips does not make it stiff."""
-        return self._whole, tuple("" if law is not None else name for law, name in zip(self._laws, modes, strict=True))
+        return self.whole, tuple("" if law is not None else name for law, name in zip(self._laws, modes, strict=True))
 
     def judged(self, moment: Moment, problem: Problem) -> Problem:
         """The motion by which an engine is chosen: with nothing held, as stiffness may be hidden in what is."""
@@ -125,7 +164,7 @@ class HeldAssembly(Assembly):
         free = p.copy()
         free[self._joining] = 0.0
         known = self._found.setdefault(free.tobytes(), {})
-        return self._rates_made(p.tobytes(), lambda: (self.bound(p).rhs, known))
+        return self._rates_made(p.tobytes(), lambda: (self._right_side(p), known))
 
 
 def laws_that_hold(model: Model, elements: Sequence[Element]) -> list[int | None] | None:
@@ -144,6 +183,42 @@ def laws_that_hold(model: Model, elements: Sequence[Element]) -> list[int | None
         return None
     found = [_law(form, element) if holds(element) else None for element in elements]
     return None if any(law is None and holds(element) for law, element in zip(found, elements, strict=True)) else found
+
+
+def _entries(model: Model, elements: Sequence[Element], laws: Sequence[int | None]) -> HeldRows | None:
+    """Rows in which what holds is numbers, or None where there are none."""
+    pairs = [(element, law) for element, law in zip(elements, laws, strict=True) if law is not None]
+    links = [law for _, law in pairs]
+    if not all(_vanishes(model.form, *pair) for pair in pairs):
+        return None
+    rigid = (element for element, law in zip(elements, laws, strict=True) if law is None and becomes_rigid(element))
+    others = [_places(model.form, element) for element in rigid]
+    found = groups(model.form, links, others)
+    rows = None if found is None else model.rows_of(len(others) + 1)
+    if found is None or rows is None:
+        return None
+    return HeldRows(rows, [(link, held_places(model.form, link)) for link in links], found)
+
+
+def _vanishes(form: StateForm, element: Element, law: int) -> bool:
+    """Whether a law is zero in all modes in which an element holds."""
+    branch, (first, *others) = form.graph.branches[law], element.modes.options
+    numbers = {symbol: symbol for symbol in branch.template.symbols if symbol.name == element.modes.symbol}
+    values = {mode.value for mode in others if mode.form != first.form}
+    return all(branch.template.law.xreplace(dict.fromkeys(numbers, Float(value))) == 0 for value in values)
+
+
+def becomes_rigid(element: Element) -> bool:
+    """Whether an element joins its ends in some modes."""
+    return len({mode.form for mode in element.modes.options}) > 1
+
+
+def _places(form: StateForm, element: Element) -> set[int]:
+    """Places of the states of speed that the nodes of an element's part turn with."""
+    part = next(part for part in form.graph.parts if part.name == element.part.name)
+    rows = (form.tree.potentials[node] or {} for node in part.nodes.values() if node != GROUND)
+    trees = set[int]().union(*rows)
+    return {place for place, tree in enumerate(form.across_states) if tree in trees}
 
 
 def holds(element: Element) -> bool:

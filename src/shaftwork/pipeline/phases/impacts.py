@@ -11,8 +11,8 @@ from shaftwork.codegen.observer import Impact
 from shaftwork.components.branches import INTEGRAL
 from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError, SimulationError
-from shaftwork.pipeline.phases.collisions import NO_IMPACT, Collisions, limited
-from shaftwork.pipeline.phases.elements import Element, ModeNames, Watched
+from shaftwork.pipeline.phases.collisions import Collisions, limited
+from shaftwork.pipeline.phases.elements import NO_IMPACT, Element, ModeNames, Watched
 from shaftwork.pipeline.phases.impulses import Blow, Impulses, Stage
 from shaftwork.pipeline.phases.moments import CLEAR, Change, Moment
 from shaftwork.pipeline.phases.regimes import Regimes, with_modes

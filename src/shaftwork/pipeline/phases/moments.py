@@ -134,6 +134,11 @@ class Regime:
         pairs = zip(parts, self.sizes, strict=True)
         return [(part, part * size / NOMINAL, math.copysign(1.0, part), AHEAD * size) for part, size in pairs]
 
+    @cached_property
+    def values(self) -> Array:
+        """The parameters and what else the equations are made of."""
+        return self.assembly.values(self.p)
+
     def constant(self, number: int, expression: Expr | None) -> float:
         """A number that is made of an element's parameters."""
         return self.assembly.constant(number, expression, self.p)

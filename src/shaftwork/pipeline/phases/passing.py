@@ -12,8 +12,9 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import no_value
 from shaftwork.integrate.problem import Reaction, SeriesError
-from shaftwork.pipeline.phases.elements import Element, ModeNames
-from shaftwork.pipeline.phases.moments import Change, Moment, Regime, clear_of_limit
+from shaftwork.pipeline.phases.assemblies import Assembly
+from shaftwork.pipeline.phases.elements import Element, ModeNames, Watched
+from shaftwork.pipeline.phases.moments import CLEAR, Change, Moment, Regime, clear_of_limit
 from shaftwork.pipeline.phases.settling import Settling
 
 # Of so many roundings of the time a guard may be late that is met together with another one.
@@ -26,16 +27,21 @@ class Phase(NamedTuple):
     Args:
         start: s.
         modes: of every element.
-        p: parameters of the equations.
+        assembly: the equations.
+        p: their parameters.
     """
 
     start: float
     modes: ModeNames
+    assembly: Assembly
     p: Array
 
 
-_Following = tuple[Regime, Sequence[float], list[Change]]
-"""The modes that follow, how far rounding moves their guards, and the changes that lead there."""
+_Following = tuple[Regime, Sequence[float], list[Change], Array | None]
+"""The modes that follow, how far rounding moves their guards, the changes that lead there, and the states if other."""
+
+_Entered = tuple[Sequence[float], Sequence[float], list[float], Array | None]
+"""Guards at an instant and later, how far beyond zero each is met, and the states if they are other ones."""
 
 
 def _always(_t: float, _moment: Moment) -> bool:
@@ -49,14 +55,16 @@ class _Way:
     Args:
         to: the modes that follow.
         side: on which the guard was met.
-        watched: guards and sides of those modes, and whether it is another one than leads there.
+        watched: guards and sides of those modes, and whether each must be within its limit there.
         change: its element, and the modes before and after.
+        holds: whether the element comes to hold its ends together, or does so no more.
     """
 
     to: Regime
     side: float
     watched: tuple[tuple[int, float, bool], ...]
     change: tuple[Element, str, str]
+    holds: bool
 
 
 class Passing:
@@ -85,7 +93,7 @@ class Passing:
         """The modes that go on, and how far rounding moves each guard."""
         self._note: Callable[[float, list[Change]], None] | None = note
         self._size = moment.x.size
-        self.phases = [Phase(start, self.regime.modes, self.regime.p)]
+        self.phases = [Phase(start, self.regime.modes, self.regime.assembly, self.regime.p)]
         """The phases so far."""
         self._reactions: list[Reaction] = []
         self._suited: set[Regime] = set()
@@ -100,17 +108,17 @@ class Passing:
         found = self._direct(met, t, x) or self._settled(met, t, x)
         if found is None:
             return None
-        regime, bands, changes = found
+        regime, bands, changes, y = found
         if regime not in self._suited:
-            moment = Moment(regime, x[: self._size].copy(), bands)
+            moment = Moment(regime, x[: self._size].copy() if y is None else y, bands)
             if not self._suits(t, moment):
                 self.beyond = moment, changes
                 return None
             self._suited.add(regime)
         self.regime, self.bands = regime, bands
         self._note(t, changes)
-        self.phases.append(Phase(t, regime.modes, regime.p))
-        reaction = Reaction(regime.p, regime.ends, bands, regime.equations)
+        self.phases.append(Phase(t, regime.modes, regime.assembly, regime.p))
+        reaction = Reaction(regime.values, regime.ends, bands, regime.equations, y)
         self._reactions.append(reaction)
         return reaction
 
@@ -126,8 +134,10 @@ class Passing:
         self.refuse_missed(met, t, x)
         moment, changes = self._settling.settle(t, t, before, met)
         if moment.x is before.x:
-            return moment.regime, moment.bands, changes
-        self.beyond = moment, changes  # other states are other equations, or an impact in these
+            return moment.regime, moment.bands, changes, None
+        if moment.regime.assembly.whole is self.regime.assembly.whole and not any(made.impact for made in changes):
+            return moment.regime, moment.bands, changes, moment.x
+        self.beyond = moment, changes  # other equations, or an impact in these
         return None
 
     def refuse_missed(self, met: int | None, t: float, x: Array) -> None:
@@ -146,7 +156,7 @@ class Passing:
                 raise no_value(*law)
         for number, made in regime.watched:
             k = made.guard
-            if k != met and min(made.side * now[k], made.side * before[k]) > bands[k]:
+            if k != met and min(made.side * now[k], made.side * before[k]) > CLEAR * bands[k]:
                 element = self._settling.elements[number]
                 words = (
                     f"'{element.name}' ceased to be {element.modes[regime.modes[number]].words} before t = {t:.9g} s"
@@ -157,36 +167,72 @@ class Passing:
     def _direct(self, met: int, t: float, x: Array) -> _Following | None:
         """The modes that follow by this guard alone, or None where it takes more to tell.
 
-        The same as in `Settling`, for the guards of one combination of modes only, as it is asked at every change.
+        The same as in `Settling`, for the guards of one combination of modes only, as it is asked at every change. What
+        comes to hold by more than it can gives way at once.
         """
-        ways = self.regime.ways
-        way: _Way | None = ways[met] if met in ways else ways.setdefault(met, self._find(self.regime, met))
+        way = self._way(self.regime, met)
         if way is None:
             return None
-        to, before = way.to, self.bands
-        now, near, later = to.near(t, x.tolist()[: self._size], to.tick, to.moves, to.longest)
+        made, changes = self._entered(way, t, x), [Change(t, *way.change)]
+        if isinstance(made, int):
+            element, before, _ = way.change
+            way = self._way(way.to, made) if way.holds else None
+            if way is None or way.change[0] is not element or not way.holds or way.change[2] == before:
+                return None
+            made, changes = self._entered(way, t, x), [*changes, Change(t, *way.change)]
+        if made is None or isinstance(made, int):
+            return None
+        now, later, bands, y = made
+        # it is left behind for good
+        if not way.holds and (way.side * now[met] < 0 or not way.side * (later[met] - now[met]) > 0):
+            return None
+        return way.to, bands, changes, y
+
+    def _entered(self, way: _Way, t: float, x: Array) -> _Entered | int | None:
+        """Guards now and later and their bands in the modes of a way, with the states where they are others; or the
+        number of one that is beyond its limit; None where it takes more to tell.
+        """
+        to, before, y = way.to, self.bands, None
+        if way.holds:
+            y = to.assembly.taking_over(x[: self._size], to.p)
+            if y is None:  # what comes to hold stops something
+                return None
+        states = (x if y is None else y).tolist()[: self._size]
+        now, near, later = to.near(t, states, to.tick, to.moves, to.longest)
         bands = [0.0] * len(now)
         for guard, side, other in way.watched:
             beyond, band = side * now[guard], abs(near[guard] - now[guard])
             if other and (beyond >= -band or beyond >= -before[guard]):
-                return None
+                return guard if beyond > max(band, before[guard]) else None
             bands[guard] = clear_of_limit(beyond, band)
-        if way.side * now[met] < 0:
-            return None
-        if not way.side * (later[met] - now[met]) > 0:  # it is not left behind for good
-            return None
-        return to, bands, [Change(t, *way.change)]
+        return now, later, bands, y
+
+    def _way(self, regime: Regime, met: int) -> _Way | None:
+        """Where a guard leads in the same equations."""
+        ways = regime.ways
+        found: _Way | None = ways[met] if met in ways else ways.setdefault(met, self._find(regime, met))
+        return found
 
     def _find(self, regime: Regime, met: int) -> _Way | None:
-        """Where a guard leads in the same equations."""
         pairs = [pair for pair in regime.watched if pair[1].guard == met]
         (number, ended), elements = pairs[0], self._settling.elements
         element, leave = elements[number], ended.leave
         before = regime.modes[number]
         if len(pairs) > 1 or not leave.to or leave.rebound is not None:
             return None
-        if element.modes[leave.to].form != element.modes[before].form:
+        holds = element.modes[leave.to].form != element.modes[before].form
+        if holds and not regime.assembly.holds_by_numbers(number):
             return None
         to = self._settling.regime((*regime.modes[:number], leave.to, *regime.modes[number + 1 :]))
-        watched = tuple((guard, side, guard != met or side == ended.side) for guard, side in to.ends)
-        return _Way(to, ended.side, watched, (element, before, leave.to))
+        watched = tuple((made.guard, made.side, _tells(number, ended, k, made, holds=holds)) for k, made in to.watched)
+        return _Way(to, ended.side, watched, (element, before, leave.to), holds)
+
+
+def _tells(number: int, ended: Watched, other: int, made: Watched, *, holds: bool) -> bool:
+    """Whether a guard must be within its limit where another one has led to its mode: it is not the same one.
+
+    What gives way is at rest, and about to move as the torque that it has met grows.
+    """
+    if holds:
+        return other != number or not made.leave.by_speed
+    return made.guard != ended.guard or made.side == ended.side

@@ -82,17 +82,18 @@ class Phases:
             raise made.with_traceback(None)  # else it would keep the frames of every time that it was raised
         return made
 
-    def running(self, modes: ModeNames, values: Mapping[str, float]) -> Assembly:
-        """The equations in which a motion goes on: those of `assembly`, or, for many parts that hold, one set for all.
+    def running(self, modes: ModeNames, values: Mapping[str, float], *, by_series: bool) -> Assembly:
+        """The equations in which a motion goes on: those of `assembly`, or one set for all that hold.
 
         Args:
             modes: of every element.
             values: parameters that differ from the network's.
+            by_series: whether they need a heyoka program.
 
         Raises:
             NetworkError: as there.
         """
-        if len(self._holding) < MANY:
+        if not self._holding:
             return self.assembly(modes)
         held = tuple(k for k in self._holding if self._form(k, modes) != self._form(k, self.first))
         forms = tuple(self._form(k, modes) for k in self._lasting)
@@ -101,7 +102,8 @@ class Phases:
             model = self.assembly(free).model
             laws = laws_that_hold(model, self.elements)
             self._wholes[forms] = None if laws is None else HeldAssembly(model, self.elements, laws)
-        if (whole := self._wholes[forms]) is None:
+        whole = self._wholes[forms]
+        if whole is None or not (whole.has_rows or (len(self._holding) >= MANY and not by_series)):
             return self.assembly(modes)
         if (forms, held) not in self._held:
             self._held[forms, held] = whole.holding(held)

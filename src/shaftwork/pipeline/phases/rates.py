@@ -8,36 +8,31 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
+from shaftwork.codegen.scalar import ScalarProgram
 
 if TYPE_CHECKING:
-    from shaftwork.pipeline.model import Model
     from shaftwork.pipeline.phases.assemblies import Motion
 
 FEW = 50
 """Right-hand sides that are not worth code of their own."""
 
 
-def rates_of(model: Model, bound: BoundArrays, motion: Motion, p: Array) -> Callable[[float, Array], Array]:
+def rates_of(program: ScalarProgram, motion: Motion, p: Array) -> Callable[[float, Array], Array]:
     """The right-hand side with its parameters.
 
     Args:
-        model: the equations.
-        bound: the same with parameters.
-        motion: rates and guards.
+        program: the equations.
+        motion: rates and guards, with parameters.
         p: the parameters.
     """
-    scalar_program = model.scalar
-    if scalar_program is None:
-        return bound.rhs
     asked, own = count(), list[Callable[[float, Array], Array]]()
 
     def rates(t: float, x: Array) -> Array:
         if next(asked) < FEW:
             return np.array(motion(t, x.tolist())[0])
         if not own:
-            own.append(scalar_program.bind(p))
+            own.append(program.bind(p))
         return own[0](t, x)
 
     return rates

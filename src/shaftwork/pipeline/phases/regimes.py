@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +11,7 @@ from sympy import Integer
 
 from shaftwork.codegen.elements import Array
 from shaftwork.components.branches import INTEGRAL
-from shaftwork.core.errors import NetworkError, ParameterError
+from shaftwork.core.errors import NetworkError, ParameterError, SimulationError
 from shaftwork.pipeline.ending import Ending
 from shaftwork.pipeline.phases.elements import Element, ModeNames
 from shaftwork.pipeline.phases.moments import AHEAD_OF_RUN, ROUNDINGS, Moment, Regime
@@ -19,6 +19,7 @@ from shaftwork.pipeline.phases.starts import begins_anew
 from shaftwork.reduction.cancelling import jamming
 
 if TYPE_CHECKING:
+    from shaftwork.pipeline.phases.assemblies import Assembly
     from shaftwork.pipeline.phases.phases import Phases
 
 # How far in rad a motion may start beyond a rigid limit: what errors and printed digits of another run leave there.
@@ -32,12 +33,17 @@ class Regimes:
         phases: the sets of equations.
         values: parameters that differ from the network's.
         span: start and end of the run, s.
-        own: whether each has equations of its own, also where there are many.
+        equations: for a combination of modes.
     """
 
-    def __init__(self, phases: Phases, values: Mapping[str, float], span: tuple[float, float], *, own: bool) -> None:
-        self._phases, self._values = phases, dict(values)
-        self._own = own
+    def __init__(
+        self,
+        phases: Phases,
+        values: Mapping[str, float],
+        span: tuple[float, float],
+        equations: Callable[[ModeNames], Assembly],
+    ) -> None:
+        self._phases, self._values, self._equations = phases, dict(values), equations
         self._times = ROUNDINGS * math.ulp(max(map(abs, span))), AHEAD_OF_RUN * (span[1] - span[0])
         self._made: dict[ModeNames, Regime] = {}
 
@@ -48,8 +54,7 @@ class Regimes:
             NetworkError: the equations of these modes contradict each other, or a gear jams in them.
         """
         if modes not in self._made:
-            phases = self._phases
-            assembly = phases.assembly(modes) if self._own else phases.running(modes, self._values)
+            assembly = self._equations(modes)
             form, p = assembly.model.form, assembly.vector(self._values, self._phases.numbers(modes))
             if self._values and (jammed := tuple(jamming(form, {**assembly.model.parameters, **self._values}))):
                 raise NetworkError(f"'{form.graph.name}' cannot be assembled", jammed)
@@ -137,6 +142,20 @@ class Regimes:
         if new.assembly is moment.regime.assembly:
             return Moment(new, moment.x)
         return self.taking(modes, t, self.held(moment, t))
+
+
+def anew(elements: Sequence[Element], moment: Moment, t: float, number: int) -> str:
+    """The mode of an element in which a motion would start, other than the one that ends."""
+    regime, before = moment.regime, moment.regime.modes[number]
+    for late in (0.0, regime.ahead(moment.course(t)[2])):  # by rounding, what ends the mode may not be true yet
+        to = regime.assembly.start_of(number, before, t + late, moment.moved(t, late).x, regime.p)
+        if to:
+            return to
+    element = elements[number]
+    raise SimulationError(
+        f"'{element.name}' is no more {element.modes[before].words} at t = {t:.9g} s, and starts in none of its "
+        "other modes. Give one of them a condition that holds there, Mode(starts=...)."
+    )
 
 
 def with_modes(modes: ModeNames, changed: Mapping[int, str]) -> ModeNames:

@@ -11,13 +11,14 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
+from operator import itemgetter
 
 import numpy as np
 
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.observer import Impact
 from shaftwork.codegen.timeline import Timeline
-from shaftwork.core.errors import AccuracyWarning, ParameterError, SimulationError
+from shaftwork.core.errors import AccuracyWarning, NetworkError, ParameterError, SimulationError
 from shaftwork.core.notices import warn
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import Problem, SeriesError, StickingError, Trajectory, changed
@@ -25,8 +26,8 @@ from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.ending import Ending
 from shaftwork.pipeline.implicit import PRESCRIBED, at_rest
 from shaftwork.pipeline.phases.assemblies import Assembly
-from shaftwork.pipeline.phases.collisions import NO_IMPACT
-from shaftwork.pipeline.phases.commutation import takeovers
+from shaftwork.pipeline.phases.commutation import is_switch, takeovers
+from shaftwork.pipeline.phases.elements import NO_IMPACT
 from shaftwork.pipeline.phases.moments import Change, Moment, Regime
 from shaftwork.pipeline.phases.passing import Passing, Phase
 from shaftwork.pipeline.phases.phases import FOLLOWING, Phases
@@ -49,12 +50,10 @@ class Span:
     """One run of an engine: phases in the same equations.
 
     Args:
-        assembly: the equations.
         trajectory: the motion, in the states of these equations and their clocks.
         phases: at least one.
     """
 
-    assembly: Assembly
     trajectory: Trajectory
     phases: tuple[Phase, ...]
 
@@ -74,10 +73,12 @@ class Known:
     begins: list[tuple[Moment, list[Change]]] = field(default_factory=list)
 
 
-def _known(phases: Phases, values: Mapping[str, float], span: tuple[float, float], *, own: bool) -> Known:
+def _known(phases: Phases, values: Mapping[str, float], demand: Demand, *, own: bool) -> Known:
     """What the last run with these values over the same time has found out, or nothing yet."""
-    key = tuple(sorted(values.items())), span, own
-    made: Known = phases.found(key, lambda: Known(Settling(phases, values, span, own=own)))
+    by_series = demand.engine == "heyoka"
+    equations = None if own else partial(phases.running, values=values, by_series=by_series)
+    key = tuple(sorted(values.items())), demand.span, own, by_series
+    made: Known = phases.found(key, lambda: Known(Settling(phases, values, demand.span, equations)))
     return made
 
 
@@ -88,12 +89,12 @@ class Run:
         phases: the sets of equations.
         values: parameters that differ from the network's.
         demand: what is asked.
-        own: whether each combination of modes has equations of its own, also where there are many; so for heyoka.
+        own: whether each combination of modes has equations of its own.
     """
 
     def __init__(self, phases: Phases, values: Mapping[str, float], demand: Demand, *, own: bool = False) -> None:
         self.phases, self.demand = phases, demand
-        self._known = _known(phases, values, demand.span, own=own or demand.engine == "heyoka")
+        self._known = _known(phases, values, demand, own=own)
         self.settling = self._known.settling
         self.spans: list[Span] = []
         self.changes: list[Change] = []
@@ -131,32 +132,58 @@ class Run:
 
     def _started(self, initial: Mapping[str, float] | None) -> tuple[Moment, list[Change]]:
         """The states and modes at the start, and what changes there; currents may need diodes that conduct."""
-        try:
-            return self._joined(initial, {})
-        except ParameterError:
-            phases, start = self.phases, self.demand.span[0]
-            if not initial:
-                raise
-            for joins in takeovers(phases.elements, phases.first):
-                if not self.settling.possible(with_modes(phases.first, joins)):
-                    continue
-                with suppress(ParameterError, SimulationError):
-                    found = self._joined(initial, joins)
-                    held = self.settling.held(found[0], start)
-                    if all(abs(held.get(k, v) - v) <= NO_IMPACT * max(abs(v), 1.0) for k, v in initial.items()):
-                        return found
-            raise
+        if not initial:
+            return self._joined({}, self._read(initial, {}))
+        readings, failed = list[tuple[int, dict[int, str], Moment]](), None
+        closed = self._closed()
+        for joins in [{}, closed] if closed else [{}]:
+            try:
+                moment = self._read(initial, joins)
+            except ParameterError as error:
+                failed = failed or error
+            else:
+                held = self.settling.held(moment, self.demand.span[0])
+                readings.append((sum(held[name] != 0 for name in held.keys() - initial.keys()), joins, moment))
+        if readings:  # what is not named rests, if the circuit lets it
+            _, joins, moment = min(readings, key=itemgetter(0))
+            return self._joined(joins, moment)
+        for joins in takeovers(self.phases.elements, with_modes(self.phases.first, closed)):
+            with suppress(ParameterError, SimulationError, NetworkError):
+                found = self._joined(closed | joins, self._read(initial, closed | joins))
+                held = self.settling.held(found[0], self.demand.span[0])
+                if all(abs(held.get(k, v) - v) <= NO_IMPACT * max(abs(v), 1.0) for k, v in initial.items()):
+                    return found
+        assert failed is not None  # noqa: S101 (as no reading is left)
+        raise failed
 
-    def _joined(self, initial: Mapping[str, float] | None, joins: Mapping[int, str]) -> tuple[Moment, list[Change]]:
-        """The same with start values read in the equations in which some elements join something."""
+    def _closed(self) -> dict[int, str]:
+        """Switches that the time closes at the start, and their modes."""
+        switches = [k for k, element in enumerate(self.phases.elements) if is_switch(element.modes)]
+        if not switches:
+            return {}
+        regime = self.settling.regime(self.phases.first)
+        rest = np.zeros(len(regime.assembly.model.states))
+        modes = regime.assembly.first_modes(self._after(regime), rest, regime.p)
+        joins = {k: modes[k] for k in switches if modes[k] != self.phases.first[k]}
+        return joins if self.settling.possible(with_modes(self.phases.first, joins)) else {}
+
+    def _read(self, initial: Mapping[str, float] | None, joins: Mapping[int, str]) -> Moment:
+        """Start values in the equations in which some elements join something."""
         start, regime = self.demand.span[0], self.settling.regime(with_modes(self.phases.first, joins))
-        assembly, p = regime.assembly, regime.p
+        assembly = regime.assembly
         if isinstance(initial, Mapping) and initial and start != 0:
             refuse_incomplete(assembly.stores.names, initial, start)
-        x, waves = start_of(assembly.model, assembly.prepared(p), initial, self.demand.span)
-        x = self._beside_waves(regime, x, waves)
-        after = self.timeline(assembly, p).sides(start)[1]
-        return self.settling.settle(start, after, self.settling.started(after, x, joins), None)
+        x, waves = start_of(assembly.model, assembly.prepared(regime.p), initial, self.demand.span)
+        return Moment(regime, self._beside_waves(regime, x, waves))
+
+    def _after(self, regime: Regime) -> float:
+        """A time just after the start."""
+        return self.timeline(regime.assembly, regime.p).sides(self.demand.span[0])[1]
+
+    def _joined(self, joins: Mapping[int, str], read: Moment) -> tuple[Moment, list[Change]]:
+        """The modes that go on from a start that has been read where some elements join something, and the changes."""
+        after = self._after(read.regime)
+        return self.settling.settle(self.demand.span[0], after, self.settling.started(after, read.x, joins), None)
 
     def _beside_waves(self, regime: Regime, x: Array, start: WaveStart | CarriedWaves | None) -> Array:
         """The states at the start, and behind them what arrives by waves, if there are any."""
@@ -194,9 +221,9 @@ class Run:
     def timeline(self, assembly: Assembly, p: Array) -> Timeline:
         """The instants at which inputs jump or bend."""
         timelines = self._known.timelines
-        if assembly not in timelines:
-            timelines[assembly] = assembly.model.switching.timeline(p, *self.demand.span)
-        return timelines[assembly]
+        if assembly.whole not in timelines:
+            timelines[assembly.whole] = assembly.model.switching.timeline(p, *self.demand.span)
+        return timelines[assembly.whole]
 
     def _instants(self, moment: Moment) -> Timeline:
         return self.timeline(moment.regime.assembly, moment.regime.p)
@@ -253,7 +280,6 @@ class Run:
 
     def _span(self, t: float, moment: Moment) -> tuple[float, Moment]:
         """One run of the engine, up to a change of equations or the next instant at which an input jumps."""
-        regime = moment.regime
         trajectory, passing = self._passed(t, moment)
         passing.close()
         self.steps += trajectory.statistics.get("steps", 0)
@@ -262,14 +288,14 @@ class Run:
         if self.demand.t_eval is not None and t in trajectory.t[-1:] and t < self.demand.span[1]:
             # an output at an event belongs to the next phase, which has it too
             trajectory = replace(trajectory, t=trajectory.t[:-1], x=trajectory.x[:-1])
-        self.spans.append(Span(regime.assembly, trajectory, tuple(passing.phases)))
+        self.spans.append(Span(trajectory, tuple(passing.phases)))
         met, sides = trajectory.met, self._instants(moment).sides(t)
         if met is not None and passing.beyond is not None and sides == (t, t):
             moment, changes = passing.beyond
             self.note(t, changes)
             return t, moment
         moment = Moment(passing.regime, x[: moment.x.size], passing.bands)
-        if sides != (t, t) and regime.assembly.model.form.has_impulses:
+        if sides != (t, t) and moment.regime.assembly.model.form.has_impulses:
             moment, changes, at_once = self.settling.jumped(t, moment, *sides)
             self.note(t, changes)
             self.jumps.append(at_once)

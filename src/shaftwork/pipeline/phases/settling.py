@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
 from types import MappingProxyType
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import NetworkError, SimulationError
-from shaftwork.pipeline.phases.commutation import commutations
+from shaftwork.pipeline.phases.commutation import Commutation, by_time, is_switch
 from shaftwork.pipeline.phases.courses import Way, chosen, leaving
 from shaftwork.pipeline.phases.elements import ModeNames, Watched
 from shaftwork.pipeline.phases.impacts import Impacts
@@ -22,9 +22,10 @@ from shaftwork.pipeline.phases.moments import (
     clear_of_limits,
     together,
 )
-from shaftwork.pipeline.phases.regimes import Regimes, refuse_beyond, with_modes
+from shaftwork.pipeline.phases.regimes import Regimes, anew, refuse_beyond, with_modes
 
 if TYPE_CHECKING:
+    from shaftwork.pipeline.phases.assemblies import Assembly
     from shaftwork.pipeline.phases.phases import Phases
 
 # So many changes within one instant have no end: of two rigid flanks without a gap between them, say.
@@ -41,16 +42,21 @@ class Settling:
         phases: the sets of equations.
         values: parameters that differ from the network's.
         span: start and end of the run, s.
-        own: whether each combination of modes has equations of its own, as for an analysis that reads them.
+        equations: for a combination of modes; by default each has its own, as an analysis reads them.
     """
 
     def __init__(
-        self, phases: Phases, values: Mapping[str, float], span: tuple[float, float], *, own: bool = True
+        self,
+        phases: Phases,
+        values: Mapping[str, float],
+        span: tuple[float, float],
+        equations: Callable[[ModeNames], Assembly] | None = None,
     ) -> None:
         self._phases, self.elements = phases, phases.elements
-        self._regimes = Regimes(phases, values, span, own=own)
+        self._regimes = Regimes(phases, values, span, equations or phases.assembly)
         self.regime, self.held, self.resumed = self._regimes.regime, self._regimes.held, self._regimes.resumed
         self._impacts = Impacts(self._regimes, self.elements, together=phases.netlist.impacts == "together")
+        self._commutation = Commutation(self._regimes, self.elements, self._beyond)
         self.jumped, self.possible = self._impacts.jumped, self._regimes.possible
 
     def started(self, t: float, x: Array, joins: Mapping[int, str] = MappingProxyType({})) -> Moment:
@@ -72,10 +78,11 @@ class Settling:
         modes, wanted = loose.modes, with_modes(loose.assembly.first_modes(t, x, loose.p), joins)
         if self._regimes.possible(wanted):
             modes = wanted
-        else:
-            for k, name in enumerate(wanted):
-                leaves = self.elements[k].modes[name].leaves
-                options = (with_modes(modes, {k: to}) for to in (name, *(leave.to for leave in leaves if leave.to)))
+        else:  # of switches the time tells, so that others give way
+            for k in sorted(range(len(wanted)), key=lambda k: not is_switch(self.elements[k].modes)):
+                leaves = (leave for leave in self.elements[k].modes[wanted[k]].leaves if not by_time(leave))
+                names = (wanted[k], *(leave.to for leave in leaves if leave.to))
+                options = (with_modes(modes, {k: name}) for name in names)
                 modes = next(filter(self._regimes.possible, options), modes)
         return self._regimes.changed(Moment(loose, x), t, modes)
 
@@ -239,11 +246,15 @@ class Settling:
                 (Murty, Linear Complementarity, 1988, section 4.1).
         """
         in_order = repeats > 0
-        moment, found = self._exceeded(moment, t, ended, still, in_order=in_order)
+        moment, found = self._exceeded(moment, t, ended, still, in_order=in_order, again=in_order)
         return moment, chosen(found, in_order=in_order)
 
+    def _beyond(self, moment: Moment, t: float) -> list[Way]:
+        """Elements and guards that end modes at once."""
+        return [way for _, way in self._exceeded(moment, t, moment, (), in_order=False)[1]]
+
     def _exceeded(
-        self, moment: Moment, t: float, ended: Moment, still: Sequence[Way], *, in_order: bool
+        self, moment: Moment, t: float, ended: Moment, still: Sequence[Way], *, in_order: bool, again: bool = False
     ) -> tuple[Moment, list[tuple[float, Way]]]:
         """The guards beyond their limits, or on them and about to go beyond, and how far; the moment with its bands.
 
@@ -253,6 +264,7 @@ class Settling:
             ended: the moment before any change.
             still: elements and guards that were found here already and change nothing.
             in_order: whether the first one will be taken, and not the worst.
+            again: whether modes have come back.
         """
         regime, here = moment.regime, moment.course(t)
         beside, now = regime.course(*regime.beside(here)), here[3]
@@ -273,7 +285,7 @@ class Settling:
         # impacts come first: torques are those of the motion after them
         hits = [excess for excess in beyond if not excess[1][1].leave.by_torque]
         if on_limit and not hits:
-            soon_beyond = leaving(regime, here, beside, on_limit)
+            soon_beyond = leaving(regime, here, beside, on_limit, again=again)
             hits = [excess for excess in soon_beyond if excess[1][1].leave.rebound is not None]
             beyond = beyond + soon_beyond if in_order else beyond or soon_beyond
         return Moment(regime, moment.x, clear_of_limits(regime, now, bands)), hits or beyond
@@ -287,7 +299,9 @@ class Settling:
         """
         element, leave, regime = self.elements[number], ended.leave, moment.regime
         before = regime.modes[number]
-        to = leave.to or self._anew(moment, after, number)
+        to = leave.to or anew(self.elements, moment, after, number)
+        if is_switch(element.modes) and (switched := self._commutation.switched(t, after, moment, number, to)):
+            return *switched, None
         speed = self._impacts.meets(moment, after, element.modes[to], number)
         slips = next((name for side, name in element.modes[to].gives_way if side * speed > 0), "")
         if slips == before:  # it was met by rounding alone: it is moving away
@@ -298,24 +312,11 @@ class Settling:
             if speed or (leave.rebound is not None and not slips):
                 return *self._hit(t, after, moment, number, replace(ended, leave=replace(leave, to=to))), None
             modes = with_modes(regime.modes, {number: to})
-            new, conducting = self._commutated(moment, after, modes)
+            new, conducting = self._commutation.commutated(moment, after, modes)
             others = [Change(t, self.elements[k], regime.modes[k], name) for k, name in conducting.items()]
             return new, [Change(t, element, before, to), *others], None
         except NetworkError as error:
             return *self._around(t, after, moment, (number, to), error, tried), error
-
-    def _anew(self, moment: Moment, t: float, number: int) -> str:
-        """The mode of an element in which a motion would start, other than the one that ends."""
-        regime, before = moment.regime, moment.regime.modes[number]
-        for late in (0.0, regime.ahead(moment.course(t)[2])):  # by rounding, what ends the mode may not be true yet
-            to = regime.assembly.start_of(number, before, t + late, moment.moved(t, late).x, regime.p)
-            if to:
-                return to
-        element = self.elements[number]
-        raise SimulationError(
-            f"'{element.name}' is no more {element.modes[before].words} at t = {t:.9g} s, and starts in none of its "
-            "other modes. Give one of them a condition that holds there, Mode(starts=...)."
-        )
 
     def _hit(self, t: float, after: float, moment: Moment, number: int, ended: Watched) -> tuple[Moment, list[Change]]:
         """An impact; what hits stays where a rebound would lose less than it gains, as it is found late by rounding.
@@ -343,14 +344,6 @@ class Settling:
         step, beyond = regime.ahead(here[2]), met.side * here[3][met.guard]
         gain = met.side * regime.limits(*regime.later(here, step))[met.guard] - beyond
         return beyond * step / gain if 0 < beyond < gain else 0.0
-
-    def _commutated(self, moment: Moment, t: float, modes: ModeNames) -> tuple[Moment, dict[int, str]]:
-        """The modes that are wanted, and what then takes over a torque or current that they would cut off."""
-        plain = self._regimes.changed(moment, t, modes)
-        for other, changed in commutations(self._regimes, self.elements, t, moment, plain):
-            if not self._violated(other, t, other, ())[1]:
-                return other, changed
-        return plain, {}
 
     def _around(
         self, t: float, after: float, moment: Moment, wanted: tuple[int, str], error: NetworkError, tried: int

@@ -15,12 +15,16 @@ from shaftwork.codegen.valueless import in_words
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import no_value
+from shaftwork.core.kept import Kept
 from shaftwork.network.graph import GraphPart
 from shaftwork.pipeline.phases.starts import conditional, starts_of
 from shaftwork.reduction.readings import Readings
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.phases.elements import Element, ModeNames
+
+KEPT = 256
+"""Speeds across elements that are kept with values of the parameters."""
 
 
 class Shown:
@@ -45,6 +49,7 @@ class Shown:
         # of each element the place where what it shows begins
         self._firsts = tuple(accumulate((2 + len(symbols) for symbols in self._symbols), initial=0))
         self._speeds: dict[int, Callable[..., Any]] = {}
+        self._bound = Kept[tuple[int, bytes], Callable[..., Any]](KEPT)
 
     def first_modes(self, t: float, read: Sequence[float], p: Array) -> ModeNames:
         """The mode of each element in which a motion starts, in the equations in which nothing is joined by a mode."""
@@ -58,14 +63,13 @@ class Shown:
 
     def across(self, numbers: Sequence[int], t: float, read: Sequence[float], p: Array) -> list[float]:
         """The speeds across elements, which are asked for at every impact: in plain floats, and without the others."""
-        parameters = p.tolist()
-        return [float(self._speed(number)(parameters)[1](t, read)[0]) for number in numbers]
+        return [float(self._speed(number, p)(t, read)[0]) for number in numbers]
 
-    def _speed(self, number: int) -> Callable[..., Any]:
+    def _speed(self, number: int, p: Array) -> Callable[..., Any]:
         if number not in self._speeds:
             given = {"t": TIME, "read": self._readings.symbols}
             self._speeds[number] = bindable(given, {"p": self._parameters}, (), (self._expression(number, ACROSS),))
-        return self._speeds[number]
+        return self._bound((number, p.tobytes()), lambda: self._speeds[number](p.tolist())[1])
 
     def _at(self, t: float, read: Sequence[float], p: Array) -> Sequence[Any]:
         return self.function(t, *read, *p.tolist())  # type: ignore[no-any-return]

@@ -23,7 +23,7 @@ from shaftwork.results.solution import PhaseRow, Solution
 
 def solution(run: Run, name: str) -> Solution:
     """The motion as a whole, to be read."""
-    names = run.spans[0].assembly.stores.names
+    names = run.spans[0].phases[0].assembly.stores.names
     whole = _Whole(run) if run.waves is None else _WithWaves(run, run.waves)
     return Solution(
         name=name,
@@ -42,25 +42,27 @@ def solution(run: Run, name: str) -> Solution:
 
 def _stored(run: Run, span: Span, names: tuple[str, ...]) -> Array:
     """(k, stores) all that is stored at the output times of a span, and what arrives by waves."""
-    t, states = span.trajectory.t, span.trajectory.x[:, : _width(span.assembly)]
-    arrived = states[:, len(span.assembly.model.states) :]
+    assembly = span.phases[0].assembly
+    t, states = span.trajectory.t, span.trajectory.x[:, : _width(assembly)]
+    arrived = states[:, len(assembly.model.states) :]
     if not t.size:
         return np.empty((0, len(names) + arrived.shape[1]))
     return np.hstack([_stores(run, span, names, states), arrived])
 
 
 def _stores(run: Run, span: Span, names: tuple[str, ...], states: Array) -> Array:
-    t = span.trajectory.t
-    stores = span.assembly.stores
+    t, first = span.trajectory.t, span.phases[0]
+    stores = first.assembly.stores
     if stores.by_loops:
-        return stores.of(lambda: span.assembly.bound(span.phases[0].p), t, states)
+        return stores.of(lambda: first.assembly.bound(first.p), t, states)
     starts = np.array([phase.start for phase in span.phases])
-    read_at = run.timeline(span.assembly, span.phases[0].p).one_sided(t)
+    read_at = run.timeline(first.assembly, first.p).one_sided(t)
     made = np.empty((t.size, len(names)))
     index = np.clip(np.searchsorted(starts, t, side="right") - 1, 0, None)
     for number in np.unique(index).tolist():
         here = index == number
-        made[here] = stores.of(partial(span.assembly.bound, span.phases[number].p), read_at[here], states[here])
+        phase = span.phases[number]
+        made[here] = stores.of(partial(phase.assembly.bound, phase.p), read_at[here], states[here])
     return made
 
 
@@ -105,7 +107,7 @@ class _WithWaves(_Whole):
 
 
 def _stretch(run: Run, span: Span, phase: Phase) -> Stretch:
-    assembly, states = span.assembly, span.assembly.model.states
+    assembly, states = phase.assembly, phase.assembly.model.states
     size, dense = _width(assembly), span.trajectory.dense
     instants = run.timeline(assembly, phase.p)
     bind = partial(assembly.bound, phase.p)

@@ -111,14 +111,15 @@ def _legs_of_run(run: Run) -> Iterator[Leg]:
         starts = [phase.start for phase in span.phases]
         for phase, (start, stop) in zip(span.phases, pairwise([*starts, end]), strict=True):
             if stop > start:
-                instants = run.timeline(span.assembly, phase.p)
-                leg = _leg(span.assembly.model, phase.p, _states(span), span.trajectory.steps, (start, stop), instants)
-                yield replace(leg, assembly=span.assembly, modes=phase.modes)
+                assembly, p = phase.assembly, phase.p
+                instants = run.timeline(assembly, p)
+                leg = _leg(assembly.model, p, _states(span), span.trajectory.steps, (start, stop), instants)
+                yield replace(leg, assembly=assembly, modes=phase.modes)
 
 
 def _states(span: Span) -> Callable[[Array], Array]:
     """Those of the equations, without their clocks."""
-    size, dense = len(span.assembly.model.states), span.trajectory.dense
+    size, dense = len(span.phases[0].assembly.model.states), span.trajectory.dense
     return lambda times: dense(times)[:, :size]
 
 
