@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import pytest
 
@@ -69,3 +70,116 @@ def test_a_speed_that_the_frame_holds_is_no_start() -> None:
     net.add(sw.Ground("frame"), "a")
     with pytest.raises(sw.ParameterError, match=r"J\.omega = 3 contradicts its sources.*it would be 0\. Leave it out"):
         net.simulate(1.0, initial={"J.omega": 3.0})
+
+
+def buck(order: Iterable[str], **switch: float) -> sw.Network:
+    """A switch that feeds a coil, and the diode through which its current goes on; what is added first, and later."""
+    parts = {
+        "supply": (sw.VoltageSource("supply", u=U), "p", "ground"),
+        "switch": (sw.Switch("switch", **switch), "p", "x"),
+        "diode": (sw.Diode("diode"), "ground", "x"),
+        "L": (sw.Inductor("L", L=L), "x", "r"),
+        "R": (sw.Resistor("R", R=R), "r", "ground"),
+    }
+    net = sw.Network("buck")
+    for name in order:
+        net.add(*parts[name])
+    return net
+
+
+def rising(current: float, t: float, final: float = U / R) -> float:
+    """The current of the coil after some time, s."""
+    return final + (current - final) * math.exp(-t * R / L)
+
+
+@pytest.mark.parametrize("current", [0.0, 5.0, -5.0])
+@pytest.mark.parametrize("diode_first", [True, False])
+def test_a_switch_is_closed_from_the_start_wherever_its_diode_stands(
+    diode_first: bool,  # noqa: FBT001
+    current: float,
+) -> None:
+    order = ("diode", "supply", "switch", "L", "R") if diode_first else ("R", "L", "switch", "diode", "supply")
+    sol = buck(order, t_off=0.02).simulate(0.03, initial={"L.i": current} if current else None)
+    carried = rising(current, 0.02)
+    assert sol.at([0.02 - 1e-9])["L.i"][0] == pytest.approx(carried, rel=1e-6)  # it falls by 1e-7 of it in 1 ns
+    assert sol["L.i"][-1] == pytest.approx(rising(carried, 0.01, 0.0), rel=CLOSE)
+
+
+def test_a_switch_that_closes_takes_the_current_over_from_a_diode() -> None:
+    sol = buck(("supply", "switch", "diode", "L", "R"), t_on=0.01).simulate(0.03, initial={"L.i": 10.0})
+    assert sol["L.i"][-1] == pytest.approx(rising(rising(10.0, 0.01, 0.0), 0.02), rel=CLOSE)
+    assert sol.energy.lost_in["switch"] == sol.energy.lost_in["diode"] == 0.0
+
+
+@pytest.mark.parametrize("diodes", [(), ("high", "low")])
+@pytest.mark.parametrize("order", ["upper lower", "lower upper"])
+def test_switches_of_one_instant_change_together(order: str, diodes: tuple[str, ...]) -> None:
+    """A half bridge without a dead time: in no order is the supply shorted, or the current cut off."""
+    parts = {
+        "upper": (sw.Switch("upper", t_off=0.02), "p", "x"),
+        "lower": (sw.Switch("lower", t_on=0.02), "x", "ground"),
+        "high": (sw.Diode("high"), "x", "p"),
+        "low": (sw.Diode("low"), "ground", "x"),
+    }
+    net = sw.Network("half bridge")
+    net.add(sw.VoltageSource("supply", u=U), "p", "ground")
+    for name in (*order.split(), *diodes):
+        net.add(*parts[name])
+    net.add(sw.Inductor("L", L=L), "x", "r")
+    net.add(sw.Resistor("R", R=R), "r", "ground")
+    sol = net.simulate(0.03)
+    assert sol["L.i"][-1] == pytest.approx(rising(rising(0.0, 0.02), 0.01, 0.0), rel=CLOSE)
+
+
+@pytest.mark.parametrize("coils", [1, 3, 5])
+def test_each_of_several_coils_goes_on_through_its_own_diode(coils: int) -> None:
+    net = sw.Network("coils")
+    net.add(sw.VoltageSource("supply", u=U), "p", "ground")
+    net.add(sw.Switch("switch", t_off=0.02), "p", "x")
+    for k in range(coils):
+        net.add(sw.Resistor(f"fuse{k}", R=0.1), "x", f"x{k}")
+        net.add(sw.Diode(f"diode{k}"), "ground", f"x{k}")
+        net.add(sw.Inductor(f"L{k}", L=L * (k + 1)), f"x{k}", f"r{k}")
+        net.add(sw.Resistor(f"R{k}", R=R), f"r{k}", "ground")
+    sol = net.simulate(0.03)
+    for k in range(coils):
+        rate, total = 1.0 / (L * (k + 1)), R + 0.1
+        carried = U / total * (1.0 - math.exp(-0.02 * total * rate))
+        assert sol[f"L{k}.i"][-1] == pytest.approx(carried * math.exp(-0.01 * R * rate), rel=CLOSE)
+    assert sol.energy.lost_in["switch"] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_coil_that_a_switch_shorts_starts_without_the_current_of_the_other_one() -> None:
+    net = fed(sw.Inductor("L1", L=L), u=0.0)
+    net.add(sw.Switch("switch"), "n1", "r")
+    assert net.simulate(0.01, initial={"L1.i": 10.0})["L.i"][0] == 0.0
+    assert net.simulate(0.01, initial={"L1.i": 10.0, "L.i": 4.0})["L.i"][-1] == pytest.approx(4.0, rel=CLOSE)
+
+
+def test_two_diodes_in_a_row_charge_a_capacitor_and_do_not_empty_it() -> None:
+    """At 50 ms a switch shorts the first capacitor, which two diodes part from the second one."""
+    net = sw.Network("rectifier")
+    net.add(sw.VoltageSource("supply", u=10.0), "s", "ground")
+    net.add(sw.Resistor("R", R=1.0), "s", "a")
+    net.add(sw.Capacitor("C1", C=0.001), "a", "ground")
+    net.add(sw.Switch("switch", t_on=0.05), "a", "ground")
+    net.add(sw.Diode("first"), "a", "b")
+    net.add(sw.Resistor("bleeder", R=1000.0), "b", "ground")
+    net.add(sw.Diode("second"), "b", "c")
+    net.add(sw.Capacitor("C2", C=0.001), "c", "ground")
+    sol = net.simulate(0.06)
+    charged = 10.0 / 1.001 * (1.0 - math.exp(-0.05 * (1.0 + 1e-3) / 0.002))
+    assert sol.at([0.06])["C2.u"][0] == pytest.approx(charged, rel=1e-7)
+    assert sol["C1.u"][-1] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_an_empty_capacitor_behind_two_diodes_takes_half_of_what_a_supply_gives_at_once() -> None:
+    net = sw.Network("rectifier")
+    net.add(sw.VoltageSource("supply", u=10.0), "a", "ground")
+    net.add(sw.Diode("first"), "a", "b")
+    net.add(sw.Resistor("bleeder", R=1000.0), "b", "ground")
+    net.add(sw.Diode("second"), "b", "c")
+    net.add(sw.Capacitor("C", C=0.001), "c", "ground")
+    sol = net.simulate(0.1)
+    assert sol["C.u"][-1] == pytest.approx(10.0, rel=CLOSE)
+    assert sol.energy_residual < 1e-9

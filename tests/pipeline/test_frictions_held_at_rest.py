@@ -174,3 +174,20 @@ def test_equations_of_a_phase_have_the_torque_of_rest_where_another_part_holds()
     assert r"\tau_{s,\mathrm{one}}" in held
     assert r"\tau_{c,\mathrm{one}}" not in held
     assert r"\tau_{c,\mathrm{one}}" in free
+
+
+@pytest.mark.parametrize("order", list(permutations(range(3))))
+def test_what_rubs_within_a_planetary_gear_that_a_clutch_locks_does_not_tell_its_motion(order: tuple[int, ...]) -> None:
+    """The carrier has no inertia. Both cannot hold together with the teeth, and the friction holds only 0.2 N m."""
+    rigid = [
+        (sw.DryFriction("friction", tau_c=0.2), "c", "r"),
+        (sw.Clutch("clutch", tau=20.0), "s", "c"),
+        (sw.PlanetaryGear("planets", ratio=3.0), "s", "c", "r"),
+    ]
+    net = sw.Network("gearbox")
+    net.add(sw.Inertia("J1", J=1.0), "s")
+    net.add(sw.Inertia("J3", J=0.5), "r")
+    net.add(sw.TorqueSource("motor", tau=7.0), "c")
+    for k in order:
+        net.add(*rigid[k])
+    assert net.simulate(0.3)["J1.omega"][-1] == pytest.approx(7.0 / 1.5 * 0.3, rel=1e-9)

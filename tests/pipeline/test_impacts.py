@@ -400,3 +400,27 @@ def test_a_freewheel_that_an_impact_closes_gives_no_energy() -> None:
     lost = sol.energy.lost_in
     assert sum(lost.values()) == pytest.approx(1.625, rel=EXACT)
     assert all(value >= 0 for value in lost.values())
+
+
+@pytest.mark.parametrize("massless", [True, False])
+def test_two_freewheels_in_a_row_let_what_is_before_them_stop_and_what_is_behind_them_go_on(
+    massless: bool,  # noqa: FBT001
+) -> None:
+    net = sw.Network("row")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.TorqueSource("motor", tau=5.0), "a")
+    net.add(sw.HardStop("stop", upper=0.5), "a")
+    net.add(sw.Freewheel("first"), "a", "b")
+    net.add(sw.Damper("between", d=0.001), "b")
+    if not massless:
+        net.add(sw.Inertia("J", J=1e-9), "b")
+    net.add(sw.Freewheel("second"), "b", "c")
+    net.add(sw.Inertia("J2", J=1.0), "c")
+    net.add(sw.Damper("behind", d=0.1), "c")
+    sol = net.simulate(0.1, initial={"J1.omega": 10.0, "J2.omega": 10.0})
+    hit = next(event[0] for event in sol.events if event[1] == "stop")
+    before = 5.0 / 0.101 + (10.0 - 5.0 / 0.101) * math.exp(-hit * 0.101 / 2.0)  # all turns as one
+    assert sol["J1.omega"][-1] == pytest.approx(0.0, abs=1e-12)
+    assert sol["J2.omega"][-1] == pytest.approx(before * math.exp(-0.1 * (0.1 - hit)), rel=1e-8)
+    assert sol.energy.lost_in["stop"] == pytest.approx(before**2 / 2, rel=1e-7)
+    assert sol.energy_residual < 1e-9

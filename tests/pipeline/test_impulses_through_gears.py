@@ -405,3 +405,25 @@ def test_a_source_that_jumps_through_zero_gives_in_each_direction_of_power_its_i
         sol = net.simulate(2.0)
     assert sol["J.omega"][-1] == -3.0
     assert sol.energy_residual < 1e-12
+
+
+@pytest.mark.parametrize("inertia", [0.5, 2.0, 4.5])
+def test_a_gear_that_jams_behind_a_damped_spring_starts_again(inertia: float) -> None:
+    """As it stops at once the damper pushes it on, and it jams again, ever sooner and in ever smaller steps."""
+    net = sw.Network("worm")
+    net.add(sw.Inertia("J1", J=2.0), "n0")
+    net.add(sw.Spring("spring", c=1000.0, d=0.5), "n0", "n1")
+    net.add(sw.Inertia("J2", J=0.1), "n1")
+    net.add(sw.LossyGear("worm", ratio=-0.5, efficiency=0.45, efficiency_back=-0.5), "n1", "n2")
+    net.add(sw.Inertia("J3", J=inertia), "n2")
+    sol = net.simulate(0.5, initial={"J1.omega": 5.0})
+    assert sol.energy_residual < 1e-8
+    # Euler's steps of 10 us are off by some 2e-3 here, and their error halves with them
+    w, torque, gear, step = 5.0, 0.0, 0.0, 1e-5
+    for _ in range(round(0.5 / step)):
+        passes = torque + 0.5 * (w - gear)
+        if gear * passes < 0:  # b cannot drive
+            gear, passes = 0.0, torque + 0.5 * w
+        torque += step * 1000.0 * (w - gear)
+        w, gear = w - step * passes / 2.0, gear + step * passes / (0.1 + inertia / (0.25 * 0.45))
+    assert sol["J1.omega"][-1] == pytest.approx(w, abs=4e-3)

@@ -1,7 +1,7 @@
-"""Many parts that hold and slip: one set of equations with reactions, beside those of each combination by itself.
+"""Parts that hold and slip: one set of equations with reactions, beside those of each combination by itself.
 
-The engine heyoka has equations of its own for each combination of modes, in which what is joined is one inertia; so
-both ways share neither states nor matrices.
+In equations of its own what is joined is one inertia, so both ways share neither states nor matrices. Reactions are
+numbers in explicit rows where each part holds inertias of its own; matrices tell them where there are many others.
 """
 
 from __future__ import annotations
@@ -16,6 +16,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import shaftwork as sw
+from shaftwork.pipeline.arguments import Demand
+from shaftwork.pipeline.phases.run import Run
+from shaftwork.pipeline.phases.solution import solution
 from tests.properties.examples import share_of_examples
 
 COUNT = 14
@@ -53,19 +56,73 @@ def chain(kinds: tuple[str, ...], *, ratio: float = 1.0) -> sw.Network:
 KINDS = st.lists(st.sampled_from(["friction", "load", "brake", "clutch"]), min_size=COUNT, max_size=COUNT).map(tuple)
 
 
-@pytest.mark.slow
-@given(KINDS)
-@share_of_examples(0.05)
-def test_reactions_lead_to_the_motion_of_the_equations_of_each_combination(kinds: tuple[str, ...]) -> None:
-    model = chain(kinds).compile()
-    own, one = (model.simulate(0.5, rtol=1e-10, engine=engine, t_eval=11) for engine in ("heyoka", "scipy"))
-    speeds = [f"J{k}.omega" for k in range(COUNT + 1)] + ["J.omega"]
+def by_combinations(model: Any, t_end: float) -> sw.Solution:
+    """The motion in equations of its own for each combination."""
+    run = Run(
+        model.phases, {}, Demand((0.0, t_end), 1e-10, None, np.linspace(0.0, t_end, 11), "auto", 10**6, None), own=True
+    )
+    run.march(None)
+    return solution(run, "own")
+
+
+def assert_alike(one: sw.Solution, own: sw.Solution, speeds: list[str], losses: list[str], share: float) -> None:
     largest = max(np.abs(own[name]).max() for name in speeds)
     for name in speeds:
-        np.testing.assert_allclose(one[name], own[name], rtol=0, atol=1e-6 * largest)  # as engines agree elsewhere
+        np.testing.assert_allclose(one[name], own[name], rtol=0, atol=share * largest)
     assert one.energy_residual < 1e-8
-    for k in range(COUNT):
-        assert one.energy.lost_in[f"x{k}"] == pytest.approx(own.energy.lost_in[f"x{k}"], abs=1e-6 * own.energy.work)
+    for name in losses:
+        assert one.energy.lost_in[name] == pytest.approx(own.energy.lost_in[name], abs=share * own.energy.work)
+
+
+@pytest.mark.slow
+@given(KINDS, st.sampled_from(["auto", "scipy"]))
+@share_of_examples(0.05)
+def test_reactions_lead_to_the_motion_of_the_equations_of_each_combination(kinds: tuple[str, ...], engine: str) -> None:
+    model = chain(kinds).compile()
+    one, own = model.simulate(0.5, rtol=1e-10, engine=engine, t_eval=11), by_combinations(model, 0.5)
+    speeds = [f"J{k}.omega" for k in range(COUNT + 1)] + ["J.omega"]
+    assert_alike(one, own, speeds, [f"x{k}" for k in range(COUNT)], 1e-6)  # as engines agree elsewhere
+
+
+FEW = st.lists(st.sampled_from(["friction", "load", "brake", "clutch"]), min_size=1, max_size=4).map(tuple)
+
+
+@given(FEW)
+@share_of_examples(0.1)
+def test_so_do_those_of_few_parts_which_are_numbers_in_rows(kinds: tuple[str, ...]) -> None:
+    model = chain(kinds).compile()
+    one, own = model.simulate(1.5, rtol=1e-10, t_eval=11), by_combinations(model, 1.5)
+    speeds = [f"J{k}.omega" for k in range(len(kinds) + 1)] + ["J.omega"]
+    assert one.events == tuple((pytest.approx(time, abs=1e-7), *rest) for time, *rest in own.events)
+    assert_alike(one, own, speeds, [f"x{k}" for k in range(len(kinds))], 1e-8)  # both by series of the same tolerance
+
+
+def test_brakes_in_circles_that_open_at_one_instant_leave_what_those_that_are_left_can_hold() -> None:
+    """Until 1 s all turns as one; then f4 alone rubs on J3, at its 2 N m, and the others have gone."""
+    net, inertias = sw.Network("circles"), (2.57, 1.21, 1.74, 1.59, 0.35)
+    for name, nodes, tau, t_off in (
+        ("f1", "20", 2.0, 1.0),
+        ("f10", "14", 10.0, 1.0),
+        ("f6", "24", 10.0, None),
+        ("f5", "31", 10.0, 1.0),
+        ("f2", "41", 5.0, 1.0),
+        ("f4", "13", 2.0, 1.5),
+        ("f11", "0", 20.0, 1.5),
+        ("f3", "13", 5.0, 1.0),
+        ("f9", "01", 5.0, None),
+        ("f8", "20", 5.0, 1.0),
+        ("f0", "21", 10.0, 1.0),
+        ("f7", "1", 20.0, 1.0),
+    ):
+        net.add(sw.Brake(name, tau=tau, t_off=t_off), *(f"n{node}" for node in nodes))
+    for k, inertia in enumerate(inertias):
+        net.add(sw.Inertia(f"J{k}", J=inertia), f"n{k}")
+    net.add(sw.TorqueSource("motor", tau=-20.0 + sw.Step(40.0, start=1.0)), "n1")
+    sol = net.simulate(2.0)
+    # of 20 N m 5 go to J0, which f11 holds until 1.5 s, and 2 to J3
+    assert sol["J3.omega"][-1] == pytest.approx(2.0 * 0.5 / inertias[3], rel=1e-9)
+    assert sol["J0.omega"][-1] == pytest.approx(5.0 * 0.5 / inertias[0], rel=1e-9)
+    assert sol["J1.omega"][-1] == pytest.approx((13.0 * 0.5 + 15.0 * 0.5) / inertias[1], rel=1e-9)
 
 
 @OTHERS

@@ -179,7 +179,7 @@ def normal_tree(graph: CircuitGraph) -> NormalTree:
     locked: list[tuple[int, tuple[int, ...]]] = []
     columns = {branch.index: column_of(graph, branch) for branch in graph.branches}
     balances = {branch.index: balance_of(graph, branch) for branch in graph.branches} if lossy else columns
-    for branch in sorted(graph.branches, key=lambda item: item.template.kind):  # stable: keeps the order of the table
+    for branch in sorted(graph.branches, key=lambda made: _rank(graph, made)):  # stable: keeps the order of the table
         kind, index = branch.template.kind, branch.index
         reduced = work.reduce(columns[index])
         opposed = torques.reduce(balances[index]) if lossy else reduced
@@ -209,6 +209,12 @@ def normal_tree(graph: CircuitGraph) -> NormalTree:
         _names_in([*work.coincidences, *(torques.coincidences if lossy else ())]),
         unbalanced,
     )
+
+
+def _rank(graph: CircuitGraph, branch: GraphBranch) -> tuple[Kind, bool]:
+    """By what branches come into the tree: gears before what holds by a mode, which carries nothing beside them."""
+    kind = branch.template.kind
+    return kind, kind is Kind.COUPLING and bool(graph.parts[branch.part].modes)
 
 
 def _is_free(reduced: Row) -> bool:

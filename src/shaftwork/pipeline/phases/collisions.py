@@ -20,17 +20,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
 
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.mobility import Mobility, complementary
-from shaftwork.components.branches import ACROSS
-from shaftwork.components.modes import Leave, Modes
+from shaftwork.components.modes import Leave
 from shaftwork.core.errors import SimulationError
 from shaftwork.core.kept import Kept
 from shaftwork.network.graph import GROUND
+from shaftwork.pipeline.phases.contacts import Contact, lasting, limited, one_side, opens_at
 from shaftwork.pipeline.phases.elements import NO_IMPACT, Element, ModeNames
 from shaftwork.pipeline.phases.impulses import Blow, Impulses, Stage, Start
 from shaftwork.pipeline.phases.moments import CLEAR, Moment, Regime
@@ -40,28 +41,6 @@ KEPT = 64
 """Sets of contacts of which what impulses do is kept."""
 SAME = 1e-9
 """Speeds at which contacts close that differ by less than this fraction are the same."""
-
-
-class Contact(NamedTuple):
-    """What cannot close further, be it closed or only touching.
-
-    Args:
-        number: of the element.
-        side: 1 where it opens as the speed across it rises, -1 where as that falls.
-        apart: mode in which it is open.
-        joined: mode in which it is closed.
-        leave: by which it closes; None where it is closed already.
-        restitution: of what it hits with, and
-        rest: speed up to which nothing is thrown back.
-    """
-
-    number: int
-    side: float
-    apart: str
-    joined: str
-    leave: Leave | None = None
-    restitution: float = 0.0
-    rest: float = 0.0
 
 
 class Collision(NamedTuple):
@@ -111,7 +90,7 @@ class Collisions:
         """
         touching = [*self._contacts(t, moment, number, leave)]
         contacts = self._in_turn(t, moment, touching)
-        before = np.array(_opens(t, moment, contacts))
+        before = np.array(opens_at(t, moment, contacts))
         back = np.array([self._restitution(c, u) for c, u in zip(contacts, before.tolist(), strict=True)])
         self._refuse_no_gap(
             t, {c.number for c, share in zip(contacts, back.tolist(), strict=True) if share >= 1}, touching
@@ -127,15 +106,15 @@ class Collisions:
             stages += self._thrown_back(t, contacts, stages, back)
         least = NO_IMPACT * max(1.0, np.abs(before).max(initial=0.0))
         hit = [c for c, i in zip(contacts, _pressed(stages), strict=True) if c.leave and (i > 0 or c.number == number)]
-        after, closed = self._ended(t, modes, contacts, stages, least, hit)
+        after, closed, further = self._ended(t, modes, contacts, stages, least, hit)
         owners = (self._elements[contact.number].part.name for contact in contacts)
         lost = zip(owners, self._taken(t, contacts, stages).tolist(), strict=True)
         return Collision(
             after,
             (*both_ways, *(c for c in hit if c in closed)),
             tuple(c for c in hit if c not in closed),
-            _sums([*lost, *self._impulses.lost(t, stages).items()]),
-            self._impulses.given(t, stages),
+            _sums([*lost, *self._impulses.lost(t, (*stages, *further)).items()]),
+            self._impulses.given(t, (*stages, *further)),
         )
 
     def _refuse_no_gap(self, t: float, elastic: Collection[int], touching: Sequence[Contact]) -> None:
@@ -158,11 +137,13 @@ class Collisions:
             modes: that are to go on.
             least: speed up to which an element stays as it is.
         """
-        contacts = [*self._lasting(modes)]
+        contacts = [*lasting(self._elements, modes)]
         start = self._apart(before, moment, modes, contacts)
         stages = self._compressed(t, start, contacts)
         hit = [c for c, i in zip(contacts, _pressed(stages), strict=True) if i > 0]
-        return self._ended(t, modes, contacts, stages, least, hit)[0], stages
+        after, _, further = self._ended(t, modes, contacts, stages, least, hit)
+        passed = stages if _pressed(stages).any() or not further else ()  # sources jump with what passes
+        return after, (*passed, *further)
 
     def _ended(
         self,
@@ -172,21 +153,36 @@ class Collisions:
         stages: Sequence[Stage],
         least: float,
         hit: Sequence[Contact],
-    ) -> tuple[Moment, list[Contact]]:
-        """What follows stages, and the contacts that are closed then: of those that were open only what was hit."""
+    ) -> tuple[Moment, list[Contact], tuple[Stage, ...]]:
+        """What follows stages, the contacts that are closed then, of those that were open only what was hit, and what
+        passes on through contacts beside massless nodes.
+
+        No impulse tells whether these press. Where they would take one, each is joined as its ends still come together.
+        """
         after = stages[-1].blow.after
         mobility, opens = self._mobility(t, after, contacts)
         closed = [c for c, u in zip(contacts, opens, strict=True) if u <= least and (c.leave is None or c in hit)]
         modes = with_modes(after.regime.modes, self._slipping(t, before, after, least))
         massless = {c.number for c, tells in zip(contacts, mobility.has_inertia, strict=True) if not tells}
-        kept = [c for c in closed if c.number not in massless or c.leave is not None]
+        open_yet = [c for c in closed if c.number in massless and c.leave is None]
+        kept = [c for c in closed if c not in open_yet]
         new, apart = (
             self._regimes.changed(after, t, with_modes(modes, {c.number: c.joined for c in some}))
             for some in (closed, kept)
         )
-        # what has closed before beside a massless node may pull now: it opens, and closes again where it is pressed
-        pulls = len(kept) < len(closed) and self._differs(t, new, apart, least)
-        return (apart, kept) if pulls else (new, closed)
+        if not open_yet or not self._differs(t, new, apart, least):
+            return new, closed, ()
+        further = tuple[Stage, ...]()
+        while open_yet:
+            speed, contact = min(zip(opens_at(t, apart, open_yet), open_yet, strict=True), key=itemgetter(0))
+            if speed >= -least:
+                break
+            joined = self._joined(t, self._impulses.begins(apart, t), {contact.number: contact.joined}, contacts)
+            if self._differs(t, apart, joined[-1].blow.after, least):
+                further += joined
+            apart = joined[-1].blow.after
+            open_yet.remove(contact)
+        return apart, [c for c in closed if c not in open_yet], further
 
     def _differs(self, t: float, one: Moment, other: Moment, least: float) -> bool:
         """Whether speeds at two moments of the same time are not the same."""
@@ -258,7 +254,7 @@ class Collisions:
         """(contacts,) energy in J that contacts take up: their impulses at the mean of their closing speeds."""
         taken = np.zeros(len(contacts))
         for start, blow, share in stages:
-            began, ends = (_opens(t, one, contacts) for one in (start.moment, blow.after))
+            began, ends = (opens_at(t, one, contacts) for one in (start.moment, blow.after))
             taken -= share * blow.pressed * (np.array(began) + share / 2 * np.subtract(ends, began))
         # what opens before others close it comes late, and gives nothing: the sum alone is physics
         least = np.maximum(taken, 0.0)
@@ -287,11 +283,11 @@ class Collisions:
         regime, pairs = moment.regime, tuple(self._nodes(moment, contact) for contact in contacts)
         stores, p = regime.assembly.stores, regime.p
         mobility = self._mobilities((regime, pairs), lambda: stores.mobility(regime.assembly.bound(p), pairs))
-        return mobility, np.where(mobility.has_inertia, _opens(t, moment, contacts), 0.0)
+        return mobility, np.where(mobility.has_inertia, opens_at(t, moment, contacts), 0.0)
 
     def _in_turn(self, t: float, moment: Moment, contacts: list[Contact]) -> list[Contact]:
         """The contacts that take part: of those that throw back only the fastest, but if all do so together."""
-        speeds = {c: -opens for c, opens in zip(contacts, _opens(t, moment, contacts), strict=True)}
+        speeds = {c: -opens for c, opens in zip(contacts, opens_at(t, moment, contacts), strict=True)}
         thrown = [speed for c, speed in speeds.items() if self._restitution(c, -speed)]
         if self._together or not thrown:
             return contacts
@@ -305,7 +301,7 @@ class Collisions:
             t, moment, number, leave: as in `impact`.
         """
         contacts = self._in_turn(t, moment, [*self._contacts(t, moment, number, leave)])
-        opens = _opens(t, moment, contacts)
+        opens = opens_at(t, moment, contacts)
         thrown = (c for c, speed in zip(contacts, opens, strict=True) if self._restitution(c, speed))
         return min(thrown, key=lambda contact: contact.number != number, default=None)
 
@@ -325,47 +321,17 @@ class Collisions:
         """Contacts that are closed or touch, freewheels, and the element that wants to close."""
         regime, here = moment.regime, moment.course(t)
         now, bands = here[3], regime.bands(here)
-        lasting = [*self._lasting(regime.modes)]
-        yield from lasting
+        closed = [*lasting(self._elements, regime.modes)]
+        yield from closed
         for k, watched in regime.watched:
             closes, guard = watched.leave, watched.guard
             wanted = k == number and closes.to == leave.to
             touches = closes.rebound is not None and watched.side * now[guard] > -CLEAR * bands[guard]
             side = one_side(self._elements[k].modes, closes.to) if (wanted or touches) and closes.to else None
-            if side is not None and not any(c.number == k and c.joined == closes.to for c in lasting):
+            if side is not None and not any(c.number == k and c.joined == closes.to for c in closed):
                 closes = leave if wanted else closes
                 constants = (regime.constant(k, given) for given in (closes.rebound, closes.rest))
                 yield Contact(k, side, regime.modes[k], closes.to, closes, *constants)
-
-    def _lasting(self, modes: ModeNames) -> Iterator[Contact]:
-        """Contacts that are closed, and freewheels."""
-        for k, (element, name) in enumerate(zip(self._elements, modes, strict=True)):
-            own = element.modes
-            if (side := one_side(own, name)) is not None:
-                yield Contact(k, side, own[name].gives_way[0][1], name)
-            for leave in own[name].leaves:
-                side = one_side(own, leave.to) if leave.to and leave.when == ACROSS else None
-                if side is not None:
-                    yield Contact(k, side, name, leave.to, leave)
-
-
-def one_side(modes: Modes, name: str) -> float | None:
-    """The side of the speed across at which a mode opens that joins by a torque of one sign; None of other modes."""
-    mode = modes[name]
-    sides = [side for side, _ in mode.gives_way]
-    return sides[0] if len(sides) == 1 and mode.form != modes.options[0].form else None
-
-
-def limited(elements: Sequence[Element], modes: ModeNames) -> dict[int, tuple[tuple[float, str], ...]]:
-    """Elements that join by a torque that is limited, with the sides on which it is and the modes there."""
-    found = {k: element.modes[name].gives_way for k, (element, name) in enumerate(zip(elements, modes, strict=True))}
-    return {k: ways for k, ways in found.items() if ways}
-
-
-def _opens(t: float, moment: Moment, contacts: Sequence[Contact]) -> list[float]:
-    """The speeds at which contacts open."""
-    speeds = moment.speeds([contact.number for contact in contacts], t)
-    return [contact.side * speed for contact, speed in zip(contacts, speeds, strict=True)]
 
 
 def _blow(moment: Moment, mobility: Mobility, impulses: Array) -> Blow:

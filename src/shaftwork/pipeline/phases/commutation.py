@@ -12,6 +12,7 @@ from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Leave, Modes
 from shaftwork.core.errors import NetworkError
+from shaftwork.pipeline.phases.contacts import one_side
 from shaftwork.pipeline.phases.courses import Way
 from shaftwork.pipeline.phases.elements import NO_IMPACT, Element, ModeNames
 from shaftwork.pipeline.phases.moments import Change, Moment
@@ -118,9 +119,8 @@ def _led(elements: Sequence[Element], modes: ModeNames, when: Expr) -> list[tupl
 
 def is_one_way(modes: Modes) -> bool:
     """Whether an element is a diode or a freewheel: it joins by a torque of one sign, as soon as speeds let it."""
-    joined = [mode for mode in modes.options if mode.form != modes.options[0].form]
     rebounds = any(leave.rebound is not None for mode in modes.options for leave in mode.leaves)
-    return not rebounds and any(len(mode.gives_way) == 1 for mode in joined)
+    return not rebounds and any(one_side(modes, mode.name) is not None for mode in modes.options)
 
 
 def is_switch(modes: Modes) -> bool:

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from shaftwork.codegen.elements import Array
 from shaftwork.components.modes import Leave, Modes
 from shaftwork.network.graph import GraphPart
 
@@ -18,6 +21,11 @@ NO_IMPACT = 1e-8
 
 ModeNames = tuple[str, ...]
 """The mode of every element of a network, in their order."""
+
+
+def is_same(after: Array, before: Array) -> bool:
+    """Whether states (n,) after an instant are those before it, but for errors of the run."""
+    return bool(np.abs(after - before).max(initial=0.0) <= NO_IMPACT * np.abs(before).max(initial=1.0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,7 +29,7 @@ from shaftwork.integrate.problem import Problem
 from shaftwork.network.graph import GROUND
 from shaftwork.network.templates import Kind
 from shaftwork.pipeline.phases.assemblies import Assembly
-from shaftwork.pipeline.phases.elements import NO_IMPACT, Element, ModeNames
+from shaftwork.pipeline.phases.elements import Element, ModeNames, is_same
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.held_rows import HeldRows, groups, held_places
 
@@ -93,7 +93,7 @@ class HeldAssembly(Assembly):
     def taking_over(self, x: Array, p: Array) -> Array | None:
         """The states in which all comes to one speed that holds, or None where an impact leads there."""
         met = self.joints(p).met(x)
-        return met if np.abs(met - x).max() <= NO_IMPACT * max(np.abs(x).max(), 1.0) else None
+        return met if is_same(met, x) else None
 
     @property
     def has_rows(self) -> bool:

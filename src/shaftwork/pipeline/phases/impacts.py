@@ -11,7 +11,8 @@ from shaftwork.codegen.observer import Impact
 from shaftwork.components.branches import INTEGRAL
 from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError, SimulationError
-from shaftwork.pipeline.phases.collisions import Collisions, limited
+from shaftwork.pipeline.phases.collisions import Collisions
+from shaftwork.pipeline.phases.contacts import limited
 from shaftwork.pipeline.phases.elements import NO_IMPACT, Element, ModeNames, Watched
 from shaftwork.pipeline.phases.impulses import Blow, Impulses, Stage
 from shaftwork.pipeline.phases.moments import CLEAR, Change, Moment

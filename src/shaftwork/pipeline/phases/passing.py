@@ -13,7 +13,7 @@ from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import no_value
 from shaftwork.integrate.problem import Reaction, SeriesError
 from shaftwork.pipeline.phases.assemblies import Assembly
-from shaftwork.pipeline.phases.elements import Element, ModeNames, Watched
+from shaftwork.pipeline.phases.elements import Element, ModeNames, Watched, is_same
 from shaftwork.pipeline.phases.moments import CLEAR, Change, Moment, Regime, clear_of_limit
 from shaftwork.pipeline.phases.settling import Settling
 
@@ -135,7 +135,7 @@ class Passing:
         moment, changes = self._settling.settle(t, t, before, met)
         if moment.x is before.x:
             return moment.regime, moment.bands, changes, None
-        if moment.regime.assembly.whole is self.regime.assembly.whole and not any(made.impact for made in changes):
+        if moment.regime.assembly.whole is self.regime.assembly.whole and is_same(moment.x, before.x):
             return moment.regime, moment.bands, changes, moment.x
         self.beyond = moment, changes  # other equations, or an impact in these
         return None

@@ -62,12 +62,13 @@ def joints_across(form: StateForm, part: GraphPart, element: Modes) -> Mapping[i
 def holds_at_rest(form: StateForm, part: GraphPart, element: Modes) -> tuple[int, float] | None:
     """The branch of the friction that alone holds an element at rest, and the sign of its speed for the element's.
 
-    None where nothing does, or several joints do: a gear among them may carry as well.
+    None where nothing does, or another part that has modes, or several.
     """
     joints = joints_across(form, part, element) or {}
-    if len(joints) != 1:
+    holders = {branch: share for branch, share in joints.items() if form.graph.part_of(branch).modes}
+    if len(holders) != 1:
         return None
-    ((branch, share),) = joints.items()
+    ((branch, share),) = holders.items()
     rubs = any(len(mode.gives_way) > 1 for modes in form.graph.part_of(branch).modes for mode in modes.options)
     return (branch, math.copysign(1.0, share)) if rubs else None
 
