@@ -40,11 +40,12 @@ def settle(program: Any, integrator: Any, horizon: float) -> None:
     first = program.parameter_count
     parameters, signs = integrator.pars[:first], integrator.pars[first : first + len(program.switches)]
     timed = signs * program.timed
-    inside = program.switch_signs(integrator.time + SOMEWHERE * horizon, integrator.state, parameters, timed)
+    if program.timed.any():
+        timed = program.switch_signs(integrator.time + SOMEWHERE * horizon, integrator.state, parameters, timed)
     if program.all_timed:
-        signs[:] = inside
+        signs[:] = timed
         return
-    signs[:] = program.switch_signs(integrator.time, integrator.state, parameters, inside * program.timed)
+    signs[:] = program.switch_signs(integrator.time, integrator.state, parameters, timed * program.timed)
     if (near := _within_rounding(program, integrator) & ~program.timed).any():
         kept = signs.copy()
         signs[near] = 0.0
