@@ -86,9 +86,10 @@ class CurrentSource(Component):
 class Switch(Component):
     """An ideal switch between two nodes of a circuit.
 
-    Law: u = 0 while closed, i = 0 while open. It closes at t_on, or when `on` rises above zero, and opens for good at
-    t_off, which must be later than t_on. Modes: open, closed. A current that an inductance drives is cut off at once,
-    with its energy lost in the switch; a diode beside the inductance lets it flow on.
+    Law: u = 0 while closed, i = 0 while open. It closes at t_on; with `on`, when that rises above zero, but not before
+    t_on. It opens for good at t_off, which must be later than t_on. Modes: open, closed. A current that an inductance
+    drives and that finds no other way is cut off at once, with its energy lost in the switch; a diode, or a switch that
+    closes at the same instant, lets it flow on.
     """
 
     t_on: float = parameter("s", "time at which it closes", default=0.0, latex=r"t_{on}")

@@ -1,8 +1,8 @@
-"""Many parts that hold and slip: one set of equations for all their combinations.
+"""Parts that hold and slip: one set of equations for all their combinations.
 
-A network of k frictions has 2^k combinations of what is stuck. For few parts each that is met gets equations of its
-own, with fewer states and compiled code. For many that costs more than the motion: here all have the equations in which
-everything slips, and `codegen.held` adds the reactions of what holds.
+A network of k frictions has 2^k combinations of what is stuck. Here all have the equations in which everything slips,
+and what holds adds reactions: as numbers in explicit rows where each part holds inertias of its own (`HeldRows`), so
+that an engine goes on past a change of what holds; else as matrices (`codegen.held`), which are worth it for many.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from shaftwork.pipeline.phases.moments import Moment
 
 MANY = 12
-"""From so many elements on that hold and slip."""
+"""From so many elements on that hold and slip matrices are quicker than equations for each combination that is met."""
 KEPT_RATES = 2
 """Parameter vectors whose right-hand sides are kept in one combination of what holds."""
 
