@@ -183,3 +183,21 @@ def test_an_empty_capacitor_behind_two_diodes_takes_half_of_what_a_supply_gives_
     sol = net.simulate(0.1)
     assert sol["C.u"][-1] == pytest.approx(10.0, rel=CLOSE)
     assert sol.energy_residual < 1e-9
+
+
+@pytest.mark.parametrize("order", ["upper lower", "lower upper"])
+def test_a_capacitor_at_a_leg_is_emptied_by_the_switch_that_closes_as_the_other_one_opens(order: str) -> None:
+    parts = {
+        "upper": (sw.Switch("upper", t_off=0.02), "p", "x"),
+        "lower": (sw.Switch("lower", t_on=0.02), "x", "ground"),
+    }
+    net = sw.Network("leg")
+    net.add(sw.VoltageSource("supply", u=U), "p", "ground")
+    for name in order.split():
+        net.add(*parts[name])
+    net.add(sw.Capacitor("C", C=0.001), "x", "ground")
+    net.add(sw.Resistor("R", R=100.0), "x", "ground")
+    sol = net.simulate(0.03)
+    assert sol["C.u"][-1] == pytest.approx(0.0, abs=1e-12)
+    assert sol.energy.lost_in["lower"] == pytest.approx(0.001 * U**2 / 2, rel=CLOSE)
+    assert sol.energy_residual < 1e-9

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import chain, combinations, islice
 
@@ -51,7 +51,8 @@ class Commutation:
     ) -> tuple[Moment, list[Change]] | None:
         """A switch changes, with all others whose time it is too, and diodes so that all that is stored goes on.
 
-        None where that is not possible: a current is cut off, or a capacitor is charged at once.
+        None where that is not possible: a current is cut off, or a capacitor is charged at once. Of several switches
+        those that open do so before others close then.
         """
         modes, changed = moment.regime.modes, {number: to}
         now, bands = moment.regime.limits(after, moment.x.tolist()), moment.bands
@@ -63,8 +64,19 @@ class Commutation:
         ways = [*_begins(self._elements, new_modes), *_ends(self._elements, new_modes)]
         for new, led in self._keeping(after, moment, new_modes, _sets(ways, 0), names):
             if not any(is_one_way(self._elements[k].modes) for k, _ in self._beyond(new, after)):
-                return new, [Change(t, self._elements[k], modes[k], name) for k, name in (changed | led).items()]
-        return None
+                return new, self._changes(t, modes, changed | led)
+        opens = {k: to for k, to in changed.items() if not self._joins(k, to)}
+        if not 0 < len(opens) < len(changed):
+            return None
+        new, led = self.commutated(moment, after, with_modes(modes, opens))
+        return new, self._changes(t, modes, opens | led)
+
+    def _joins(self, number: int, name: str) -> bool:
+        modes = self._elements[number].modes
+        return modes[name].form != modes.options[0].form
+
+    def _changes(self, t: float, modes: ModeNames, changed: Mapping[int, str]) -> list[Change]:
+        return [Change(t, self._elements[k], modes[k], name) for k, name in changed.items()]
 
     def _keeping(
         self, t: float, moment: Moment, modes: ModeNames, sets: Iterable[dict[int, str]], names: Sequence[str]
