@@ -126,9 +126,9 @@ def _stretch(run: Run, span: Span, phase: Phase) -> Stretch:
 
 
 def _impacts(run: Run) -> tuple[Impact, ...]:
-    """Changes and sources with which speeds may jump, those of one time in one, with the part of the first change."""
+    """Changes and sources with which speeds may jump, those of one time in one, with the part that hits or changes."""
     jumps = [jump for jump in run.jumps if jump.given or jump.lost]
-    for change in run.changes:
+    for change in sorted(run.changes, key=lambda made: (made.time, not made.impact)):
         modes = change.element.modes
         if change.rebound or change.given or change.lost or modes[change.before].form != modes[change.after].form:
             jumps.append(Impact(change.time, change.element.part.name, change.given, change.lost))
