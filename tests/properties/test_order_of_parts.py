@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import replace
+from random import Random
 
 import numpy as np
 import pytest
@@ -64,3 +65,70 @@ def test_the_order_of_parts_beside_lossy_gears_changes_nothing(seed: int) -> Non
     np.testing.assert_allclose(found, speeds[inertias], rtol=0, atol=SAME * size + uncertain)
     for k, old in enumerate(joints):
         np.testing.assert_allclose(found_rebounds[k], rebounds[old], rtol=0, atol=1e-7)
+
+
+Placed = tuple[sw.Component, tuple[str, ...]]
+
+
+@st.composite
+def inverter_legs(draw: st.DrawFn) -> list[Placed]:
+    """Two switches that feed a coil, with the diodes beside them or some of them, and a motor or a resistor."""
+    upper_off, lower_on, end = draw(st.sampled_from([(0.1, 0.1, 0.2), (0.1, 0.12, 0.2), (0.05, 0.05, 0.1)]))
+    feeds = "p" if draw(st.booleans()) else "behind"
+    parts: list[Placed] = [
+        (sw.VoltageSource("supply", u=draw(st.sampled_from([24.0, 12.0]))), ("p", "ground")),
+        (sw.Switch("upper", t_off=upper_off), (feeds, "x")),
+        (sw.Switch("lower", t_on=lower_on, t_off=end), ("x", "ground")),
+        (sw.Switch("again", t_on=end), (feeds, "x")),
+        (sw.Diode("low"), ("ground", "x")),
+    ]
+    if feeds != "p":
+        parts.append((sw.Resistor("source", R=0.05), ("p", feeds)))
+    if draw(st.booleans()):
+        parts.append((sw.Diode("high"), ("x", feeds)))
+    if draw(st.booleans()):
+        parts.append((sw.DCMachine("motor", k=0.3, R=0.5, L=0.02), ("x", "ground", "shaft")))
+        parts.append((sw.Inertia("J", J=0.02), ("shaft",)))
+        parts.append((sw.DryFriction("friction", tau_c=0.4), ("shaft",)))
+    else:
+        parts.append((sw.Resistor("R", R=draw(st.sampled_from([0.5, 2.0]))), ("x", "y")))
+        parts.append((sw.Inductor("L", L=0.02), ("y", "ground")))
+    return parts
+
+
+@st.composite
+def gearboxes(draw: st.DrawFn) -> list[Placed]:
+    """A planetary gear of which one shaft may have no inertia, with what holds between its shafts and on the frame."""
+    parts: list[Placed] = [(sw.PlanetaryGear("planets", ratio=draw(st.sampled_from([1.0, 2.0, 3.0]))), ("s", "c", "r"))]
+    pairs = draw(st.lists(st.sampled_from(["sc", "cr", "sr", "s", "c", "r"]), min_size=1, max_size=4))
+    massless = draw(st.sampled_from(["", *sorted({node for pair in pairs for node in pair})]))
+    inertias = {"s": 1.0, "c": 0.7, "r": 0.5}
+    parts += [(sw.Inertia(f"J{node}", J=J), (node,)) for node, J in inertias.items() if node != massless]
+    for k, pair in enumerate(pairs):
+        kind, tau = draw(st.sampled_from(["friction", "clutch", "freewheel"])), draw(st.sampled_from([0.2, 2.0, 20.0]))
+        nodes = tuple(pair) if len(pair) > 1 else (pair, "ground")
+        if kind == "friction":
+            parts.append((sw.DryFriction(f"x{k}", tau_c=tau), nodes))
+        elif kind == "clutch":
+            parts.append((sw.Clutch(f"x{k}", tau=tau, t_on=draw(st.sampled_from([0.0, 0.1]))), nodes))
+        else:
+            parts.append((sw.Freewheel(f"x{k}"), nodes))
+    tau = sw.Step(7.0, start=0.1, before=draw(st.sampled_from([0.0, -7.0])))
+    return [*parts, (sw.TorqueSource("motor", tau=tau), (draw(st.sampled_from(["s", "c", "r"])),))]
+
+
+@given(inverter_legs() | gearboxes(), st.randoms(use_true_random=False))
+@share_of_examples(0.2)
+def test_the_order_of_switches_and_of_what_holds_a_gearbox_changes_nothing(parts: list[Placed], rng: Random) -> None:
+    sums = []
+    other = rng.sample(parts, len(parts))
+    for order in (parts, other):
+        net = sw.Network("train")
+        for part, nodes in order:
+            net.add(part, *nodes)
+        sol = net.simulate(0.3, rtol=1e-10, t_eval=np.linspace(0.0, 0.3, 8))
+        assert sol.energy_residual < 1e-8
+        sums.append({name: sol[name] for name in sol.states})
+    size = max(1.0, *(np.abs(values).max() for values in sums[0].values()))
+    for name, values in sums[0].items():
+        np.testing.assert_allclose(sums[1][name], values, rtol=0, atol=1e-8 * size)
