@@ -108,12 +108,14 @@ class _Run:
         self.steps = 0
         self.met: int | None = None
         """The guard that ended the run."""
+        self._begun: tuple[float, Array] | None = None
+        """Time in s and state at the last guard past which it went on."""
         self.reactions: list[tuple[float, Callable[[], Rates]]] = []
         """Times in s of guards past which it went on, and what makes the equations that hold from there on."""
 
     def piece(self, piece: Piece, advance: Advance) -> None:
         """Bring the run to the end of a piece; `advance` records what it passes."""
-        integrator = self.integrator
+        integrator, self._begun = self.integrator, None
         integrator.time = piece.start
         integrator.state[:] = self.start = start_of_piece(self.problem, piece, self.state)
         # heyoka keeps no parameters behind the last one that the rows contain
@@ -196,6 +198,7 @@ class _Run:
         self._p[: reaction.p.size] = reaction.p
         if reaction.x is not None:
             self._x[: reaction.x.size] = reaction.x
+        self._begun = time, self._x.copy()
         self._guard(reaction.ends, reaction.offsets)
         self.program.weigh(self.integrator)
         return True
@@ -279,8 +282,8 @@ class _Run:
             return watch.last_good or (piece.start, self.start)
         if np.isfinite(integrator.time) and np.isfinite(integrator.state).all():
             return integrator.time, integrator.state.copy()
-        integrator.time, integrator.state[:] = piece.start, self.start
-        good = piece.start, self.start
+        good = self._begun or (piece.start, self.start)
+        integrator.time, integrator.state[:] = good
         while integrator.step(max_delta_t=piece.end - integrator.time)[0].name == "success":
             good = integrator.time, integrator.state.copy()
         return good
