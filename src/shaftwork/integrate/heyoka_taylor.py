@@ -282,8 +282,7 @@ class _Run:
             return watch.last_good or (piece.start, self.start)
         if np.isfinite(integrator.time) and np.isfinite(integrator.state).all():
             return integrator.time, integrator.state.copy()
-        good = self._begun or (piece.start, self.start)
-        integrator.time, integrator.state[:] = good
+        integrator.time, integrator.state[:] = good = self._begun or (piece.start, self.start)
         while integrator.step(max_delta_t=piece.end - integrator.time)[0].name == "success":
             good = integrator.time, integrator.state.copy()
         return good
