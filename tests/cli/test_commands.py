@@ -406,7 +406,7 @@ def test_a_comparison_is_written_as_a_table_and_a_picture(
     assert main(["compare", "shaft-step", *(["--out", str(folder)] if out else [])]) == DONE
     assert made.advice in capsys.readouterr().out
     names = {place.name for place in folder.iterdir()} if out else set()
-    assert names == ({"shaftwork.json", "work-precision.csv", "work-precision.png"} if out else set())
+    assert names == ({"shaftwork.json", "torques.png", "work-precision.csv", "work-precision.png"} if out else set())
     assert not out or "Lumped(m=10)" in (folder / "work-precision.csv").read_text("utf-8")
 
 
@@ -519,3 +519,10 @@ def test_a_message_of_a_run_names_the_option_that_a_run_has(tmp_path: Path, caps
     message = capsys.readouterr().err
     assert "--initial J1.omega=..." in message
     assert "--at" not in message
+
+
+def test_a_comparison_of_which_nothing_comes_says_why_and_ends_with_1(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["compare", "bldc-shaft", "--models", "Wave", "--t-end", "0.002", "--budget", "1"]
+    assert main(arguments) == FAILED
+    said = capsys.readouterr().err
+    assert "No model of shaft 'line' could be compared. Wave(places=5): Shaft 'line': damping = 0.02" in said

@@ -11,6 +11,7 @@ import pytest
 import sympy
 
 import shaftwork as sw
+from shaftwork.studies.ladder import LADDER, rungs
 from shaftwork.studies.truth import QUANTITIES, truth, with_model
 from shaftwork.studies.work_precision import Trial, WorkPrecision, _timed, work_precision
 
@@ -159,4 +160,61 @@ def test_a_model_that_takes_too_long_is_given_up_and_says_when(monkeypatch: pyte
     net = sw.scenes.shaft_step()
     monkeypatch.setattr(sys.modules["shaftwork.studies.work_precision"], "LONGEST", -1.0)
     with pytest.raises(sw.SimulationError, match=r"given up after -1 s at t = .* of 0\.01 s"):
-        _timed(net.compile(), "line", "scipy", 0.01, np.array([0.01]))
+        _timed(net.compile(), "line", Trial("", "scipy", 0, 0.0, np.inf, {}, asked="scipy"), 0.01, np.array([0.01]))
+
+
+def test_models_are_named_with_sizes_or_without() -> None:
+    assert rungs(["Lumped"], [5, 7]) == (sw.Lumped(5), sw.Lumped(7))
+    assert rungs(["Lumped(3)", "OneSpring"], [5]) == (sw.Lumped(3), sw.OneSpring())
+    printed = rungs(["CentralDifference(closure='printed')"], None)
+    assert printed == tuple(sw.CentralDifference(m, closure="printed") for m in (10, 20, 40, 80))
+    assert set(rungs(None, None)) >= set(LADDER) - {sw.Wave(3)}
+    with pytest.raises(sw.ParameterError, match="is no shaft model"):
+        rungs(["Foo"], None)
+
+
+def test_every_kind_of_model_is_tried_whatever_the_budget_and_what_is_left_out_says_why() -> None:
+    models, told = [sw.Lumped(5), sw.Lumped(10), sw.Spectral(2), sw.Spectral(4)], list[Trial]()
+    study = work_precision(
+        sw.scenes.shaft_step(), "line", t_end=0.01, models=models, points=11, budget=1e-9, report=told.append
+    )
+    assert [trial.model for trial in study.trials] == ["Lumped(m=5)", "Lumped(m=10)", "Spectral(n=2)", "Spectral(n=4)"]
+    assert [trial.model for trial in told] == ["Lumped(m=5)", "Spectral(n=2)", "Lumped(m=10)", "Spectral(n=4)"]
+    assert [bool(trial.errors) for trial in study.trials] == [True, False, True, False]
+    ((why, left_out),) = study.left_out.items()
+    assert why == "not tried, since the budget of 1e-09 s of CPU is spent"
+    assert left_out == ("Lumped(m=10)", "Spectral(n=4)")
+    assert [trial.model for trial in study.representatives] == ["Lumped(m=5)", "Spectral(n=2)"]
+    assert why in study.plot().get_supxlabel()
+
+
+def test_a_tighter_tolerance_is_a_row_of_its_own_and_courses_are_laid_over_each_other() -> None:
+    """The error along rtol, of a model whose own error is none: a shaft of one spring, without inertia."""
+    net = sw.Network("swing")
+    net.add(sw.TorqueSource("motor", tau=5 * sympy.sin(300 * sw.t)), "a")
+    net.add(sw.Inertia("Ja", J=0.025), "a")
+    net.add(sw.Shaft("line", length=1.0, diameter=0.02), "a", "b")
+    net.add(sw.Inertia("Jb", J=0.11), "b")
+    study = work_precision(
+        net, "line", t_end=0.02, models=["Spectral(12)"], engines=["scipy"], rtols=[1e-3, 1e-6], points=21
+    )
+    loose, tight = study.trials
+    assert (loose.rtol, tight.rtol) == (1e-3, 1e-6)
+    assert loose.error > 10 * tight.error
+    assert "rtol" in str(study).splitlines()[1]
+    upper, lower = study.plot_courses("a").axes
+    drawn = {line.get_label(): line.get_ydata() for line in upper.lines}
+    np.testing.assert_array_equal(drawn["characteristics"], study.courses[:, 0])
+    np.testing.assert_allclose(lower.lines[0].get_ydata(), drawn[tight.model] - study.courses[:, 0], atol=1e-15)
+
+
+@pytest.mark.slow
+def test_a_drive_with_an_inverter_and_a_damped_shaft_has_a_truth_that_two_degrees_agree_on() -> None:
+    study = work_precision(
+        sw.scenes.bldc_shaft(), "line", t_end=0.01, models=["Spectral(4)", "Lumped(5)", "Wave()"], points=21
+    )
+    assert study.truth[0].startswith("Spectral(")
+    assert study.truth[1] < 1e-6
+    spectral, lumped, wave = study.trials
+    assert spectral.error < 1e-4 < lumped.error < 1e-2
+    assert "internal damping" in wave.why

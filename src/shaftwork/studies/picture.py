@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import textwrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -47,7 +49,36 @@ def work_precision_figure(study: WorkPrecision) -> Figure:
     axes[0].set_ylabel("largest error of the end torques / largest torque")
     axes[0].text(0.02, 0.02, "better: down and left", transform=axes[0].transAxes, fontsize=8, alpha=0.7)
     axes[1].legend(frameon=False, fontsize=8)
+    left_out = (f"left out, {why}: {', '.join(models)}" for why, models in study.left_out.items())
+    if note := "\n".join(textwrap.shorten(line, 180) for line in left_out):
+        figure.supxlabel(note, fontsize=7, x=0.01, ha="left")
     figure.suptitle(f"{study.name}: which model of '{study.shaft}' reaches which accuracy at which cost")
+    return figure
+
+
+def courses_figure(study: WorkPrecision, end: str) -> Figure:
+    """Two panels: the torque at an end by the best model of each kind and as it truly is, and the differences."""
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise MissingExtraError("matplotlib", "plot", "WorkPrecision.plot_courses()") from None
+    figure = Figure(figsize=(11, 7), layout="constrained")
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+    column, symbol = ("ab".index(end), rf"$\tau_{end}$")
+    true = study.courses[:, column]
+    for trial, style in zip(study.representatives, itertools.cycle(("-", "--", "-.", ":")), strict=False):
+        assert trial.courses is not None  # noqa: S101 (that of a representative)
+        course = trial.courses[:, column]
+        (line,) = upper.plot(study.t, course, style, linewidth=1.0, label=trial.model)
+        lower.plot(study.t, course - true, style, linewidth=1.0, color=line.get_color())
+    upper.plot(study.t, true, color="black", linewidth=1.4, zorder=0, label=study.truth[0])
+    upper.set_ylabel(f"{symbol} of '{study.shaft}' in N m")
+    lower.set_ylabel("less the exact one in N m")
+    lower.set_xlabel("t in s")
+    figure.legend(loc="outside lower center", frameon=False, fontsize=8, ncols=4)
+    for axis in (upper, lower):
+        axis.grid(alpha=0.2)
+    figure.suptitle(f"{study.name}: torque at end {end} of '{study.shaft}', the best model of each kind")
     return figure
 
 

@@ -6,15 +6,17 @@ import csv
 import dataclasses
 import itertools
 import time
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from operator import itemgetter
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from shaftwork.components.shaft_models import CentralDifference, Lumped, OneSpring, ShaftModel, Spectral, Wave
+from shaftwork.components.shaft_models import ShaftModel
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError
 from shaftwork.core.files import replaced
@@ -23,29 +25,23 @@ from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.network import Network
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
-from shaftwork.studies.arguments import engine_names, shaft_models
+from shaftwork.studies.arguments import engine_names, several, shaft_models
+from shaftwork.studies.ladder import LADDER
 from shaftwork.studies.truth import QUANTITIES, Truth, frequencies, quantities, truth, with_model
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-LADDER: tuple[ShaftModel, ...] = (
-    Wave(3),
-    OneSpring(),
-    *(Spectral(n) for n in (2, 4, 8, 16, 32, 48)),
-    *(Lumped(m) for m in (5, 10, 20, 40, 80, 160)),
-    *(CentralDifference(m, order=4) for m in (10, 20, 40)),
-    *(CentralDifference(m) for m in (10, 20, 40, 80)),
-)
-"""The models and sizes that are compared where none are named."""
+RTOL = 1e-8
+"""Relative tolerance of the runs where none is given."""
 POINTS, CALLS = 401, 5
 """Output times, and warm calls of which the median counts."""
 SLOW = 3.0
-"""Where set-up and run have taken longer, in s, larger models of its kind are left out."""
+"""Where set-up and run have taken longer, in s of CPU, larger models of its kind are left out."""
 LONGEST = 5.0
-"""A run is given up after so long, s."""
+"""A run is given up after so long, s of CPU."""
 BUDGET = 45.0
-"""Where so long has passed, in s, the rest is left out."""
+"""CPU time in s for all trials, from when the truth is known."""
 LOWEST = 20
 """Modes of a model that are computed, those of smallest rate; as many as the exact ones up to f_5 and their doubles."""
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6)
@@ -69,6 +65,8 @@ class Trial:
             those of the exact shaft: spurious ones, or missing ones where negative; None where unknown.
         why: why it failed or was not tried; empty where it was.
         asked: name of the engine that was asked for.
+        rtol: relative tolerance of the runs.
+        courses: (k, 2) torque at both ends at the output times; None where it failed.
     """
 
     model: str
@@ -80,6 +78,8 @@ class Trial:
     extra_modes: int | None = None
     why: str = ""
     asked: str = "auto"
+    rtol: float = RTOL
+    courses: Array | None = field(default=None, repr=False, compare=False)
 
     @property
     def family(self) -> str:
@@ -87,6 +87,11 @@ class Trial:
         name, _, arguments = self.model.rstrip(")").partition("(")
         _, comma, choices = arguments.partition(",")
         return f"{name}{comma}{choices}"
+
+    @property
+    def line(self) -> tuple[str, str, float]:
+        """What it shares with larger models of its kind: the family, the engine and the tolerance."""
+        return self.family, self.asked, self.rtol
 
     @property
     def spent(self) -> float:
@@ -106,6 +111,10 @@ class Trial:
         return max(self.errors["tau_a"], self.errors["tau_b"]) if self.errors else np.inf
 
 
+UNKNOWN = Trial("", "", 0, 0.0, np.inf, {})
+"""A trial of which nothing came."""
+
+
 @dataclass(frozen=True)
 class WorkPrecision:
     """The comparison of models and engines.
@@ -115,12 +124,16 @@ class WorkPrecision:
         shaft: name of the shaft.
         trials: in the order in which they were asked for.
         truth: where the truth comes from, and its own error.
+        t: (k,) output times, s.
+        courses: (k, 2) the true torques at both ends.
     """
 
     name: str
     shaft: str
     trials: tuple[Trial, ...]
     truth: tuple[str, float]
+    t: Array = field(default_factory=lambda: np.empty(0), repr=False, compare=False)
+    courses: Array = field(default_factory=lambda: np.empty((0, 2)), repr=False, compare=False)
 
     def cheapest(self, tolerance: float) -> Trial | None:
         """The trial of the least CPU time whose end torques are right to a tolerance."""
@@ -143,9 +156,11 @@ class WorkPrecision:
         return tuple(dict.fromkeys(name for trial in self.trials for name in trial.errors))
 
     def __str__(self) -> str:
-        header = ["model", "engine", "states", "set-up ms", "CPU ms", *self.columns, "extra modes"]
+        shows_rtol = len({trial.rtol for trial in self.trials}) > 1
+        header = ["model", "engine", *(["rtol"] if shows_rtol else []), "states", "set-up ms", "CPU ms"]
+        header += [*self.columns, "extra modes"]
         rows = [
-            [trial.model, trial.engine, *trial.costs]
+            [trial.model, trial.engine, *([f"{trial.rtol:g}"] if shows_rtol else []), *trial.costs]
             + [f"{trial.errors[name]:.1e}" if name in trial.errors else "-" for name in self.columns]
             + ["-" if trial.extra_modes is None else f"{trial.extra_modes}"]
             + ([trial.why] if trial.why else [])
@@ -163,17 +178,51 @@ class WorkPrecision:
         """Write every trial with all its errors."""
         with replaced(path) as file:
             writer = csv.writer(file)
-            writer.writerow(["model", "engine", "states", "setup_s", "cpu_s", *self.columns, "extra_modes", "why"])
+            first = ["model", "engine", "rtol", "states", "setup_s", "cpu_s"]
+            writer.writerow([*first, *self.columns, "extra_modes", "why"])
             for trial in self.trials:
                 errors = [trial.errors.get(name, "") for name in self.columns]
                 last = ("" if trial.extra_modes is None else trial.extra_modes, trial.why)
-                writer.writerow([trial.model, trial.engine, trial.states, trial.setup, trial.cpu, *errors, *last])
+                costs = (trial.rtol, trial.states, trial.setup, trial.cpu)
+                writer.writerow([trial.model, trial.engine, *costs, *errors, *last])
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """All of it in plain values, without the courses."""
+        trials = [dataclasses.asdict(dataclasses.replace(trial, courses=None)) for trial in self.trials]
+        for trial in trials:
+            del trial["courses"]
+        return {"name": self.name, "shaft": self.shaft, "trials": trials, "truth": self.truth}
 
     def plot(self) -> Figure:
         """Error of the end torques over CPU time, a curve for each kind of model (extra `plot`)."""
         from shaftwork.studies.picture import work_precision_figure
 
         return work_precision_figure(self)
+
+    def plot_courses(self, end: str = "b") -> Figure:
+        """The torque at an end, "a" or "b", by each kind of model and as it truly is, and the differences below."""
+        from shaftwork.studies.picture import courses_figure
+
+        return courses_figure(self, end)
+
+    @property
+    def left_out(self) -> Mapping[str, tuple[str, ...]]:
+        """Models of which there is no error, by the reason."""
+        found: dict[str, list[str]] = {}
+        for trial in self.trials:
+            if trial.why:
+                found.setdefault(trial.why, []).append(trial.model)
+        return {why: tuple(dict.fromkeys(models)) for why, models in found.items()}
+
+    @property
+    def representatives(self) -> tuple[Trial, ...]:
+        """Of each kind of model the one that is most accurate."""
+        best: dict[str, Trial] = {}
+        for trial in self.trials:
+            if trial.courses is not None and trial.error < best.get(trial.family, UNKNOWN).error:
+                best[trial.family] = trial
+        return tuple(best.values())
 
 
 def work_precision(
@@ -183,9 +232,11 @@ def work_precision(
     t_end: float,
     models: Sequence[ShaftModel | str] = LADDER,
     engines: Iterable[str] = ("auto",),
+    rtols: Iterable[float] = (RTOL,),
     points: int = POINTS,
     budget: float = BUDGET,
     report: Callable[[Trial], None] | None = None,
+    tell: Callable[[str], None] | None = None,
 ) -> WorkPrecision:
     """Solve a network with each model of its shafts, by each engine, and measure error and CPU time.
 
@@ -200,10 +251,13 @@ def work_precision(
         t_end: end of the motion, s.
         models: models, or their texts.
         engines: engines by name.
+        rtols: relative tolerances of the runs.
         points: number of output times.
-        budget: no trial is begun later than this after the start, s of the clock. A run is given up after `LONGEST` s
-            unless its engine is compiled, and larger models of a kind that took `SLOW` s are left out.
+        budget: CPU time in s for all trials together, from when the truth is known. The smallest model of each kind is
+            tried in any case, with every engine and tolerance; then the next sizes of all. A run is given up after
+            `LONGEST` s of CPU, and larger models of a kind that took `SLOW` s are left out.
         report: is told of each trial when it is done.
+        tell: is told what is done meanwhile, in a line.
 
     Raises:
         ParameterError: there is no such shaft, model or engine, or a number is out of its range.
@@ -215,30 +269,54 @@ def work_precision(
     end, allowed = in_si("t_end", t_end, "s", above=0), in_si("budget", budget, "s", above=0)
     if (count := whole(points)) is None:
         raise ParameterError(f"points = {points!r} must be a number of output times, 1 or more.")
-    pairs = list(itertools.product(shaft_models(models), engine_names(engines)))
-    began = time.monotonic()
+    tolerances = [in_si("rtol", rtol, "1", above=0) for rtol in several("rtols", rtols)]
+    asked = [
+        (model, Trial(_text(model), engine, 0, 0.0, np.inf, {}, asked=engine, rtol=rtol))
+        for model, engine, rtol in itertools.product(shaft_models(models), engine_names(engines), tolerances)
+    ]
     # the fronts of waves that start at zero pass at multiples of the delay; these times are none
     t = end * (np.arange(1, count + 1) - 0.5) / count
-    known = truth(net, shaft, end, t)
-    trials: list[Trial] = []
-    for model, engine in pairs:
-        asked = Trial(_text(model), engine, 0, 0.0, np.inf, {}, asked=engine)
-        why = _not_tried(asked, trials)
-        if time.monotonic() - began > allowed:
-            why = f"not tried, since the budget of {allowed:g} s is spent"
-        made = dataclasses.replace(asked, why=why) if why else _trial(net, shaft, model, asked, end, t, known)
-        trials.append(made)
+    known = truth(net, shaft, end, t, tell or _nothing)
+    began, made = time.thread_time(), dict[int, Trial]()
+    for number, rank in _in_turn([trial for _, trial in asked]):
+        model, trial = asked[number]
+        why = _not_tried(trial, made.values())
+        if rank and time.thread_time() - began > allowed:
+            why = f"not tried, since the budget of {allowed:g} s of CPU is spent"
+        made[number] = dataclasses.replace(trial, why=why) if why else _trial(net, shaft, model, trial, end, t, known)
         if report is not None:
-            report(made)
-    return WorkPrecision(net.name, shaft, tuple(trials), (known.source, known.error))
+            report(made[number])
+    trials = tuple(made[number] for number in range(len(asked)))
+    return WorkPrecision(net.name, shaft, trials, (known.source, known.error), t, _ends(known.values))
 
 
-def _not_tried(asked: Trial, trials: Sequence[Trial]) -> str:
+def _nothing(_: str) -> None:
+    pass
+
+
+def _in_turn(asked: Sequence[Trial]) -> list[tuple[int, int]]:
+    """Numbers of trials in the order in which they are made: first the first of each kind, then the second ones.
+
+    Behind each number how many of its kind come before it.
+    """
+    ranks, seen = list[tuple[int, int]](), Counter[tuple[str, str, float]]()
+    for number, trial in enumerate(asked):
+        ranks.append((number, seen[trial.line]))
+        seen[trial.line] += 1
+    return sorted(ranks, key=itemgetter(1))
+
+
+def _not_tried(asked: Trial, trials: Iterable[Trial]) -> str:
     """Why a model is left out: a smaller one of its kind has taken too long already. Empty where it is not."""
     for trial in trials:
-        if trial.family == asked.family and trial.asked == asked.asked and trial.spent > SLOW:
+        if trial.line == asked.line and trial.spent > SLOW:
             return f"not tried, since {trial.model} took {trial.spent:.0f} s"
     return ""
+
+
+def _ends(values: Mapping[str, Array]) -> Array:
+    """(k, 2) the torques at both ends."""
+    return np.column_stack([values["tau_a"], values["tau_b"]])
 
 
 def _trial(net: Network, shaft: str, model: ShaftModel, asked: Trial, t_end: float, t: Array, known: Truth) -> Trial:
@@ -248,11 +326,11 @@ def _trial(net: Network, shaft: str, model: ShaftModel, asked: Trial, t_end: flo
         compiled = varied.compile()
         built = time.thread_time() - began
         if compiled.form.waves:
-            _bearable(compiled, shaft, asked.engine, t_end)
-        solution, first = _timed(compiled, shaft, asked.engine, t_end, t)
+            _bearable(compiled, shaft, asked, t_end)
+        solution, first = _timed(compiled, shaft, asked, t_end, t)
         times = [first] if built + first > SLOW else []
         while not times or (len(times) < CALLS and sum(times) < 1.0):
-            times.append(_timed(compiled, shaft, asked.engine, t_end, t)[1])
+            times.append(_timed(compiled, shaft, asked, t_end, t)[1])
     except ShaftworkError as error:
         why = str(error).splitlines()[0]
         return dataclasses.replace(asked, setup=time.thread_time() - began, why=why)
@@ -264,26 +342,35 @@ def _trial(net: Network, shaft: str, model: ShaftModel, asked: Trial, t_end: flo
         errors |= {f"f_{k + 2}": float(np.abs(present / f - 1).min()) for k, f in enumerate(judged)}
         extra = int((present < limit).sum()) - MODES
     setup = built + max(first - cpu, 0.0)
-    return Trial(asked.model, solution.engine, len(compiled.states), setup, cpu, errors, extra, asked=asked.asked)
+    size = len(compiled.states)
+    return Trial(
+        asked.model, solution.engine, size, setup, cpu, errors, extra, "", asked.asked, asked.rtol, _ends(found)
+    )
 
 
-def _bearable(compiled: Model, shaft: str, engine: str, t_end: float) -> None:
+def _bearable(compiled: Model, shaft: str, asked: Trial, t_end: float) -> None:
     """Refuse a run of waves, which nothing interrupts, where the first part of it says that it takes too long."""
     for part in (t_end / 16, t_end / 8, t_end / 4, t_end / 2):
-        _, cpu = _timed(compiled, shaft, engine, part, np.array([part]))
+        _, cpu = _timed(compiled, shaft, asked, part, np.array([part]))
         if cpu > LONGEST / 2:
             raise SimulationError(f"given up: {part:.3g} s of {t_end:g} s took {cpu:.0f} s")
 
 
-def _timed(compiled: Model, shaft: str, engine: str, t_end: float, t: Array) -> tuple[Solution, float]:
+def _timed(compiled: Model, shaft: str, asked: Trial, t_end: float, t: Array) -> tuple[Solution, float]:
     """A run in which both end torques are read, and its CPU time in s."""
-    began, deadline = time.thread_time(), time.monotonic() + LONGEST
+    began, engine = time.thread_time(), asked.asked
 
     def watch(reached: float) -> None:
-        if time.monotonic() > deadline:
+        if time.thread_time() - began > LONGEST:
             raise SimulationError(f"given up after {LONGEST:g} s at t = {reached:.3g} s of {t_end:g} s")
 
-    solution = compiled.simulate(t_end, t_eval=t, engine=engine, progress=watch)  # type: ignore[arg-type]
+    solution = compiled.simulate(
+        t_end,
+        t_eval=t,
+        engine=engine,  # type: ignore[arg-type]
+        rtol=asked.rtol,
+        progress=watch,
+    )
     solution[f"{shaft}.tau_a"], solution[f"{shaft}.tau_b"]
     return solution, time.thread_time() - began
 
