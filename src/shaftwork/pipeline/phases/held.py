@@ -24,6 +24,8 @@ from shaftwork.codegen.linear_readings import ReadingMatrices
 from shaftwork.codegen.matrices import LinearPart
 from shaftwork.codegen.products import Factor
 from shaftwork.codegen.scalar import ScalarProgram
+from shaftwork.components.noise import HeldNoise, SmoothNoise
+from shaftwork.components.pieces import parts
 from shaftwork.core.kept import Kept
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.graph import GROUND
@@ -95,10 +97,16 @@ class HeldAssembly(Assembly):
         met = self.joints(p).met(x)
         return met if is_same(met, x) else None
 
-    @property
-    def has_rows(self) -> bool:
-        """Whether what holds is numbers in explicit rows, for which heyoka has a program."""
-        return self._entries is not None
+    def suits(self, engine: str) -> bool:
+        """Whether what holds is numbers in explicit rows, and these are quick for an engine by name.
+
+        They contain guards of all modes. Those that change by themselves heyoka follows beside the motion; others
+        evaluate them at every stage, and noise takes its time.
+        """
+        if self._entries is None or not self.clocks:
+            return self._entries is not None
+        noisy = any(isinstance(made, HeldNoise | SmoothNoise) for made in parts(self._expressions))
+        return engine in ("auto", "heyoka") and not noisy and self.program is not None
 
     @cached_property
     def scalar(self) -> ScalarProgram | None:

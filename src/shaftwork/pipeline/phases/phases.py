@@ -82,13 +82,13 @@ class Phases:
             raise made.with_traceback(None)  # else it would keep the frames of every time that it was raised
         return made
 
-    def running(self, modes: ModeNames, values: Mapping[str, float], *, by_series: bool) -> Assembly:
+    def running(self, modes: ModeNames, values: Mapping[str, float], engine: str) -> Assembly:
         """The equations in which a motion goes on: those of `assembly`, or one set for all that hold.
 
         Args:
             modes: of every element.
             values: parameters that differ from the network's.
-            by_series: whether they need a heyoka program.
+            engine: name of the engine that is asked for.
 
         Raises:
             NetworkError: as there.
@@ -103,7 +103,7 @@ class Phases:
             laws = laws_that_hold(model, self.elements)
             self._wholes[forms] = None if laws is None else HeldAssembly(model, self.elements, laws)
         whole = self._wholes[forms]
-        if whole is None or not (whole.has_rows or (len(self._holding) >= MANY and not by_series)):
+        if whole is None or not (whole.suits(engine) or (len(self._holding) >= MANY and engine != "heyoka")):
             return self.assembly(modes)
         if (forms, held) not in self._held:
             self._held[forms, held] = whole.holding(held)

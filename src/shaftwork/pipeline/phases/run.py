@@ -75,9 +75,8 @@ class Known:
 
 def _known(phases: Phases, values: Mapping[str, float], demand: Demand, *, own: bool) -> Known:
     """What the last run with these values over the same time has found out, or nothing yet."""
-    by_series = demand.engine == "heyoka"
-    equations = None if own else partial(phases.running, values=values, by_series=by_series)
-    key = tuple(sorted(values.items())), demand.span, own, by_series
+    equations = None if own else partial(phases.running, values=values, engine=demand.engine)
+    key = tuple(sorted(values.items())), demand.span, own, demand.engine
     made: Known = phases.found(key, lambda: Known(Settling(phases, values, demand.span, equations)))
     return made
 
