@@ -88,7 +88,7 @@ FEW = st.lists(st.sampled_from(["friction", "load", "brake", "clutch"]), min_siz
 
 
 @given(FEW)
-@share_of_examples(0.1)
+@share_of_examples(0.02)
 def test_so_do_those_of_few_parts_which_are_numbers_in_rows(kinds: tuple[str, ...]) -> None:
     model = chain(kinds).compile()
     one, own = model.simulate(1.5, rtol=1e-10, t_eval=11), by_combinations(model, 1.5)
