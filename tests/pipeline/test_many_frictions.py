@@ -79,7 +79,7 @@ def assert_alike(one: sw.Solution, own: sw.Solution, speeds: list[str], losses: 
 @share_of_examples(0.05)
 def test_reactions_lead_to_the_motion_of_the_equations_of_each_combination(kinds: tuple[str, ...], engine: str) -> None:
     model = chain(kinds).compile()
-    one, own = model.simulate(0.5, rtol=1e-10, engine=engine, t_eval=11), by_combinations(model, 0.5)
+    one, own = model.simulate(0.25, rtol=1e-10, engine=engine, t_eval=11), by_combinations(model, 0.25)
     speeds = [f"J{k}.omega" for k in range(COUNT + 1)] + ["J.omega"]
     assert_alike(one, own, speeds, [f"x{k}" for k in range(COUNT)], 1e-6)  # as engines agree elsewhere
 
