@@ -51,6 +51,11 @@ def inside_phases(sol: Solution) -> tuple[Array, Array]:
     return times, np.searchsorted(starts, times, side="right") - 1
 
 
+def rounded(speed: Array) -> Array:
+    """The size of a speed in rad/s that is zero but for the rounding of sums of others."""
+    return np.maximum(np.abs(speed) - 1e-13, 0.0)
+
+
 class Witness:
     """A motion at times inside its phases, and what the modes of its parts claim there.
 
@@ -91,7 +96,7 @@ class Witness:
         yield "is no mode", 1.0 * ~(forward | backward | held | apart)
         yield "slips backward", forward * (-speed - self._slow)
         yield "slips forward", backward * (speed - self._slow)
-        yield "moves", held * np.abs(speed)  # to the last bit
+        yield "moves", held * rounded(speed)
         yield "pushes", np.where(forward, -tau, np.where(backward, tau, 0.0)) - self._weak(tau)
         yield "holds more than it can", held * (np.abs(tau) - self._capacity(part) - self._weak(tau))
         begins, ends = part.values.get("t_on", -math.inf), part.values.get("t_off", math.inf)
@@ -114,7 +119,7 @@ class Witness:
         locked = words == "locked"
         yield "overruns", ~locked * (speed - self._slow)
         yield "has a torque", ~locked * np.abs(tau)
-        yield "moves", locked * np.abs(speed)
+        yield "moves", locked * rounded(speed)
         yield "pulls", locked * (-tau - self._weak(tau))
 
     def _contact(self, part: Part, words: Array, speed: Array, tau: Array) -> Iterator[tuple[str, Array]]:
@@ -126,7 +131,7 @@ class Witness:
         yield "pulls", np.where(ahead, -tau, np.where(behind, tau, 0.0)) - self._weak(tau)
         if part.is_rigid:
             yield "is beyond its limit", is_open * (np.maximum(twist - upper, lower - twist) - CLOSE)
-            yield "moves", ~is_open * np.abs(speed)
+            yield "moves", ~is_open * rounded(speed)
             yield "is off its limit", np.where(ahead, np.abs(twist - upper), 0.0) - CLOSE
             yield "is off its limit", np.where(behind, np.abs(lower - twist), 0.0) - CLOSE
             return
