@@ -68,8 +68,10 @@ class Commutation:
         opens = {k: to for k, to in changed.items() if not self._joins(k, to)}
         if not 0 < len(opens) < len(changed):
             return None
-        new, led = self.commutated(moment, after, with_modes(modes, opens))
-        return new, self._changes(t, modes, opens | led)
+        with suppress(NetworkError):  # then each by itself, which says what contradicts what
+            new, led = self.commutated(moment, after, with_modes(modes, opens))
+            return new, self._changes(t, modes, opens | led)
+        return None
 
     def _joins(self, number: int, name: str) -> bool:
         modes = self._elements[number].modes
@@ -82,7 +84,7 @@ class Commutation:
         self, t: float, moment: Moment, modes: ModeNames, sets: Iterable[dict[int, str]], names: Sequence[str]
     ) -> Iterator[tuple[Moment, dict[int, str]]]:
         """Of modes with other ones of diodes those in which what is stored under some names goes on."""
-        for pairs in islice(sets, MOST):
+        for pairs in sets:
             with suppress(NetworkError):
                 other = self._regimes.changed(moment, t, with_modes(modes, pairs))
                 if self._keeps(t, moment, other, names):
@@ -111,7 +113,7 @@ def takeovers(elements: Sequence[Element], modes: ModeNames) -> Iterator[dict[in
 
 def _sets(ways: Sequence[tuple[int, str]], least: int) -> Iterator[dict[int, str]]:
     sizes = range(least, len(ways) + 1)
-    return chain.from_iterable(map(dict, combinations(ways, size)) for size in sizes)
+    return islice(chain.from_iterable(map(dict, combinations(ways, size)) for size in sizes), MOST)
 
 
 def _begins(elements: Sequence[Element], modes: ModeNames) -> list[tuple[int, str]]:
