@@ -216,5 +216,5 @@ def test_a_drive_with_an_inverter_and_a_damped_shaft_has_a_truth_that_two_degree
     assert study.truth[0].startswith("Spectral(")
     assert study.truth[1] < 1e-6
     spectral, lumped, wave = study.trials
-    assert spectral.error < 1e-4 < lumped.error < 1e-2
+    assert 10 * spectral.error < lumped.error < 1e-3  # five sections bend the second mode by a percent
     assert "internal damping" in wave.why
