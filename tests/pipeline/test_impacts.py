@@ -424,3 +424,17 @@ def test_two_freewheels_in_a_row_let_what_is_before_them_stop_and_what_is_behind
     assert sol["J2.omega"][-1] == pytest.approx(before * math.exp(-0.1 * (0.1 - hit)), rel=1e-8)
     assert sol.energy.lost_in["stop"] == pytest.approx(before**2 / 2, rel=1e-7)
     assert sol.energy_residual < 1e-9
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.3])
+def test_rigid_flanks_without_a_gap_go_on_together_where_the_torque_turns_round(restitution: float) -> None:
+    net = sw.Network("gap of zero")
+    net.add(sw.Inertia("Jc", J=0.45), "c")
+    net.add(sw.Inertia("Jd", J=0.54), "d")
+    net.add(sw.TorqueSource("motor", tau=sw.Step(-39.26, start=0.05, before=23.13)), "d")
+    net.add(sw.Backlash("gap", gap=0.0, restitution=restitution), "c", "d")
+    sol = net.simulate(0.3)
+    for name in ("Jc.omega", "Jd.omega"):
+        assert sol[name][-1] == pytest.approx((23.13 * 0.05 - 16.13 * 0.25) / 0.99, rel=1e-12)
+    assert {event[0] for event in sol.events} == {0.0, 0.05}
+    assert sol.phases[-1].name == "gap in contact"

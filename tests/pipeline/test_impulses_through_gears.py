@@ -395,6 +395,36 @@ def test_a_gear_does_not_jam_where_a_freewheel_opens_and_lets_it_turn_on() -> No
     assert sol["hung.omega"][-1] == pytest.approx(before + 8.8 / 3.0 * 0.065, rel=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("joint", "efficiency_back"),
+    [
+        (sw.Clutch("joint", tau=400.0), 2 - 1 / 0.45),
+        (sw.Clutch("joint", tau=4e5), 2 - 1 / 0.45),
+        (sw.DryFriction("joint", tau_c=400.0), 2 - 1 / 0.45),
+        (sw.DryFriction("joint", tau_c=4000.0), -0.9),
+    ],
+)
+def test_a_gear_that_would_jam_by_itself_does_not_where_what_is_engaged_answers_with_it(
+    joint: sw.Component, efficiency_back: float
+) -> None:
+    """Jw alone would be braked by more than it can answer; the joint holds, so that Jm answers with it."""
+    net = sw.Network("worm")
+    net.add(sw.Inertia("Jm", J=0.5), "m")
+    net.add(joint, "m", "w")
+    net.add(sw.Inertia("Jw", J=0.05), "w")
+    net.add(sw.LossyGear("worm", ratio=10.0, efficiency=0.45, efficiency_back=-0.5), "w", "d")
+    net.add(sw.Inertia("Jb", J=42.0), "d")
+    net.add(sw.TorqueSource("load", tau=-1962.0), "d")
+    sol = net.compile().simulate(
+        0.5, initial={"Jw.omega": -20.0, "Jm.omega": -20.0}, parameters={"worm.efficiency_back": efficiency_back}
+    )
+    rate = -efficiency_back * 196.2 / (0.55 + efficiency_back * 0.42)
+    (at,) = (event[0] for event in sol.events if event[1] == "worm" and event[3] == "stuck")
+    assert at == pytest.approx(20.0 / rate, rel=1e-9)
+    assert sol["Jb.omega"][-1] == pytest.approx(0.0, abs=1e-12)
+    assert sol.energy_residual < 1e-9
+
+
 def test_a_source_that_jumps_through_zero_gives_in_each_direction_of_power_its_impulse_times_its_mean_speed() -> None:
     """A lossy gear is driven by the inertia down to rest and drives it from there: two stages, one balance."""
     net = sw.Network("reversal")

@@ -222,3 +222,21 @@ def test_a_hundred_frictions_need_one_set_of_equations_whatever_holds() -> None:
     assert len({tuple(phase.modes.values()) for phase in sol.phases}) > 20
     assert not sol["J99.omega"].any()
     assert sol.energy_residual < 1e-8
+
+
+@pytest.mark.parametrize("others", [0, 12])
+def test_a_friction_with_a_torque_of_rest_holds_that_in_a_ring_of_clutches_whatever_else_there_is(others: int) -> None:
+    """It holds up to 10 N m at rest and 5 in motion; the clutches share what is left of 20 N m on three inertias."""
+    net = sw.Network("ring")
+    net.add(sw.TorqueSource("motor", tau=20.0), "a")
+    for node in "abc":
+        net.add(sw.Inertia(f"J{node}", J=1.0), node)
+    net.add(sw.DryFriction("friction", tau_c=5.0, tau_s=10.0, omega_s=0.0), "a", "b")
+    net.add(sw.Clutch("k1", tau=30.0), "b", "c")
+    net.add(sw.Clutch("k2", tau=30.0), "c", "a")
+    for k in range(others):
+        net.add(sw.Inertia(f"I{k}", J=1.0), f"p{k}")
+        net.add(sw.DryFriction(f"g{k}", tau_c=1.0), f"p{k}")
+    sol = net.simulate(1.0)
+    torques = [sol[f"{name}.tau"][-1] for name in ("friction", "k1", "k2")]
+    np.testing.assert_allclose(torques, [10.0, 10.0 / 3, -10.0 / 3], rtol=1e-9)

@@ -117,7 +117,27 @@ def gearboxes(draw: st.DrawFn) -> list[Placed]:
     return [*parts, (sw.TorqueSource("motor", tau=tau), (draw(st.sampled_from(["s", "c", "r"])),))]
 
 
-@given(inverter_legs() | gearboxes(), st.randoms(use_true_random=False))
+@st.composite
+def rings(draw: st.DrawFn) -> list[Placed]:
+    """Inertias in a ring of frictions that hold more at rest than in motion, and clutches let go at one instant."""
+    nodes = "abcde"[: draw(st.integers(3, 5))]
+    torque = st.integers(-25, 25).map(float)
+    parts: list[Placed] = [(sw.Inertia(f"J{node}", J=draw(st.integers(1, 9)) / 2), (node,)) for node in nodes]
+    for node in nodes:
+        before, after = draw(torque), draw(torque)
+        parts.append((sw.TorqueSource(f"m{node}", tau=sw.Step(after - before, start=0.05, before=before)), (node,)))
+    for k, node in enumerate(nodes):
+        pair = (node, nodes[(k + 1) % len(nodes)])
+        kind, slips = draw(st.sampled_from(["friction", "off", "on", "clutch"])), draw(st.integers(2, 8))
+        if kind == "friction":
+            parts.append((sw.DryFriction(f"x{k}", tau_c=slips, tau_s=slips + 6.0, omega_s=0.0), pair))
+        else:
+            when = {"off": {"t_off": 0.05}, "on": {"t_on": 0.05}, "clutch": {}}[kind]
+            parts.append((sw.Clutch(f"x{k}", tau=7.0 * slips, **when), pair))
+    return parts
+
+
+@given(inverter_legs() | gearboxes() | rings(), st.randoms(use_true_random=False))
 @share_of_examples(0.05)
 def test_the_order_of_switches_and_of_what_holds_a_gearbox_changes_nothing(parts: list[Placed], rng: Random) -> None:
     sums = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import networkx as nx
@@ -63,6 +64,25 @@ def jamming(form: StateForm, parameters: Mapping[str, float]) -> Iterator[Proble
         yield _jammed(View(form), tuple(branch.index for branch in form.graph.branches if branch.template.through))
 
 
+def self_locks(form: StateForm, parameters: Mapping[str, float]) -> bool:
+    """Whether a coupling turns the power of one of its ends round, so that it may jam.
+
+    Args:
+        form: the equations.
+        parameters: values by name.
+    """
+    if form.tree.cutsets is form.tree.loops:
+        return False
+    lossy = (branch for branch in form.graph.branches if branch.template.through)
+    pairs = ((made, *pair) for made in lossy for pair in zip(made.terms, made.balances, strict=True))
+    powers = (form.graph.in_network_symbols(term[0] * balance[0], made) for made, term, balance in pairs)
+    return any(_value(power, parameters) < 0 for power in powers)
+
+
+def _value(expression: sympy.Expr, parameters: Mapping[str, float]) -> float:
+    return float(expression.xreplace({s: sympy.Float(parameters[s.name]) for s in expression.free_symbols}))
+
+
 def _sign_of_tree(
     form: StateForm, column: Callable[[CircuitGraph, GraphBranch], Row], parameters: Mapping[str, float]
 ) -> float:
@@ -83,10 +103,7 @@ def _matrix(numbers: Sequence[Sequence[Number]], parameters: Mapping[str, float]
     """Gains in numbers."""
     gains = [number for row in numbers for number in row if isinstance(number, Gain)]
 
-    def leaf(expression: sympy.Expr) -> float:
-        return float(expression.xreplace({s: sympy.Float(parameters[s.name]) for s in expression.free_symbols}))
-
-    known = dict(zip(map(id, gains), fold(gains, leaf), strict=True))
+    known = dict(zip(map(id, gains), fold(gains, partial(_value, parameters=parameters)), strict=True))
     made = [[known[id(number)] if isinstance(number, Gain) else number for number in row] for row in numbers]
     return np.array(made, dtype=float).reshape(len(numbers), -1 if made and made[0] else columns)
 

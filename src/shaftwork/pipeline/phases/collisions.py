@@ -105,7 +105,9 @@ class Collisions:
         if back.any():
             stages += self._thrown_back(t, contacts, stages, back)
         least = NO_IMPACT * max(1.0, np.abs(before).max(initial=0.0))
-        hit = [c for c, i in zip(contacts, _pressed(stages), strict=True) if c.leave and (i > 0 or c.number == number)]
+        # without a gap the other flank of the element touches too
+        wanted = {c for c in contacts if (c.number, c.joined) == (number, leave.to)}
+        hit = [c for c, i in zip(contacts, _pressed(stages), strict=True) if c.leave and (i > 0 or c in wanted)]
         after, closed, further = self._ended(t, modes, contacts, stages, least, hit)
         owners = (self._elements[contact.number].part.name for contact in contacts)
         lost = zip(owners, self._taken(t, contacts, stages).tolist(), strict=True)

@@ -6,6 +6,9 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from shaftwork.codegen.elements import Array
 from shaftwork.components.modes import Choice
 from shaftwork.core.errors import NetworkError, NetworkWarning, ParameterError
 from shaftwork.core.kept import Kept
@@ -21,6 +24,7 @@ from shaftwork.pipeline.phases.regimes import with_modes
 from shaftwork.pipeline.phases.resting import at_rest
 from shaftwork.pipeline.phases.wave_assembly import WaveAssembly
 from shaftwork.pipeline.waves import engine_of_waves
+from shaftwork.reduction.cancelling import self_locks
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.model import Model
@@ -35,6 +39,8 @@ FOLLOWING = {
     ADAMS: (1 / 100, 1e-8),
     "wave": (1.0, 1e-6),  # its panels leave out a tenth of the tolerance
 }
+# A speed that is no more than this, where all speeds are about 1, is none.
+STILL = 1e-9
 _ENGINES = ", ".join(name for name in FOLLOWING if name not in (ADAMS, "wave"))
 
 
@@ -98,18 +104,37 @@ class Phases:
         held = tuple(k for k in self._holding if self._form(k, modes) != self._form(k, self.first))
         forms = tuple(self._form(k, modes) for k in self._lasting)
         if forms not in self._wholes:
-            free = with_modes(modes, {k: self.first[k] for k in held})
-            model = self.assembly(free).model
-            laws = laws_that_hold(model, self.elements)
-            self._wholes[forms] = None if laws is None else HeldAssembly(model, self.elements, laws)
+            self._wholes[forms] = self._whole(with_modes(modes, {k: self.first[k] for k in held}))
         whole = self._wholes[forms]
         if whole is None or not (whole.suits(engine) or (len(self._holding) >= MANY and engine != "heyoka")):
             return self.assembly(modes)
+        if self_locks(whole.model.form, {**whole.model.parameters, **values}):
+            return self.assembly(modes)  # whether it jams depends on what is held
         if (forms, held) not in self._held:
             self._held[forms, held] = whole.holding(held)
         made = self._held[forms, held]
+        p = made.vector(values, self.numbers(modes))
         # where parts share what they hold, the first carries as much as it can
-        return made if made.joints(made.vector(values, {})).independent else self.assembly(modes)
+        return made if made.joints(p).independent and not self._rests(made, modes, p) else self.assembly(modes)
+
+    def _rests(self, made: HeldAssembly, modes: ModeNames, p: Array) -> bool:
+        """Whether what has another law at rest slips by its mode, and yet cannot turn as others hold its ends."""
+        pairs = enumerate(zip(self.elements, modes, strict=True))
+        slipping = [k for k, (element, name) in pairs if element.modes[name].at_rest is not None]
+        if not slipping:
+            return False
+        x = np.random.default_rng(0).uniform(1.0, 2.0, len(made.model.states))  # no two alike by chance
+        speeds = made.across(slipping, 0.0, made.joints(p).alike(x), p)
+        return any(abs(speed) < STILL for speed in speeds)
+
+    def _whole(self, free: ModeNames) -> HeldAssembly | None:
+        """One set of equations for all that hold, from the modes in which none does; None where there is none."""
+        try:
+            model = self.assembly(free).model
+        except NetworkError:  # as of a gear that jams only while a clutch behind it slips
+            return None
+        laws = laws_that_hold(model, self.elements)
+        return None if laws is None else HeldAssembly(model, self.elements, laws)
 
     @cached_property
     def _holding(self) -> tuple[int, ...]:

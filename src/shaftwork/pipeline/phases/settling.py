@@ -284,6 +284,9 @@ class Settling:
                 beyond.append((value, pair))
         # impacts come first: torques are those of the motion after them
         hits = [excess for excess in beyond if not excess[1][1].leave.by_torque]
+        # then what the time ends: what else gives way shows when all of that has changed
+        timed = [pair for pair in on_limit if by_time(pair[1].leave)]
+        hits = hits or (leaving(regime, here, beside, timed, again=False) if timed else [])
         if on_limit and not hits:
             soon_beyond = leaving(regime, here, beside, on_limit, again=again)
             hits = [excess for excess in soon_beyond if excess[1][1].leave.rebound is not None]
