@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+import numpy as np
 import pytest
+import sympy
 
 import shaftwork as sw
 
@@ -201,3 +203,34 @@ def test_a_capacitor_at_a_leg_is_emptied_by_the_switch_that_closes_as_the_other_
     assert sol["C.u"][-1] == pytest.approx(0.0, abs=1e-12)
     assert sol.energy.lost_in["lower"] == pytest.approx(0.001 * U**2 / 2, rel=CLOSE)
     assert sol.energy_residual < 1e-9
+
+
+@pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials"])
+@pytest.mark.parametrize(
+    "on",
+    [
+        0.3 - (10 * sw.t - sympy.floor(10 * sw.t)),
+        sympy.Piecewise((1, 10 * sw.t - sympy.floor(10 * sw.t) < 0.3), (0, True)),
+    ],
+    ids=["a line against a saw tooth", "one and zero"],
+)
+def test_a_switch_follows_a_law_of_time_as_a_chopper_with_a_freewheeling_diode_does(
+    on: sympy.Expr, engine: str
+) -> None:
+    """3 of 10 parts of each period i goes to 24 V / 2 ohm, else to zero, with L / R = 0.02 s."""
+    net = sw.Network("chopper")
+    net.add(sw.VoltageSource("supply", u=24.0), "p", "ground")
+    net.add(sw.Switch("switch", on=on), "p", "x")
+    net.add(sw.Diode("diode"), "ground", "x")
+    net.add(sw.Resistor("R", R=2.0), "x", "y")
+    net.add(sw.Inductor("L", L=0.04), "y", "ground")
+    sol = net.simulate(0.5, engine=engine, rtol=1e-10)
+    current = 0.0
+    for _ in range(5):
+        current = 12.0 + (current - 12.0) * math.exp(-0.03 / 0.02)
+        current *= math.exp(-0.07 / 0.02)
+    # at 0.5 s it closes again
+    assert sol["L.i"][-1] == pytest.approx(current, rel=1e-8)
+    times = [time for time, part, *_ in sol.events if part == "switch"]
+    np.testing.assert_allclose(times[:9], [0.03, 0.1, 0.13, 0.2, 0.23, 0.3, 0.33, 0.4, 0.43], rtol=1e-12)
+    assert sol.energy_residual < 1e-8

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from difflib import get_close_matches
 from functools import cached_property
 from typing import Any
 
@@ -33,68 +32,17 @@ from shaftwork.components.base import Signal
 from shaftwork.components.branches import INTEGRAL
 from shaftwork.components.slopes import slope
 from shaftwork.core.errors import SignalError, SimulationError
-from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart, signals_of
+from shaftwork.network.graph import GROUND, GraphBranch, GraphPart
 from shaftwork.network.templates import BranchTemplate, Kind
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.gains import add
+from shaftwork.reduction.inputs import Place, places_of
 from shaftwork.reduction.tree import Row
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class _Place:
-    """Where an input enters: its part, its signal, and the branch, -1 where it has to be added."""
-
-    part: int
-    signal: Signal
-    branch: int
-
-
-def _inputs_of(graph: CircuitGraph, number: int) -> dict[str, _Place]:
-    """The inputs at a part: what it prescribes, or the torque that it gives; a plain name comes last."""
-    part = graph.parts[number]
-    prescribed = {
-        graph.branches[k].template.ends: k
-        for k in part.branches
-        if graph.branches[k].template.kind is Kind.ACROSS_SOURCE and not graph.branches[k].template.reads
-    }
-    own = signals_of(graph, part)
-    if prescribed:
-        across = ((name, made) for name, made in own.items() if made.kind == "across" and made.ends in prescribed)
-        return {f"{part.name}.{name}": _Place(number, made, prescribed[made.ends]) for name, made in across}
-    if part.component.role not in ("source", "loss"):
-        return {}
-    return {f"{part.name}.{name}": _Place(number, made, -1) for name, made in own.items() if made.kind == "through"}
-
-
-def source_inputs(graph: CircuitGraph) -> tuple[str, ...]:
-    """The inputs of all sources, in the order of the parts."""
-    names: list[str] = []
-    for number, part in enumerate(graph.parts):
-        if part.component.role == "source":
-            names.extend({place.signal: name for name, place in _inputs_of(graph, number).items()}.values())
-    return tuple(names)
-
-
-def _places(graph: CircuitGraph, names: Sequence[str]) -> tuple[_Place, ...]:
-    """Where the named inputs enter.
-
-    Raises:
-        SignalError: there is no such input.
-    """
-    known = {name: place for number in range(len(graph.parts)) for name, place in _inputs_of(graph, number).items()}
-    for name in names:
-        if name not in known:
-            close = get_close_matches(str(name), known, n=3) or tuple(known)[:12]
-            raise SignalError(
-                f"'{name}' is no input of '{graph.name}'. An input is what a source gives: "
-                f"{', '.join(close) or 'none'}. To excite another node, add a source there; its law may be 0."
-            )
-    return tuple(known[name] for name in names)
-
-
-def _with_inputs(form: StateForm, places: Sequence[_Place]) -> tuple[StateForm, tuple[int, ...]]:
+def _with_inputs(form: StateForm, places: Sequence[Place]) -> tuple[StateForm, tuple[int, ...]]:
     """The form with a branch for every torque that is an input, and the branches of all inputs."""
     graph, tree = form.graph, form.tree
     branches, parts, members = list(graph.branches), list(graph.parts), list[int]()
@@ -187,7 +135,7 @@ class Linearization:
     ) -> None:
         if arriving is None:
             refuse_waves(model.form)
-        places = _places(model.form.graph, inputs)
+        places = places_of(model.form.graph, inputs)
         form, branches = _with_inputs(model.form, places)
         x = x if arriving is None else np.concatenate([x, arriving])
         self._form, self._point = form, (t, x)

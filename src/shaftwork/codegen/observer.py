@@ -14,12 +14,12 @@ from shaftwork.codegen.recovery import History
 from shaftwork.codegen.stores import Stores
 from shaftwork.codegen.timeline import NOTHING, Timeline
 from shaftwork.codegen.waves import Carrying, Dense, along_lines
-from shaftwork.components.base import Component, Profile, Signal
-from shaftwork.core.domains import ROTATION
+from shaftwork.components.base import Component, Profile
 from shaftwork.core.errors import SignalError
-from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart, signals_of
+from shaftwork.network.graph import CircuitGraph, GraphPart
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
+from shaftwork.reduction.names import Names
 
 LARGEST_HISTORY = 2_000_000
 """Values, branches by times, of a trajectory whose branch quantities are made all at once."""
@@ -41,56 +41,6 @@ class Impact(NamedTuple):
     lost: Mapping[str, float]
 
 
-class Quantities:
-    """The names of all quantities of a model; made once for all motions in the same equations.
-
-    Args:
-        form: the state form.
-    """
-
-    def __init__(self, form: StateForm) -> None:
-        self._form, self._graph = form, form.graph
-
-    @cached_property
-    def signals(self) -> dict[str, tuple[GraphPart, Signal]]:
-        """Signals of parts."""
-        parts = self._graph.parts
-        return {f"{p.name}.{name}": (p, made) for p in parts for name, made in signals_of(self._graph, p).items()}
-
-    @cached_property
-    def integrals(self) -> dict[str, int]:
-        """States that are integrals, by number."""
-        return {state.name: k for k, state in enumerate(self._form.states) if state.kind == "integral"}
-
-    @cached_property
-    def nodes(self) -> dict[str, int]:
-        """Speeds of nodes and the like, by number of the node."""
-        pairs = zip(self._graph.nodes, self._graph.domains, strict=True)
-        return {f"{name}.{domain.across.name}": k for k, (name, domain) in enumerate(pairs)}
-
-    @cached_property
-    def units(self) -> Mapping[str, str]:
-        """Every quantity that can be read and its unit; where a part and a node share a name, the part's is meant."""
-        units = {f"{name}": domain.across.unit for name, domain in zip(self.nodes, self._graph.domains, strict=True)}
-        units |= {name: _unit(signal) for name, (_, signal) in self.signals.items()}
-        units |= {s.name: s.unit for s in self._form.states if s.kind == "integral"}
-        units |= {f"{part.name}.power": "W" for part in self._graph.parts}
-        return units | {f"{part.name}.energy": "J" for part in self._graph.parts}
-
-    @property
-    def wiring(self) -> Mapping[str, str]:
-        """See `CircuitGraph.wiring`."""
-        return self._graph.wiring
-
-    def nodes_of(self, name: str) -> tuple[str, ...]:
-        """Names of the nodes that a signal of a part or the speed of a node is of, the reference not among them."""
-        if name not in self.signals:
-            return (self._graph.node_name(self.nodes[name]),) if name in self.nodes else ()
-        part, signal = self.signals[name]
-        numbers = (part.nodes[end] for end in signal.ends if end is not None)
-        return tuple(self._graph.node_name(number) for number in numbers if number != GROUND)
-
-
 class ModelObserver:
     """Recovers every quantity of a network from its states.
 
@@ -107,10 +57,10 @@ class ModelObserver:
         form: StateForm,
         bind: Callable[[], BoundArrays],
         instants: Timeline = NOTHING,
-        quantities: Quantities | None = None,
+        quantities: Names | None = None,
     ) -> None:
         self._form, self._bind, self._instants = form, bind, instants
-        self.quantities = Quantities(form) if quantities is None else quantities
+        self.quantities = Names(form) if quantities is None else quantities
         self._graph: CircuitGraph = form.graph
         self._last: tuple[Array, Array, History] | None = None
 
@@ -291,9 +241,3 @@ def _carrying(dense: Dense | None) -> Carrying:
     if not isinstance(dense, Carrying):
         raise SignalError("A wave is on its way, and one instant does not tell it. Read it of a motion.")
     return dense
-
-
-def _unit(signal: Signal) -> str:
-    domain = signal.domain or ROTATION
-    quantity = {"across": domain.across, "twist": domain.integral}.get(signal.kind, domain.through)
-    return quantity.unit

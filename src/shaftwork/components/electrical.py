@@ -5,10 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
-from sympy import And, Min, Not, false
+from sympy import And, Min, Not, Piecewise, false
 
 from shaftwork.components.base import Component, Port, Role, component
-from shaftwork.components.branches import ACROSS, AcrossLaw, AcrossStore, Branch, ThroughLaw, ThroughStore, rigid
+from shaftwork.components.branches import (
+    ACROSS,
+    INTEGRAL,
+    AcrossLaw,
+    AcrossStore,
+    Branch,
+    ThroughLaw,
+    ThroughStore,
+    rigid,
+)
 from shaftwork.components.friction import STUCK, conducting
 from shaftwork.components.laws import t
 from shaftwork.components.modes import ANEW, Leave, Mode, Modes
@@ -86,16 +95,17 @@ class CurrentSource(Component):
 class Switch(Component):
     """An ideal switch between two nodes of a circuit.
 
-    Law: u = 0 while closed, i = 0 while open. It closes at t_on; with `on`, when that rises above zero, but not before
-    t_on. It opens for good at t_off, which must be later than t_on. Modes: open, closed. A current that an inductance
-    drives and that finds no other way is cut off at once, with its energy lost in the switch; a diode, or a switch that
-    closes at the same instant, lets it flow on.
+    Law: u = 0 while closed, i = 0 while open. It closes at t_on; with `on`, a law of time alone, it is closed while
+    that is above zero, from t_on on; with one that reads u, from when that rises above zero. It opens for good at
+    t_off, which must be later than t_on. Modes: open, closed. A current that an inductance drives and that finds no
+    other way is cut off at once, with its energy lost in the switch; a diode, or a switch that closes at the same
+    instant, lets it flow on.
     """
 
     t_on: float = parameter("s", "time at which it closes", default=0.0, latex=r"t_{on}")
     t_off: float | None = parameter("s", "time at which it opens", default=None, latex=r"t_{off}")
     on: Any = parameter(
-        "1", "closes when this law, in the voltage u across it and t, is above zero", law=True, default=None
+        "1", "closed while this law of t is above zero, or from when one of u is", law=True, default=None
     )
 
     role: ClassVar[Role] = "loss"
@@ -105,14 +115,17 @@ class Switch(Component):
         refuse_no_time_on(self, "closes")
 
     def modes(self, p: Any) -> Iterator[Modes]:
-        begins = t - p.t_on if p.on is None else p.on if p.t_on == 0 else Min(t - p.t_on, p.on)
+        timed = p.on is not None and not p.on.free_symbols & {ACROSS, INTEGRAL}
+        law = Piecewise((1, p.on > 0), (-1, True)) if timed else p.on  # of a law that is zero for a while too
+        begins = t - p.t_on if law is None else law if p.t_on == 0 else Min(t - p.t_on, law)
         past = false if p.t_off is None else t >= p.t_off
         on = And(begins >= 0 if p.on is None else begins > 0, Not(past))
         over = () if p.t_off is None else (Leave(t - p.t_off, "over"),)
+        opens = (Leave(-law, "open"),) if timed else ()
         yield Modes(
             (
                 Mode("open", (Leave(begins, ANEW),), starts=And(Not(on), Not(past))),
-                Mode("closed", over, 1.0, STUCK, starts=on),
+                Mode("closed", (*over, *opens), 1.0, STUCK, starts=on),
                 Mode("over", starts=past, says="open"),
             )
         )

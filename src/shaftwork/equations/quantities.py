@@ -121,9 +121,9 @@ class Quantities:
         """The same; of a wave that arrives, what left the other end."""
         read = {"across": self.node, "through": self.store, "integral": self.integral}
         others = readings_of(self.graph, branch).items()
-        return self._own(branch).xreplace({symbol: read[made.kind](made.of) for symbol, made in others})
+        return self.own_law(branch).xreplace({symbol: read[made.kind](made.of) for symbol, made in others})
 
-    def _own(self, branch: int) -> Expr:
+    def own_law(self, branch: int) -> Expr:
         """A law in parameters and derived quantities of the network, but not in what it reads of others."""
         made = self.graph.branches[branch]
         law: Expr = made.template.printed.xreplace(self._of_network[made.part])
@@ -283,7 +283,7 @@ class Quantities:
 
     def _defined(self, branch: GraphBranch) -> Symbol:
         """The symbol of the across variable that a store or a source defines."""
-        law = self._own(branch.index)
+        law = self.own_law(branch.index)
         if branch.template.kind is Kind.ACROSS_SOURCE and law.is_Symbol and law.name in self.graph.parameters:
             return law
         quantity = self.domain((branch.plus, branch.minus)).across

@@ -17,6 +17,7 @@ from shaftwork.reduction.form import StateForm
 
 if TYPE_CHECKING:
     from shaftwork.equations.second_order import SecondOrder
+    from shaftwork.equations.transfer import TransferFunction
 
 Form = Literal["kirchhoff", "state", "second-order"]
 SHOWN = 5
@@ -255,6 +256,36 @@ class Equations:
         from shaftwork.equations.second_order import second_order
 
         return second_order(self.form.graph)
+
+    def transfer_function(
+        self,
+        input: str,  # noqa: A002 (it is what it is)
+        output: str,
+        *,
+        values: bool = False,
+        at: Mapping[str, float] | None = None,
+        t: float | None = None,
+    ) -> TransferFunction:
+        """A quantity over an input as a quotient of polynomials in s, about a point.
+
+        Law: the quotient of two determinants of Kirchhoff's equations in the image domain, by Cramer's rule; laws have
+        their slopes there, as symbols where these are no sums and products of parameters. Exact.
+
+        Args:
+            input: what a source gives, "motor.tau".
+            output: any speed, torque or angle, "shaft.tau".
+            values: with the parameters' values instead of their symbols, which large networks need.
+            at: with values, the point, as {"J1.omega": 8.0}; what is not named is zero.
+            t: with values, the time at which laws are read, s; by default as for `TransferFunction.numeric`.
+
+        Raises:
+            SignalError: there is no such input or quantity.
+            CompileError: a shaft is a travelling wave, or the polynomials would be too long in symbols.
+            ParameterError: `at` names no quantity, or a law has no finite slope there.
+        """
+        from shaftwork.equations.transfer import transfer_function
+
+        return transfer_function(self, (input, output), values=values, at=at, t=t)
 
     def latex(self, form: Form | None = None, *, values: bool = False, phase: str | NamedPhase | None = None) -> str:
         """The equations as the body of a LaTeX document (needs amsmath), or for a notebook cell.

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.linear import Linearization, source_inputs
+from shaftwork.codegen.linear import Linearization
 from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.start_values import Start, initial_state
 from shaftwork.components.laws import t as TIME
@@ -20,6 +20,7 @@ from shaftwork.network.templates import Kind
 from shaftwork.network.wording import listed
 from shaftwork.pipeline.point_speeds import as_multiple, speeds_to_give, warn_of_speeds_left, warn_of_turning_angles
 from shaftwork.pipeline.settled import SteadyState
+from shaftwork.reduction.inputs import source_inputs
 from shaftwork.results import campbell as diagram
 from shaftwork.results.exact import ExactModel
 from shaftwork.results.linear import LinearModel, linear_model

@@ -17,7 +17,6 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.linear_readings import ReadingMatrices
 from shaftwork.codegen.many import ManyExpressions
 from shaftwork.codegen.matrices import LinearPart
-from shaftwork.codegen.observer import Quantities
 from shaftwork.codegen.recovery import History
 from shaftwork.codegen.scalar import ScalarProgram
 from shaftwork.codegen.stores import Stores
@@ -35,6 +34,7 @@ from shaftwork.pipeline.phases.rates import rates_of
 from shaftwork.pipeline.phases.shown import Shown
 from shaftwork.pipeline.phases.watch import Watch
 from shaftwork.pipeline.prepared import Prepared
+from shaftwork.reduction.names import Names
 from shaftwork.reduction.readings import NamedReadings, Readings
 from shaftwork.reduction.rows import Rows
 
@@ -76,7 +76,7 @@ class Assembly:
         self.model, self.elements = model, elements
         self.whole: Assembly = self
         """Where what holds is numbers in the equations: those in which nothing does, of which these are a copy."""
-        self.stores, self.quantities = Stores(model.form), Quantities(model.form)
+        self.stores, self.quantities = Stores(model.form), Names(model.form)
         self._places = {name: k for k, name in enumerate(model.parameters)}
         self._rows = rows = model.rows if rows is None and None not in forms else rows
         self._readings = readings = NamedReadings(model.form) if rows is None else Readings(model.form, rows)

@@ -1,0 +1,77 @@
+"""Transfer functions as LaTeX."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+from sympy import Add, Expr, Integer, Symbol
+
+from shaftwork.equations.assembly import Group
+from shaftwork.equations.blocks import Blocks
+from shaftwork.equations.notation import without_marks
+from shaftwork.equations.printing import LINE_WIDTH, Line, Writer, aligned
+from shaftwork.equations.spelling import escaped
+from shaftwork.equations.tableau import S, Slope
+from shaftwork.equations.widths import printed_width
+
+if TYPE_CHECKING:  # the record prints itself through this module
+    from shaftwork.equations.transfer import TransferFunction
+
+REAL = Symbol("s", real=True)
+"""Stands for s in print, where all letters are real."""
+
+
+def in_latex(made: TransferFunction) -> str:
+    """The quotient, its polynomials by themselves where they are wide, and what letters of slopes stand for."""
+    return f"\\begin{{align*}}\n{without_marks(aligned(tuple(_lines(made))))}\n\\end{{align*}}"
+
+
+def _lines(made: TransferFunction) -> Iterator[Line]:
+    names, blocks = made.equations.symbol_names, Blocks(made.equations, values=False)
+    letters = _letters(made.slopes, set(names.values()))
+    writer = Writer({**names, **letters, REAL.name: "s"}, {*made.equations.values, *letters}, (), {})
+    above, below = (writer.pieces(_powers(polynomial)) for polynomial in made.printed)
+    left = rf"\frac{{{_named(made.output, names)}}}{{{_named(made.input, names)}}}"
+    if 1.5 * max(printed_width(" ".join(pieces)) for pieces in (above, below)) < LINE_WIDTH:
+        yield Line(left, (rf"\frac{{{' '.join(above)}}}{{{' '.join(below)}}}",))
+    else:
+        yield Line(left, (r"\frac{Z(s)}{N(s)}",))
+        yield Line("Z(s)", above)
+        yield Line("N(s)", below)
+    for letter, slope in made.slopes.items():
+        yield Line(letters[letter.name], _derivative(slope, blocks.writer))
+
+
+def _named(name: str, names: Mapping[str, str]) -> str:
+    return names.get(name, rf"\mathrm{{{escaped(name)}}}")
+
+
+def _letters(slopes: Mapping[Symbol, Slope], taken: set[str]) -> dict[str, str]:
+    """A letter for each slope, with the name of its part: k, or another where the part has one."""
+    found: dict[str, str] = {}
+    for symbol in slopes:
+        owner, _, own = symbol.name.rpartition(".")
+        index = own.removeprefix("slope").replace("_", ",")
+        options = (rf"{base}_{{\mathrm{{{escaped(owner)}}}{index}}}" for base in ("k", r"\kappa", r"\lambda"))
+        whole = rf"\mathrm{{{escaped(symbol.name)}}}"
+        found[symbol.name] = next((text for text in options if text not in taken), whole)
+    return found
+
+
+def _powers(polynomial: Expr) -> list[Group]:
+    """The terms of a polynomial in s, the highest power first."""
+    powers: dict[int, list[Expr]] = {}
+    for term in Add.make_args(polynomial.expand()):
+        coefficient, power = term.as_independent(S)
+        powers.setdefault(int(power.as_base_exp()[1]) if power != 1 else 0, []).append(coefficient)
+    return [Group(REAL**power, tuple(terms)) for power, terms in sorted(powers.items(), reverse=True)]
+
+
+def _derivative(slope: Slope, writer: Writer) -> tuple[str, ...]:
+    """How a torque changes with what its law reads, or the slope in full where the torque is no quantity by itself."""
+    sign, letter = slope.of.as_coeff_Mul()
+    if not (letter.is_Symbol and slope.by.is_Symbol):
+        return writer.pieces([Group(Integer(1), Add.make_args(slope.value))])
+    minus = "-" if sign < 0 else ""
+    return (rf"{minus}\frac{{\partial {writer.latex(letter)}}}{{\partial {writer.latex(slope.by)}}}",)

@@ -1,0 +1,182 @@
+"""Transfer functions in symbols against the linearised model, closed forms and other libraries' reading of them."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+import numpy as np
+import pytest
+import scipy.signal
+import sympy
+from hypothesis import given
+from hypothesis import strategies as st
+
+import shaftwork as sw
+from tests.properties.examples import compiled, network_of, share_of_examples
+from tests.reference.mna import SOURCE_VALUE
+from tests.strategies import Network, networks
+
+F = np.array([0.03, 0.7, 5.0])
+
+
+def two_masses() -> sw.Network:
+    net = sw.Network("two masses")
+    net.add(sw.TorqueSource("motor", tau=1.0), "a")
+    net.add(sw.Inertia("J1", J=2.0), "a")
+    net.add(sw.Spring("shaft", c=50.0, d=0.3), "a", "b")
+    net.add(sw.Inertia("J2", J=3.0), "b")
+    net.add(sw.Damper("load", d=0.1), "b")
+    return net
+
+
+def symbols(*names: str) -> tuple[sympy.Symbol, ...]:
+    return tuple(sympy.Symbol(name, real=True) for name in names)
+
+
+def test_the_torque_of_a_shaft_between_two_masses_is_the_quotient_that_one_finds_by_hand() -> None:
+    H = two_masses().equations().transfer_function("motor.tau", "shaft.tau")
+    J1, J2, c, d, load = symbols("J1.J", "J2.J", "shaft.c", "shaft.d", "load.d")
+    Z = d + c / H.s  # the shaft's torque over the difference of the speeds
+    loads = 1 / (J2 * H.s + load)
+    byhand = Z * (1 / (J1 * H.s)) / (1 + Z * (1 / (J1 * H.s) + loads))
+    assert sympy.simplify(H.expression - byhand) == 0
+    assert not H.slopes
+
+
+def test_poles_are_the_rates_of_the_modes_and_zeros_those_of_the_part_behind_the_output() -> None:
+    net = two_masses()
+    H = net.equations().transfer_function("motor.tau", "J1.omega")
+    np.testing.assert_allclose(
+        sorted(H.poles(), key=abs)[1:], sorted([*net.modes().rates[-1:], *net.modes().rates[-1:].conj()], key=np.imag)
+    )
+    # with J1 held still: J2 on the shaft
+    np.testing.assert_allclose(H.zeros(), np.roots([3.0, 0.4, 50.0])[::-1])
+
+
+def test_coefficients_are_what_other_libraries_take() -> None:
+    net = two_masses()
+    system = scipy.signal.TransferFunction(*net.equations().transfer_function("motor.tau", "J2.omega").coefficients())
+    _, found = scipy.signal.freqresp(system, 2 * np.pi * F)
+    np.testing.assert_allclose(found, net.frequency_response("motor.tau", "J2.omega", F).values, rtol=1e-12)
+
+
+def test_other_values_and_points_go_in_afterwards() -> None:
+    net = sw.scenes.crane()
+    H = net.equations().transfer_function("motor.tau", "shaft.tau")
+    (slope,) = H.slopes.values()
+    assert str(slope.by) == "J1.omega"
+    assert str(slope.of) == "-motor.tau"
+    numeric = H.numeric({"shaft.c": 3e4}, {"J1.omega": 8.0}, t=0.0)
+    linear = net.compile().linearize({"J1.omega": 8.0, "J2.omega": 8.0}, t=0.0, parameters={"shaft.c": 3e4})
+    np.testing.assert_allclose(
+        numeric(2j * np.pi * F), linear.frequency_response("motor.tau", "shaft.tau", F).values, rtol=1e-10
+    )
+
+
+def test_a_crane_is_printed_with_the_slope_of_its_motor_as_a_letter() -> None:
+    printed = sw.scenes.crane().equations().transfer_function("motor.tau", "shaft.tau").latex()
+    assert r"k_{\mathrm{motor}} &= -\frac{\partial \tau_{M}}{\partial \omega_{1}}" in printed
+    assert r"Z(s) &= J_{2} \, d_{\mathrm{sh}} \, s^{2} + J_{2} \, c_{\mathrm{sh}} \, s" in printed
+
+
+def test_in_a_phase_what_holds_is_one_body() -> None:
+    net = sw.scenes.crane()
+    phase = net.start_phase()
+    assert "load stuck" in phase
+    H = net.equations(phase=phase).transfer_function("motor.tau", "shaft.tau")
+    response = net.frequency_response("motor.tau", "shaft.tau", F).values  # at rest, where the load is stuck
+    np.testing.assert_allclose(H(2j * np.pi * F), response, rtol=1e-10)
+
+
+def test_a_speed_that_drives_an_inertia_rigidly_asks_for_its_rate() -> None:
+    net = sw.Network("driven")
+    net.add(sw.SpeedSource("drive", omega=3.0), "a")
+    net.add(sw.Inertia("J", J=2.0), "a")
+    H = net.equations().transfer_function("drive.omega", "drive.tau")
+    (J,) = symbols("J.J")
+    assert H.expression == J * H.s
+
+
+def test_a_long_shaft_takes_numbers_and_keeps_its_digits() -> None:
+    """Degree 100, with poles from 5 to 2e5 1/s."""
+    net = sw.Network("line")
+    net.add(sw.TorqueSource("motor", tau=1.0), "a")
+    net.add(sw.Inertia("J1", J=2.0), "a")
+    net.add(sw.Shaft("line", length=1.0, diameter=0.02, model=sw.Lumped(50)), "a", "b")
+    net.add(sw.Inertia("J2", J=2.0), "b")
+    H = net.equations().transfer_function("motor.tau", "line.tau_b", values=True)
+    assert H.denominator.degree() == 100
+    f = np.array([0.1, 50.0, 3000.0])
+    np.testing.assert_allclose(
+        H(2j * np.pi * f), net.frequency_response("motor.tau", "line.tau_b", f).values, rtol=1e-10
+    )
+
+
+def test_poles_in_numbers_are_those_of_the_modes() -> None:
+    net = sw.Network("chain")
+    net.add(sw.TorqueSource("motor", tau=1.0), "n0")
+    for k in range(8):
+        net.add(sw.Inertia(f"J{k}", J=1.0 + 0.1 * k), f"n{k}")
+        if k:
+            net.add(sw.Spring(f"s{k}", c=10.0**k, d=0.01), f"n{k - 1}", f"n{k}")
+    H = net.equations().transfer_function("motor.tau", "n7.omega", values=True)
+    rates = np.array([rate for rate in net.modes().rates if rate])
+    wanted = np.concatenate([rates, rates.conj()])
+    found = H.poles()
+    assert H.poles()[0] == 0.0
+    np.testing.assert_allclose(np.sort_complex(found[1:]), np.sort_complex(wanted), rtol=1e-8)
+
+
+def test_a_pole_has_no_value() -> None:
+    with pytest.raises(sw.ParameterError, match=r"s = 0.*is a pole"):
+        two_masses().equations().transfer_function("motor.tau", "J1.omega").numeric({"load.d": 0.0})(0.0)
+
+
+@pytest.mark.parametrize(
+    ("names", "error", "says"),
+    [
+        (("motr.tau", "shaft.tau"), sw.SignalError, "'motr.tau' is no input of 'two masses'.*motor.tau"),
+        (("motor.tau", "shaft.tua"), sw.SignalError, r"No quantity 'shaft\.tua' in 'two masses'\. 'shaft' has: "),
+        (("motor.tau", "shaft.power"), sw.SignalError, "'shaft.power' is a product of speeds and torques"),
+    ],
+)
+def test_names_that_are_not_there_are_told(names: tuple[str, str], error: type[Exception], says: str) -> None:
+    with pytest.raises(error, match=says):
+        two_masses().equations().transfer_function(*names)
+
+
+def test_values_and_points_that_are_not_there_are_told() -> None:
+    H = two_masses().equations().transfer_function("motor.tau", "shaft.tau")
+    with pytest.raises(sw.ParameterError, match=r"There is no parameter 'shaft\.k'"):
+        H.numeric({"shaft.k": 1.0})
+    with pytest.raises(sw.ParameterError, match=r"at: No quantity 'J3\.omega'"):
+        H.numeric(at={"J3.omega": 1.0})
+
+
+def test_a_travelling_wave_is_refused_with_what_can_be_taken_instead() -> None:
+    net = sw.Network("line")
+    net.add(sw.TorqueSource("motor", tau=1.0), "a")
+    net.add(sw.Inertia("J1", J=2.0), "a")
+    net.add(sw.Shaft("line", length=1.0, diameter=0.02, model=sw.Wave()), "a", "b")
+    net.add(sw.Inertia("J2", J=2.0), "b")
+    with pytest.raises(sw.CompileError, match=r"Shaft 'line' is a travelling wave.*Spectral\(8\)"):
+        net.equations().transfer_function("motor.tau", "J2.omega")
+
+
+@share_of_examples(0.4)
+@given(networks(max_inertias=6), st.integers(0, 63))
+def test_random_networks_respond_as_their_linearised_model_does(pieces: Network, number: int) -> None:
+    """In symbols where these are short enough, and in numbers; 1e-10 of the largest value of the same quantity."""
+    net = network_of(pieces)
+    drive = next(piece for piece in pieces if piece.type in SOURCE_VALUE)
+    given = f"{drive.name}.{SOURCE_VALUE[drive.type]}"
+    linear = compiled(net).linearize()
+    names = [name for name in linear.slopes.units if not name.endswith((".power", ".energy"))]
+    wanted = names[number % len(names)]
+    response = linear.frequency_response(given, wanted, F).values
+    in_numbers = net.equations().transfer_function(given, wanted, values=True)
+    made = [in_numbers]
+    with suppress(sw.CompileError):  # too long
+        made.append(net.equations().transfer_function(given, wanted))
+    for H in made:
+        np.testing.assert_allclose(H(2j * np.pi * F), response, rtol=0, atol=1e-10 * np.abs(response).max())
