@@ -48,6 +48,7 @@ def run(options: Namespace, say: Say) -> Data:
     from shaftwork.components.shafts import Shaft
     from shaftwork.studies import work_precision
     from shaftwork.studies.ladder import rungs
+    from shaftwork.studies.work_precision import milliseconds
 
     net, scene = load(options)
     shafts = [part.name for part in net.parts if isinstance(part, Shaft)]
@@ -65,7 +66,7 @@ def run(options: Namespace, say: Say) -> Data:
 
     def report(trial: Trial) -> None:
         done.append(trial)
-        came = trial.why or f"{1e3 * trial.cpu:.3g} ms, end torques to {trial.error:.1g}"
+        came = trial.why or f"{milliseconds(trial.cpu)} ms, end torques to {trial.error:.1g}"
         tell(f"{trial.model} on {trial.engine}: {came}")
 
     try:

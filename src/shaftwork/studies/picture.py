@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import itertools
 import textwrap
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from shaftwork.core.errors import MissingExtraError
+from shaftwork.studies.ladder import LADDER
+from shaftwork.studies.work_precision import family_of, text_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -16,7 +19,7 @@ if TYPE_CHECKING:
     from shaftwork.studies.work_precision import Trial, WorkPrecision
 
 MARKERS = "osD^vP*X<>"
-"""One for each kind of model."""
+"""One for each kind of model, the same in every study; the colours go with them."""
 FLOOR = 1e-12
 """Errors below are drawn here: they are rounding."""
 
@@ -33,16 +36,17 @@ def work_precision_figure(study: WorkPrecision) -> Figure:
     for trial in study.trials:
         if np.isfinite(trial.error):
             families.setdefault(trial.family, []).append(trial)
-    for (family, members), marker in zip(families.items(), MARKERS * len(families), strict=False):
+    for family, members in families.items():
+        style = _style(family, families)
         errors = [max(trial.error, FLOOR) for trial in members]
         costs = [1e3 * trial.cpu for trial in members]
         sizes = [float(max(trial.states, 1)) for trial in members]
         for axis, values in zip(axes, (costs, sizes), strict=True):
-            (line,) = axis.loglog(values, errors, marker=marker, markersize=6, linewidth=1.3, label=family)
-            ends = {0: (-4, 4, "right"), len(members) - 1: (4, -9, "left")} if len(members) > 1 else {}
+            axis.loglog(values, errors, markersize=6, linewidth=1.3, label=family, **style)
+            ends = {len(members) - 1: (4, -9, "left"), 0: (-4, 4, "right")}  # of one alone the first is meant
             for k, (x, y, side) in ends.items():
-                style = {"fontsize": 7, "color": line.get_color(), "ha": side}
-                axis.annotate(_size(members[k]), (values[k], errors[k]), (x, y), textcoords="offset points", **style)
+                text = {"fontsize": 7, "color": style["color"], "ha": side}
+                axis.annotate(_size(members[k]), (values[k], errors[k]), (x, y), textcoords="offset points", **text)
     for axis, label in zip(axes, ("CPU time of a warm call in ms", "number of states"), strict=True):
         axis.set_xlabel(label)
         axis.grid(which="both", alpha=0.2)
@@ -66,20 +70,28 @@ def courses_figure(study: WorkPrecision, end: str) -> Figure:
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     column, symbol = ("ab".index(end), rf"$\tau_{end}$")
     true = study.courses[:, column]
-    for trial, style in zip(study.representatives, itertools.cycle(("-", "--", "-.", ":")), strict=False):
+    families = [trial.family for trial in study.representatives]
+    for trial, dashes in zip(study.representatives, itertools.cycle(("-", "--", "-.", ":")), strict=False):
         assert trial.courses is not None  # noqa: S101 (that of a representative)
-        course = trial.courses[:, column]
-        (line,) = upper.plot(study.t, course, style, linewidth=1.0, label=trial.model)
-        lower.plot(study.t, course - true, style, linewidth=1.0, color=line.get_color())
+        course, colour = trial.courses[:, column], _style(trial.family, families)["color"]
+        upper.plot(study.t, course, dashes, linewidth=1.0, color=colour, label=trial.model)
+        lower.semilogy(study.t, np.abs(course - true), dashes, linewidth=1.0, color=colour)
     upper.plot(study.t, true, color="black", linewidth=1.4, zorder=0, label=study.truth[0])
     upper.set_ylabel(f"{symbol} of '{study.shaft}' in N m")
-    lower.set_ylabel("less the exact one in N m")
+    lower.set_ylabel("error in N m")
     lower.set_xlabel("t in s")
     figure.legend(loc="outside lower center", frameon=False, fontsize=8, ncols=4)
     for axis in (upper, lower):
         axis.grid(alpha=0.2)
     figure.suptitle(f"{study.name}: torque at end {end} of '{study.shaft}', the best model of each kind")
     return figure
+
+
+def _style(family: str, others: Iterable[str]) -> dict[str, str]:
+    """Colour and marker of a kind of model: its place among those that are compared by default, and then others."""
+    known = dict.fromkeys(family_of(text_of(model)) for model in LADDER)
+    place = list(known | dict.fromkeys(sorted(others))).index(family)
+    return {"color": f"C{place % 10}", "marker": MARKERS[place % len(MARKERS)]}
 
 
 def _size(trial: Trial) -> str:

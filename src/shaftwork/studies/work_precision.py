@@ -84,9 +84,7 @@ class Trial:
     @property
     def family(self) -> str:
         """The model without its size."""
-        name, _, arguments = self.model.rstrip(")").partition("(")
-        _, comma, choices = arguments.partition(",")
-        return f"{name}{comma}{choices}"
+        return family_of(self.model)
 
     @property
     def line(self) -> tuple[str, str, float]:
@@ -109,6 +107,13 @@ class Trial:
     def error(self) -> float:
         """The larger error of the two end torques; infinite where it failed."""
         return max(self.errors["tau_a"], self.errors["tau_b"]) if self.errors else np.inf
+
+
+def family_of(model: str) -> str:
+    """The text of a model without its size."""
+    name, _, arguments = model.rstrip(")").partition("(")
+    _, comma, choices = arguments.partition(",")
+    return f"{name}{comma}{choices}"
 
 
 UNKNOWN = Trial("", "", 0, 0.0, np.inf, {})
@@ -144,9 +149,10 @@ class WorkPrecision:
     def advice(self) -> str:
         """For each of some tolerances the cheapest model, a line each."""
         lines = []
+        tried = "none of these" if all(trial.errors for trial in self.trials) else "none of those that were tried"
         for tolerance in TOLERANCES:
             best = self.cheapest(tolerance)
-            what = "none of these" if best is None else f"{best.model} on {best.engine}, {1e3 * best.cpu:.2g} ms"
+            what = tried if best is None else f"{best.model} on {best.engine}, {milliseconds(best.cpu)} ms"
             lines.append(f"end torques to {tolerance:g}: {what}")
         return "\n".join(lines)
 
@@ -271,7 +277,7 @@ def work_precision(
         raise ParameterError(f"points = {points!r} must be a number of output times, 1 or more.")
     tolerances = [in_si("rtol", rtol, "1", above=0) for rtol in several("rtols", rtols)]
     asked = [
-        (model, Trial(_text(model), engine, 0, 0.0, np.inf, {}, asked=engine, rtol=rtol))
+        (model, Trial(text_of(model), engine, 0, 0.0, np.inf, {}, asked=engine, rtol=rtol))
         for model, engine, rtol in itertools.product(shaft_models(models), engine_names(engines), tolerances)
     ]
     # the fronts of waves that start at zero pass at multiples of the delay; these times are none
@@ -288,6 +294,11 @@ def work_precision(
             report(made[number])
     trials = tuple(made[number] for number in range(len(asked)))
     return WorkPrecision(net.name, shaft, trials, (known.source, known.error), t, _ends(known.values))
+
+
+def milliseconds(cpu: float) -> str:
+    """A CPU time in s as it is read."""
+    return f"{1e3 * cpu:.3g}" if cpu < 1 else f"{1e3 * cpu:.0f}"
 
 
 def _nothing(_: str) -> None:
@@ -392,7 +403,7 @@ def _frequencies(net: Network, compiled: Model, judged: Array) -> Array:
         return np.empty(0)
 
 
-def _text(model: ShaftModel) -> str:
+def text_of(model: ShaftModel) -> str:
     """The model with its size and what differs from the default, so that a row is short."""
     fields = dataclasses.fields(model)
     shown = [f for k, f in enumerate(fields) if k == 0 or getattr(model, f.name) != f.default]
