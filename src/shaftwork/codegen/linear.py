@@ -4,14 +4,10 @@
 
 in deviations from the point, with v the inputs. B1 is there where a prescribed speed drives an inertia rigidly, or a
 torque winds up springs in series: the derivative of the input then enters the equations.
-
-An input torque acts between the nodes of its source, parallel to whatever the source does by itself, also where its law
-is zero or depends on speed. So it is a branch of its own: one more link of the tree that is there already.
 """
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
@@ -19,7 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from sympy import Integer
 
 from shaftwork.codegen.arrays import ArrayProgram, BoundArrays
 from shaftwork.codegen.elements import Array
@@ -28,75 +23,15 @@ from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.recovery import History
 from shaftwork.codegen.waves import Dense
-from shaftwork.components.base import Signal
 from shaftwork.components.branches import INTEGRAL
 from shaftwork.components.slopes import slope
-from shaftwork.core.errors import SignalError, SimulationError
-from shaftwork.network.graph import GROUND, GraphBranch, GraphPart
-from shaftwork.network.templates import BranchTemplate, Kind
+from shaftwork.core.errors import SimulationError
+from shaftwork.network.graph import GROUND, GraphPart
+from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.gains import add
-from shaftwork.reduction.inputs import Place, places_of
-from shaftwork.reduction.tree import Row
+from shaftwork.reduction.inputs import places_of, with_inputs
 
 Complex = NDArray[np.complexfloating[Any, Any]]
-
-
-def _with_inputs(form: StateForm, places: Sequence[Place]) -> tuple[StateForm, tuple[int, ...]]:
-    """The form with a branch for every torque that is an input, and the branches of all inputs."""
-    graph, tree = form.graph, form.tree
-    branches, parts, members = list(graph.branches), list(graph.parts), list[int]()
-    loops = dict(tree.loops)
-    cutsets = loops if tree.cutsets is tree.loops else dict(tree.cutsets)
-    for place in places:
-        if place.branch >= 0:
-            members.append(place.branch)
-            continue
-        index, part, ends = len(branches), parts[place.part], place.signal.ends
-        loops[index] = _row(form, part, place.signal, tree.loops, tree.potentials)
-        if cutsets is not loops:
-            cutsets[index] = _row(form, part, place.signal, tree.cutsets, tree.shares)
-        plus, minus = (GROUND if end is None else part.nodes[end] for end in ends)
-        template = BranchTemplate(Kind.THROUGH_SOURCE, Integer(0), ends, (), "", (), Integer(0))
-        branches.append(GraphBranch(index, place.part, template, plus, minus, ()))
-        parts[place.part] = dataclasses.replace(part, branches=(*part.branches, index))
-        members.append(index)
-    added = tuple(range(len(graph.branches), len(branches)))
-    if not added:
-        return form, tuple(members)
-    links = {**tree.links, Kind.THROUGH_SOURCE: (*tree.links[Kind.THROUGH_SOURCE], *added)}
-    return StateForm(
-        dataclasses.replace(graph, parts=tuple(parts), branches=tuple(branches)),
-        dataclasses.replace(tree, links=links, loops=loops, cutsets=cutsets),
-        form.angles,
-    ), tuple(members)
-
-
-def _row(
-    form: StateForm, part: GraphPart, signal: Signal, links: Mapping[int, Row], nodes: Sequence[Row | None]
-) -> Row:
-    """The loop or cutset of a branch between the ends of a signal, from those of the links and nodes."""
-    for index in part.branches:
-        if index in links and form.graph.branches[index].template.ends == signal.ends:
-            return links[index]
-    ends = [GROUND if end is None else part.nodes[end] for end in signal.ends]
-    rows = [{} if end == GROUND else _of_node(form, part, end, nodes) for end in ends]
-    loop = dict(rows[0])
-    for key, factor in rows[1].items():
-        total = add(loop.pop(key, 0), -factor, [])
-        if not (isinstance(total, int) and total == 0):
-            loop[key] = total
-    return loop
-
-
-def _of_node(form: StateForm, part: GraphPart, node: int, rows: Sequence[Row | None]) -> Row:
-    row = rows[node]
-    if row is None:
-        name = form.graph.node_name(node)
-        raise SignalError(
-            f"'{part.name}' is no input: nothing ties its node '{name}' to the reference. Join it to a Ground."
-        )
-    return row
 
 
 def refuse_waves(form: StateForm) -> None:
@@ -136,7 +71,7 @@ class Linearization:
         if arriving is None:
             refuse_waves(model.form)
         places = places_of(model.form.graph, inputs)
-        form, branches = _with_inputs(model.form, places)
+        form, branches = with_inputs(model.form, places)
         x = x if arriving is None else np.concatenate([x, arriving])
         self._form, self._point = form, (t, x)
         self._bound = model.bind(p) if form is model.form else ArrayProgram(form).bind(p)

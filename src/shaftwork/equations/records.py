@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal, Protocol
@@ -13,10 +13,12 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.core.screen import counted, named, on_one_screen
 from shaftwork.equations.assembly import Assembly, Group, Sides
 from shaftwork.equations.notation import Letter, notation
+from shaftwork.equations.topology import NamedMatrix, Topology
 from shaftwork.reduction.form import StateForm
 
 if TYPE_CHECKING:
     from shaftwork.equations.second_order import SecondOrder
+    from shaftwork.equations.state_space import StateSpace
     from shaftwork.equations.transfer import TransferFunction
 
 Form = Literal["kirchhoff", "state", "second-order"]
@@ -247,6 +249,21 @@ class Equations:
         return known
 
     @cached_property
+    def incidence(self) -> NamedMatrix:
+        """A of Kirchhoff's A i = 0: a row for each node, a column for each branch."""
+        return Topology(self.assembly).incidence()
+
+    @cached_property
+    def loop_matrix(self) -> NamedMatrix:
+        """B of Kirchhoff's B v = 0: a row for the fundamental loop of each link, a column for each branch."""
+        return Topology(self.assembly).loops()
+
+    @cached_property
+    def cutset_matrix(self) -> NamedMatrix:
+        """Q of Q i = 0: a row for the fundamental cutset of each branch of the tree, a column for each branch."""
+        return Topology(self.assembly).cutsets()
+
+    @cached_property
     def second_order(self) -> SecondOrder:
         """M phi'' + D phi' + K phi = T of a mechanical network.
 
@@ -286,6 +303,21 @@ class Equations:
         from shaftwork.equations.transfer import transfer_function
 
         return transfer_function(self, (input, output), values=values, at=at, t=t)
+
+    def state_space(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> StateSpace:
+        """Small motions about a point: A, B, C, D in the parameters' symbols; laws by their slopes, see there.
+
+        Args:
+            inputs: what sources give, "motor.tau"; by default all of it.
+            outputs: speeds, torques and angles; by default the states.
+
+        Raises:
+            SignalError: there is no such input or quantity.
+            CompileError: a shaft is a travelling wave, or more rates are coupled than are solved in symbols.
+        """
+        from shaftwork.equations.state_space import state_space
+
+        return state_space(self, inputs, outputs)
 
     def latex(self, form: Form | None = None, *, values: bool = False, phase: str | NamedPhase | None = None) -> str:
         """The equations as the body of a LaTeX document (needs amsmath), or for a notebook cell.

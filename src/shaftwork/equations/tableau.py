@@ -11,19 +11,19 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import Literal
 
 from sympy import Expr, Integer, Symbol
 
 from shaftwork.components.base import Signal
 from shaftwork.components.branches import ACROSS, INTEGRAL
-from shaftwork.components.laws import t as TIME
-from shaftwork.components.slopes import slope
 from shaftwork.core.errors import CompileError
 from shaftwork.equations.assembly import Assembly
+from shaftwork.equations.slopes import Slopes
 from shaftwork.network.controlled import Reading, readings_of
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
 from shaftwork.network.templates import Kind
+from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.inputs import Place
 
 S = Symbol("s")
@@ -32,20 +32,6 @@ Unknown = tuple[Literal["across", "through", "integral"], int]
 """What is across a node, passes through a branch, or is the integral of what is across a branch."""
 Sum = Mapping[Unknown, Expr]
 """Factors of unknowns."""
-
-
-class Slope(NamedTuple):
-    """What the letter of a slope stands for: how what a law lets through changes with what it reads.
-
-    Args:
-        of: symbol of what passes through, with a sign; zero where that of the law alone has none.
-        by: what the law reads.
-        value: the slope, in quantities of the network.
-    """
-
-    of: Expr
-    by: Expr
-    value: Expr
 
 
 def total(terms: Iterable[tuple[Expr | int, Sum]]) -> Sum:
@@ -57,31 +43,34 @@ def total(terms: Iterable[tuple[Expr | int, Sum]]) -> Sum:
     return {unknown: entry for unknown, entry in found.items() if entry != 0}
 
 
+def refuse_waves(form: StateForm) -> None:
+    """Refuse a network of which no polynomials and matrices tell the motion.
+
+    Raises:
+        CompileError: a shaft is a travelling wave.
+    """
+    if form.waves:
+        raise CompileError(
+            f"Shaft '{form.graph.part_of(form.waves[0]).name}' is a travelling wave, whose transfer functions are no "
+            "rational functions of s. Take model=Spectral(8), or frequency_response for their values."
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class Tableau:
     """The rows, made as they are asked for.
 
     Args:
         assembly: the equations in the time domain.
+        slopes: of their laws.
     """
 
     assembly: Assembly
-
-    def __post_init__(self) -> None:
-        if waves := self.assembly.form.waves:
-            raise CompileError(
-                f"Shaft '{self._graph.part_of(waves[0]).name}' is a travelling wave, whose transfer functions are no "
-                "rational functions of s. Take model=Spectral(8), or frequency_response for their values."
-            )
+    slopes: Slopes
 
     @property
     def _graph(self) -> CircuitGraph:
         return self.assembly.form.graph
-
-    @cached_property
-    def slopes(self) -> dict[Symbol, Slope]:
-        """What the letters of slopes stand for; complete once the rows are made."""
-        return {}
 
     @cached_property
     def _laws(self) -> dict[int, Sum]:
@@ -173,30 +162,13 @@ class Tableau:
 
     def _near(self, branch: GraphBranch) -> Sum:
         """A law near a point: its slopes times what it reads."""
-        law = self.assembly.quantities.own_law(branch.index)
-        read = {ACROSS: self.across, INTEGRAL: self.integral}
-        own = {symbol: of(branch) for symbol, of in read.items() if law.has(symbol)}
-        reads = {symbol: self._value(of) for symbol, of in readings_of(self._graph, branch.index).items()}
-        return total((self._slope(branch, law, symbol), value) for symbol, value in (own | reads).items())
+        own = {ACROSS: self.across, INTEGRAL: self.integral}
+        reads = readings_of(self._graph, branch.index)
+        slopes = self.slopes.of(branch).items()
+        return total((slope, own[by](branch) if by in own else self._value(reads[by])) for by, slope in slopes)
 
     def _value(self, reading: Reading) -> Sum:
         if reading.kind == "across":
             return self.node(reading.of)
         branch = self._graph.branches[reading.of]
         return self.through(branch) if reading.kind == "through" else self.integral(branch)
-
-    def _slope(self, branch: GraphBranch, law: Expr, symbol: Symbol) -> Expr:
-        """The slope of a law, or a letter where it is more than sums and products of parameters."""
-        made, quantities, index = slope(law, symbol), self.assembly.quantities, branch.index
-        names = {"across": quantities.node, "through": quantities.store, "integral": quantities.integral}
-        point = {ACROSS: quantities.across((branch.plus, branch.minus)), INTEGRAL: quantities.integral(index)}
-        point |= {each: names[of.kind](of.of) for each, of in readings_of(self._graph, index).items()}
-        if made.free_symbols.isdisjoint({*point, TIME}) and made.is_rational_function():
-            return made
-        owner = self._graph.part_of(index).name
-        number = sum(known.name.rpartition(".")[0] == owner for known in self.slopes)
-        letter = Symbol(f"{owner}.slope{f'_{number + 1}' if number else ''}", real=True)
-        flow = quantities.flow_of[index]
-        of = flow.sign * quantities.through(flow) if len(flow.branches) == 1 else Integer(0)
-        self.slopes[letter] = Slope(of, point[symbol], made.xreplace(point))
-        return letter

@@ -20,7 +20,8 @@ from shaftwork.components.laws import breakpoints
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError, ParameterError, SignalError, no_quantity
 from shaftwork.equations.determinants import determinant, too_long
-from shaftwork.equations.tableau import S, Slope, Sum, Tableau, Unknown
+from shaftwork.equations.slopes import Slope, Slopes
+from shaftwork.equations.tableau import S, Sum, Tableau, Unknown, refuse_waves
 from shaftwork.network.graph import GROUND
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.inputs import Place, places_of
@@ -161,14 +162,16 @@ def transfer_function(
         CompileError: a shaft is a travelling wave; the network is too large for symbols; or it has several motions.
         ParameterError: with values, `at` names no quantity, or a law has no finite slope there.
     """
+    refuse_waves(equations.form)
     (place,) = places_of(equations.form.graph, names[:1])
-    tableau = Tableau(equations.assembly)
+    slopes = Slopes(equations.assembly.quantities)
+    tableau = Tableau(equations.assembly, slopes)
     read, direct = _output(equations, tableau, place, names[1])
     rows = tableau.rows(read)
     known: dict[Symbol, Rational] | None = None
     if values:
         numbers = _Numbers(equations, None, at, t)
-        numbers.add(tableau.slopes)
+        numbers.add(slopes.letters)
         known = numbers.known
     above, below = _quotient(rows, tableau.entered(place), (read, direct), known)
     if not below:
@@ -177,9 +180,8 @@ def transfer_function(
             "tell all speeds and torques near this point."
         )
     above, below = _reduced(above, below)
-    slopes = {} if values else tableau.slopes
     left = above.as_expr().free_symbols | below.as_expr().free_symbols
-    kept = {letter: slope for letter, slope in slopes.items() if letter in left}
+    kept = {letter: slope for letter, slope in slopes.letters.items() if letter in left}
     return TransferFunction(*names, Poly(above.as_expr(), S), Poly(below.as_expr(), S), kept, equations)
 
 

@@ -11,8 +11,9 @@ from shaftwork.equations.assembly import Group
 from shaftwork.equations.blocks import Blocks
 from shaftwork.equations.notation import without_marks
 from shaftwork.equations.printing import LINE_WIDTH, Line, Writer, aligned
+from shaftwork.equations.slopes import Slope
 from shaftwork.equations.spelling import escaped
-from shaftwork.equations.tableau import S, Slope
+from shaftwork.equations.tableau import S
 from shaftwork.equations.widths import printed_width
 
 if TYPE_CHECKING:  # the record prints itself through this module

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
+from sympy import Integer
+
 from shaftwork.components.base import Signal
 from shaftwork.core.errors import SignalError
-from shaftwork.network.graph import CircuitGraph, signals_of
-from shaftwork.network.templates import Kind
+from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart, signals_of
+from shaftwork.network.templates import BranchTemplate, Kind
+from shaftwork.reduction.form import StateForm
+from shaftwork.reduction.gains import add
+from shaftwork.reduction.tree import Row
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,3 +74,64 @@ def places_of(graph: CircuitGraph, names: Sequence[str]) -> tuple[Place, ...]:
                 f"{', '.join(close) or 'none'}. To excite another node, add a source there; its law may be 0."
             )
     return tuple(known[name] for name in names)
+
+
+def with_inputs(form: StateForm, places: Sequence[Place]) -> tuple[StateForm, tuple[int, ...]]:
+    """The form with a branch for every torque that is an input, and the branches of all inputs.
+
+    An input torque acts between the nodes of its source, beside whatever the source does by itself, also where its law
+    is zero or depends on speed. So it is a branch of its own: one more link of the tree that is there already.
+    """
+    graph, tree = form.graph, form.tree
+    branches, parts, members = list(graph.branches), list(graph.parts), list[int]()
+    loops = dict(tree.loops)
+    cutsets = loops if tree.cutsets is tree.loops else dict(tree.cutsets)
+    for place in places:
+        if place.branch >= 0:
+            members.append(place.branch)
+            continue
+        index, part, ends = len(branches), parts[place.part], place.signal.ends
+        loops[index] = _row(form, part, place.signal, tree.loops, tree.potentials)
+        if cutsets is not loops:
+            cutsets[index] = _row(form, part, place.signal, tree.cutsets, tree.shares)
+        plus, minus = (GROUND if end is None else part.nodes[end] for end in ends)
+        template = BranchTemplate(Kind.THROUGH_SOURCE, Integer(0), ends, (), "", (), Integer(0))
+        branches.append(GraphBranch(index, place.part, template, plus, minus, ()))
+        parts[place.part] = dataclasses.replace(part, branches=(*part.branches, index))
+        members.append(index)
+    added = tuple(range(len(graph.branches), len(branches)))
+    if not added:
+        return form, tuple(members)
+    links = {**tree.links, Kind.THROUGH_SOURCE: (*tree.links[Kind.THROUGH_SOURCE], *added)}
+    return StateForm(
+        dataclasses.replace(graph, parts=tuple(parts), branches=tuple(branches)),
+        dataclasses.replace(tree, links=links, loops=loops, cutsets=cutsets),
+        form.angles,
+    ), tuple(members)
+
+
+def _row(
+    form: StateForm, part: GraphPart, signal: Signal, links: Mapping[int, Row], nodes: Sequence[Row | None]
+) -> Row:
+    """The loop or cutset of a branch between the ends of a signal, from those of the links and nodes."""
+    for index in part.branches:
+        if index in links and form.graph.branches[index].template.ends == signal.ends:
+            return links[index]
+    ends = [GROUND if end is None else part.nodes[end] for end in signal.ends]
+    rows = [{} if end == GROUND else _of_node(form, part, end, nodes) for end in ends]
+    loop = dict(rows[0])
+    for key, factor in rows[1].items():
+        total = add(loop.pop(key, 0), -factor, [])
+        if not (isinstance(total, int) and total == 0):
+            loop[key] = total
+    return loop
+
+
+def _of_node(form: StateForm, part: GraphPart, node: int, rows: Sequence[Row | None]) -> Row:
+    row = rows[node]
+    if row is None:
+        name = form.graph.node_name(node)
+        raise SignalError(
+            f"'{part.name}' is no input: nothing ties its node '{name}' to the reference. Join it to a Ground."
+        )
+    return row

@@ -62,3 +62,17 @@ def _has_size(text: str, name: str) -> bool:
     _, _, inside = text.partition("(")
     first = inside.rstrip(") ").split(",")[0].strip()
     return first.isdigit() or f"{name}=" in inside.replace(" ", "")
+
+
+def text_of(model: ShaftModel) -> str:
+    """The model with its size and what differs from the default, so that a row is short."""
+    fields = dataclasses.fields(model)
+    shown = [f for k, f in enumerate(fields) if k == 0 or getattr(model, f.name) != f.default]
+    return f"{type(model).__name__}({', '.join(f'{f.name}={getattr(model, f.name)!r}' for f in shown)})"
+
+
+def family_of(model: str) -> str:
+    """The text of a model without its size."""
+    name, _, arguments = model.rstrip(")").partition("(")
+    _, comma, choices = arguments.partition(",")
+    return f"{name}{comma}{choices}"

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shaftwork.core.errors import MissingExtraError
-from shaftwork.studies.ladder import LADDER
-from shaftwork.studies.work_precision import family_of, text_of
+from shaftwork.studies.ladder import LADDER, family_of, text_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

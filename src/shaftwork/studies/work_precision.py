@@ -26,7 +26,7 @@ from shaftwork.pipeline.network import Network
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
 from shaftwork.studies.arguments import engine_names, several, shaft_models
-from shaftwork.studies.ladder import LADDER
+from shaftwork.studies.ladder import LADDER, family_of, text_of
 from shaftwork.studies.truth import QUANTITIES, Truth, frequencies, quantities, truth, with_model
 
 if TYPE_CHECKING:
@@ -107,13 +107,6 @@ class Trial:
     def error(self) -> float:
         """The larger error of the two end torques; infinite where it failed."""
         return max(self.errors["tau_a"], self.errors["tau_b"]) if self.errors else np.inf
-
-
-def family_of(model: str) -> str:
-    """The text of a model without its size."""
-    name, _, arguments = model.rstrip(")").partition("(")
-    _, comma, choices = arguments.partition(",")
-    return f"{name}{comma}{choices}"
 
 
 UNKNOWN = Trial("", "", 0, 0.0, np.inf, {})
@@ -401,10 +394,3 @@ def _frequencies(net: Network, compiled: Model, judged: Array) -> Array:
         return frequencies(compiled.linearize(None).modes(count=LOWEST))
     except ShaftworkError:
         return np.empty(0)
-
-
-def text_of(model: ShaftModel) -> str:
-    """The model with its size and what differs from the default, so that a row is short."""
-    fields = dataclasses.fields(model)
-    shown = [f for k, f in enumerate(fields) if k == 0 or getattr(model, f.name) != f.default]
-    return f"{type(model).__name__}({', '.join(f'{f.name}={getattr(model, f.name)!r}' for f in shown)})"

@@ -1,0 +1,72 @@
+"""The slopes of laws about a point, as parameters where they are made of these, else as letters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+from sympy import Expr, Integer, Symbol
+
+from shaftwork.components.branches import ACROSS, INTEGRAL
+from shaftwork.components.laws import t as TIME
+from shaftwork.components.slopes import slope
+from shaftwork.equations.quantities import Quantities
+from shaftwork.network.controlled import readings_of
+from shaftwork.network.graph import GraphBranch
+
+
+class Slope(NamedTuple):
+    """What the letter of a slope stands for: how what a law lets through changes with what it reads.
+
+    Args:
+        of: symbol of what passes through, with a sign; zero where that of the law alone has none.
+        by: what the law reads.
+        value: the slope, in quantities of the network.
+    """
+
+    of: Expr
+    by: Expr
+    value: Expr
+
+
+class Slopes:
+    """The slopes of the laws of a network.
+
+    Args:
+        quantities: its symbols.
+    """
+
+    def __init__(self, quantities: Quantities) -> None:
+        self._quantities, self._known = quantities, dict[int, Mapping[Symbol, Expr]]()
+        self.letters: dict[Symbol, Slope] = {}
+        """What the letters stand for, of all laws that have been asked for."""
+
+    def of(self, branch: GraphBranch) -> Mapping[Symbol, Expr]:
+        """The slopes of a law by what it reads, in the symbols of its template."""
+        if branch.index not in self._known:
+            self._known[branch.index] = dict(self._made(branch))
+        return self._known[branch.index]
+
+    def _made(self, branch: GraphBranch) -> Iterator[tuple[Symbol, Expr]]:
+        quantities, index = self._quantities, branch.index
+        law, reads = quantities.own_law(index), readings_of(quantities.graph, index)
+        names = {"across": quantities.node, "through": quantities.store, "integral": quantities.integral}
+        point = {ACROSS: quantities.across((branch.plus, branch.minus)), INTEGRAL: quantities.integral(index)}
+        point |= {symbol: names[of.kind](of.of) for symbol, of in reads.items()}
+        for symbol in point:
+            made = slope(law, symbol) if law.has(symbol) else Integer(0)
+            if made == 0:
+                continue
+            if made.free_symbols.isdisjoint({*point, TIME}) and made.is_rational_function():
+                yield symbol, made
+            else:
+                yield symbol, self._letter(index, point[symbol], made.xreplace(point))
+
+    def _letter(self, index: int, by: Expr, value: Expr) -> Symbol:
+        quantities = self._quantities
+        owner, flow = quantities.graph.part_of(index).name, quantities.flow_of[index]
+        number = sum(known.name.rpartition(".")[0] == owner for known in self.letters)
+        letter = Symbol(f"{owner}.slope{f'_{number + 1}' if number else ''}", real=True)
+        of = flow.sign * quantities.through(flow) if len(flow.branches) == 1 else Integer(0)
+        self.letters[letter] = Slope(of, by, value)
+        return letter

@@ -1,0 +1,172 @@
+"""The state equations about a point as matrices of parameters' symbols."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from sympy import Add, Dummy, Expr, ImmutableMatrix, Integer, Symbol, cancel
+
+from shaftwork.components.laws import t as TIME
+from shaftwork.core.errors import CompileError, SignalError, no_quantity
+from shaftwork.equations.slopes import Slope, Slopes
+from shaftwork.equations.tableau import refuse_waves
+from shaftwork.network.graph import GraphBranch
+from shaftwork.network.templates import Kind
+from shaftwork.reduction.blocks import BlockTooLargeError
+from shaftwork.reduction.form import StateForm
+from shaftwork.reduction.inputs import places_of, source_inputs, with_inputs
+from shaftwork.reduction.names import Names
+from shaftwork.reduction.readings import Readings
+from shaftwork.reduction.rows import Rows, explicit_rows
+
+if TYPE_CHECKING:  # the records make matrices through this module
+    from shaftwork.equations.records import Equations
+
+
+@dataclass(frozen=True, eq=False)
+class StateSpace:
+    """Small motions about a point in symbols.
+
+    Law: z' = A z + B v,  y = C z + D v + D1 v', with z = x - B1 v of the states x, as of `LinearModel`.
+
+    Args:
+        states: n names.
+        inputs: m names.
+        outputs: k names.
+        A: (n, n).
+        B: (n, m).
+        C: (k, n).
+        D: (k, m).
+        B1: (n, m); zero unless a derivative of an input acts on a state.
+        D1: (k, m); zero unless one acts on an output.
+        slopes: what the letters of slopes of laws stand for.
+    """
+
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    A: ImmutableMatrix
+    B: ImmutableMatrix
+    C: ImmutableMatrix
+    D: ImmutableMatrix
+    B1: ImmutableMatrix
+    D1: ImmutableMatrix
+    slopes: Mapping[Symbol, Slope]
+
+
+def state_space(equations: Equations, inputs: Sequence[str] | None, outputs: Sequence[str] | None) -> StateSpace:
+    """The matrices.
+
+    Args:
+        equations: of the network.
+        inputs: names; None for all sources.
+        outputs: names; None for the states.
+
+    Raises:
+        SignalError: there is no such input or quantity.
+        CompileError: a shaft is a travelling wave, or more rates are coupled than are solved in symbols.
+    """
+    refuse_waves(equations.form)
+    named = source_inputs(equations.form.graph) if inputs is None else tuple(inputs)
+    slopes = Slopes(equations.assembly.quantities)
+    places = places_of(equations.form.graph, named)
+    form, branches = with_inputs(_near(equations, slopes), places)
+    values = [(Dummy(real=True), Dummy(real=True)) for _ in places]
+    laws = {
+        branch: place.signal.sign * (value + TIME * rate)
+        for branch, place, (value, rate) in zip(branches, places, values, strict=True)
+    }
+    form = _with_laws(form, laws)
+    try:
+        rows = explicit_rows(form)
+    except BlockTooLargeError:
+        raise CompileError(
+            f"Of '{form.graph.name}' more rates are coupled than are solved in symbols. Take transfer_function, which "
+            "solves any, or compile().linearize() for numbers."
+        ) from None
+    wanted = tuple(state.name for state in form.states) if outputs is None else tuple(outputs)
+    read = _Outputs(form, rows)
+    groups = rows.states, [value for value, _ in values], [rate for _, rate in values]
+    A, B, B1 = (_slopes(rows.rates, group) for group in groups)
+    C, D, D1 = (_slopes([read.of(name) for name in wanted], group) for group in groups)
+    states = tuple(state.name for state in form.states)
+    B, D = ((whole + by @ B1).applyfunc(cancel) for whole, by in ((B, A), (D, C)))
+    return StateSpace(states, named, wanted, A, B, C, D, B1, D1, dict(slopes.letters))
+
+
+def _near(equations: Equations, slopes: Slopes) -> StateForm:
+    """The form with laws by their slopes, in letters of the network, and sources at zero."""
+    quantities, laws = equations.assembly.quantities, dict[int, Expr]()
+    for branch in equations.form.graph.branches:
+        match branch.template.kind:
+            case Kind.THROUGH_SOURCE:
+                laws[branch.index] = Integer(0)
+            case Kind.LAW | Kind.ACROSS_SOURCE:
+                laws[branch.index] = Add(*(slope * by for by, slope in slopes.of(branch).items()))
+            case Kind.COUPLING:
+                pass
+            case _:
+                laws[branch.index] = quantities.own_law(branch.index)
+    return _with_laws(equations.form, laws)
+
+
+def _with_laws(form: StateForm, laws: Mapping[int, Expr]) -> StateForm:
+    """The form with other laws, in symbols of the network."""
+
+    def changed(branch: GraphBranch) -> GraphBranch:
+        template = dataclasses.replace(branch.template, law=laws[branch.index], symbols=())
+        return dataclasses.replace(branch, template=template)
+
+    branches = (changed(branch) if branch.index in laws else branch for branch in form.graph.branches)
+    return dataclasses.replace(form, graph=dataclasses.replace(form.graph, branches=tuple(branches)))
+
+
+class _Outputs:
+    """Quantities in states, inputs and their rates."""
+
+    def __init__(self, form: StateForm, rows: Rows) -> None:
+        self._form, self._names, self._readings = form, Names(form), Readings(form, rows)
+        self._own = {state.name: symbol for state, symbol in zip(form.states, rows.states, strict=True)}
+
+    @cached_property
+    def _at_node(self) -> Mapping[int, tuple[int, str]]:
+        """For each node a part and its port there."""
+        parts = enumerate(self._form.graph.parts)
+        return {node: (k, port) for k, part in parts for port, node in part.nodes.items()}
+
+    def of(self, name: str) -> Expr:
+        """A quantity by its name.
+
+        Raises:
+            SignalError: there is none, or it is no sum of states.
+        """
+        parts, reads = self._form.graph.parts, self._readings
+        if name in self._own:
+            return self._own[name]
+        if name in self._names.signals:
+            part, signal = self._names.signals[name]
+            if signal.kind == "across":
+                first, second = signal.ends
+                return signal.sign * (reads.across(part, first) - reads.across(part, second))
+            if signal.kind == "through":
+                return signal.sign * reads.into(part, signal.ends[0])
+            stores = (k for k in part.branches if self._form.graph.branches[k].template.kind is Kind.THROUGH_STORE)
+            labels = self._form.graph.branches
+            store = next(k for k in stores if signal.label in ("", labels[k].template.label))
+            through = reads.through(store)
+            return through / labels[store].template.law if signal.kind == "twist" else signal.sign * through
+        if name in self._names.nodes:
+            number, port = self._at_node[self._names.nodes[name]]
+            return reads.across(parts[number], port)
+        if name in self._names.units:
+            raise SignalError(f"'{name}' is a product of speeds and torques, and no sum of states.")
+        raise no_quantity(name, self._form.graph.name, self._names.units)
+
+
+def _slopes(rows: Sequence[Expr], by: Sequence[Symbol]) -> ImmutableMatrix:
+    at_once = [row.xreplace({TIME: Integer(0)}) for row in rows]
+    return ImmutableMatrix(len(rows), len(by), [cancel(row.diff(symbol)) for row in at_once for symbol in by])
