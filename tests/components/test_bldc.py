@@ -107,6 +107,59 @@ def test_a_locked_rotor_takes_the_current_of_two_phases_in_series() -> None:
     assert np.all(sol["m.i_c"] == 0)
 
 
+def _current(t: np.ndarray, pieces: list[tuple[float, float, float]]) -> np.ndarray:
+    """Of two phases in series under a voltage from some times on that is u + rise (t - begin), as (begin, u, rise)."""
+    found, start, lag = np.zeros_like(t), 0.0, DATA["L"] / DATA["R"]
+    ends = [*(begin for begin, *_ in pieces[1:]), np.inf]
+    for (begin, u, rise), end in zip(pieces, ends, strict=True):
+
+        def course(s: np.ndarray, u: float = u, rise: float = rise, start: float = start) -> np.ndarray:
+            steady = (u + rise * (s - lag)) / (2 * DATA["R"])
+            return steady + (start - (u - rise * lag) / (2 * DATA["R"])) * np.exp(-s / lag)
+
+        inside = (t >= begin) & (t < end)
+        found[inside] = course(t[inside] - begin)
+        start = float(course(np.array([end - begin]))[0]) if np.isfinite(end) else start
+    return found
+
+
+PULSES = [(k * 0.002 + late, u, 0.0) for k in range(10) for late, u in ((0.0, 300.0), (0.0006, 0.0))]
+
+
+@pytest.mark.parametrize("engine", ["scipy", "heyoka", "sundials"])
+@pytest.mark.parametrize(
+    ("U", "pieces"),
+    [
+        (sw.Ramp(80.0, 0.01), [(0.0, 0.0, 8000.0), (0.01, 80.0, 0.0)]),
+        (sw.Table([0.0, 0.005, 0.02], [20.0, 60.0, 60.0]), [(0.0, 20.0, 8000.0), (0.005, 60.0, 0.0)]),
+        (300 * sympy.Piecewise((1, 500 * sw.t - sympy.floor(500 * sw.t) < 0.3), (0, True)), PULSES),
+    ],
+    ids=["ramp", "table", "pulses"],
+)
+def test_a_locked_rotor_follows_a_voltage_over_time(U: object, pieces: list, engine: str) -> None:
+    net = sw.Network("locked")
+    net.add(sw.BLDCMotor("m", **(DATA | {"U": U})), "rotor")
+    net.add(sw.SpeedSource("lock", omega=0.0), "rotor", "ground")
+    start = {"m.phi": np.pi / 3 / DATA["pole_pairs"] + 0.05}
+    sol = net.simulate(0.02, initial=start, rtol=1e-10, engine=engine, t_eval=np.linspace(0.0, 0.0199, 200))
+    wanted = _current(sol.t, pieces)
+    np.testing.assert_allclose(np.abs(sol["m.i_b"]), wanted, rtol=0, atol=1e-8 * wanted.max())
+    assert sol.energy_residual < 1e-9
+
+
+@pytest.mark.parametrize("U", [540.0 + 0 * sw.t, 500.0 + 0.8 * sw.omega], ids=["over time", "over speed"])
+def test_a_law_of_the_supply_is_read_at_the_rotor(U: object) -> None:
+    """At 50 rad/s both are 540 V."""
+    found = []
+    for voltage in (540.0, U):
+        net = sw.Network("driven")
+        net.add(sw.BLDCMotor("m", **(DATA | {"U": voltage})), "rotor")
+        net.add(sw.SpeedSource("drive", omega=50.0), "rotor", "ground")
+        found.append(net.simulate(0.03, rtol=1e-10, t_eval=31))
+    for name in ("m.i_a", "m.i_b", "m.i_c", "m.tau"):
+        np.testing.assert_allclose(found[1][name], found[0][name], rtol=0, atol=1e-8 * np.abs(found[0][name]).max())
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("pole_pairs", [1.0, 2.0])
 def test_the_mean_of_the_steady_motion_is_that_of_the_averaged_motor(pole_pairs: float) -> None:

@@ -11,6 +11,7 @@ from sympy import Abs, Expr, Integer, Max, Min, Rational, asin, cos, pi, sin
 from shaftwork.components.base import Component, Port, Role, Signal, component
 from shaftwork.components.branches import (
     ACROSS,
+    INTEGRAL,
     AcrossLaw,
     Branch,
     ThroughLaw,
@@ -19,6 +20,7 @@ from shaftwork.components.branches import (
     integral_of,
     through_of,
 )
+from shaftwork.components.laws import as_expression
 from shaftwork.components.modes import ANEW, Leave, Mode, Modes
 from shaftwork.core.domains import ELECTRICAL, ROTATION
 from shaftwork.core.parameters import parameter
@@ -47,12 +49,13 @@ class BLDCMotor(Component):
     -U/2 for 210 < theta < 330, whatever the current's sign; between them the current goes on through a diode to the
     other side until it is zero, and the phase is open until a diode conducts again. After `dead_time` a switch follows
     the one before it, at the speed of that instant. The inductance of a phase has its share of the mutual ones in it,
-    L = L_mu + L_sigma. Rotor inertia is a part of its own. Modes of each leg: high, low, freewheeling high,
+    L = L_mu + L_sigma. U may be a law, of pulses of a chopper before the inverter for one: at zero its legs short the
+    motor. Rotor inertia is a part of its own. Modes of each leg: high, low, freewheeling high,
     freewheeling low, open. Source: Popenda 2019, figs 4-13. Analogue: three transformers whose ratios turn
     with the rotor.
     """
 
-    U: float = parameter("V", "direct voltage of the inverter", above=0)
+    U: Any = parameter("V", "direct voltage of the inverter, also over time or the rotor's speed", at_least=0, law=True)
     R: float = parameter("ohm", "resistance of a phase", at_least=0)
     L: float = parameter("H", "inductance of a phase", above=0)
     k: float = parameter("V*s/rad", "flat back EMF of a phase over speed; its torque over current", above=0)
@@ -74,7 +77,7 @@ class BLDCMotor(Component):
         for phase, shape in shapes.items():
             leg, winding, emf = (f"{place}_{phase}" for place in ("leg", "winding", "emf"))
             if getattr(p, f"form_{phase}") != OPEN:
-                yield AcrossLaw(getattr(p, f"mode_{phase}") * p.U / 2, (leg, None), f"u_{phase}")
+                yield AcrossLaw(getattr(p, f"mode_{phase}") * _supply(p) / 2, (leg, None), f"u_{phase}")
             yield ThroughLaw(ACROSS / p.R, (leg, winding), f"R_{phase}")
             yield ThroughStore(1 / p.L, (winding, emf), f"i_{phase}")
             yield AcrossLaw(p.k * shape * across_of("rotor"), (emf, "star"), f"u_e_{phase}")
@@ -104,6 +107,11 @@ def _angle(p: Any, phase: str) -> Expr:
     return p.pole_pairs * integral_of("e") - PHASES[phase]
 
 
+def _supply(p: Any) -> Expr:
+    """The voltage of the inverter, in which speed and angle are those of the rotor."""
+    return as_expression(p.U).xreplace({ACROSS: across_of("rotor"), INTEGRAL: integral_of("e")})
+
+
 def _leg(p: Any, phase: str) -> Modes:
     """A leg of the inverter: two switches, a diode beside each, and the mode in which none of them conducts."""
     angle, current, voltage = _angle(p, phase), through_of(f"i_{phase}"), across_of(f"leg_{phase}")
@@ -112,14 +120,14 @@ def _leg(p: Any, phase: str) -> Modes:
     above = sin(angle) - EDGE if turned == 0 else Min(sin(angle), sin(before)) - EDGE
     below = -sin(angle) - EDGE if turned == 0 else Min(-sin(angle), -sin(before)) - EDGE
     closes = (Leave(above, "high"), Leave(below, "low"))
-    opens = "upper diode", "lower diode"
+    opens, half = ("upper diode", "lower diode"), _supply(p) / 2
     return Modes(
         (
             Mode("high", (Leave(EDGE - sin(angle), ANEW),), 1.0, starts=above > 0),
             Mode("low", (Leave(EDGE + sin(angle), ANEW),), -1.0, starts=below > 0),
             Mode(opens[0], (Leave(current, OPEN), *closes), 1.0, starts=current < 0, says="freewheeling high"),
             Mode(opens[1], (Leave(-current, OPEN), *closes), -1.0, starts=current > 0, says="freewheeling low"),
-            Mode(OPEN, (Leave(voltage - p.U / 2, opens[0]), Leave(-voltage - p.U / 2, opens[1]), *closes), form=OPEN),
+            Mode(OPEN, (Leave(voltage - half, opens[0]), Leave(-voltage - half, opens[1]), *closes), form=OPEN),
         ),
         label=phase,
     )
