@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+import math
 
 import numpy as np
 import pytest
@@ -98,7 +98,7 @@ def test_a_speed_that_drives_an_inertia_rigidly_asks_for_its_rate() -> None:
 
 
 def test_a_long_shaft_takes_numbers_and_keeps_its_digits() -> None:
-    """Degree 100, with poles from 5 to 2e5 1/s."""
+    """Degree 100: its coefficients are larger than floats are."""
     net = sw.Network("line")
     net.add(sw.TorqueSource("motor", tau=1.0), "a")
     net.add(sw.Inertia("J1", J=2.0), "a")
@@ -106,6 +106,9 @@ def test_a_long_shaft_takes_numbers_and_keeps_its_digits() -> None:
     net.add(sw.Inertia("J2", J=2.0), "b")
     H = net.equations().transfer_function("motor.tau", "line.tau_b", values=True)
     assert H.denominator.degree() == 100
+    with pytest.raises(sw.ParameterError, match="degree 100, and coefficients larger than floats"):
+        H.coefficients()
+    assert "inf" not in H.latex()
     f = np.array([0.1, 50.0, 3000.0])
     np.testing.assert_allclose(
         H(2j * np.pi * f), net.frequency_response("motor.tau", "line.tau_b", f).values, rtol=1e-10
@@ -153,6 +156,113 @@ def test_values_and_points_that_are_not_there_are_told() -> None:
         H.numeric(at={"J3.omega": 1.0})
 
 
+def fed(*parts: tuple[object, ...]) -> sw.Network:
+    """Parts at nodes, with a source that drives node a."""
+    net = sw.Network("fed")
+    net.add(sw.TorqueSource("drive", tau=1.0), "a")
+    for part, *nodes in parts:
+        net.add(part, *nodes)
+    return net
+
+
+@pytest.mark.filterwarnings("ignore:.*have the same name:shaftwork.core.errors.NetworkWarning")
+def test_a_point_is_what_laws_read_of_it_and_no_zero_in_silence() -> None:
+    """Behind a gear, between two nodes, and beside a node that bears the name of a part."""
+    geared = fed(
+        (sw.TorqueSource("m", tau=-0.1 * sw.omega**2), "a"),
+        (sw.Inertia("J1", J=2.0), "a"),
+        (sw.Gear("g", ratio=3.0), "a", "b"),
+        (sw.Inertia("J2", J=3.0), "b"),
+    )
+    with pytest.raises(sw.ParameterError, match=r"the law of 'm' reads J1\.omega, which is not given"):
+        geared.equations().transfer_function("drive.tau", "J1.omega", values=True, at={"J2.omega": 3.0})
+    between = fed(
+        (sw.Inertia("J1", J=2.0), "a"),
+        (sw.TorqueSource("m", tau=-0.1 * sw.omega**3), "a", "b"),
+        (sw.Spring("s", c=10.0), "a", "b"),
+        (sw.Inertia("J2", J=3.0), "b"),
+    )
+    alike = fed(
+        (sw.TorqueSource("m", tau=-0.1 * sw.omega**3), "a"),
+        (sw.Inertia("J1", J=2.0), "a"),
+        (sw.Spring("s", c=5.0), "a", "J1"),
+        (sw.Inertia("J2", J=2.0), "J1"),
+    )
+    for net, at in ((between, {"J1.omega": 9.0, "J2.omega": 1.0}), (alike, {"J1.omega": 4.0})):
+        H = net.equations().transfer_function("drive.tau", "a.omega", values=True, at=at)
+        response = net.compile().linearize(at).frequency_response("drive.tau", "a.omega", F).values
+        np.testing.assert_allclose(H(2j * np.pi * F), response, rtol=1e-10)
+
+
+def test_laws_are_read_when_none_of_them_switches_any_more() -> None:
+    net = fed(
+        (sw.TorqueSource("late", tau=sw.Step(1.0, start=9.0)), "a"),
+        (sw.TorqueSource("m", tau=-sw.omega * sw.t), "a"),
+        (sw.Inertia("J", J=2.0), "a"),
+    )
+    H = net.equations().transfer_function("drive.tau", "J.omega")
+    np.testing.assert_allclose(H(2j * np.pi * F), net.frequency_response("drive.tau", "J.omega", F).values, rtol=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("law", "at"), [(-5 * sympy.sign(sw.omega), None), (-sympy.sqrt(sw.omega + 1), {"J.omega": -3.0})]
+)
+def test_a_law_without_a_slope_at_the_point_is_refused(law: sympy.Expr, at: dict[str, float] | None) -> None:
+    equations = fed((sw.TorqueSource("m", tau=law), "a"), (sw.Inertia("J", J=2.0), "a")).equations()
+    with pytest.raises(sw.ParameterError, match="The law of 'm' has no finite slope at this point"):
+        equations.transfer_function("drive.tau", "J.omega", values=True, at=at)
+
+
+def test_numbers_that_go_in_afterwards_leave_no_common_factors_and_are_looked_at() -> None:
+    H = two_masses().equations().transfer_function("motor.tau", "shaft.tau")
+    assert H.numeric({"load.d": 0.0})(0.0) == pytest.approx(0.6)
+    assert len(H.numeric({"load.d": 0.0}).poles()) == 2
+    for value, says in ((math.nan, "no finite number"), (-50.0, "must be at least 0"), ("abc", "no finite number")):
+        with pytest.raises(sw.ParameterError, match=says):
+            H.numeric({"shaft.c": value})
+    with pytest.raises(sw.ParameterError, match="no finite value with these numbers"):
+        H.numeric({"J1.J": 0.0, "shaft.c": 0.0, "shaft.d": 0.0})
+    with pytest.raises(sw.ParameterError, match="in numbers already"):
+        two_masses().equations().transfer_function("motor.tau", "shaft.tau", values=True).numeric({"shaft.c": 5.0})
+    with pytest.raises(sw.ParameterError, match="is no finite number"):
+        H(np.inf)
+
+
+def test_a_train_that_the_input_does_not_reach_neither_answers_nor_counts() -> None:
+    parts = [
+        part
+        for x in "ab"
+        for k in range(4)
+        for part in (
+            (sw.Inertia(f"J{x}{k}", J=1.0 + k), f"{x}{k}" if x + str(k) != "a0" else "a"),
+            (sw.Damper(f"D{x}{k}", d=0.1 + k), f"{x}{k}" if x + str(k) != "a0" else "a"),
+        )
+    ]
+    parts += [
+        (sw.Spring(f"s{x}{k}", c=3.0 + k, d=0.1), f"{x}{k - 1}" if x + str(k) != "a1" else "a", f"{x}{k}")
+        for x in "ab"
+        for k in (1, 2, 3)
+    ]
+    equations = fed(*parts).equations()
+    assert equations.transfer_function("drive.tau", "Jb0.omega").expression == 0
+    assert equations.transfer_function("drive.tau", "Ja3.omega").denominator.degree() == 7
+
+
+def test_a_mesh_takes_numbers() -> None:
+    nodes = [(i, k) for i in range(4) for k in range(4)]
+    name = {(i, k): "a" if i == k == 0 else f"n{i}{k}" for i, k in nodes}
+    parts: list[tuple[object, ...]] = [(sw.Inertia(f"J{i}{k}", J=1.0 + 0.01 * i), name[i, k]) for i, k in nodes]
+    parts += [(sw.Spring(f"v{i}{k}", c=3.0, d=0.1), name[i - 1, k], name[i, k]) for i, k in nodes if i]
+    parts += [(sw.Spring(f"h{i}{k}", c=3.0, d=0.1), name[i, k - 1], name[i, k]) for i, k in nodes if k]
+    net = fed(*parts)
+    with pytest.raises(sw.CompileError, match="values=True"):
+        net.equations().transfer_function("drive.tau", "J11.omega")
+    H = net.equations().transfer_function("drive.tau", "J11.omega", values=True)
+    np.testing.assert_allclose(
+        H(2j * np.pi * F), net.frequency_response("drive.tau", "J11.omega", F).values, rtol=1e-10
+    )
+
+
 def test_a_travelling_wave_is_refused_with_what_can_be_taken_instead() -> None:
     net = sw.Network("line")
     net.add(sw.TorqueSource("motor", tau=1.0), "a")
@@ -176,7 +286,10 @@ def test_random_networks_respond_as_their_linearised_model_does(pieces: Network,
     response = linear.frequency_response(given, wanted, F).values
     in_numbers = net.equations().transfer_function(given, wanted, values=True)
     made = [in_numbers]
-    with suppress(sw.CompileError):  # too long
+    try:
         made.append(net.equations().transfer_function(given, wanted))
+    except sw.CompileError as error:
+        if len(pieces) < 8 or "thousands of terms" not in str(error):
+            raise
     for H in made:
         np.testing.assert_allclose(H(2j * np.pi * F), response, rtol=0, atol=1e-10 * np.abs(response).max())

@@ -5,26 +5,29 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from shaftwork.core.errors import CompileError
-
 Polynomial = Any
 """An element of a ring of sympy's sparse polynomials."""
 MOST_TERMS = 5_000
 """Terms of the minors on the way to a determinant; one of more is longer than anyone reads, and takes minutes."""
 
 
-def determinant(rows: Sequence[Mapping[int, Polynomial]], one: Polynomial) -> Polynomial:
-    """The determinant of a square matrix, by minors of its first rows, each from those of a row less.
+class TooManyTermsError(Exception):
+    """Polynomials on the way to a determinant grow beyond what is asked for."""
 
-    A column is dropped from the minors with the last row in which it stands. Rows that share columns follow each other,
-    so that in the matrix of a chain or tree few minors are known at a time.
+
+def determinant(rows: Sequence[Mapping[int, Polynomial]], one: Polynomial, most: int = MOST_TERMS) -> Polynomial:
+    """The determinant of a square matrix, expanded row by row (Laplace).
+
+    The minors known at a time are those of the rows so far, by their columns. One without a column that no later row
+    has is dropped. Rows that share columns follow each other, so that of a chain or tree they are few.
 
     Args:
         rows: nonzero entries by column.
         one: of the ring.
+        most: terms that all minors may have.
 
     Raises:
-        CompileError: the minors have more terms than `MOST_TERMS`.
+        TooManyTermsError: they have more.
     """
     order = _order(rows)
     last = {column: place for place, row in enumerate(order) for column in rows[row]}
@@ -45,17 +48,9 @@ def determinant(rows: Sequence[Mapping[int, Polynomial]], one: Polynomial) -> Po
                 term = minor * entry
                 made[both] = made.get(both, 0) + (-term if (taken >> column).bit_count() % 2 else term)
         minors = {taken: minor for taken, minor in made.items() if minor}
-        if sum(map(len, minors.values())) > MOST_TERMS:
-            raise too_long()
+        if sum(map(len, minors.values())) > most:
+            raise TooManyTermsError
     return -minors.get(closed, 0 * one) if _is_odd(order) else minors.get(closed, 0 * one)
-
-
-def too_long() -> CompileError:
-    """The error of polynomials that have too many terms."""
-    return CompileError(
-        "The polynomials have thousands of terms in symbols, more than anyone reads. Take values=True, which puts in "
-        "the parameters' values."
-    )
 
 
 def _order(rows: Sequence[Mapping[int, Polynomial]]) -> list[int]:

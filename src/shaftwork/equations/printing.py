@@ -54,7 +54,11 @@ class _Printer(LatexPrinter):  # type: ignore[misc]
         return sorted(terms, key=lambda term: bool(term.could_extract_minus_sign()))
 
     def _print_Float(self, number: Float) -> str:
-        return printed_number(float(number))
+        value = float(number)
+        if math.isfinite(value):
+            return printed_number(value)
+        mantissa, _, exponent = str(number.n(DIGITS)).partition("e")  # one that floats do not hold
+        return rf"{mantissa} \cdot 10^{{{int(exponent)}}}"
 
     def _print_Piecewise(self, cases: Piecewise) -> str:
         """One case a row, and a sum that is wider than that in several."""

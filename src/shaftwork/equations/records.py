@@ -292,7 +292,7 @@ class Equations:
             input: what a source gives, "motor.tau".
             output: any speed, torque or angle, "shaft.tau".
             values: with the parameters' values instead of their symbols, which large networks need.
-            at: with values, the point, as {"J1.omega": 8.0}; what is not named is zero.
+            at: with values, the point, as {"J1.omega": 8.0}, with all that laws read; by default rest.
             t: with values, the time at which laws are read, s; by default as for `TransferFunction.numeric`.
 
         Raises:

@@ -9,10 +9,13 @@ from sympy import Expr, Integer, Symbol
 
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.laws import t as TIME
-from shaftwork.components.slopes import slope
+from shaftwork.components.slopes import jumps, slope
 from shaftwork.equations.quantities import Quantities
 from shaftwork.network.controlled import readings_of
 from shaftwork.network.graph import GraphBranch
+
+VARIED = Symbol("varied", real=True)
+"""Stands for what a law that jumps reads."""
 
 
 class Slope(NamedTuple):
@@ -22,11 +25,15 @@ class Slope(NamedTuple):
         of: symbol of what passes through, with a sign; zero where that of the law alone has none.
         by: what the law reads.
         value: the slope, in quantities of the network.
+        part: whose law it is.
+        jumps: the law with `VARIED` in place of what it reads, where it may jump in that; else None.
     """
 
     of: Expr
     by: Expr
     value: Expr
+    part: str
+    jumps: Expr | None
 
 
 class Slopes:
@@ -55,18 +62,22 @@ class Slopes:
         point |= {symbol: names[of.kind](of.of) for symbol, of in reads.items()}
         for symbol in point:
             made = slope(law, symbol) if law.has(symbol) else Integer(0)
-            if made == 0:
+            may_jump = jumps(law, symbol)
+            if made == 0 and not may_jump:
                 continue
-            if made.free_symbols.isdisjoint({*point, TIME}) and made.is_rational_function():
+            if not may_jump and made.free_symbols.isdisjoint({*point, TIME}) and made.is_rational_function():
                 yield symbol, made
             else:
-                yield symbol, self._letter(index, point[symbol], made.xreplace(point))
+                jumping = law.xreplace({**point, symbol: VARIED}) if may_jump else None
+                yield symbol, self._letter(index, point[symbol], made.xreplace(point), jumping)
 
-    def _letter(self, index: int, by: Expr, value: Expr) -> Symbol:
+    def _letter(self, index: int, by: Expr, value: Expr, jumping: Expr | None) -> Symbol:
         quantities = self._quantities
         owner, flow = quantities.graph.part_of(index).name, quantities.flow_of[index]
-        number = sum(known.name.rpartition(".")[0] == owner for known in self.letters)
-        letter = Symbol(f"{owner}.slope{f'_{number + 1}' if number else ''}", real=True)
+        number = sum(known.part == owner for known in self.letters.values())
+        letter = Symbol(
+            f"slope{f'_{number + 1}' if number else ''}({owner})", real=True
+        )  # no parameter has such a name
         of = flow.sign * quantities.through(flow) if len(flow.branches) == 1 else Integer(0)
-        self.letters[letter] = Slope(of, by, value)
+        self.letters[letter] = Slope(of, by, value, owner, jumping)
         return letter

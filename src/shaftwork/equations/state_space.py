@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 from sympy import Add, Dummy, Expr, ImmutableMatrix, Integer, Symbol, cancel
@@ -17,11 +16,11 @@ from shaftwork.equations.tableau import refuse_waves
 from shaftwork.network.graph import GraphBranch
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.blocks import BlockTooLargeError
+from shaftwork.reduction.expressed import Expressed
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.inputs import places_of, source_inputs, with_inputs
 from shaftwork.reduction.names import Names
-from shaftwork.reduction.readings import Readings
-from shaftwork.reduction.rows import Rows, explicit_rows
+from shaftwork.reduction.rows import explicit_rows
 
 if TYPE_CHECKING:  # the records make matrices through this module
     from shaftwork.equations.records import Equations
@@ -89,10 +88,10 @@ def state_space(equations: Equations, inputs: Sequence[str] | None, outputs: Seq
             "solves any, or compile().linearize() for numbers."
         ) from None
     wanted = tuple(state.name for state in form.states) if outputs is None else tuple(outputs)
-    read = _Outputs(form, rows)
+    read = Expressed(form, rows)
     groups = rows.states, [value for value, _ in values], [rate for _, rate in values]
     A, B, B1 = (_slopes(rows.rates, group) for group in groups)
-    C, D, D1 = (_slopes([read.of(name) for name in wanted], group) for group in groups)
+    C, D, D1 = (_slopes([_quantity(form, read, name) for name in wanted], group) for group in groups)
     states = tuple(state.name for state in form.states)
     B, D = ((whole + by @ B1).applyfunc(cancel) for whole, by in ((B, A), (D, C)))
     return StateSpace(states, named, wanted, A, B, C, D, B1, D1, dict(slopes.letters))
@@ -125,46 +124,19 @@ def _with_laws(form: StateForm, laws: Mapping[int, Expr]) -> StateForm:
     return dataclasses.replace(form, graph=dataclasses.replace(form.graph, branches=tuple(branches)))
 
 
-class _Outputs:
-    """Quantities in states, inputs and their rates."""
+def _quantity(form: StateForm, read: Expressed, name: str) -> Expr:
+    """A quantity in states, inputs and their rates.
 
-    def __init__(self, form: StateForm, rows: Rows) -> None:
-        self._form, self._names, self._readings = form, Names(form), Readings(form, rows)
-        self._own = {state.name: symbol for state, symbol in zip(form.states, rows.states, strict=True)}
-
-    @cached_property
-    def _at_node(self) -> Mapping[int, tuple[int, str]]:
-        """For each node a part and its port there."""
-        parts = enumerate(self._form.graph.parts)
-        return {node: (k, port) for k, part in parts for port, node in part.nodes.items()}
-
-    def of(self, name: str) -> Expr:
-        """A quantity by its name.
-
-        Raises:
-            SignalError: there is none, or it is no sum of states.
-        """
-        parts, reads = self._form.graph.parts, self._readings
-        if name in self._own:
-            return self._own[name]
-        if name in self._names.signals:
-            part, signal = self._names.signals[name]
-            if signal.kind == "across":
-                first, second = signal.ends
-                return signal.sign * (reads.across(part, first) - reads.across(part, second))
-            if signal.kind == "through":
-                return signal.sign * reads.into(part, signal.ends[0])
-            stores = (k for k in part.branches if self._form.graph.branches[k].template.kind is Kind.THROUGH_STORE)
-            labels = self._form.graph.branches
-            store = next(k for k in stores if signal.label in ("", labels[k].template.label))
-            through = reads.through(store)
-            return through / labels[store].template.law if signal.kind == "twist" else signal.sign * through
-        if name in self._names.nodes:
-            number, port = self._at_node[self._names.nodes[name]]
-            return reads.across(parts[number], port)
-        if name in self._names.units:
+    Raises:
+        SignalError: there is none of this name, or it is no sum of states.
+    """
+    names = Names(form)
+    found = Symbol(name, real=True) if any(state.name == name for state in form.states) else read.quantity(name)
+    if found is None:
+        if name in names.units:
             raise SignalError(f"'{name}' is a product of speeds and torques, and no sum of states.")
-        raise no_quantity(name, self._form.graph.name, self._names.units)
+        raise no_quantity(name, form.graph.name, names.units)
+    return found
 
 
 def _slopes(rows: Sequence[Expr], by: Sequence[Symbol]) -> ImmutableMatrix:

@@ -11,37 +11,34 @@ from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+import networkx as nx
 import numpy as np
 from mpmath import mpf, polyroots, workdps
 from numpy.typing import NDArray
 from sympy import Add, Expr, Float, Integer, Poly, Rational, Symbol, lcm, prime, sring, together
 
-from shaftwork.components.laws import breakpoints
-from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError, ParameterError, SignalError, no_quantity
-from shaftwork.equations.determinants import determinant, too_long
+from shaftwork.equations.determinants import MOST_TERMS, TooManyTermsError, determinant
+from shaftwork.equations.point_values import DIGITS, Numbers, Values, exact, fraction
 from shaftwork.equations.slopes import Slope, Slopes
 from shaftwork.equations.tableau import S, Sum, Tableau, Unknown, refuse_waves
-from shaftwork.network.graph import GROUND
-from shaftwork.network.templates import Kind
 from shaftwork.reduction.inputs import Place, places_of
 from shaftwork.reduction.names import Names
 
 if TYPE_CHECKING:  # the records make transfer functions through this module
     from shaftwork.equations.records import Equations
 
-DIGITS = 40
-"""Decimal digits with which numbers that are no fractions, as pi, become fractions: far more than floats have."""
 FEW = 1000
 """The largest denominator of a fraction that is printed as one."""
 
+MOST_NUMBERS = 200_000
+"""Terms of the minors where these are polynomials in s alone."""
 SHORT = 600
 """Terms of a quotient up to which all common factors are looked for: it takes seconds."""
 STEPS, EXTRA = 1000, 10
 """Steps in which roots are improved, and the binary digits more for each of them: what cancels in a polynomial."""
 
 Complex = NDArray[np.complex128]
-Values = Mapping[str, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,29 +84,50 @@ class TransferFunction:
 
         Args:
             parameters: values in place of those of the network, as {"shaft.c": 2e4}.
-            at: the point at which laws have their slopes, as {"J1.omega": 8.0}; what is not named is zero.
+            at: the point at which laws have their slopes, {"J1.omega": 8.0}, with all that they read; by default rest.
             t: time at which laws are read, s; by default after their last breakpoint; of parts that change their mode,
                 at rest, 0.
 
         Raises:
-            ParameterError: there is no such parameter or quantity, or a law has no finite slope at the point.
+            ParameterError: there is no such parameter or quantity, one has no such value, a law has no finite slope at
+                the point, or there are numbers already.
         """
-        numbers = _Numbers(self.equations, parameters, at, t)
+        if not self._symbols and (parameters or at):
+            raise ParameterError("This transfer function is in numbers already. Make it without values=True.")
+        numbers = Numbers(self.equations, parameters, at, t)
         numbers.add(self.slopes)
         above, below = (_in_numbers(p.as_expr(), numbers.known) for p in (self.numerator, self.denominator))
+        if not below:
+            raise ParameterError(f"{self.output} / {self.input} has no finite value with these numbers.")
+        above, below = above.cancel(below, include=True)
         return replace(self, numerator=above, denominator=below, slopes={})
+
+    @property
+    def _symbols(self) -> bool:
+        """Whether there are symbols in the coefficients."""
+        return bool(self.numerator.free_symbols_in_domain | self.denominator.free_symbols_in_domain)
 
     @cached_property
     def _numeric(self) -> TransferFunction:
-        symbols = self.numerator.free_symbols_in_domain | self.denominator.free_symbols_in_domain
-        return self.numeric() if symbols else self
+        return self.numeric() if self._symbols else self
 
     def coefficients(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Numerator and denominator in numbers, from the highest power of s down, the first of the denominator 1."""
+        """Numerator and denominator in numbers, from the highest power of s down, the first of the denominator 1.
+
+        Raises:
+            ParameterError: one is larger than floats are.
+        """
         made = self._numeric
         first = made.denominator.LC()
-        above, below = ([float(c / first) for c in p.all_coeffs()] for p in (made.numerator, made.denominator))
-        return np.array(above), np.array(below)
+        above, below = (
+            np.array([float(c / first) for c in p.all_coeffs()]) for p in (made.numerator, made.denominator)
+        )
+        if not (np.isfinite(above).all() and np.isfinite(below).all()):
+            raise ParameterError(
+                f"The denominator has degree {made.denominator.degree()}, and coefficients larger than floats are. "
+                "Take poles() and zeros(), or values at s."
+            )
+        return above, below
 
     def poles(self) -> Complex:
         """Zeros of the denominator, 1/s; each as often as it occurs."""
@@ -123,9 +141,11 @@ class TransferFunction:
         """Values at complex s, 1/s, of the same shape.
 
         Raises:
-            ParameterError: one of them is a pole.
+            ParameterError: one of them is a pole, or no finite number.
         """
         made, at = self._numeric, np.asarray(s, dtype=complex)
+        if not np.isfinite(at).all():
+            raise ParameterError(f"s = {at[~np.isfinite(at)][0]} is no finite number.")
         found = [_divided(made.numerator, made.denominator, complex(value)) for value in at.ravel()]
         return np.array(found, dtype=complex).reshape(at.shape)
 
@@ -170,16 +190,24 @@ def transfer_function(
     rows = tableau.rows(read)
     known: dict[Symbol, Rational] | None = None
     if values:
-        numbers = _Numbers(equations, None, at, t)
+        numbers = Numbers(equations, None, at, t)
         numbers.add(slopes.letters)
         known = numbers.known
-    above, below = _quotient(rows, tableau.entered(place), (read, direct), known)
+    entered = tableau.entered(place)
+    try:
+        above, below = _reduced(*_quotient(_reached(rows, read), entered, (read, direct), known))
+    except TooManyTermsError:
+        raise CompileError(
+            "The network has too many loops for determinants in numbers. Take frequency_response."
+            if values
+            else "The polynomials have thousands of terms in symbols, more than anyone reads. Take values=True, which "
+            "puts in the parameters' values."
+        ) from None
     if not below:
         raise CompileError(
-            f"'{equations.form.graph.name}' has more than one small motion for the same input: its equations do not "
-            "tell all speeds and torques near this point."
+            f"The equations of '{equations.form.graph.name}' near this point are singular: they leave a speed or "
+            "torque undetermined. Take another point, or another phase."
         )
-    above, below = _reduced(above, below)
     left = above.as_expr().free_symbols | below.as_expr().free_symbols
     kept = {letter: slope for letter, slope in slopes.letters.items() if letter in left}
     return TransferFunction(*names, Poly(above.as_expr(), S), Poly(below.as_expr(), S), kept, equations)
@@ -208,6 +236,15 @@ def _output(equations: Equations, tableau: Tableau, place: Place, name: str) -> 
     raise no_quantity(name, graph.name, names.units)
 
 
+def _reached(rows: Mapping[Unknown, Sum], read: Sum) -> Mapping[Unknown, Sum]:
+    """The rows of the unknowns on which those that are read depend, or which depend on these."""
+    trains: nx.Graph[Unknown] = nx.Graph()
+    trains.add_nodes_from(rows)
+    trains.add_edges_from((own, other) for own, row in rows.items() for other in row)
+    reached = set[Unknown]().union(*(nx.node_connected_component(trains, unknown) for unknown in read))
+    return {own: row for own, row in rows.items() if own in reached}
+
+
 def _quotient(
     rows: Mapping[Unknown, Sum], entered: Mapping[Unknown, int], output: tuple[Sum, int], known: Values | None
 ) -> tuple[Any, Any]:
@@ -231,118 +268,53 @@ def _quotient(
     left = iter(made)
     matrix = [{column: next(left) for column in row} for row, _ in cleared]
     own = [{column: entry for column, entry in row.items() if column < len(rows)} for row in matrix[:-1]]
-    return determinant(matrix, ring.one), determinant(own, ring.one) * factor
+    most = MOST_TERMS if known is None else MOST_NUMBERS
+    return determinant(matrix, ring.one, most), determinant(own, ring.one, most) * factor
 
 
 def _reduced(above: Any, below: Any) -> tuple[Any, Any]:
-    """The same quotient without common factors, if it is short; of a long one those that hold s are looked for.
+    """The same quotient without common factors.
 
-    A factor is there for any numbers in the place of symbols, so that none with s is left where some numbers have none.
+    Of a long one only factors that hold s are looked for: where numerator and denominator have none in common for one
+    choice of the parameters, they have none at all.
+
+    Raises:
+        TooManyTermsError: a long one has such a factor.
     """
-    if len(above) + len(below) <= SHORT:
-        return above.cancel(below)  # type: ignore[no-any-return]
     ring = above.ring
+    if not (above and below) or len(above) + len(below) <= SHORT or ring.ngens == 1:
+        return above.cancel(below) if below else (above, below)
     powers = np.min([*above.itermonoms(), *below.itermonoms()], axis=0)
     above, below = (p.exquo(ring.term_new(tuple(powers.tolist()), ring.domain.one)) for p in (above, below))
     place = ring.symbols.index(S)
     numbers = [
-        (x, number) for k, (x, number) in enumerate(zip(ring.gens, _different(ring.ngens), strict=True)) if k != place
+        (x, number)
+        for k, (x, number) in enumerate(zip(ring.gens, _distinct_primes(ring.ngens), strict=True))
+        if k != place
     ]
     tried = [p.evaluate(numbers) for p in (above, below)]
     if tried[0].gcd(tried[1]).is_ground:
         return above, below
-    raise too_long()
+    raise TooManyTermsError
 
 
-def _different(count: int) -> list[int]:
-    """Whole numbers that have little in common."""
+def _distinct_primes(count: int) -> list[int]:
     return [prime(7 + 3 * k) for k in range(count)]
 
 
 def _cleared(row: Mapping[int, Expr]) -> tuple[dict[int, Expr], Expr]:
     """A row without fractions of symbols, and by what it has been multiplied."""
-    parts = {column: _exact(together(entry)).as_numer_denom() for column, entry in row.items()}
+    parts = {column: exact(together(entry)).as_numer_denom() for column, entry in row.items()}
     common = Integer(1)
     for _, below in parts.values():
         common = lcm(common, below)
     return {column: (above * (common / below).cancel()).expand() for column, (above, below) in parts.items()}, common
 
 
-def _exact(expression: Expr) -> Expr:
-    """Floats as the fractions that they are."""
-    return expression.xreplace({number: Rational(number) for number in expression.atoms(Float)})
-
-
 def _in_numbers(expression: Expr, known: Mapping[Symbol, Rational]) -> Poly:
     """A polynomial in s whose coefficients are fractions."""
-    found = Poly(_exact(expression).xreplace(dict(known)), S)
-    return Poly([_fraction(coefficient) for coefficient in found.all_coeffs()], S)
-
-
-def _fraction(number: Expr) -> Rational:
-    return number if number.is_Rational else Rational(number.evalf(DIGITS))
-
-
-class _Numbers:
-    """The values of all symbols.
-
-    Raises:
-        ParameterError: there is no such parameter or quantity.
-    """
-
-    def __init__(self, equations: Equations, parameters: Values | None, at: Values | None, t: float | None) -> None:
-        graph = equations.form.graph
-        given = dict(parameters or {})
-        for name in given.keys() - graph.parameters.keys():
-            raise ParameterError(f"There is no parameter '{name}'. There are: {', '.join(graph.parameters)}.")
-        self.known = {Symbol(n, real=True): Rational(float(v)) for n, v in {**graph.parameters, **given}.items()}
-        for symbol, law in equations.definitions.items():
-            self.known[symbol] = _fraction(_exact(law).xreplace(self.known))
-        time = _time(equations, self.known, at) if t is None else t
-        self._point = {TIME: Rational(float(time)), **_point(equations, at or {})}
-
-    def add(self, slopes: Mapping[Symbol, Slope]) -> None:
-        """The values of slopes of laws.
-
-        Raises:
-            ParameterError: one has no finite value at the point.
-        """
-        for letter, (*_, law) in slopes.items():
-            rest = {symbol: Integer(0) for symbol in law.free_symbols}
-            value = law.xreplace({**rest, **self._point, **self.known}).evalf(DIGITS)
-            if not (value.is_number and value.is_finite):
-                owner = letter.name.rpartition(".")[0]
-                raise ParameterError(f"The law of '{owner}' has no finite slope at this point. Take another in at=.")
-            self.known[letter] = Rational(value)
-
-
-def _time(equations: Equations, known: Mapping[Symbol, Rational], at: Values | None) -> float:
-    """A time in s after which no law switches any more; at rest, where parts change their mode, none has yet."""
-    if any(part.modes for part in equations.form.graph.parts) and at is None:
-        return 0.0
-    branches = (branch for branch in equations.form.graph.branches if branch.template.kind is Kind.LAW)
-    laws = (equations.assembly.quantities.law(branch.index) for branch in branches)
-    return max((0.0, *(time for law in laws for time in breakpoints(law, known)))) + 1.0
-
-
-def _point(equations: Equations, at: Values) -> dict[Symbol, Rational]:
-    """The symbols of quantities at a point."""
-    names, quantities = Names(equations.form), equations.assembly.quantities
-    found: dict[Symbol, Rational] = {}
-    for name, value in at.items():
-        if name not in names.units:
-            raise ParameterError(f"at: {no_quantity(name, equations.form.graph.name, names.units)}")
-        symbol: Expr = Symbol(name, real=True)
-        if name in names.nodes:
-            symbol = quantities.node(names.nodes[name])
-        elif name in names.signals and names.signals[name][1].kind == "across":
-            part, signal = names.signals[name]
-            plus, minus = (GROUND if end is None else part.nodes[end] for end in signal.ends)
-            symbol = signal.sign * quantities.across((plus, minus))
-        sign, letter = symbol.as_coeff_Mul()
-        if letter.is_Symbol:
-            found[letter] = Rational(float(value)) / sign
-    return found
+    found = Poly(exact(expression).xreplace(dict(known)), S)
+    return Poly([fraction(coefficient) for coefficient in found.all_coeffs()], S)
 
 
 def _divided(above: Poly, below: Poly, s: complex) -> complex:

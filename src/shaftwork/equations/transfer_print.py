@@ -51,10 +51,10 @@ def _named(name: str, names: Mapping[str, str]) -> str:
 def _letters(slopes: Mapping[Symbol, Slope], taken: set[str]) -> dict[str, str]:
     """A letter for each slope, with the name of its part: k, or another where the part has one."""
     found: dict[str, str] = {}
-    for symbol in slopes:
-        owner, _, own = symbol.name.rpartition(".")
-        index = own.removeprefix("slope").replace("_", ",")
-        options = (rf"{base}_{{\mathrm{{{escaped(owner)}}}{index}}}" for base in ("k", r"\kappa", r"\lambda"))
+    for symbol, slope in slopes.items():
+        number = symbol.name.partition("(")[0].partition("_")[2]
+        index = rf"\mathrm{{{escaped(slope.part)}}}{f',{number}' if number else ''}"
+        options = (rf"{base}_{{{index}}}" for base in ("k", r"\kappa", r"\lambda"))
         whole = rf"\mathrm{{{escaped(symbol.name)}}}"
         found[symbol.name] = next((text for text in options if text not in taken), whole)
     return found

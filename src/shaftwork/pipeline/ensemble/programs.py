@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.expressed import Expressed
 from shaftwork.codegen.lane_program import LaneProgram, lane_expressions, lane_function, lane_program
 from shaftwork.codegen.lanes import LaneStep, Use
 from shaftwork.codegen.stores import Stores
 from shaftwork.core.errors import CompileError
 from shaftwork.pipeline.model import Model
+from shaftwork.reduction.expressed import Expressed
 from shaftwork.results.measures import Measure
 
 EXTREMES = {"max": (1.0,), "min": (-1.0,), "peak": (1.0, -1.0)}

@@ -352,8 +352,10 @@ def _of_energy(energy: float, shares: Array, opens: Array, W: Array) -> Array:
     linear, square = float(shares @ opens), float(shares @ W @ shares)
     if not square > 0:  # both sides are held, until a gear gives way
         return shares if energy > 0 else 0 * shares
-    energy = max(energy, 0.0)
-    return shares * (2 * energy / (linear + math.sqrt(linear**2 + 2 * square * energy)) if energy else 0.0)
+    if energy <= 0:
+        return 0 * shares
+    root = math.sqrt(linear**2 + 2 * square * energy)
+    return shares * (2 * energy / (linear + root) if linear > 0 else (root - linear) / square)  # no terms cancel
 
 
 def _sums(pairs: Iterable[tuple[str, float]]) -> dict[str, float]:

@@ -11,7 +11,6 @@ from sympy import Expr, Symbol
 
 from shaftwork.codegen.differentiated import Differentiated, Shown
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.expressed import Expressed
 from shaftwork.core.errors import AccuracyWarning, ParameterError, SimulationError
 from shaftwork.core.notices import warn
 from shaftwork.integrate.variation import Coefficients, Variation, variation
@@ -22,6 +21,7 @@ from shaftwork.pipeline.sensitivities.differentiable import rows_of
 from shaftwork.pipeline.sensitivities.jump_conditions import ADVICE, TOGETHER, Jump, JumpConditions, by_chance
 from shaftwork.pipeline.sensitivities.legs import Leg, parted
 from shaftwork.pipeline.sensitivities.motion_legs import Motion
+from shaftwork.reduction.expressed import Expressed
 
 ROUNDING = 1e-3
 """What a change of a parameter by all of itself does to a state is rounding below this part of the state's size."""
