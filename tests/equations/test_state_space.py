@@ -59,6 +59,7 @@ def test_a_motor_has_a_letter_for_its_slope_and_an_input_beside_it() -> None:
 
 def test_what_is_not_there_is_told() -> None:
     equations = sw.scenes.crane().equations()
+    assert equations.state_space("motor.tau", "shaft.tau").outputs == ("shaft.tau",)
     with pytest.raises(sw.SignalError, match=r"'motr\.tau' is no input"):
         equations.state_space(["motr.tau"])
     with pytest.raises(sw.SignalError, match=r"No quantity 'J3\.omega'"):

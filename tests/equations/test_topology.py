@@ -33,7 +33,7 @@ def test_a_shaft_between_two_inertias_has_the_matrices_that_one_writes_down() ->
     assert eqs.cutset_matrix.rows == ("J1.tau", "J2.tau")
     assert eqs.cutset_matrix.matrix == sympy.Matrix([[1, 1, 1, 0], [0, 0, -1, 1]])
     assert eqs.incidence["b", "shaft.tau_c"] == -1
-    with pytest.raises(KeyError):
+    with pytest.raises(KeyError, match=r"There is no 'c'\. There are: a, b"):
         eqs.incidence["c", "shaft.tau_c"]
 
 

@@ -263,6 +263,17 @@ def test_a_mesh_takes_numbers() -> None:
     )
 
 
+def test_a_point_without_numbers_or_one_that_contradicts_itself_is_refused() -> None:
+    equations = sw.scenes.crane().equations()
+    with pytest.raises(sw.ParameterError, match="Take values=True"):
+        equations.transfer_function("motor.tau", "shaft.tau", at={"J1.omega": 8.0})
+    H = equations.transfer_function("motor.tau", "shaft.tau")
+    with pytest.raises(sw.ParameterError, match="contradicts another speed at the same node"):
+        H.numeric(at={"J1.omega": 1.0, "rotor.omega": 8.0})
+    with pytest.raises(sw.ParameterError, match="must be values by name"):
+        H.numeric(at=[1.0])
+
+
 def test_a_travelling_wave_is_refused_with_what_can_be_taken_instead() -> None:
     net = sw.Network("line")
     net.add(sw.TorqueSource("motor", tau=1.0), "a")

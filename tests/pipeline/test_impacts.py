@@ -438,3 +438,49 @@ def test_rigid_flanks_without_a_gap_go_on_together_where_the_torque_turns_round(
         assert sol[name][-1] == pytest.approx((23.13 * 0.05 - 16.13 * 0.25) / 0.99, rel=1e-12)
     assert {event[0] for event in sol.events} == {0.0, 0.05}
     assert sol.phases[-1].name == "gap in contact"
+
+
+@pytest.mark.parametrize("order", [range(8), range(7, -1, -1), (2, 6, 1, 4, 0, 5, 3, 7)])
+def test_a_contact_without_a_gap_takes_an_impact_from_either_side_whatever_it_was_pressed_by(order: list[int]) -> None:
+    """At 1 rad/s J1 hits J0, and J2 goes with it: 0.2 rad/s together, and 0.3 after half of 0.4 N m s has come back."""
+    parts = [
+        (sw.Inertia("J0", J=1.0), "n0"),
+        (sw.Inertia("J1", J=0.5), "n1"),
+        (sw.Inertia("J2", J=1.0), "n2"),
+        (sw.HardStop("stop", upper=0.2, restitution=0.5), "n1", "n0"),
+        (sw.Backlash("claw", gap=0.0), "n0", "n2"),
+        (sw.Brake("brake", tau=4.0), "n2"),
+        (sw.CoulombLoad("load", tau=4.0), "n0"),
+        (sw.TorqueSource("motor", tau=3.0), "n2"),
+    ]
+    net = sw.Network("claw")
+    for k in order:
+        net.add(parts[k][0], *parts[k][1:])
+    sol = net.simulate(0.25, initial={"J0.omega": -0.5, "J2.omega": -0.5, "J1.omega": 1.0})
+    hits = next(time for time, part, *_ in sol.events if part == "stop")
+    # then 4 N m of brake and 4 N m of load act against 3 N m
+    assert sol["J0.omega"][-1] == pytest.approx(0.3 - 2.5 * (0.25 - hits), rel=1e-9)
+    assert sol["J2.omega"][-1] == pytest.approx(sol["J0.omega"][-1], rel=1e-9)
+    assert sol["J1.omega"][-1] == pytest.approx(-0.2, rel=1e-9)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+@pytest.mark.parametrize("way", [1, -1])
+def test_flanks_without_a_gap_change_sides_where_a_freewheel_catches_up(restitution: float, way: int) -> None:
+    """From 5/26 s on J2 drives J0, and the claw presses J1 on its other flank."""
+    parts = [
+        (sw.Inertia("J0", J=3.0), "n0"),
+        (sw.Inertia("J1", J=2.0), "n1"),
+        (sw.Inertia("J2", J=2.0), "n2"),
+        (sw.Backlash("claw", gap=0.0, restitution=restitution), "n0", "n1"),
+        (sw.Freewheel("freewheel"), "n2", "n0"),
+        (sw.TorqueSource("T0", tau=-6.0), "n0"),
+        (sw.TorqueSource("T2", tau=8.0), "n2"),
+    ]
+    net = sw.Network("claw")
+    for part, *nodes in parts[::way]:
+        net.add(part, *nodes)
+    sol = net.simulate(0.5, initial={"J2.omega": -1.0})
+    wanted = -1.2 * 5 / 26 + 2 / 7 * (0.5 - 5 / 26)
+    for name in ("J0.omega", "J1.omega", "J2.omega"):
+        assert sol[name][-1] == pytest.approx(wanted, rel=1e-9)

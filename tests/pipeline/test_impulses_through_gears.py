@@ -425,6 +425,25 @@ def test_a_gear_that_would_jam_by_itself_does_not_where_what_is_engaged_answers_
     assert sol.energy_residual < 1e-9
 
 
+@pytest.mark.parametrize("omega_s", [0.0, 0.1])
+@pytest.mark.parametrize("way", [1, -1])
+def test_a_friction_behind_a_self_locking_gear_holds_up_to_its_torque_of_rest(omega_s: float, way: int) -> None:
+    """2 N m times 3 times 0.7 reach it, more than it has in motion, and less than the 8 N m at rest."""
+    parts = [
+        (sw.Inertia("J0", J=2.0), "a"),
+        (sw.Inertia("J1", J=2.0), "b"),
+        (sw.LossyGear("worm", ratio=3.0, efficiency=0.7, efficiency_back=0.0), "a", "b"),
+        (sw.DryFriction("friction", tau_c=4.0, tau_s=8.0, omega_s=omega_s), "b"),
+        (sw.TorqueSource("motor", tau=sw.Step(-2.0, start=0.25)), "a"),
+    ]
+    net = sw.Network("worm")
+    for part, *nodes in parts[::way]:
+        net.add(part, *nodes)
+    sol = net.simulate(1.0)
+    assert not sol["J1.omega"].any()
+    assert sol["friction.tau"][-1] == pytest.approx(-4.2, rel=1e-9)
+
+
 def test_a_source_that_jumps_through_zero_gives_in_each_direction_of_power_its_impulse_times_its_mean_speed() -> None:
     """A lossy gear is driven by the inertia down to rest and drives it from there: two stages, one balance."""
     net = sw.Network("reversal")

@@ -138,6 +138,8 @@ class _Point:
         names, quantities = Names(equations.form), equations.assembly.quantities
         states = {state.name for state in equations.form.states}
         self._nodes, self._others = {GROUND: Rational(0)}, dict[Symbol, Rational]()
+        if not isinstance(at, Mapping):
+            raise ParameterError(f"at = {at!r} must be values by name, as {{'J1.omega': 8.0}}.")
         for name, given in at.items():
             value = Rational(_finite(f"at: {name}", given))
             if name in names.signals and names.signals[name][1].kind == "across":
@@ -145,11 +147,11 @@ class _Point:
                 plus, minus = (GROUND if end is None else part.nodes[end] for end in signal.ends)
                 sign, symbol = (signal.sign * quantities.across((plus, minus))).as_coeff_Mul()
                 if minus == GROUND:
-                    self._nodes[plus] = signal.sign * value
+                    self._set(plus, signal.sign * value, name)
                 elif symbol.is_Symbol:
                     self._others[symbol] = value / sign
             elif name in names.nodes:
-                self._nodes[names.nodes[name]] = value
+                self._set(names.nodes[name], value, name)
             elif name not in {*names.units, *states}:
                 raise ParameterError(f"at: {no_quantity(name, equations.form.graph.name, names.units)}")
             elif name.endswith((".power", ".energy")):
@@ -159,6 +161,10 @@ class _Point:
         numbers = range(len(equations.form.graph.nodes))
         self._symbols = {quantities.node(number): (number, GROUND) for number in numbers}
         self._symbols |= {pair.symbol: ends for ends, pair in quantities.pairs.items()}
+
+    def _set(self, node: int, value: Rational, name: str) -> None:
+        if self._nodes.setdefault(node, value) != value:
+            raise ParameterError(f"at: {name} contradicts another speed at the same node.")
 
     def value(self, symbol: Symbol) -> Rational | None:
         """What a law reads; None where the point does not tell it."""

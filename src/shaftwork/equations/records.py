@@ -304,7 +304,9 @@ class Equations:
 
         return transfer_function(self, (input, output), values=values, at=at, t=t)
 
-    def state_space(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> StateSpace:
+    def state_space(
+        self, inputs: str | Sequence[str] | None = None, outputs: str | Sequence[str] | None = None
+    ) -> StateSpace:
         """Small motions about a point: A, B, C, D in the parameters' symbols; laws by their slopes, see there.
 
         Args:

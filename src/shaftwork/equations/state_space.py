@@ -57,7 +57,9 @@ class StateSpace:
     slopes: Mapping[Symbol, Slope]
 
 
-def state_space(equations: Equations, inputs: Sequence[str] | None, outputs: Sequence[str] | None) -> StateSpace:
+def state_space(
+    equations: Equations, inputs: str | Sequence[str] | None, outputs: str | Sequence[str] | None
+) -> StateSpace:
     """The matrices.
 
     Args:
@@ -70,7 +72,7 @@ def state_space(equations: Equations, inputs: Sequence[str] | None, outputs: Seq
         CompileError: a shaft is a travelling wave, or more rates are coupled than are solved in symbols.
     """
     refuse_waves(equations.form)
-    named = source_inputs(equations.form.graph) if inputs is None else tuple(inputs)
+    named = source_inputs(equations.form.graph) if inputs is None else _listed(inputs)
     slopes = Slopes(equations.assembly.quantities)
     places = places_of(equations.form.graph, named)
     form, branches = with_inputs(_near(equations, slopes), places)
@@ -87,7 +89,7 @@ def state_space(equations: Equations, inputs: Sequence[str] | None, outputs: Seq
             f"Of '{form.graph.name}' more rates are coupled than are solved in symbols. Take transfer_function, which "
             "solves any, or compile().linearize() for numbers."
         ) from None
-    wanted = tuple(state.name for state in form.states) if outputs is None else tuple(outputs)
+    wanted = tuple(state.name for state in form.states) if outputs is None else _listed(outputs)
     read = Expressed(form, rows)
     groups = rows.states, [value for value, _ in values], [rate for _, rate in values]
     A, B, B1 = (_slopes(rows.rates, group) for group in groups)
@@ -95,6 +97,10 @@ def state_space(equations: Equations, inputs: Sequence[str] | None, outputs: Seq
     states = tuple(state.name for state in form.states)
     B, D = ((whole + by @ B1).applyfunc(cancel) for whole, by in ((B, A), (D, C)))
     return StateSpace(states, named, wanted, A, B, C, D, B1, D1, dict(slopes.letters))
+
+
+def _listed(names: str | Sequence[str]) -> tuple[str, ...]:
+    return (names,) if isinstance(names, str) else tuple(names)
 
 
 def _near(equations: Equations, slopes: Slopes) -> StateForm:

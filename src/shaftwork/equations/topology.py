@@ -40,6 +40,9 @@ class NamedMatrix:
             KeyError: there is no such row or column.
         """
         rows, columns = self._places
+        for name, known in zip(names, (rows, columns), strict=True):
+            if name not in known:
+                raise KeyError(f"There is no '{name}'. There are: {', '.join(known)}.")
         return self.matrix[rows[names[0]], columns[names[1]]]
 
 

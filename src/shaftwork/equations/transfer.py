@@ -183,6 +183,8 @@ def transfer_function(
         ParameterError: with values, `at` names no quantity, or a law has no finite slope there.
     """
     refuse_waves(equations.form)
+    if not values and (at is not None or t is not None):
+        raise ParameterError("at and t put numbers in. Take values=True, or numeric(at=...) of what this makes.")
     (place,) = places_of(equations.form.graph, names[:1])
     slopes = Slopes(equations.assembly.quantities)
     tableau = Tableau(equations.assembly, slopes)

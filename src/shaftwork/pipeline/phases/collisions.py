@@ -24,9 +24,11 @@ from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
+from sympy import Integer
 
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.mobility import Mobility, complementary
+from shaftwork.components.branches import INTEGRAL
 from shaftwork.components.modes import Leave
 from shaftwork.core.errors import SimulationError
 from shaftwork.core.kept import Kept
@@ -34,11 +36,13 @@ from shaftwork.network.graph import GROUND
 from shaftwork.pipeline.phases.contacts import Contact, lasting, limited, one_side, opens_at
 from shaftwork.pipeline.phases.elements import NO_IMPACT, Element, ModeNames
 from shaftwork.pipeline.phases.impulses import Blow, Impulses, Stage, Start
-from shaftwork.pipeline.phases.moments import CLEAR, Moment, Regime
+from shaftwork.pipeline.phases.moments import CLEAR, NOTHING, Moment, Regime
 from shaftwork.pipeline.phases.regimes import Regimes, with_modes
 
 KEPT = 64
 """Sets of contacts of which what impulses do is kept."""
+ROUNDED = 64 * float(np.finfo(float).eps)
+"""Speeds at which contacts close that are less than this part of the largest speed are what rounding leaves."""
 SAME = 1e-9
 """Speeds at which contacts close that differ by less than this fraction are the same."""
 
@@ -88,10 +92,15 @@ class Collisions:
             NetworkError: nothing stops what is prescribed; says what contradicts what.
             SimulationError: flanks without a gap between them lose nothing.
         """
-        touching = [*self._contacts(t, moment, number, leave)]
-        contacts = self._in_turn(t, moment, touching)
+        # without a gap the other flank of the element touches too; of two that are closed the last one tells the mode
+        touching = sorted(
+            self._contacts(t, moment, number, leave), key=lambda c: (c.number, c.joined) == (number, leave.to)
+        )
+        speeds = np.abs(moment.x[: len(moment.regime.assembly.model.form.across_states)])
+        meets = -min(opens_at(t, moment, touching), default=0.0) > ROUNDED * speeds.max(initial=0.0)
+        contacts = self._in_turn(t, moment, touching) if meets else touching
         before = np.array(opens_at(t, moment, contacts))
-        back = np.array([self._restitution(c, u) for c, u in zip(contacts, before.tolist(), strict=True)])
+        back = np.array([meets * self._restitution(c, u) for c, u in zip(contacts, before.tolist(), strict=True)])
         self._refuse_no_gap(
             t, {c.number for c, share in zip(contacts, back.tolist(), strict=True) if share >= 1}, touching
         )
@@ -105,9 +114,9 @@ class Collisions:
         if back.any():
             stages += self._thrown_back(t, contacts, stages, back)
         least = NO_IMPACT * max(1.0, np.abs(before).max(initial=0.0))
-        # without a gap the other flank of the element touches too
         wanted = {c for c in contacts if (c.number, c.joined) == (number, leave.to)}
-        hit = [c for c, i in zip(contacts, _pressed(stages), strict=True) if c.leave and (i > 0 or c in wanted)]
+        pressed = zip(contacts, _pressed(stages), strict=True)
+        hit = [c for c, impulse in pressed if c.leave and ((meets and impulse > 0) or c in wanted)]
         after, closed, further = self._ended(t, modes, contacts, stages, least, hit)
         owners = (self._elements[contact.number].part.name for contact in contacts)
         lost = zip(owners, self._taken(t, contacts, stages).tolist(), strict=True)
@@ -325,6 +334,7 @@ class Collisions:
         now, bands = here[3], regime.bands(here)
         closed = [*lasting(self._elements, regime.modes)]
         yield from closed
+        yield from self._other_flanks(moment, closed)
         for k, watched in regime.watched:
             closes, guard = watched.leave, watched.guard
             wanted = k == number and closes.to == leave.to
@@ -334,6 +344,20 @@ class Collisions:
                 closes = leave if wanted else closes
                 constants = (regime.constant(k, given) for given in (closes.rebound, closes.rest))
                 yield Contact(k, side, regime.modes[k], closes.to, closes, *constants)
+
+    def _other_flanks(self, moment: Moment, closed: Sequence[Contact]) -> Iterator[Contact]:
+        """Flanks that touch while the other one of their element is closed, as there is no gap between them."""
+        for contact in closed:
+            number, modes = contact.number, self._elements[contact.number].modes
+            place = moment.regime.assembly.twist(number)
+            for leave in modes[contact.apart].leaves if place is not None else ():
+                side = one_side(modes, leave.to) if leave.rebound is not None and leave.to != contact.joined else None
+                if side is None:
+                    continue
+                limit = moment.regime.constant(number, leave.when.xreplace({INTEGRAL: Integer(0)}))
+                if limit + float(leave.when.diff(INTEGRAL)) * moment.x[place] > -NOTHING:
+                    constants = (moment.regime.constant(number, given) for given in (leave.rebound, leave.rest))
+                    yield Contact(number, side, contact.apart, leave.to, leave, *constants)
 
 
 def _blow(moment: Moment, mobility: Mobility, impulses: Array) -> Blow:

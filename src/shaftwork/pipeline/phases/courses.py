@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.pipeline.phases.elements import Watched
-from shaftwork.pipeline.phases.moments import ROUNDINGS, Course, Regime
+from shaftwork.pipeline.phases.moments import ROUNDINGS, Change, Course, Regime
 
 # What a look ahead gains must be more than so many rounding units.
 FEW = 4
@@ -58,3 +59,20 @@ def chosen(found: list[tuple[float, Way]], *, in_order: bool) -> Way | None:
     if not found:
         return None
     return (min(found, key=lambda one: one[1][0]) if in_order else max(found, key=lambda one: one[0]))[1]
+
+
+def endless(t: float, changes: list[Change], blocked: NetworkError | None) -> SimulationError:
+    """The error of changes within one instant that come to no end, or of what contradicts what among them."""
+    last = changes[-1]
+    others = dict.fromkeys(change.element.name for change in changes)
+    before, after = (last.element.modes[name].words for name in (last.before, last.after))
+    if blocked is not None:
+        advice = str(blocked.problems[0])
+    elif last.rebound:
+        after, advice = "rebound", "Take a restitution below 1, a larger omega_rest, or a gap between its limits."
+    else:
+        advice = "Give the node between them an inertia or damping."
+    return SimulationError(
+        f"At t = {t:.9g} s no modes of {', '.join(others)} are consistent: '{last.element.name}' changes for ever "
+        f"between {before} and {after}. {advice}"
+    )

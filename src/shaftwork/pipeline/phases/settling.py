@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.pipeline.phases.commutation import Commutation, by_time, is_switch
-from shaftwork.pipeline.phases.courses import Way, chosen, leaving
+from shaftwork.pipeline.phases.courses import Way, chosen, endless, leaving
 from shaftwork.pipeline.phases.elements import ModeNames, Watched
 from shaftwork.pipeline.phases.impacts import Impacts
 from shaftwork.pipeline.phases.moments import (
@@ -226,7 +226,7 @@ class Settling:
             again = bool(latest) and not impact and moment.regime.modes in seen
             repeats += again
             if repeats > MOST_REPEATS or len(changes) > MOST_AT_ONCE:
-                raise self._endless(t, changes, blocked)
+                raise endless(t, changes, blocked)
             if again or impact:
                 seen.clear()
             still = [] if latest else [*still, exceeded]
@@ -357,6 +357,8 @@ class Settling:
         """
         modes, (number, to) = moment.regime.modes, wanted
         element, before = self.elements[number], modes[number]
+        if number in self._impacts.gears and (other := self._passing_on(after, moment, number, to)) is not None:
+            return other[0], [Change(t, element, before, other[1])]
         leads = (leave for leave in element.modes[to].leaves if leave.to not in ("", before))
         # neither the other flank nor a time to come is there
         ways = [{number: leave.to} for leave in leads if leave.rebound is None and not leave.by_twist]
@@ -378,18 +380,18 @@ class Settling:
             f"at t = {t:.9g} s. {error.problems[0]}"
         ) from error
 
-    @staticmethod
-    def _endless(t: float, changes: list[Change], blocked: NetworkError | None) -> SimulationError:
-        last = changes[-1]
-        others = dict.fromkeys(change.element.name for change in changes)
-        before, after = (last.element.modes[name].words for name in (last.before, last.after))
-        if blocked is not None:
-            advice = str(blocked.problems[0])
-        elif last.rebound:
-            after, advice = "rebound", "Take a restitution below 1, a larger omega_rest, or a gap between its limits."
-        else:
-            advice = "Give the node between them an inertia or damping."
-        return SimulationError(
-            f"At t = {t:.9g} s no modes of {', '.join(others)} are consistent: '{last.element.name}' changes for ever "
-            f"between {before} and {after}. {advice}"
-        )
+    def _passing_on(self, t: float, moment: Moment, number: int, to: str) -> tuple[Moment, str] | None:
+        """Another mode of a gear at rest, and what follows, that contradicts nothing and leaves all else as it is."""
+        modes, own = moment.regime.modes, self.elements[number].modes
+        if moment.across(number, t) != 0:
+            return None
+        held = self._regimes.held(moment, t)
+        leads = [leave.to for name in (to, modes[number]) for leave in own[name].leaves]
+        for name in dict.fromkeys(leads):
+            new = with_modes(modes, {number: name})
+            if name in (to, modes[number]) or not self._regimes.possible(new):
+                continue
+            made = self._regimes.changed(moment, t, new)
+            if self._regimes.held(made, t) == held and not self._beyond(made, t):
+                return made, name
+        return None
