@@ -24,7 +24,7 @@ def numbers(space: StateSpace, values: Mapping[str, float]) -> dict[str, Array]:
     return {name: np.array(made.xreplace(known).tolist(), dtype=float).reshape(made.shape) for name, made in matrices}
 
 
-@share_of_examples(1.0)
+@share_of_examples(0.25)
 @given(networks(max_inertias=5), st.integers(0, 63))
 def test_random_networks_have_the_matrices_of_their_linearised_model(pieces: Network, number: int) -> None:
     """1e-9 of the largest entry of a row: a sum of terms of both signs is rounded otherwise."""

@@ -284,7 +284,7 @@ def test_a_travelling_wave_is_refused_with_what_can_be_taken_instead() -> None:
         net.equations().transfer_function("motor.tau", "J2.omega")
 
 
-@share_of_examples(0.4)
+@share_of_examples(0.25)
 @given(networks(max_inertias=6), st.integers(0, 63))
 def test_random_networks_respond_as_their_linearised_model_does(pieces: Network, number: int) -> None:
     """In symbols where these are short enough, and in numbers; 1e-10 of the largest value of the same quantity."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from sympy import Add, Expr, Integer, Symbol
+from sympy import Add, Expr, Integer, Symbol, default_sort_key
 
 from shaftwork.equations.assembly import Group
 from shaftwork.equations.blocks import Blocks
@@ -63,7 +63,7 @@ def _letters(slopes: Mapping[Symbol, Slope], taken: set[str]) -> dict[str, str]:
 def _powers(polynomial: Expr) -> list[Group]:
     """The terms of a polynomial in s, the highest power first."""
     powers: dict[int, list[Expr]] = {}
-    for term in Add.make_args(polynomial.expand()):
+    for term in sorted(Add.make_args(polynomial.expand()), key=default_sort_key):  # else each process has its order
         coefficient, power = term.as_independent(S)
         powers.setdefault(int(power.as_base_exp()[1]) if power != 1 else 0, []).append(coefficient)
     return [Group(REAL**power, tuple(terms)) for power, terms in sorted(powers.items(), reverse=True)]
