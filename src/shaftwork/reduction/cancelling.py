@@ -59,8 +59,7 @@ def jamming(form: StateForm, parameters: Mapping[str, float]) -> Iterator[Proble
             return  # negative values need no coupling to cancel
         F, Q = (_block(rows, trees, links, parameters) for rows in (form.tree.loops, form.tree.cutsets))
         own, others = (np.array([values[branch] for branch in group]) for group in (trees, links))
-        matrix = np.diag(own) + Q * others @ F.T
-        sign *= 0 if matrix.size and _is_singular(matrix) else np.linalg.slogdet(matrix).sign
+        sign *= np.linalg.slogdet(np.diag(own) + Q * others @ F.T).sign
     if sign <= 0:
         yield _jammed(View(form), tuple(branch.index for branch in form.graph.branches if branch.template.through))
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 MARKERS = "osD^vP*X<>"
 """One for each kind of model, the same in every study; the colours go with them."""
 FLOOR = 1e-12
-"""Errors below are drawn here: they are rounding."""
+"""Errors below this part of the largest value are drawn here: they are rounding."""
 
 
 def work_precision_figure(study: WorkPrecision) -> Figure:
@@ -69,12 +69,13 @@ def courses_figure(study: WorkPrecision, end: str) -> Figure:
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     column, symbol = ("ab".index(end), rf"$\tau_{end}$")
     true = study.courses[:, column]
+    least = FLOOR * (np.abs(true).max(initial=0.0) or 1.0)
     families = [trial.family for trial in study.representatives]
     for trial, dashes in zip(study.representatives, itertools.cycle(("-", "--", "-.", ":")), strict=False):
         assert trial.courses is not None  # noqa: S101 (that of a representative)
         course, colour = trial.courses[:, column], _style(trial.family, families)["color"]
         upper.plot(study.t, course, dashes, linewidth=1.0, color=colour, label=trial.model)
-        lower.semilogy(study.t, np.abs(course - true), dashes, linewidth=1.0, color=colour)
+        lower.semilogy(study.t, np.maximum(np.abs(course - true), least), dashes, linewidth=1.0, color=colour)
     upper.plot(study.t, true, color="black", linewidth=1.4, zorder=0, label=study.truth[0])
     upper.set_ylabel(f"{symbol} of '{study.shaft}' in N m")
     lower.set_ylabel("error in N m")
