@@ -22,6 +22,8 @@ MODELS = (
     sw.CentralDifference(8, order=4),
     sw.CentralDifference(3, closure="printed"),
     sw.CentralDifference(7, closure="printed"),
+    sw.CentralDifference(7, form="paper"),
+    sw.CentralDifference(8, form="paper"),
     sw.Spectral(1),
     sw.Spectral(2),
     sw.Spectral(9),

@@ -23,6 +23,7 @@ MESHES = (
     sw.CentralDifference(6),
     sw.CentralDifference(9, order=4),
     sw.CentralDifference(8, closure="printed"),
+    sw.CentralDifference(8, form="paper"),
 )
 TORQUES = st.floats(-1e3, 1e3).filter(lambda torque: abs(torque) > 1e-3)
 

@@ -145,6 +145,12 @@ class CentralDifference(ShaftModel):
             inertia of the shaft, which is too light by one part in m: first order. Speeds that alternate from node to
             node twist nothing, a spurious motion of frequency zero. Order 2 alone.
         second_difference: of the damping, "consistent" or "printed", which has half of it whatever m is.
+        form: "network", a circuit that makes no energy, as above, or "paper": (20)-(23) letter by letter, with the
+            torque M_k between the ends as state and the damping on it, for k = 1, ..., m - 1. The machines turn at
+            omega_0 and omega_m, which he numbers 1 and m, and see M_1 and M_{m-1}. He leaves M_0 and M_m open; here
+            they are M_1 and M_{m-1}, the only ones with which (21) and the machines' equations see the same torques.
+            Closure and second difference are then "printed". With an even m the speeds at even nodes and the torques at
+            odd ones, which the machines see, move by themselves; the others follow them, and give nothing back.
 
     Source: Popenda 2019, (16)-(23); Strand, Summation by parts for finite difference approximations for d/dx, 1994.
     """
@@ -153,10 +159,15 @@ class CentralDifference(ShaftModel):
     order: int = 2
     closure: str = "sbp"
     second_difference: str = "consistent"
+    form: str = "network"
 
     purpose: ClassVar[str] = "speeds and torques at the same nodes; spurious modes"
 
     def __post_init__(self) -> None:
+        _one_of(self, "form", ("network", "paper"))
+        if self.form == "paper":
+            object.__setattr__(self, "closure", "printed")
+            object.__setattr__(self, "second_difference", "printed")
         _one_of(self, "order", tuple(SUMMATION_BY_PARTS))
         _one_of(self, "closure", ("sbp", "printed"))
         _one_of(self, "second_difference", ("consistent", "printed"))

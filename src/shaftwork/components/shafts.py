@@ -12,6 +12,7 @@ from sympy import Expr, Float, Rational, pi, sqrt
 from shaftwork.components.base import Component, Derived, Port, Profile, Signal, component
 from shaftwork.components.branches import (
     ACROSS,
+    AcrossLaw,
     AcrossStore,
     Branch,
     DelayLine,
@@ -19,10 +20,12 @@ from shaftwork.components.branches import (
     IdealCoupling,
     ThroughLaw,
     ThroughStore,
+    across_of,
     rigid,
+    through_of,
 )
 from shaftwork.components.shaft_meshes import Mesh, Row
-from shaftwork.components.shaft_models import Auto, Lumped, OneSpring, Rigid, ShaftModel, Wave
+from shaftwork.components.shaft_models import Auto, CentralDifference, Lumped, OneSpring, Rigid, ShaftModel, Wave
 from shaftwork.core.domains import ROTATION
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter
@@ -86,7 +89,11 @@ class Shaft(Component):
         if isinstance(self.resolved, Wave):
             return (Port("middle"),) if self.friction else ()
         mesh = self.resolved.mesh()
-        twists = (f"twist{k}" for k, row in enumerate(mesh.weights, mesh.first) if not _is_difference(row))
+        twists = (
+            f"twist{k}"
+            for k, row in enumerate(mesh.weights, mesh.first)
+            if not _is_difference(row) or _is_in_letters(self.resolved)
+        )
         return tuple(Port(name) for name in (*_names(mesh)[1:-1], *twists))
 
     def signals(self) -> dict[str, Signal]:
@@ -113,7 +120,11 @@ class Shaft(Component):
         if not isinstance(self.resolved, Rigid | OneSpring):
             mesh = self.resolved.mesh()
             speeds = [(x, ((1.0, name),)) for x, name in zip(mesh.nodes, _names(mesh), strict=True)]
-            inside = [(y, _torque(mesh, k)) for k, y in enumerate(mesh.stations, mesh.first) if 0 < y < 1]
+            inside = [
+                (y, ((1.0, f"tau_{k}"),) if _is_in_letters(self.resolved) else _torque(mesh, k))
+                for k, y in enumerate(mesh.stations, mesh.first)
+                if 0 < y < 1
+            ]
         torques = ((0.0, ((1.0, "a"),)), *inside, (1.0, ((-1.0, "b"),)))
         return {
             "tau": Profile("through", *_columns(torques), ROTATION),
@@ -145,6 +156,8 @@ class Shaft(Component):
                 yield ThroughLaw(p.damping / p.length * ACROSS, _ENDS)
             case Wave():
                 yield from self._waves(p)
+            case CentralDifference(form="paper", m=m):
+                yield from _as_printed(m, p)
             case _:
                 yield from self._distributed(p)
 
@@ -190,6 +203,23 @@ class Shaft(Component):
             yield ThroughLaw(damper, (names[k], names[k + 1]), f"tau_d_{k}")
 
 
+def _as_printed(m: int, p: Any) -> Iterator[Branch]:
+    """Popenda's (20)-(23) as they stand: each row is a law of its own, so what one gives another need not take."""
+    names = ["a", *map(str, range(1, m)), "b"]
+    torques = [through_of(f"tau_{min(max(k, 1), m - 1)}") for k in range(m + 1)]
+    yield ThroughLaw(torques[0], ("a", None), "tau_a")
+    for k in range(1, m):
+        yield AcrossStore(p.line_inertia * p.interval, (names[k], None), f"omega_{k}")
+        yield ThroughLaw(p.friction * p.interval * ACROSS, (names[k], None))
+        yield ThroughLaw((torques[k + 1] - torques[k - 1]) / 2, (names[k], None), f"tau_n_{k}")
+        slope = (across_of(names[k + 1]) - across_of(names[k - 1])) / 2
+        bend = p.damping / p.line_inertia * (torques[k + 1] - 2 * torques[k] + torques[k - 1]) / 2
+        twist = -slope + bend / (p.line_stiffness * p.interval)
+        yield AcrossLaw(twist, (f"twist{k}", None), f"omega_twist_{k}")
+        yield ThroughStore(p.line_stiffness / p.interval, (f"twist{k}", None), f"tau_{k}")
+    yield ThroughLaw(-torques[m], ("b", None), "tau_b")
+
+
 def _columns(entries: Sequence[tuple[float, _Sum]]) -> tuple[tuple[float, ...], str, tuple[_Sum, ...]]:
     """Places, the length that they are shares of, and what is read at each."""
     return tuple(place for place, _ in entries), "length", tuple(terms for _, terms in entries)
@@ -211,6 +241,10 @@ def _on_a_line(share: float, *, halves: bool) -> tuple[str, float]:
 def _names(mesh: Mesh) -> list[str]:
     """The speed nodes: a, 1, 2, ..., b."""
     return ["a", *(str(k) for k in range(1, len(mesh.nodes) - 1)), "b"]
+
+
+def _is_in_letters(model: ShaftModel) -> bool:
+    return isinstance(model, CentralDifference) and model.form == "paper"
 
 
 def _is_difference(row: Row) -> bool:

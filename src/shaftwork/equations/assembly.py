@@ -13,6 +13,7 @@ from typing import NamedTuple
 from sympy import Add, Expr, Integer, Mul
 
 from shaftwork.components.branches import ACROSS, HISTORY, INTEGRAL
+from shaftwork.components.laws import t as TIME
 from shaftwork.equations.quantities import Flow, Quantities, rate_of
 from shaftwork.network.graph import GROUND
 from shaftwork.network.templates import Kind
@@ -164,6 +165,29 @@ class Assembly:
             if self.kind(tree) is not without
         )
 
+    def is_sum(self, branch: int) -> bool:
+        """Whether a law is a sum of what it reads of others, so that it is printed where it stands."""
+        template = self.form.graph.branches[branch].template
+        factors = {symbol: template.printed.diff(symbol) for symbol in template.reads}
+        total = Add(*(symbol * factor for symbol, factor in factors.items()))
+        left = (template.printed - total).expand()
+        return bool(factors) and left == 0 and not any(factor.has(*factors, TIME) for factor in factors.values())
+
+    def in_place(self, terms: Iterable[Expr]) -> Terms:
+        """Terms in which prescribed across variables that are sums stand by these."""
+        found = (term.xreplace(self._sums) for term in terms)
+        return tuple(part for term in found for part in terms_of(term.expand(deep=False)))
+
+    @cached_property
+    def _sums(self) -> dict[Expr, Expr]:
+        found: dict[Expr, Expr] = {}
+        for branch in self.form.across_sources:
+            across = self.quantities.across(self.ends(branch))
+            if self.is_sum(branch):
+                (letter,) = across.free_symbols
+                found[letter] = across.coeff(letter) * self.quantities.law(branch)
+        return found
+
     def coupling(self, branch: int) -> Sides:
         """What an ideal coupling imposes on the speeds of its nodes."""
         made = self.form.graph.branches[branch]
@@ -225,7 +249,7 @@ class Assembly:
     @cached_property
     def lumped(self) -> frozenset[int]:
         """Links that are printed by their flow's symbol: laws and sources whose flow lies wholly outside the tree."""
-        flows = dict.fromkeys(self.quantities.flow_of[law] for law in self.form.laws)
+        flows = dict.fromkeys(self.quantities.flow_of[law] for law in self.form.laws if not self.is_sum(law))
         return frozenset(branch for flow in flows if all(map(self._known, flow.branches)) for branch in flow.branches)
 
     def _known(self, branch: int) -> bool:
@@ -237,15 +261,16 @@ class Assembly:
 
     def out_of(self, tree: int, left_out: Kind | None = None) -> Terms:
         """Through variables that drive a tree branch: minus those of the links in its cutset."""
-        terms: dict[Flow | int, Expr] = {}
+        terms: dict[Flow | int, Terms] = {}
         for link, gain in self.cutsets.get(tree, ()):
             if self.kind(link) is left_out:
                 continue
             flow = self.quantities.flow_of.get(link)
             if flow is not None and link in self.lumped:
-                terms[flow] = -gain * flow.sign * self.quantities.through(flow)
+                terms[flow] = (-gain * flow.sign * self.quantities.through(flow),)
             elif flow is None:
-                terms[link] = -gain * self.stored(link)
+                terms[link] = (-gain * self.stored(link),)
             else:
-                terms[link] = -gain * self.through_law(link, Add(*self.around(link)))
-        return tuple(terms.values())
+                term = -gain * self.through_law(link, Add(*self.around(link)))
+                terms[link] = terms_of(term.expand()) if self.is_sum(link) else (term,)
+        return tuple(term for made in terms.values() for term in made)

@@ -118,7 +118,7 @@ class Blocks:
             laws: print the laws that stand in the rates; not needed below Kirchhoff's equations, which contain them.
         """
         rows = [row for row in self.equations.states if not self._is_summed(row)]
-        shown = [row.sides if row.explicit and len(row.groups) <= 1 else row.coupled for row in rows]
+        shown = [row.sides if row.explicit and _rates_in(row.coupled.left) <= 1 else row.coupled for row in rows]
         coupled = any(made is not row.sides for made, row in zip(shown, rows, strict=True))
         remark = "Rates that stand together on a left side are coupled by inertias or springs." if coupled else ""
         summed = (line for made in self.sums for line in made.states())
@@ -229,7 +229,7 @@ class Blocks:
             yield from self.law(flow, {} if across == 0 else {sign * across: known})
         for source in self.equations.form.across_sources:
             prescribed = assembly.law_of_source(source)
-            if prescribed.groups[0].terms != (prescribed.left,):
+            if not assembly.is_sum(source) and prescribed.groups[0].terms != (prescribed.left,):
                 yield self.writer.line(prescribed)
         for end, other in assembly.opposite.items():
             yield self.writer.line(assembly.law_of_history(end, Add(*assembly.around(other))))
@@ -265,6 +265,10 @@ class Blocks:
             free = iter(letter + subscript for letter in AUXILIARY if letter + subscript not in taken)
             names.update({symbol.name: next(free) for symbol, _ in shared})
         return names
+
+
+def _rates_in(left: Expr) -> int:
+    return sum(str(symbol.name).startswith("der(") for symbol in left.free_symbols)
 
 
 def _to_rounding(expression: Expr) -> Expr:

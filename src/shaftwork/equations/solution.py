@@ -5,7 +5,7 @@ Coupled unknowns are solved together while that stays readable; beyond, a row ke
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -57,8 +57,9 @@ class System:
         if not self.solved(unknown):
             return self.coupled(unknown)
         factors = self._inverse_row(block, block.index(unknown))
-        groups = (Group(factor, rising_first(self.right(other))) for factor, other in zip(factors, block, strict=True))
-        return Sides(self.symbol(unknown), tuple(group for group in groups if group.factor != 0 and group.terms))
+        pairs = zip(factors, block, strict=True)
+        groups = (group for factor, other in pairs if factor != 0 for group in _grouped(factor, self.right(other)))
+        return Sides(self.symbol(unknown), tuple(group for group in groups if group.terms))
 
     def coupled(self, unknown: int) -> Sides:
         """The equation of an unknown with all unknowns that it contains on the left."""
@@ -113,7 +114,8 @@ class SolvedForm:
             _add_products(matrix, loops.get(tree, []), members, 1 / assembly.quantities.law(tree))
 
         def right(link: int) -> Terms:
-            return (*assembly.around(link, without=Kind.THROUGH_STORE), *self._forced_twist(link))
+            twist = assembly.in_place(assembly.around(link, without=Kind.THROUGH_STORE))
+            return (*twist, *self._forced_twist(link))
 
         def symbol(link: int) -> Expr:
             return rate_of(assembly.quantities.store(link))
@@ -173,6 +175,21 @@ class SolvedForm:
                         rate = slope(assembly.quantities.law(source), TIME)
                         terms.append(-gain * compliance * factor * rate)
         return tuple(term for term in terms if term != 0)
+
+
+def _grouped(factor: Expr, terms: Terms) -> Iterator[Group]:
+    """A factor of terms as groups: a sum whose own factor cancels a part of the other one stands beside the bracket."""
+    beside: list[Group] = []
+    within: list[Expr] = []
+    for term in terms:
+        sums = [part for part in term.args if part.is_Add] if term.is_Mul else []
+        own = factor * term / sums[0] if len(sums) == 1 else factor
+        if len(sums) == 1 and not factor.free_symbols <= own.free_symbols:
+            beside.append(Group(own, rising_first(sums[0].args)))
+        else:
+            within.append(term)
+    yield Group(factor, rising_first(within))
+    yield from beside
 
 
 def _add_products(
