@@ -85,6 +85,7 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
         SimulationError as SimulationError,
     )
     from shaftwork.core.parameters import parameter as parameter
+    from shaftwork.equations.notations import Inverse as Inverse, Notation as Notation
     from shaftwork.pipeline.model import Model as Model
     from shaftwork.pipeline.network import Network as Network
     from shaftwork.results.fatigue import SNLine as SNLine
@@ -138,6 +139,7 @@ _HOME = {
         "SimulationError",
     ),
     "shaftwork.core.parameters": ("parameter",),
+    "shaftwork.equations.notations": ("Inverse", "Notation"),
     "shaftwork.pipeline.model": ("Model",),
     "shaftwork.pipeline.network": ("Network",),
     "shaftwork.results.fatigue": ("SNLine",),

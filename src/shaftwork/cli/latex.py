@@ -11,13 +11,14 @@ from shaftwork.cli.models import load
 if TYPE_CHECKING:
     from shaftwork.equations.records import Equations
 
-FORMS = ("kirchhoff", "state", "second-order", "lagrange")
+FORMS = ("kirchhoff", "state", "second-order", "lagrange", "field")
 
 
 def arguments(parser: ArgumentParser) -> None:
     """The options of the command."""
     parser.add_argument("--form", choices=FORMS, help="which equations (default: the first two)")
     parser.add_argument("--phase", metavar="WORDS", help="of one phase, such as 'gap open, load stuck'")
+    parser.add_argument("--notation", metavar="NAME", help="letters of popenda, marinkovic or modelica")
     parser.add_argument("--values", action="store_true", help="numbers instead of symbols")
     parser.add_argument("--document", action="store_true", help="a whole document that pdflatex compiles")
 
@@ -40,6 +41,7 @@ def run(options: Namespace, say: Say) -> Data:
 
 
 def _typeset(equations: Equations, options: Namespace) -> str:
+    equations = equations.written_as(options.notation)
     if options.form == "lagrange":
         from shaftwork.equations.lagrange import lagrangian
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from sympy import Add, Expr, Float, Integer, Symbol, preorder_traversal
 
 from shaftwork.core.domains import ELECTRICAL, ROTATION, TRANSLATION
+from shaftwork.core.errors import CompileError
 from shaftwork.equations.assembly import Group, Sides, sides, tidy
 from shaftwork.equations.notation import INDEX_CLOSES, INDEX_OPENS
 from shaftwork.equations.printing import LINE_WIDTH, Line, Writer, with_rates
@@ -24,7 +25,8 @@ from shaftwork.equations.widths import printed_width
 from shaftwork.network.templates import Kind
 
 if TYPE_CHECKING:  # the records print themselves through this module
-    from shaftwork.equations.records import Eliminated, Equations, Row, StateEquation
+    from shaftwork.equations.records import Equations
+    from shaftwork.equations.rows import Eliminated, Row, StateEquation
 
 AUXILIARY = (r"\sigma", r"\zeta", r"\xi", r"\chi")
 """Letters for sums that occur more than once in a law, such as a slip."""
@@ -85,11 +87,15 @@ class Blocks:
 
     def derived(self) -> Block:
         """The definitions of the letters that stand for several parameters; nothing where numbers are printed."""
-        definitions = {} if self.values else self.equations.definitions
+        definitions, inverses = {} if self.values else self.equations.definitions, self.equations.inverses
+        pairs = (
+            (inverses.get(symbol, symbol), 1 / law if symbol in inverses else law)
+            for symbol, law in definitions.items()
+        )
         weights = (WEIGHTS,) if self.sums else ()
         return Block(
             "Derived quantities",
-            (*(self.writer.line(sides(symbol, (law,))) for symbol, law in definitions.items()), *weights),
+            (*(self.writer.line(sides(symbol, (law,))) for symbol, law in pairs), *weights),
             MEANING if weights else "",
         )
 
@@ -146,6 +152,20 @@ class Blocks:
             laws.append(self.writer.line(assembly.law_of_history(end, across)))
         yield Block("where", tuple(laws), r"Angles are counted from the untwisted position.")
 
+    def fields(self) -> Iterator[Block]:
+        """Long shafts before they are divided.
+
+        Raises:
+            CompileError: there are none.
+        """
+        if not self.equations.fields:
+            raise CompileError(f"'{self.equations.form.graph.name}' has no Shaft. Take form='state'.")
+        for field in self.equations.fields:
+            along, boundary, definitions = field.lines(values=self.values)
+            yield Block(f"Along {in_text(field.part.name)}", along)
+            yield Block("At its ends", boundary)
+            yield Block("Derived quantities", definitions)
+
     def _matrices(self, form: SecondOrder) -> Iterator[Line]:
         yield Line(
             r"\mathbf{M} \, \ddot{\mathbf{q}} + \mathbf{D} \, \dot{\mathbf{q}} + \mathbf{K} \, \mathbf{q}",
@@ -189,12 +209,12 @@ class Blocks:
         graph = self.equations.form.graph
         parameters = {letter.name for letter in self.equations.letters if letter.parameter}
         order = sorted(names, key=lambda name: name not in parameters)
-        ordered = with_rates({name: names[name] for name in order})
+        ordered = with_rates({name: names[name] for name in order}, self.equations.source.rate_of)
         values = self.equations.values if self.values else {}
         printed = {**ordered, **_dotted(self.equations)}
         angles = map(self.equations.assembly.quantities.angle, range(len(graph.nodes)))
         last = {name for name in printed if name.startswith("der(")} | {angle.name for angle in angles}
-        return Writer(printed, parameters, last, values)
+        return Writer(printed, parameters, last, values, self.equations.inverses)
 
     def _lines(self, rows: Iterable[Row]) -> Iterator[Line]:
         seen: dict[str, None] = {}
@@ -216,7 +236,15 @@ class Blocks:
             if row.left == self.equations.assembly.quantities.through(flow):
                 yield from self.law(flow, {})
             elif not row.trivial:
-                yield self.writer.line(row.sides)
+                yield self.writer.line(self._by_inverse(row.sides))
+
+    def _by_inverse(self, row: Sides) -> Sides:
+        """The law of a store, with the reciprocal of its coefficient beside the rate where that has the letter."""
+        term = row.groups[0].terms[0]
+        for symbol, inverse in self.equations.inverses.items() if not self.values else ():
+            if term.is_Mul and symbol in term.args:
+                return sides(inverse * row.left, (term / symbol,))
+        return row
 
     def _laws_in_states(self) -> Iterator[Line]:
         """Nonlinear laws and sources, in terms of the states."""

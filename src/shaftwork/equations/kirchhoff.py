@@ -9,10 +9,10 @@ from sympy import Add, Expr, Symbol
 
 from shaftwork.equations.assembly import Assembly, Sides, sides
 from shaftwork.equations.quantities import Flow, rate_of
-from shaftwork.equations.records import (
+from shaftwork.equations.records import Equations
+from shaftwork.equations.rows import (
     CouplingEquation,
     Eliminated,
-    Equations,
     LawEquation,
     LoopEquation,
     NodeEquation,

@@ -21,7 +21,8 @@ from shaftwork.equations.assembly import Group, Sides, rising_first, sides, term
 from shaftwork.equations.coordinates import Coordinates, coordinates, is_prescribed
 from shaftwork.equations.motion import Motion
 from shaftwork.equations.quantities import rate_of
-from shaftwork.equations.records import Equations, Row
+from shaftwork.equations.records import Equations
+from shaftwork.equations.rows import Row
 from shaftwork.equations.second_order import linear_stiffness
 from shaftwork.network.graph import GROUND, GraphBranch
 from shaftwork.network.templates import Kind

@@ -23,7 +23,7 @@ from sympy.core.function import Application
 
 from shaftwork.equations.coordinates import coordinates
 from shaftwork.equations.quantities import rate_of
-from shaftwork.equations.records import Row
+from shaftwork.equations.rows import Row
 from shaftwork.network.graph import GROUND
 from shaftwork.reduction.gains import exactly, in_decimals
 

@@ -12,6 +12,7 @@ from sympy import Symbol
 from shaftwork.components.base import Derived
 from shaftwork.core.domains import ELECTRICAL, Quantity
 from shaftwork.core.parameters import Parameter
+from shaftwork.equations.notations import Notation
 from shaftwork.equations.quantities import Quantities, running_number
 from shaftwork.equations.spelling import GREEK, chosen_subscript, escaped
 from shaftwork.network.graph import GraphBranch, GraphPart
@@ -112,12 +113,12 @@ def split_index(name: str) -> tuple[str, str]:
     return stem, name[len(stem) :]
 
 
-def notation(form: StateForm, quantities: Quantities) -> tuple[Mapping[str, str], tuple[Letter, ...]]:
-    """LaTeX of every symbol by name, and the letters in the order of the parts, for the nomenclature.
+def notation(form: StateForm, quantities: Quantities, source: Notation) -> tuple[Mapping[str, str], tuple[Letter, ...]]:
+    """LaTeX of every symbol by name, and the letters of a source in the order of the parts, for the nomenclature.
 
     Parts of one class whose names differ by a number are printed in one style, so that they stay a series.
     """
-    bearers = (*_parts(form, quantities), *_nodes(quantities))
+    bearers = (*_parts(form, quantities, source), *_nodes(quantities, source))
     series: dict[tuple[str, str], list[Named]] = {}
     for family, bearer in bearers:
         series.setdefault((family, split_index(bearer.name)[0]), []).append(bearer)
@@ -137,13 +138,13 @@ def notation(form: StateForm, quantities: Quantities) -> tuple[Mapping[str, str]
     return printed, tuple(letters)
 
 
-def _parts(form: StateForm, quantities: Quantities) -> Iterator[tuple[str, Named]]:
+def _parts(form: StateForm, quantities: Quantities, source: Notation) -> Iterator[tuple[str, Named]]:
     graph = form.graph
     own: dict[int, list[Letter]] = {number: [] for number in range(len(graph.parts))}
     for number, letter in _quantity_letters(form, quantities):
         own[number].append(letter)
     for number, part in enumerate(graph.parts):
-        letters = _distinct((*_parameters(part), *own[number]))
+        letters = _distinct(map(source.written, (*_parameters(part), *own[number])))
         shortable = (*part.component.declared, *(letter.base for letter in letters))
         yield type(part.component).__name__, Named(part.name, letters, part.component.symbol, shortable)
 
@@ -264,7 +265,7 @@ def _distinct(letters: Iterable[Letter]) -> tuple[Letter, ...]:
     return tuple(sorted(made.values(), key=lambda letter: order[letter.name]))
 
 
-def _nodes(quantities: Quantities) -> Iterator[tuple[str, Named]]:
+def _nodes(quantities: Quantities, source: Notation) -> Iterator[tuple[str, Named]]:
     """Nodes whose speed is named after no part."""
     for number, name in enumerate(quantities.graph.nodes):
         if number not in quantities.owners and number not in quantities.inner:
@@ -273,4 +274,4 @@ def _nodes(quantities: Quantities) -> Iterator[tuple[str, Named]]:
                 _letter(quantities.node(number), domain.across),
                 _letter(quantities.angle(number), domain.integral),
             )
-            yield f"node of {domain.name}", Named(name, letters, None, ())
+            yield f"node of {domain.name}", Named(name, tuple(map(source.written, letters)), None, ())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 from sympy import Expr, Float, Heaviside, Integer, Piecewise, Pow, Symbol, true
 from sympy.printing.latex import LatexPrinter
@@ -103,11 +104,18 @@ class Writer:
         parameters: names of the parameters among them; their sums are printed before the variable that they multiply.
         last: names of the variables that stand behind a fraction, not above it: rates and coordinates.
         values: number of every parameter that is printed by its value; empty to print symbols.
+        inverses: for parameters that are printed by their reciprocals the symbols of these.
     """
 
     def __init__(
-        self, names: Mapping[str, str], parameters: Collection[str], last: Collection[str], values: Mapping[str, float]
+        self,
+        names: Mapping[str, str],
+        parameters: Collection[str],
+        last: Collection[str],
+        values: Mapping[str, float],
+        inverses: Mapping[Symbol, Symbol] = MappingProxyType({}),
     ) -> None:
+        self._replaced: dict[Symbol, Expr] = {symbol: 1 / inverse for symbol, inverse in inverses.items()}
         self._last = {Symbol(name, real=True) for name in last}
         self._values = {Symbol(name, real=True): _number(value) for name, value in values.items()}
         self._ordered = {Symbol(name, real=True): Symbol(f"{k:07d}", real=True) for k, name in enumerate(names)}
@@ -122,7 +130,9 @@ class Writer:
         return str(self._printer.doprint(self._in_order(self._valued(expression)).xreplace(self._ordered)))
 
     def _valued(self, expression: Expr) -> Expr:
-        """The expression with numbers for those parameters that are printed by their value."""
+        """The expression with numbers for those parameters that are printed by their value, or with reciprocals."""
+        if self._replaced and not self._values:
+            return expression.xreplace(self._replaced)
         if not self._values or self._values.keys().isdisjoint(expression.free_symbols):
             return expression
         return _rounded(expression.xreplace(self._values))
@@ -208,9 +218,9 @@ class Writer:
         return f"- {text[1:].lstrip()}" if text.startswith("-") else f"+ {text}"
 
 
-def with_rates(names: Mapping[str, str]) -> dict[str, str]:
+def with_rates(names: Mapping[str, str], rate: Callable[[str], str]) -> dict[str, str]:
     """The symbols and, after them, their time derivatives."""
-    rates = {rate_of(Symbol(name)).name: rf"\frac{{d {latex}}}{{d t}}" for name, latex in names.items()}
+    rates = {rate_of(Symbol(name)).name: rate(latex) for name, latex in names.items()}
     return {**names, **rates}
 
 

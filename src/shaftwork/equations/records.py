@@ -1,27 +1,38 @@
-"""The equations of a network as records: each row knows its parts, branches and nodes, and becomes sympy when read."""
+"""The equations of a network: all rows of Kirchhoff's equations and of the state form, and what is made of them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal, Protocol
 
-from sympy import Add, Eq, Expr, Float, Symbol
+from sympy import Expr, Float, Symbol
 
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.screen import counted, named, on_one_screen
-from shaftwork.equations.assembly import Assembly, Group, Sides
+from shaftwork.equations.assembly import Assembly
 from shaftwork.equations.notation import Letter, notation
+from shaftwork.equations.notations import INVERSE, OWN, Notation, notation_of
+from shaftwork.equations.rows import (
+    CouplingEquation,
+    Eliminated,
+    LawEquation,
+    LoopEquation,
+    NodeEquation,
+    Row,
+    StateEquation,
+)
 from shaftwork.equations.topology import NamedMatrix, Topology
 from shaftwork.reduction.form import StateForm
 
 if TYPE_CHECKING:
+    from shaftwork.equations.fields import Field
     from shaftwork.equations.second_order import SecondOrder
     from shaftwork.equations.state_space import StateSpace
     from shaftwork.equations.transfer import TransferFunction
 
-Form = Literal["kirchhoff", "state", "second-order"]
+Form = Literal["kirchhoff", "state", "second-order", "field"]
 SHOWN = 5
 """Rows of a kind that are shown on a screen."""
 
@@ -32,153 +43,6 @@ class NamedPhase(Protocol):
     @property
     def name(self) -> str:
         """The mode of every part in words."""
-
-
-@dataclass(frozen=True, eq=False)
-class Row:
-    """One equation and where it comes from.
-
-    Args:
-        parts: names of the parts that take part, in the order of the network.
-        branches: their branches.
-        nodes: names of the nodes concerned.
-        make: makes both sides; called when the row is first read.
-    """
-
-    parts: tuple[str, ...]
-    branches: tuple[int, ...]
-    nodes: tuple[str, ...]
-    make: Callable[[], Sides]
-
-    @cached_property
-    def sides(self) -> Sides:
-        """Left side, and the groups of terms on the right, as they are printed."""
-        return self.make()
-
-    @property
-    def left(self) -> Expr:
-        """The left side."""
-        return self.sides.left
-
-    @property
-    def groups(self) -> tuple[Group, ...]:
-        """The right side as groups of terms under a common factor."""
-        return self.sides.groups
-
-    @cached_property
-    def right(self) -> Expr:
-        """The right side as one expression."""
-        return Add(*(factor * Add(*terms) for factor, terms in self.groups))
-
-    @property
-    def equation(self) -> Eq:
-        """Left side = right side."""
-        return Eq(self.left, self.right, evaluate=False)
-
-    @property
-    def expression(self) -> Expr:
-        """Right side less left side; zero where the equation holds."""
-        return self.right - self.left
-
-    @property
-    def trivial(self) -> bool:
-        """Whether both sides are the same symbol, so that there is nothing to print."""
-        return bool(self.expression == 0)
-
-
-@dataclass(frozen=True, eq=False)
-class NodeEquation(Row):
-    """The balance at a node. `expression` is the sum of all that it receives, which is zero (Popenda 2019, (1)-(3)).
-
-    Args:
-        node: name of the node.
-        taken: makes `coefficients`.
-    """
-
-    node: str
-    taken: Callable[[], Mapping[int, Expr]]
-
-    @cached_property
-    def coefficients(self) -> Mapping[int, Expr]:
-        """For each branch the factor with which it takes its through variable from the node: 1, -1 or a ratio."""
-        return self.taken()
-
-
-@dataclass(frozen=True, eq=False)
-class LoopEquation(Row):
-    """Speed around the fundamental loop of a link (Popenda 2019, (4)).
-
-    Args:
-        link: the link's branch number.
-        summed: makes `coefficients`.
-    """
-
-    link: int
-    summed: Callable[[], tuple[tuple[int, Expr], ...]]
-
-    @cached_property
-    def coefficients(self) -> Mapping[int, Expr]:
-        """For each tree branch of the loop the factor with which its across variable enters."""
-        return dict(self.summed())
-
-
-@dataclass(frozen=True, eq=False)
-class LawEquation(Row):
-    """The law of a branch, or of the parallel branches of a part; that of an across store is in its node's balance."""
-
-
-@dataclass(frozen=True, eq=False)
-class CouplingEquation(Row):
-    """What an ideal coupling imposes on the speeds of its nodes."""
-
-
-@dataclass(frozen=True, eq=False)
-class StateEquation(Row):
-    """The rate of a state.
-
-    Args:
-        name: name of the state.
-        symbol: its symbol.
-        unit: its SI unit.
-        solved: makes `explicit`.
-        make_coupled: makes `coupled`.
-    """
-
-    name: str
-    symbol: Symbol
-    unit: str
-    solved: Callable[[], bool]
-    make_coupled: Callable[[], Sides]
-
-    @cached_property
-    def explicit(self) -> bool:
-        """False where more rates are coupled than are solved symbolically; the left side then holds them all."""
-        return self.solved()
-
-    @cached_property
-    def coupled(self) -> Sides:
-        """The row before it is solved: where several rates stand in it, it is far shorter so."""
-        return self.make_coupled()
-
-    @property
-    def rate(self) -> Expr:
-        """d(state)/dt, where the row is explicit; else what the coupled rates on the left side sum up to."""
-        return self.right
-
-
-@dataclass(frozen=True, eq=False)
-class Eliminated(Row):
-    """A quantity that is no state although it might have been, or is algebraic, and how it follows.
-
-    Args:
-        what: name of the quantity.
-        why: the reason in words.
-        kind: "speed" (of a geared store or node), "torque" (of a store in series), "algebraic" or "reaction".
-    """
-
-    what: str
-    why: str
-    kind: Literal["speed", "torque", "algebraic", "reaction"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,6 +61,7 @@ class Equations:
         notes: what was left out or decided by numerical values, in words.
         phase: the mode of every part that changes its mode, "gap open, load stuck", for which the rows hold.
         in_phase: from a phase to the equations there, where parts change their mode.
+        source: whose letters are printed.
     """
 
     form: StateForm
@@ -210,10 +75,17 @@ class Equations:
     notes: tuple[str, ...]
     phase: str = ""
     in_phase: Callable[[str | NamedPhase], Equations] | None = None
+    source: Notation = OWN
 
     @cached_property
     def _notation(self) -> tuple[Mapping[str, str], tuple[Letter, ...]]:
-        return notation(self.form, self.assembly.quantities)
+        return notation(self.form, self.assembly.quantities, self.source)
+
+    @cached_property
+    def inverses(self) -> Mapping[Symbol, Symbol]:
+        """For each parameter that is printed by its reciprocal the symbol of that."""
+        found = (letter.name for letter in self.letters if letter.name.endswith(INVERSE))
+        return {Symbol(name.removesuffix(INVERSE), real=True): Symbol(name, real=True) for name in found}
 
     @property
     def rows(self) -> tuple[Row, ...]:
@@ -246,7 +118,7 @@ class Equations:
         known = dict(self.form.graph.parameters)
         for symbol, law in self.definitions.items():
             known[symbol.name] = float(law.xreplace({each: Float(known[each.name]) for each in law.free_symbols}))
-        return known
+        return known | {inverse.name: 1 / known[symbol.name] for symbol, inverse in self.inverses.items()}
 
     @cached_property
     def incidence(self) -> NamedMatrix:
@@ -273,6 +145,13 @@ class Equations:
         from shaftwork.equations.second_order import second_order
 
         return second_order(self.form.graph)
+
+    @cached_property
+    def fields(self) -> tuple[Field, ...]:
+        """Every long shaft before it is divided: partial differential equations and boundary conditions."""
+        from shaftwork.equations.fields import fields_of
+
+        return fields_of(self)
 
     def transfer_function(
         self,
@@ -321,26 +200,46 @@ class Equations:
 
         return state_space(self, inputs, outputs)
 
-    def latex(self, form: Form | None = None, *, values: bool = False, phase: str | NamedPhase | None = None) -> str:
+    def written_as(self, notation: str | Notation | None) -> Equations:
+        """The same equations in the letters of another source.
+
+        Args:
+            notation: "popenda", "marinkovic", "modelica", or a `Notation` of your own; None for these letters.
+
+        Raises:
+            ParameterError: there is no such notation.
+        """
+        return self if notation is None else replace(self, source=notation_of(notation))
+
+    def latex(
+        self,
+        form: Form | None = None,
+        *,
+        values: bool = False,
+        phase: str | NamedPhase | None = None,
+        notation: str | Notation | None = None,
+    ) -> str:
         """The equations as the body of a LaTeX document (needs amsmath), or for a notebook cell.
 
         Args:
-            form: "kirchhoff" (balances, loops, laws), "state" (rates) or "second-order"; by default the first two.
+            form: "kirchhoff" (balances, loops, laws), "state" (rates), "second-order", or "field" (long shafts before
+                they are divided); by default the first two.
             values: print the parameters' values instead of their symbols.
             phase: the equations of this phase of a motion, "gap open, load stuck", or a row of `Solution.phases`,
                 whose name is used; by default those of the phase of these equations, which is printed above them.
+            notation: letters of another source, as in `written_as`.
 
         Raises:
-            CompileError: second-order form of a network with electrical nodes.
-            ParameterError: there is no such phase.
+            CompileError: second-order form of a network with electrical nodes; no shaft to print before division.
+            ParameterError: there is no such phase or notation.
         """
         from shaftwork.equations.report import body
 
         if phase is not None:
             if self.in_phase is None:
                 raise ParameterError(f"phase = {phase!r}: no part of '{self.form.graph.name}' changes its mode.")
-            return self.in_phase(phase).latex(form, values=values)
-        return body(self, form, values=values)
+            return self.in_phase(phase).latex(form, values=values, notation=notation)
+        return body(self.written_as(notation), form, values=values)
 
     def __str__(self) -> str:
         graph = self.form.graph
@@ -363,16 +262,19 @@ class Equations:
 
     __repr__ = __str__
 
-    def document(self, form: Form | None = None, *, values: bool = False) -> str:
+    def document(
+        self, form: Form | None = None, *, values: bool = False, notation: str | Notation | None = None
+    ) -> str:
         """A complete LaTeX document: the forms, the states with their units, and the nomenclature with the values.
 
         Args:
             form: as in `latex`; by default all.
             values: print the parameters' values instead of their symbols.
+            notation: letters of another source, as in `written_as`.
         """
         from shaftwork.equations.report import document
 
-        return document(self, form, values=values)
+        return document(self.written_as(notation), form, values=values)
 
     def _repr_latex_(self) -> str:
         from shaftwork.equations.report import notebook

@@ -26,7 +26,7 @@ PREAMBLE = r"""\documentclass[11pt,a4paper]{article}
 \usepackage{booktabs}
 \usepackage{longtable}
 \allowdisplaybreaks"""
-FORMS = "'kirchhoff', 'state' or 'second-order'"
+FORMS = "'kirchhoff', 'state', 'second-order' or 'field'"
 BEGIN = r"""\date{}
 \begin{document}
 \sloppy
@@ -78,6 +78,8 @@ def blocks_of(equations: Equations, form: Form | None, *, values: bool) -> tuple
             made = tuple(blocks.state())
         case "second-order":
             made = tuple(blocks.second_order())
+        case "field":
+            return tuple(block for block in blocks.fields() if block.lines)
         case None:
             made = (*blocks.kirchhoff(twists=False), *blocks.state(laws=False))
         case _:
@@ -104,6 +106,8 @@ def document(equations: Equations, form: Form | None, *, values: bool) -> str:
         "state": ("State form", lambda: section(blocks.state(laws=form is not None))),
         "second-order": ("Second-order form", lambda: _second_order(blocks)),
     }
+    if form == "field":
+        forms = {"field": ("Along the shafts", lambda: section(blocks.fields()))}
     if form not in (None, *forms):
         raise ShaftworkError(f"There is no form {form!r}; take {FORMS}.")
     sections = {title: text() for name, (title, text) in forms.items() if form in (None, name)}

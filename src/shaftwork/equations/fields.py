@@ -1,0 +1,216 @@
+"""A long shaft before it is divided: partial differential equations along it, and what its ends see of the network.
+
+With x from node a to node b, tau_c the torque without that of the internal damping, and where nothing is lost:
+
+    -d(tau)/dx = J' d(omega)/dt + d' omega,    -d(omega)/dx = d(tau_c)/dt / C',    tau_c = tau + D' d(omega)/dx,
+    d2(tau)/dx2 = J' / C' d2(tau)/dt2 = d2(tau)/dt2 / v^2, and the same for omega.
+
+Source: Popenda 2019, (8)-(15); his (14) and (15) have another sign, with which there would be no waves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from sympy import Add, Derivative, Eq, Expr, Float, Function, Integer, Symbol, sqrt
+
+from shaftwork.components.base import Derived, symbols_of
+from shaftwork.components.laws import t
+from shaftwork.components.shafts import Shaft
+from shaftwork.core.domains import ROTATION
+from shaftwork.core.parameters import Parameter
+from shaftwork.equations.assembly import sides, terms_of
+from shaftwork.equations.notation import Letter, without_marks
+from shaftwork.equations.notations import INVERSE
+from shaftwork.equations.printing import Line, Writer, with_rates
+from shaftwork.equations.quantities import Flow
+from shaftwork.network.graph import GraphPart
+
+if TYPE_CHECKING:  # the records make these
+    from shaftwork.equations.records import Equations
+
+X = Symbol("x", real=True)
+"""The place along a shaft, from its node a."""
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """The equations along one shaft in sympy, with true functions of x and t and true derivatives.
+
+    Args:
+        equations: of the network.
+        part: the shaft.
+    """
+
+    equations: Equations
+    part: GraphPart
+
+    @cached_property
+    def torque(self) -> Expr:
+        """The torque along the shaft, a function of x and t."""
+        return self._function("tau")
+
+    @cached_property
+    def elastic(self) -> Expr:
+        """The torque without that of the internal damping."""
+        return self._function("tau_c")
+
+    @cached_property
+    def speed(self) -> Expr:
+        """The speed along the shaft."""
+        return self._function("omega")
+
+    def _function(self, name: str) -> Expr:
+        return Function(f"{self.part.name}.{name}", real=True)(X, t)
+
+    def symbol(self, name: str) -> Expr:
+        """A parameter, zero where its value is, or a quantity that follows from parameters."""
+        component = self.part.component
+        if name in component.declared and component.declared[name].magnitude(getattr(component, name))[0] == 0:
+            return Integer(0)
+        return Symbol(f"{self.part.name}.{name}", real=True)
+
+    @cached_property
+    def rows(self) -> tuple[Eq, ...]:
+        """(8) to (12) with internal damping; without it (13), and, where nothing is lost at all, (14) and (15)."""
+        torque, elastic, speed = self.torque, self.elastic, self.speed
+        inertia, compliance = self.symbol("line_inertia"), 1 / self.symbol("line_stiffness")
+        damping, friction = self.symbol("damping"), self.symbol("friction")
+        kinetic = Eq(-torque.diff(X), inertia * speed.diff(t) + friction * speed)
+        if damping == 0:
+            found = (kinetic, Eq(-speed.diff(X), compliance * torque.diff(t)))
+            factors = () if friction != 0 else (inertia * compliance, 1 / self.symbol("v") ** 2)
+            return (*found, *(Eq(f.diff(X, 2), k * f.diff(t, 2)) for k in factors for f in (torque, speed)))
+        bent = -(torque.diff(X, 2) + friction * speed.diff(X)) / inertia
+        return (
+            kinetic,
+            Eq(-speed.diff(X), compliance * elastic.diff(t)),
+            Eq(elastic, torque + damping * speed.diff(X)),
+            Eq(bent, speed.diff(X, t)),
+            Eq(-speed.diff(X), compliance * (torque.diff(t) + damping * bent)),
+        )
+
+    @cached_property
+    def boundary(self) -> tuple[Eq, ...]:
+        """Speed and torque at both ends: the speeds of the nodes, and what the other parts there give."""
+        found, quantities = list[Eq](), self.equations.assembly.quantities
+        for end, place, sign in (("a", Integer(0), 1), ("b", self.symbol("length"), -1)):
+            node = self.part.nodes[end]
+            found.append(Eq(self.speed.subs(X, place), quantities.node(node), evaluate=False))
+            found.append(Eq(self.torque.subs(X, place), sign * Add(*self._given(node)), evaluate=False))
+        return tuple(found)
+
+    def _given(self, node: int) -> Iterator[Expr]:
+        """What the other parts at a node give, less what their inertias take."""
+        assembly, graph = self.equations.assembly, self.equations.form.graph
+        for item in assembly.at_node[node]:
+            if graph.part_of(item.branches[0] if isinstance(item, Flow) else item) is self.part:
+                continue
+            if isinstance(item, Flow):
+                yield (1 if item.minus == node else -1) * item.sign * assembly.quantities.through(item)
+            else:
+                yield from (-gain * assembly.stored(item) for gain in assembly.incidence(item, node))
+
+    @cached_property
+    def definitions(self) -> Mapping[Symbol, Expr]:
+        """The letters in the rows that follow from parameters."""
+        found = {self.symbol(made.name): made.law for made in self._derived}
+        if any(row.has(self.symbol("v")) for row in self.rows):
+            found[self.symbol("v")] = sqrt(self.symbol("line_stiffness") / self.symbol("line_inertia"))
+        return found
+
+    @cached_property
+    def _derived(self) -> tuple[Derived, ...]:
+        names = ("area_moment", "line_inertia", "line_stiffness")
+        symbols: Any = symbols_of({name: self.symbol(name) for name in (*self.part.component.declared, *names)})
+        return tuple(made for made in self.part.component.derived(symbols) if made.name in names)
+
+    def lines(self, *, values: bool = False) -> tuple[tuple[Line, ...], tuple[Line, ...], tuple[Line, ...]]:
+        """The rows, the boundary conditions and the definitions in LaTeX; with values there are no definitions."""
+        writer, inverses = self._writer(self._values if values else {}), self._inverses
+        laws = (
+            (inverses[symbol], 1 / law) if symbol in inverses else (symbol, law)
+            for symbol, law in self.definitions.items()
+        )
+        return (
+            tuple(self._line(row, writer) for row in self.rows),
+            tuple(self._line(row, writer) for row in self.boundary),
+            () if values else tuple(writer.line(sides(symbol, (law,))) for symbol, law in laws),
+        )
+
+    def _line(self, row: Eq, writer: Writer) -> Line:
+        left, right = (side.xreplace(self._atoms).expand() for side in row.args)
+        return writer.line(sides(left, terms_of(right)))
+
+    @cached_property
+    def _values(self) -> dict[str, float]:
+        known = dict(self.equations.values)
+        for symbol, law in self.definitions.items():
+            known[symbol.name] = float(law.xreplace({each: Float(known[each.name]) for each in law.free_symbols}))
+        return known
+
+    @cached_property
+    def _atoms(self) -> dict[Expr, Symbol]:
+        """A symbol for every function and derivative in the rows."""
+        atoms = (
+            atom for row in (*self.rows, *self.boundary) for atom in sorted(row.atoms(Derivative, Function), key=str)
+        )
+        return {atom: Symbol(str(atom), real=True) for atom in atoms}
+
+    @cached_property
+    def _letters(self) -> tuple[Letter, ...]:
+        """The letters of the shaft."""
+        component, name = self.part.component, self.part.name
+        waves = Derived("v", Integer(0), "m/s", "speed of waves", "v")
+        declared: list[Parameter | Derived] = [*component.declared.values(), *self._derived, waves]
+        parameters = (
+            Letter(f"{name}.{made.name}", *_spelt(made.latex), made.unit, made.meaning, parameter=True)
+            for made in declared
+        )
+        quantities = (("tau", ROTATION.through, ""), ("tau_c", ROTATION.through, "c"), ("omega", ROTATION.across, ""))
+        variables = (Letter(f"{name}.{label}", q.latex, mark, q.unit, "") for label, q, mark in quantities)
+        return tuple(map(self.equations.source.written, (*parameters, *variables)))
+
+    @cached_property
+    def _inverses(self) -> dict[Symbol, Symbol]:
+        names = (letter.name for letter in self._letters if letter.name.endswith(INVERSE))
+        return {Symbol(name.removesuffix(INVERSE), real=True): Symbol(name, real=True) for name in names}
+
+    def _writer(self, values: Mapping[str, float]) -> Writer:
+        known = self.equations.symbol_names
+        _, _, subscript = known[f"{self.part.name}.length"].partition("_")
+        own = {letter.name: letter.printed(subscript.removeprefix("{").removesuffix("}")) for letter in self._letters}
+        rates = with_rates(known, self.equations.source.rate_of)
+        atoms = {symbol.name: _printed(atom, own) for atom, symbol in self._atoms.items()}
+        names = {**own, **atoms, **{name: latex for name, latex in rates.items() if name not in own}}
+        parameters = [letter.name for letter in (*self.equations.letters, *self._letters) if letter.parameter]
+        order = sorted(names, key=lambda name: name not in set(parameters))
+        last = [symbol.name for symbol in self._atoms.values()]
+        return Writer({name: names[name] for name in order}, parameters, last, values, self._inverses)
+
+
+def fields_of(equations: Equations) -> tuple[Field, ...]:
+    """The equations along every shaft of a network."""
+    shafts = (part for part in equations.form.graph.parts if isinstance(part.component, Shaft))
+    return tuple(Field(equations, part) for part in shafts)
+
+
+def _spelt(latex: str) -> tuple[str, str]:
+    base, _, mark = latex.partition("_")
+    return base if len(base) == 1 or base.startswith("\\") or "'" in base else rf"\{base}", mark.strip("{}")
+
+
+def _printed(atom: Expr, letters: Mapping[str, str]) -> str:
+    """A function of x and t, or a derivative of one."""
+    function = atom.expr if isinstance(atom, Derivative) else atom
+    where = ", ".join(without_marks(letters.get(str(place), str(place))) for place in function.args)
+    text = f"{letters[str(function.func)]}({where})"
+    if not isinstance(atom, Derivative):
+        return text
+    order = sum(times for _, times in atom.variable_count)
+    power = f"^{{{order}}}" if order > 1 else ""
+    below = r" \, ".join(rf"\partial {v}" + (f"^{{{n}}}" if n > 1 else "") for v, n in atom.variable_count)
+    return rf"\frac{{\partial{power} {text}}}{{{below}}}"

@@ -1,0 +1,122 @@
+"""The letters of other sources: one table for each, which equations are printed by on request."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+from shaftwork.core.domains import DOMAINS
+from shaftwork.core.errors import ParameterError
+
+if TYPE_CHECKING:
+    from shaftwork.equations.notation import Letter
+
+INVERSE = " inverse"
+"""At the end of the name of a letter that stands for the reciprocal of a parameter."""
+_QUANTITIES = {
+    (quantity.latex, quantity.unit): quantity.name
+    for domain in DOMAINS
+    for quantity in (domain.across, domain.through, domain.integral)
+}
+
+
+class Inverse(NamedTuple):
+    """A letter for the reciprocal of a parameter, as for a compliance in place of a stiffness.
+
+    Args:
+        latex: the letter.
+        unit: its SI unit.
+        meaning: a few words for the nomenclature.
+    """
+
+    latex: str
+    unit: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Notation:
+    """How a source writes equations.
+
+    Args:
+        quantities: LaTeX of speeds, torques and angles, by the names "omega", "tau", "phi", "v", "f", "s", "u", "i" and
+            "psi"; others keep theirs. Torques and speeds among the parameters have the same letters.
+        parameters: LaTeX of parameters, by (letter, SI unit) of the nomenclature, such as ("d", "N*m*s/rad").
+        rate: LaTeX of a time derivative, with {} for what is derived. A letter with a dot gets a second one.
+    """
+
+    quantities: Mapping[str, str] = field(default_factory=dict)
+    parameters: Mapping[tuple[str, str], str | Inverse] = field(default_factory=dict)
+    rate: str = r"\frac{{d {}}}{{d t}}"
+
+    def __post_init__(self) -> None:
+        if unknown := [name for name in self.quantities if name not in _QUANTITIES.values()]:
+            raise ParameterError(
+                f"Notation: there is no quantity {', '.join(map(repr, unknown))}. There are: "
+                f"{', '.join(_QUANTITIES.values())}."
+            )
+        if self.rate.format("x") == self.rate.format("y"):
+            raise ParameterError(f"Notation: rate = {self.rate!r} has no {{}} for what is derived.")
+
+    def written(self, letter: Letter) -> Letter:
+        """A letter as this source has it."""
+        whole = f"{letter.base}_{letter.mark}" if letter.mark else letter.base
+        chosen = self.parameters.get((whole, letter.unit)) if letter.parameter else None
+        if isinstance(chosen, Inverse):
+            named = replace(letter, name=f"{letter.name}{INVERSE}", unit=chosen.unit, meaning=chosen.meaning)
+            return _spelt(named, chosen.latex)
+        if chosen is not None:
+            return _spelt(letter, chosen)
+        sign = r"\Delta " if letter.base.startswith(r"\Delta ") else ""
+        quantity = _QUANTITIES.get((letter.base.removeprefix(sign), letter.unit), "")
+        return replace(letter, base=sign + self.quantities[quantity]) if quantity in self.quantities else letter
+
+    def rate_of(self, latex: str) -> str:
+        """A time derivative."""
+        dotted = latex.startswith(r"\dot{")
+        return latex.replace(r"\dot{", r"\ddot{", 1) if dotted else self.rate.format(latex)
+
+
+def _spelt(letter: Letter, latex: str) -> Letter:
+    base, _, mark = latex.partition("_")
+    return replace(letter, base=base, mark=mark.removeprefix("{").removesuffix("}"))
+
+
+OWN = Notation()
+STIFFNESS, DAMPING = "N*m/rad", "N*m*s/rad"
+NOTATIONS: Mapping[str, Notation] = {
+    # Popenda 2019: torques M, and susceptibilities S_c in place of stiffnesses
+    "popenda": Notation(
+        quantities={"tau": "M"},
+        parameters={
+            ("c", STIFFNESS): Inverse("S_c", "rad/(N*m)", "torsional susceptibility"),
+            ("C'", "N*m^2/rad"): Inverse("S'_c", "rad/(N*m^2)", "torsional susceptibility per length"),
+            ("d", DAMPING): "D",
+        },
+    ),
+    # Marinković et al. 2011: torques T, damping b, speeds as rates of angles
+    "marinkovic": Notation(quantities={"tau": "T", "omega": r"\dot{\varphi}"}, parameters={("d", DAMPING): "b"}),
+    # Modelica.Mechanics.Rotational and Translational, and Modelica.Electrical.Analog
+    "modelica": Notation(
+        quantities={"omega": "w", "u": "v"}, parameters={("i", "1"): r"\mathrm{ratio}"}, rate=r"\mathrm{{der}}({})"
+    ),
+}
+"""The notations that equations are printed in by name."""
+
+
+def notation_of(asked: str | Notation | None) -> Notation:
+    """A notation by its name.
+
+    Raises:
+        ParameterError: there is no such one.
+    """
+    if asked is None:
+        return OWN
+    if isinstance(asked, Notation):
+        return asked
+    if not isinstance(asked, str) or asked not in NOTATIONS:
+        raise ParameterError(
+            f"There is no notation {asked!r}. There are: {', '.join(map(repr, NOTATIONS))}; or give a Notation."
+        )
+    return NOTATIONS[asked]
