@@ -117,6 +117,65 @@ def test_at_rest_it_holds_as_far_as_neither_side_overcomes_the_loss(ratio: float
     assert np.all(up["J_b.omega"][held] == 0)
 
 
+@pytest.mark.parametrize("before", [True, False], ids=["before the gear", "behind it"])
+@pytest.mark.parametrize("holds", ["brake", "clutch", "friction"])
+@pytest.mark.parametrize("motor", [0.0, 30.0, 36.5, 44.0, 60.0, 100.0])
+def test_a_friction_that_holds_takes_what_the_teeth_leave(motor: float, holds: str, before: bool) -> None:  # noqa: FBT001
+    """A load of 800 behind 20 : 1 asks 36 of the shaft where it drives and 44.4 where it is driven, whatever holds."""
+    made = {
+        "brake": sw.Brake("brake", tau=200.0),
+        "clutch": sw.Clutch("brake", tau=200.0),
+        "friction": sw.DryFriction("brake", tau_c=150.0, tau_s=200.0),
+    }[holds]
+    net = sw.Network("lift")
+    net.add(sw.Inertia("J1", J=0.05), "m")
+    net.add(sw.Inertia("J2", J=5.0), "d")
+    gear = sw.LossyGear("gear", ratio=20.0, efficiency=0.9)
+    for part, nodes in ((made, ("m", "ground")), (gear, ("m", "d")))[:: 1 if before else -1]:
+        net.add(part, *nodes)
+    net.add(sw.TorqueSource("motor", tau=motor), "m")
+    net.add(sw.TorqueSource("weight", tau=-800.0), "d")
+    sol = net.simulate(0.5)
+    assert np.all(sol["J1.omega"] == 0.0)
+    assert sol["gear.tau_a"][-1] == pytest.approx(min(max(motor, 36.0), 40.0 / 0.9), rel=1e-12)
+    assert abs(sol["brake.tau"][-1]) == pytest.approx(abs(motor - sol["gear.tau_a"][-1]), abs=1e-12)
+
+
+@pytest.mark.parametrize("before", [True, False], ids=["before the gear", "behind it"])
+def test_a_motor_overcomes_friction_and_gear_together(before: bool) -> None:  # noqa: FBT001
+    """0.2 of the bearing and 0.1 / 0.5 of the load are overcome by 10 t at 0.04 s."""
+    net = sw.Network("rising torque")
+    net.add(sw.Inertia("J1", J=0.01), "m")
+    net.add(sw.Inertia("J2", J=0.05), "w")
+    gear = sw.LossyGear("gear", ratio=5.0, efficiency=0.5, efficiency_back=0.3)
+    for part, nodes in ((sw.DryFriction("bearing", tau_c=0.2), ("m",)), (gear, ("m", "w")))[:: 1 if before else -1]:
+        net.add(part, *nodes)
+    net.add(sw.TorqueSource("motor", tau=10 * sw.t), "m")
+    net.add(sw.TorqueSource("load", tau=-0.5), "w")
+    sol = net.simulate(0.3, rtol=1e-10)
+    inertia = 0.01 + 0.05 / (0.5 * 5.0**2)
+    assert sol["J1.omega"][-1] == pytest.approx(5 * (0.3 - 0.04) ** 2 / inertia, rel=1e-9)
+
+
+def test_a_clutch_beside_a_gear_that_holds_carries_nothing() -> None:
+    """Between the same nodes either may hold; the gear does, whichever comes first."""
+    for order in (("gear", "clutch"), ("clutch", "gear")):
+        net = sw.Network("bridged")
+        parts = {
+            "gear": sw.LossyGear("gear", ratio=1.0, efficiency=0.5, efficiency_back=-0.3),
+            "clutch": sw.Clutch("clutch", tau=100.0, t_on=0.5),
+        }
+        net.add(sw.Inertia("J1", J=1.0), "a")
+        net.add(sw.Inertia("J2", J=2.0), "b")
+        for name in order:
+            net.add(parts[name], "a", "b")
+        net.add(sw.TorqueSource("motor", tau=5.0), "a")
+        net.add(sw.TorqueSource("load", tau=-3.0), "b")
+        sol = net.simulate(1.0)
+        assert sol["J1.omega"][-1] == 0.0
+        assert sol["clutch.tau"][-1] == 0.0
+
+
 @pytest.mark.parametrize("ratio", [RATIO, -RATIO])
 def test_a_load_drives_the_rotor_of_a_gear_that_does_not_lock(ratio: float) -> None:
     load = -20.0 * np.sign(ratio)

@@ -289,7 +289,7 @@ def test_every_form_of_every_network_is_balanced(name: str, form: str) -> None:
 
 
 def test_no_other_form_is_taken() -> None:
-    with pytest.raises(ShaftworkError, match="take 'kirchhoff', 'state' or 'second-order'"):
+    with pytest.raises(ShaftworkError, match="take 'kirchhoff', 'state', 'second-order' or 'field'"):
         equations_of(crane()).latex(form="lagrange")  # type: ignore[arg-type]
 
 

@@ -7,6 +7,7 @@ from functools import cache
 from random import Random
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
@@ -476,3 +477,29 @@ def test_a_gear_that_jams_behind_a_damped_spring_starts_again(inertia: float) ->
         torque += step * 1000.0 * (w - gear)
         w, gear = w - step * passes / 2.0, gear + step * passes / (0.1 + inertia / (0.25 * 0.45))
     assert sol["J1.omega"][-1] == pytest.approx(w, abs=4e-3)
+
+
+@pytest.mark.parametrize("motor", [1.0, 4.0])
+@pytest.mark.parametrize(("load", "ratio"), [(-3.0, -20.0), (3.0, 2.0), (-3.0, 2.0)])
+@pytest.mark.parametrize("back", [0.3, 0.0, -0.2])
+def test_rebounds_before_a_gear_that_rubs_come_to_rest(motor: float, load: float, ratio: float, back: float) -> None:
+    """Flights that are each a share of the last end after some twenty; between them the gear changes which side drives.
+
+    With the speeds of the impact's own mode in place of those of the flight they gained what an event comes late, for
+    ever.
+    """
+    net = sw.Network("servo axis")
+    net.add(sw.Inertia("J0", J=0.05), "a")
+    net.add(sw.TorqueSource("motor", tau=motor), "a")
+    net.add(sw.Backlash("gap", gap=0.05, restitution=0.5), "a", "b")
+    net.add(sw.Inertia("J1", J=0.0152), "b")
+    net.add(sw.LossyGear("gear", ratio=ratio, efficiency=0.4, efficiency_back=back), "b", "c")
+    net.add(sw.Inertia("J2", J=0.4569), "c")
+    net.add(sw.TorqueSource("load", tau=load), "c")
+    sol = net.simulate(2.0)
+    times = np.array([time for time, _, _, after in sol.events if after == "rebound"])
+    assert 10 <= len(times) <= 24
+    flights = np.diff(times)
+    assert np.all(flights[3:] < 0.96 * flights[2:-1])
+    assert sol.phases[-1].end - sol.phases[-1].start > 0.5
+    assert sol.energy_residual < 1e-9

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import warnings
 from dataclasses import replace
 from random import Random
@@ -137,7 +138,34 @@ def rings(draw: st.DrawFn) -> list[Placed]:
     return parts
 
 
-@given(inverter_legs() | gearboxes() | rings(), st.randoms(use_true_random=False))
+@st.composite
+def held_gears(draw: st.DrawFn) -> list[Placed]:
+    """One or two gears that rub, at rest and under torques that turn round, beside what holds their shafts."""
+    nodes = "abc"[: draw(st.integers(2, 3))]
+    torque = st.integers(-25, 25).map(float)
+    parts: list[Placed] = [(sw.Inertia(f"J{node}", J=draw(st.integers(1, 9)) / 2), (node,)) for node in nodes]
+    for node in nodes:
+        before, after = draw(torque), draw(torque)
+        parts.append((sw.TorqueSource(f"m{node}", tau=sw.Step(after - before, start=0.05, before=before)), (node,)))
+    for k, pair in enumerate(itertools.pairwise(nodes)):
+        ratio = draw(st.sampled_from([1.0, 2.0, -3.0]))
+        ahead, back = draw(st.sampled_from([(0.9, 0.9), (0.6, 0.4), (0.5, 0.0), (0.4, -0.3)]))
+        parts.append((sw.LossyGear(f"g{k}", ratio=ratio, efficiency=ahead, efficiency_back=back), pair))
+    for k in range(draw(st.integers(1, 3))):
+        at, slips = draw(st.sampled_from([*nodes, *itertools.pairwise(nodes)])), draw(st.integers(2, 30))
+        pair = at if isinstance(at, tuple) else (at, "ground")
+        kind = draw(st.sampled_from(["friction", "off", "on", "clutch"]))
+        if kind == "friction":
+            parts.append(
+                (sw.DryFriction(f"x{k}", tau_c=slips, tau_s=draw(st.sampled_from([slips, slips + 6.0]))), pair)
+            )
+        else:
+            when = {"off": {"t_off": 0.1}, "on": {"t_on": 0.1}, "clutch": {}}[kind]
+            parts.append((sw.Clutch(f"x{k}", tau=slips, **when), pair))
+    return parts
+
+
+@given(inverter_legs() | gearboxes() | rings() | held_gears(), st.randoms(use_true_random=False))
 @share_of_examples(0.05)
 def test_the_order_of_switches_and_of_what_holds_a_gearbox_changes_nothing(parts: list[Placed], rng: Random) -> None:
     sums = []

@@ -211,10 +211,14 @@ def normal_tree(graph: CircuitGraph) -> NormalTree:
     )
 
 
-def _rank(graph: CircuitGraph, branch: GraphBranch) -> tuple[Kind, bool]:
-    """By what branches come into the tree: gears before what holds by a mode, which carries nothing beside them."""
-    kind = branch.template.kind
-    return kind, kind is Kind.COUPLING and bool(graph.parts[branch.part].modes)
+def _rank(graph: CircuitGraph, branch: GraphBranch) -> tuple[Kind, int]:
+    """By what branches come into the tree: gears before what holds by a mode, which carries nothing beside them.
+
+    Of that, gears that rub come first: beside a friction which takes all, no torque in their teeth would tell whether
+    they hold.
+    """
+    kind, modes = branch.template.kind, graph.parts[branch.part].modes
+    return kind, (1 + all(not made.passes_on for made in modes)) * bool(modes and kind is Kind.COUPLING)
 
 
 def _is_free(reduced: Row) -> bool:

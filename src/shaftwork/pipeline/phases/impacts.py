@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
@@ -81,6 +82,28 @@ class Impacts:
         changes = [*hits, *self._differences(t, regime.modes, new.regime.modes, besides)]
         self._refuse_gain(t, moment, held, self._regimes.held(new, after), hits[0])
         return new, changes
+
+    def is_last(self, t: float, moment: Moment, new: Moment, number: int, ended: Watched) -> bool:
+        """Whether a rebound would lose less than it gains, as it is found late by rounding.
+
+        Args:
+            t: s.
+            moment: what was before.
+            new: after it, with gears in the modes in which they have passed it on.
+            number: of the element.
+            ended: its guard.
+        """
+        share, speed = moment.regime.constant(number, ended.leave.rebound), moment.across(number, t)
+        late = ended.side * moment.course(t)[3][ended.guard]
+        # gears that have not turned round go on as they were
+        before = moment.regime.modes
+        same = {k: before[k] for k in self.gears if moment.across(k, t) * new.across(k, t) >= 0}
+        modes = with_modes(new.regime.modes, same)
+        flies = self._regimes.changed(new, t, modes) if self._regimes.possible(modes) else new
+        step = flies.regime.ahead(flies.course(t)[2])
+        later = flies.moved(t, step).across(number, t + step)
+        pushed = math.copysign(1.0, speed) * (later - flies.across(number, t)) / step
+        return 0 < (1 - share**2) * speed**2 < 4 * late * pushed
 
     def jammed(self, t: float, moment: Moment, new: Moment) -> Moment:
         """What a gear that jams stops at once: what holds by a limited torque slips in that, and contacts part.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -207,7 +206,7 @@ class Settling:
         changes: list[Change] = []
         still: list[Way] = []
         seen: dict[ModeNames, None] = {}
-        blocked, repeats = None, 0
+        blocked, repeats, passed = None, 0, 0.0
         tried: Counter[tuple[ModeNames, int]] = Counter()  # ways round what contradicts others, each of them once
         # a guard is met where it is beyond zero by its band, which then still is the band of what is the same after it
         ended = moment
@@ -216,7 +215,8 @@ class Settling:
             moment, exceeded = self._violated(moment, after, ended, still)
         while exceeded is not None:
             here = moment.regime.modes, exceeded[0]
-            moment, latest, contradiction = self._follow(t, after, moment, *exceeded, tried[here])
+            moment, latest, contradiction, since = self._follow(t, after, moment, *exceeded, tried[here])
+            passed += since
             changes, blocked = [*changes, *latest], contradiction or blocked
             if contradiction is not None:
                 tried[here] += 1
@@ -229,10 +229,11 @@ class Settling:
                 raise endless(t, changes, blocked)
             if again or impact:
                 seen.clear()
+            tried = Counter() if impact else tried  # what contradicted others need not do so at other speeds
             still = [] if latest else [*still, exceeded]
             seen[moment.regime.modes] = None
             moment, exceeded = self._violated(moment, after, ended, still, repeats)
-        return moment, changes
+        return moment.moved(after, passed), changes
 
     def _violated(
         self, moment: Moment, t: float, ended: Moment, still: Sequence[Way], repeats: int = 0
@@ -295,51 +296,48 @@ class Settling:
 
     def _follow(
         self, t: float, after: float, moment: Moment, number: int, ended: Watched, tried: int = 0
-    ) -> tuple[Moment, list[Change], NetworkError | None]:
-        """The mode of an element changes, or what hits is thrown back; and what kept it from what it wanted.
-
-        Of the ways round that, some have been tried.
+    ) -> tuple[Moment, list[Change], NetworkError | None, float]:
+        """The mode of an element changes, or what hits is thrown back; what kept it from what it wanted, and how long
+        ago, in s, it was hit. Of the ways round what keeps it, some have been tried.
         """
         element, leave, regime = self.elements[number], ended.leave, moment.regime
         before = regime.modes[number]
         to = leave.to or anew(self.elements, moment, after, number)
         if is_switch(element.modes) and (switched := self._commutation.switched(t, after, moment, number, to)):
-            return *switched, None
+            return *switched, None, 0.0
         speed = self._impacts.meets(moment, after, element.modes[to], number)
         slips = next((name for side, name in element.modes[to].gives_way if side * speed > 0), "")
         if slips == before:  # it was met by rounding alone: it is moving away
-            return moment, [], None
+            return moment, [], None, 0.0
         if slips:  # its torque is limited, so it takes no speed away at once
             to, speed = slips, 0.0
         try:
             if speed or (leave.rebound is not None and not slips):
-                return *self._hit(t, after, moment, number, replace(ended, leave=replace(leave, to=to))), None
+                new, changes, since = self._hit(t, after, moment, number, replace(ended, leave=replace(leave, to=to)))
+                return new, changes, None, since
             modes = with_modes(regime.modes, {number: to})
             new, conducting = self._commutation.commutated(moment, after, modes)
             others = [Change(t, self.elements[k], regime.modes[k], name) for k, name in conducting.items()]
-            return new, [Change(t, element, before, to), *others], None
+            return new, [Change(t, element, before, to), *others], None, 0.0
         except NetworkError as error:
-            return *self._around(t, after, moment, (number, to), error, tried), error
+            return *self._around(t, after, moment, (number, to), error, tried), error, 0.0
 
-    def _hit(self, t: float, after: float, moment: Moment, number: int, ended: Watched) -> tuple[Moment, list[Change]]:
+    def _hit(
+        self, t: float, after: float, moment: Moment, number: int, ended: Watched
+    ) -> tuple[Moment, list[Change], float]:
         """An impact; what hits stays where a rebound would lose less than it gains, as it is found late by rounding.
 
-        It is thrown back where it has passed its limit, and has been on its way since: what it would gain between there
-        and here would add up over many rebounds.
+        It is thrown back where it has passed its limit, and how long ago, in s, is said: what it would gain between
+        there and here would add up over many rebounds.
         """
         number, ended = self._impacts.fastest(after, moment, number, ended)
         since = 0.0 if ended.leave.rebound is None else self._since(after, moment, ended)
         new, changes = self._impacts.hit(t, after, moment.moved(after, -since), number, ended.leave)
         if not changes[0].rebound:
-            return new.moved(after, since), changes
-        share, speed = moment.regime.constant(number, ended.leave.rebound), moment.across(number, after)
-        late = ended.side * moment.course(after)[3][ended.guard]
-        step = new.regime.ahead(new.course(after)[2])
-        later = new.moved(after, step).across(number, after + step)
-        pushed = math.copysign(1.0, speed) * (later - new.across(number, after)) / step
-        if 0 < (1 - share**2) * speed**2 < 4 * late * pushed:
-            return self._impacts.hit(t, after, moment, number, replace(ended.leave, rebound=None))
-        return new.moved(after, since), changes
+            return new, changes, since
+        if self._impacts.is_last(after, moment, new, number, ended):
+            return *self._impacts.hit(t, after, moment, number, replace(ended.leave, rebound=None)), 0.0
+        return new, changes, since
 
     def _since(self, t: float, moment: Moment, met: Watched) -> float:
         """How long ago, in s, a guard passed through zero along a straight line."""
