@@ -13,6 +13,7 @@ from shaftwork.codegen.elements import Array, GainMatrix, potential_matrix, rati
 from shaftwork.codegen.inputs import Inputs
 from shaftwork.codegen.loops import LoopSolver
 from shaftwork.codegen.matrices import LinearPart, MatrixAssembly
+from shaftwork.codegen.products import by_diagonals
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
 
@@ -61,6 +62,7 @@ class BoundArrays:
         self.program, self.p, self.part = program, p, part
         factors: tuple[Any, ...] = part.factors if full else tuple(made.sparse for made in part.factors)
         self._A, self._B, self._B1, self._C, self._D = factors
+        self._rows = self._A if full else by_diagonals(self._A)
         self._has_slopes, self._controls = bool(part.B1.nnz), program.inputs.controls
         loops = program.loop_places
         form = program.form
@@ -97,6 +99,8 @@ class BoundArrays:
     def _outputs(self, t: Any, x: Array) -> Array:
         """Outputs y where there are no loops."""
         inputs = self.program.inputs
+        if not inputs.outputs:
+            return np.empty((0, *x.shape[1:]))
         y: Array = self._C @ x[: inputs.states]
         if self.part.D.nnz:  # only inputs of time alone and controlled sources reach the outputs: else there is a loop
             first = inputs.values(t, np.zeros((inputs.outputs, *x.shape[1:])), x, self.p)
@@ -110,14 +114,23 @@ class BoundArrays:
         y = self.outputs(t, x.T)
         return self.program.inputs.switches(t, y, x.T, self.p).T
 
+    @cached_property
+    def _given(self) -> Array | None:
+        """What inputs that parameters alone tell add to x'; None where others enter."""
+        if self.loops is not None or self._has_slopes or not self.program.inputs.constant:
+            return None
+        return np.asarray(self._B @ self.values(0.0, np.zeros(self.program.inputs.states))[1])
+
     def rhs(self, t: Any, x: Array) -> Array:
         """x' at time t, (n,); or (n, k) for states (n, k) at times (k,)."""
+        if (given := self._given) is not None:
+            return np.asarray(self._rows @ x + (given if x.ndim == 1 else given[:, None]))
         y, u = self.values(t, x)
         return self.rates(t, x, y, u)
 
     def rates(self, t: Any, x: Array, y: Array, u: Array) -> Array:
         """x' from the states and the inputs that go with them."""
-        rate: Array = self._A @ x[: self.program.inputs.states] + self._B @ u
+        rate: Array = self._rows @ x[: self.program.inputs.states] + self._B @ u
         if self._has_slopes:
             slopes = self.program.inputs.time_slopes(t, y, x, self.p)
             rate = rate + self._B1 @ _where(self.program.inputs.of_time, slopes)

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache, reduce
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -28,18 +29,21 @@ Moves = Sequence[tuple[float, float, float, float]]
 """How states move; see `around`."""
 
 
-class _Real:
+class RealNumbers:
     """Numbers as the floats that they are, and powers that are real or no number.
 
     Args:
         known: names of symbols and of expressions that have been evaluated before.
     """
 
+    settings: Mapping[str, Any] = MappingProxyType(SETTINGS)
+
     def __init__(self, known: Mapping[Symbol, str]) -> None:
-        super().__init__(SETTINGS)  # type: ignore[call-arg]
+        super().__init__(dict(self.settings))  # type: ignore[call-arg]
         self.known: dict[Basic, str] = dict(known)
 
     def doprint(self, expression: Expr) -> str:
+        """The code of an expression."""
         return self._print(expression)
 
     def _print(self, node: Any, **options: Any) -> str:
@@ -64,7 +68,7 @@ class _Real:
         return f"{self.power}({base}, {exponent})"  # type: ignore[attr-defined]
 
 
-class _Scalar(_Real, PythonCodePrinter):  # type: ignore[misc]
+class FloatPrinter(RealNumbers, PythonCodePrinter):  # type: ignore[misc]
     """Python's own math functions; sign and Heaviside are not among them."""
 
     power = "pow"
@@ -78,7 +82,7 @@ class _Scalar(_Real, PythonCodePrinter):  # type: ignore[misc]
         return f"(1.0 if ({argument}) > 0 else 0.0 if ({argument}) < 0 else {at_zero})"
 
 
-class _Vectorised(_Real, NumPyPrinter):  # type: ignore[misc]
+class ArrayPrinter(RealNumbers, NumPyPrinter):  # type: ignore[misc]
     """numpy's functions."""
 
     power = "power"
@@ -250,7 +254,7 @@ def _needed(shared: Mapping[str, str], texts: Iterable[str]) -> set[str]:
 
 def _reading(
     arguments: Mapping[str, Symbol | Sequence[Symbol]], expressions: Sequence[Expr]
-) -> tuple[_Scalar, list[str]]:
+) -> tuple[FloatPrinter, list[str]]:
     """A printer that knows the symbols of arguments by name, and the lines that read them from lists."""
     known: dict[Symbol, str] = {}
     lines = []
@@ -262,7 +266,7 @@ def _reading(
         taken = {symbol: k for k, symbol in enumerate(given) if symbol in used}
         lines += [f"{name}{k} = {name}[{k}]" for k in taken.values()]
         known |= {symbol: f"{name}{k}" for symbol, k in taken.items()}
-    return _Scalar(known), lines
+    return FloatPrinter(known), lines
 
 
 def vectorised(symbols: Sequence[Symbol], expression: Expr) -> Callable[..., Any]:
@@ -294,7 +298,7 @@ def vectorised_list(symbols: Sequence[Symbol], expressions: Sequence[Expr]) -> C
 
 def _array_function(symbols: Sequence[Symbol], expressions: Expr | Sequence[Expr]) -> Callable[..., Any]:
     arguments = tuple(f"v{k}" for k in range(len(symbols)))
-    return _function(_Vectorised(dict(zip(symbols, arguments, strict=True))), [], arguments, expressions, VECTORISED)
+    return _function(ArrayPrinter(dict(zip(symbols, arguments, strict=True))), [], arguments, expressions, VECTORISED)
 
 
 def _function(
@@ -313,10 +317,22 @@ def _function(
 
 def _compiled(name: str, arguments: tuple[str, ...], lines: list[str], names: dict[str, Any]) -> Callable[..., Any]:
     source = f"def {name}({', '.join(arguments)}):\n" + "".join(f"    {line}\n" for line in lines)
-    made: dict[str, Any] = {}
+    function = executed(source, name, names, {})
+    function.__doc__ = source
+    return function
+
+
+def executed(source: str, name: str, names: dict[str, Any], made: dict[str, Any]) -> Callable[..., Any]:
+    """A function of code that was made from expressions.
+
+    Args:
+        source: the code.
+        name: of the function.
+        names: objects by their names in the code.
+        made: where all that the code defines goes.
+    """
     exec(compile(source, "<equations>", "exec"), names, made)  # noqa: S102 (of our own making, from expressions)
     function: Callable[..., Any] = made[name]
-    function.__doc__ = source
     return function
 
 

@@ -177,6 +177,12 @@ class Inputs:
                         result[group.inputs] += np.einsum("i...,iq->iq...", made, by[places])
         return result
 
+    @cached_property
+    def constant(self) -> bool:
+        """Whether parameters alone tell every input."""
+        templates = (group.made_of.template for group in self._groups)
+        return not any(made.kind is Kind.LAW or made.reads or made.law.has(TIME) for made in templates)
+
     @property
     def linear(self) -> bool:
         """Whether every input is linear in all that it reads, with constant slopes."""

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from importlib.util import find_spec
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from shaftwork.codegen.arrays import ArrayProgram, BoundArrays
+from shaftwork.codegen.code import executed
 from shaftwork.codegen.elements import Array
+from shaftwork.codegen.runs import RunProgram
 from shaftwork.codegen.scalar import ScalarProgram
 from shaftwork.components.pieces import pieces_degree
-from shaftwork.core.errors import CompileError, ParameterError
+from shaftwork.core.errors import CompileError, MissingExtraError, ParameterError
 from shaftwork.core.kept import Kept
 from shaftwork.core.parameters import in_si, is_quantity, without_unit
 from shaftwork.network.graph import CircuitGraph
@@ -127,15 +130,26 @@ class CompiledModel:
         """Rates of the states.
 
         Args:
-            t: time in s.
-            x: (n,) states, in the order of `states`.
+            t: time in s; (k,) beside many states.
+            x: (n,) states, in the order of `states`; or (n, k).
             p: (parameters,) values in the order of `parameters`; by default the network's.
 
         Raises:
             ParameterError: x or p has another length, or units: states and parameters are numbers in SI.
         """
+        if np.ndim(x) == 2:
+            return self._of_many(t, x, p)
         when, states, values = self._numbers(t, x, p)
         return (self.bind(values).rhs if self.scalar is None else self.scalar.bind(values))(when, states)
+
+    def _of_many(self, t: Any, x: Any, p: Any) -> Array:
+        """Rates (n, k) of states (n, k)."""
+        states = np.asarray(without_unit("x", x, "of each state"), dtype=float)
+        when, _, values = self._numbers(t, states[:, 0], p)
+        times = np.asarray(when, dtype=float)
+        if times.shape not in ((), states.shape[1:]):
+            raise ParameterError(f"t has the shape {times.shape}: give one time, or one for each of the states.")
+        return self.bind(values).rhs(np.broadcast_to(times, states.shape[1:]), states)
 
     def jacobian(self, t: float, x: Array, p: Array | None = None) -> Any:
         """d rhs / d x as scipy.sparse.csc_array (n, n); arguments as for `rhs`."""
@@ -168,6 +182,49 @@ class CompiledModel:
                 "matrices. Call rhs(t, x, p), or take the matrices from linearize()."
             )
         return self.scalar.source
+
+    @cached_property
+    def _loops(self) -> RunProgram:
+        title = self.form.graph.name
+        if self.form.waves:
+            raise CompileError(
+                f"'{title}' has travelling waves, whose equations need the past. Take model=Spectral(16)."
+            )
+        try:
+            return RunProgram(explicit_rows(self.form), title)
+        except BlockTooLargeError:
+            raise CompileError(
+                f"'{title}' has no right-hand side line by line: too many rates are coupled for symbols. "
+                "Take rhs(t, x, p)."
+            ) from None
+
+    def source(self, language: str = "numpy") -> str:
+        """The right-hand side as text in a language, equal rows as loops.
+
+        Args:
+            language: "numpy", a function rhs(t, x, p), of states (n, k) too; "c", void rhs(t, x, p, rates); "numba", as
+                for `compiled`; or "sympy", a script with symbols t, x and p and the list rates.
+
+        Raises:
+            ParameterError: it is none of these.
+            CompileError: a law is a table or noise, a shaft is a wave, or too many rates are coupled.
+        """
+        return self._loops.source(language)
+
+    def compiled(self) -> Callable[[float, Array, Array], Array]:
+        """The right-hand side as machine code, to be called from Python or from code of your own that numba compiles.
+
+        It takes t in s, (n,) states and (parameters,) values, and checks nothing: give float arrays. The first call
+        compiles, which takes seconds.
+
+        Raises:
+            MissingExtraError: numba is not installed.
+            CompileError: as for `source`.
+        """
+        if find_spec("numba") is None:
+            raise MissingExtraError("numba", "fast", "model.compiled()")
+        names: dict[str, Any] = {}
+        return executed(self.source("numba"), "rhs", names, names)
 
     def phase(self, name: Any) -> CompiledModel:
         """The equations of one phase of a network whose parts change their mode: `rhs`, `jacobian`, `code`, `states`.

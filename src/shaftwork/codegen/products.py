@@ -18,6 +18,34 @@ FULL = 16_000
 """Multiplications up to which a full array is quicker: a product of scipy.sparse takes 5 us before it begins."""
 
 
+FEW = 2
+"""Times as many entries as there are stand in the diagonals at most, else these take longer than the rows."""
+
+
+class Diagonals:
+    """A matrix (n, n) whose entries stand in a few diagonals, as those of a long shaft do, that multiplies states.
+
+    Args:
+        matrix: of scipy.sparse.
+    """
+
+    def __init__(self, matrix: Any) -> None:
+        self._rows, self._diagonals = matrix, sparse.dia_array(matrix)
+
+    def __matmul__(self, other: Array) -> Array:
+        """Its product with (n,) or (n, k)."""
+        # beside an infinite state the zeros in the diagonals are not zero
+        quick = other.ndim == 1 and isfinite(other.dot(other))
+        return np.asarray((self._diagonals if quick else self._rows) @ other)
+
+
+def by_diagonals(matrix: Any) -> Any:
+    """A matrix of scipy.sparse, or its few diagonals."""
+    entries = matrix.tocoo()
+    count = len(np.unique(entries.coords[1] - entries.coords[0])) if matrix.nnz else 0
+    return Diagonals(matrix) if 0 < count * matrix.shape[0] <= FEW * matrix.nnz else matrix
+
+
 class Factor:
     """A matrix (n, m) that multiplies states or inputs again and again.
 

@@ -127,6 +127,22 @@ class PhasedModel(Model):
         """
         raise self._of_a_phase("code")
 
+    def source(self, language: str = "numpy") -> str:  # noqa: ARG002
+        """There is one for each phase.
+
+        Raises:
+            CompileError: always; says how to choose the phase.
+        """
+        raise self._of_a_phase("source()")
+
+    def compiled(self) -> Any:
+        """There is one for each phase.
+
+        Raises:
+            CompileError: always; says how to choose the phase.
+        """
+        raise self._of_a_phase("compiled()")
+
     def _of_a_phase(self, what: str) -> CompileError:
         graph = self.form.graph
         return CompileError(

@@ -233,7 +233,10 @@ class Settling:
             still = [] if latest else [*still, exceeded]
             seen[moment.regime.modes] = None
             moment, exceeded = self._violated(moment, after, ended, still, repeats)
-        return moment.moved(after, passed), changes
+            if exceeded is None and passed:  # in the modes that go on, how long ago it was hit
+                moment, exceeded = self._violated(moment.moved(after, passed), after, ended, still, repeats)
+                passed = 0.0
+        return moment, changes
 
     def _violated(
         self, moment: Moment, t: float, ended: Moment, still: Sequence[Way], repeats: int = 0

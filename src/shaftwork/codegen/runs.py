@@ -1,0 +1,299 @@
+"""The right-hand side as loops: rows that differ by the place of their states alone are one row of a loop.
+
+So the thousand rows of a long shaft are two stencils, and the code of any network is as long as its equations in print.
+What parameters alone tell is computed before the loops. The same loops are written in several languages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property, reduce
+from types import MappingProxyType
+from typing import Any
+
+from sympy import Add, Basic, Expr, Function, Integer, Mul, Rational, Symbol
+from sympy.printing.c import C99CodePrinter
+from sympy.printing.str import StrPrinter
+
+from shaftwork.codegen.code import ArrayPrinter, FloatPrinter, RealNumbers
+from shaftwork.components.laws import NUMERICAL
+from shaftwork.components.laws import t as TIME
+from shaftwork.core.errors import CompileError, ParameterError
+from shaftwork.reduction.rows import Rows
+
+SHORTEST = 4
+"""Fewer equal rows are written one by one."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """Equal rows one after the other.
+
+    Args:
+        first: place of the first of them.
+        count: how many.
+        rate: of the state of row i, in the symbols `near` of states, in parameters and time.
+    """
+
+    first: int
+    count: int
+    rate: Expr
+
+
+def near(distance: int) -> Symbol:
+    """The state so many places behind that of the row."""
+    return Symbol(f"x[i{distance:+d}]", real=True)
+
+
+def runs_of(rows: Rows) -> tuple[Run, ...]:
+    """The rows of all states, equal ones together."""
+    place = {symbol: k for k, symbol in enumerate(rows.states)}
+    found: list[Run] = []
+    for i, rate in enumerate(rows.rates):
+        read = {symbol: near(place[symbol] - i) for symbol in rate.free_symbols if symbol in place}
+        made = rate.xreplace(read)
+        if found and found[-1].rate == made:
+            found[-1] = Run(found[-1].first, found[-1].count + 1, made)
+        else:
+            found.append(Run(i, 1, made))
+    return tuple(one for run in found for one in ([run] if run.count >= SHORTEST else _apart(run)))
+
+
+def _apart(run: Run) -> Iterator[Run]:
+    yield from (Run(run.first + k, 1, run.rate) for k in range(run.count))
+
+
+class _C(RealNumbers, C99CodePrinter):  # type: ignore[misc]
+    """C's math functions; the sign and the step are not among them."""
+
+    power, settings = "pow", MappingProxyType({"order": "none"})
+
+    def _print_Pow(self, power: Expr, *_: Any) -> str:
+        return str(C99CodePrinter._print_Pow(self, power))  # noqa: SLF001 (its own)
+
+    def _print_Rational(self, number: Rational) -> str:
+        return f"({number.p}.0/{number.q}.0)"
+
+    def _print_sign(self, expression: Expr) -> str:
+        argument = self._print(expression.args[0])
+        return f"((({argument}) > 0) - (({argument}) < 0))"
+
+    def _print_Heaviside(self, expression: Expr) -> str:
+        argument, at_zero = (self._print(part) for part in expression.args)
+        return f"(({argument}) > 0 ? 1.0 : ({argument}) < 0 ? 0.0 : {at_zero})"
+
+    def _print_Integer(self, number: Integer) -> str:
+        return f"{int(number)}.0"  # else quotients are those of whole numbers
+
+
+class _Sympy(RealNumbers, StrPrinter):  # type: ignore[misc]
+    """sympy's own functions."""
+
+    settings = MappingProxyType({"order": "none"})
+
+    def _print_Pow(self, power: Expr, *_: Any) -> str:
+        return f"({self._print(power.base)})**({self._print(power.exp)})"
+
+
+@dataclass(frozen=True)
+class _Language:
+    """How loops are written.
+
+    Args:
+        printer: of expressions.
+        head: what stands before everything, with {states} and {parameters} for their numbers.
+        constant: a line that names what parameters tell.
+        single: a line for one row; by place and rate.
+        loop: the lines of a run; by first place, place behind the last and rate.
+        foot: the lines behind everything.
+        state: a state by its distance in a run, or by its place.
+    """
+
+    printer: type[Any]
+    head: str
+    constant: str
+    single: str
+    loop: tuple[str, ...]
+    foot: tuple[str, ...]
+    state: Callable[[Run, int], str]
+
+
+def _indexed(run: Run, distance: int) -> str:
+    return f"x[{run.first + distance}]" if run.count == 1 else f"x[i{f'{distance:+d}' if distance else ''}]"
+
+
+def _sliced(run: Run, distance: int) -> str:
+    first = run.first + distance
+    return f"x[{first}]" if run.count == 1 else f"x[{first}:{first + run.count}]"
+
+
+_PYTHON = ("for i in range({first}, {last}):", "    rates[i] = {rate}")
+_INDENTED = tuple(f"    {line}" for line in _PYTHON)
+_NUMPY = """from numpy import *
+
+
+def rhs(t, x, p):
+    rates = empty(({states}, *x.shape[1:]))"""
+_NUMBA = """from math import *
+
+from numba import njit
+from numpy import empty
+
+
+@njit(error_model="numpy")
+def rhs(t, x, p):
+    rates = empty({states})"""
+_IN_C = """#include <math.h>
+
+void rhs(double t, const double *restrict x, const double *restrict p, double *restrict rates)
+{"""
+_SYMBOLS = """from sympy import *
+
+t = Symbol("t", real=True)
+x = symbols("x:{states}", real=True, seq=True)
+p = symbols("p:{parameters}", real=True, seq=True)
+rates = [None] * {states}"""
+_LANGUAGES = {
+    "numpy": _Language(
+        ArrayPrinter,
+        _NUMPY,
+        "    {name} = {value}",
+        "    rates[{first}] = {rate}",
+        ("    rates[{first}:{last}] = {rate}",),
+        ("    return rates",),
+        _sliced,
+    ),
+    "numba": _Language(
+        FloatPrinter,
+        _NUMBA,
+        "    {name} = {value}",
+        "    rates[{first}] = {rate}",
+        _INDENTED,
+        ("    return rates",),
+        _indexed,
+    ),
+    "c": _Language(
+        _C,
+        _IN_C,
+        "    const double {name} = {value};",
+        "    rates[{first}] = {rate};",
+        ("    for (int i = {first}; i < {last}; i++)", "        rates[i] = {rate};"),
+        ("}",),
+        _indexed,
+    ),
+    "sympy": _Language(_Sympy, _SYMBOLS, "{name} = {value}", "rates[{first}] = {rate}", _PYTHON, (), _indexed),
+}
+LANGUAGES = tuple(_LANGUAGES)
+
+
+class RunProgram:
+    """The loops of a right-hand side.
+
+    Args:
+        rows: the state equations.
+        title: of the network, for messages.
+    """
+
+    def __init__(self, rows: Rows, title: str) -> None:
+        self._rows, self._title = rows, title
+
+    @cached_property
+    def _runs(self) -> tuple[tuple[Run, ...], dict[Symbol, Expr]]:
+        """The runs in terms of what parameters alone tell, and that by symbols."""
+        constants = _Constants(self._rows.parameters)
+        found = ((run, constants.taken_out(_by_coefficient(run))) for run in runs_of(self._rows))
+        runs = tuple(Run(run.first, run.count, rate) for run, rate in found)
+        return runs, constants.symbols
+
+    def source(self, language: str) -> str:
+        """The code in a language.
+
+        Raises:
+            ParameterError: it is none of them.
+            CompileError: a law has no code in it.
+        """
+        if language not in _LANGUAGES:
+            raise ParameterError(f"There is no source in {language!r}. Take one of: {', '.join(map(repr, LANGUAGES))}.")
+        made, (runs, constants) = _LANGUAGES[language], self._runs
+        known: dict[Basic, str] = {TIME: "t"}
+        known |= {symbol: f"p[{k}]" for k, symbol in enumerate(self._rows.parameters)}
+        known |= {symbol: str(symbol.name) for symbol in constants}
+        numbers = (("{states}", len(self._rows.rates)), ("{parameters}", len(self._rows.parameters)))
+        lines = [reduce(lambda text, number: text.replace(number[0], str(number[1])), numbers, made.head)]
+        values = made.printer(known)
+        lines += [
+            made.constant.format(name=symbol.name, value=self._printed(values, value))
+            for symbol, value in constants.items()
+        ]
+        for run in runs:
+            read = {symbol: made.state(run, distance) for symbol, distance in _read(run.rate)}
+            rate = self._printed(made.printer({**known, **read}), run.rate)
+            written = (made.single,) if run.count == 1 else made.loop
+            lines += [line.format(first=run.first, last=run.first + run.count, rate=rate) for line in written]
+        return "\n".join((*lines, *made.foot, ""))
+
+    def _printed(self, printer: Any, expression: Expr) -> str:
+        own = sorted({str(f.func) for f in expression.atoms(Function)} & NUMERICAL.keys())
+        if own:
+            raise CompileError(
+                f"'{self._title}' has a law with a table or noise, {', '.join(own)}, of which there is no code. Take "
+                "model.rhs, or a formula in place of it."
+            )
+        return str(printer.doprint(expression))
+
+
+class _Constants:
+    """Names for what parameters alone tell."""
+
+    def __init__(self, parameters: Sequence[Symbol]) -> None:
+        self._parameters = frozenset(parameters)
+        self.symbols: dict[Symbol, Expr] = {}
+        self._named: dict[Expr, Symbol] = {}
+
+    def taken_out(self, expression: Expr) -> Expr:
+        """An expression with symbols in place of its largest parts of parameters alone."""
+        if not expression.args or not expression.free_symbols:
+            return expression
+        if expression.free_symbols <= self._parameters:
+            return self._name(expression)
+        if isinstance(expression, Add | Mul):  # what belongs together is one number
+            own = [part for part in expression.args if part.free_symbols and part.free_symbols <= self._parameters]
+            numbers = [part for part in expression.args if not part.free_symbols] if own else []
+            rest = [part for part in expression.args if part not in own and part not in numbers]
+            one = [self._name(expression.func(*numbers, *own))] if own else []
+            return expression.func(*one, *map(self.taken_out, rest))
+        return expression.func(*map(self.taken_out, expression.args))
+
+    def _name(self, expression: Expr) -> Symbol:
+        if expression.is_Symbol:
+            return expression
+        if expression not in self._named:
+            symbol = Symbol(f"c{len(self._named)}", real=True)
+            self._named[expression], self.symbols[symbol] = symbol, expression
+        return self._named[expression]
+
+
+def _read(rate: Expr) -> list[tuple[Symbol, int]]:
+    """The states that a rate reads, and their distances."""
+    found = ((symbol, symbol.name) for symbol in rate.free_symbols if symbol.name.startswith("x[i"))
+    return sorted(((symbol, int(name[3:-1])) for symbol, name in found), key=lambda pair: pair[1])
+
+
+def _by_coefficient(run: Run) -> Expr:
+    """A rate that is linear in the states with what has the same coefficient together; others as they are."""
+    states = [symbol for symbol, _ in _read(run.rate)]
+    slopes = {symbol: run.rate.diff(symbol) for symbol in states}
+    if any(made.has(*states) for made in slopes.values()):
+        return run.rate
+    sums: dict[Expr, list[Expr]] = {}
+    for symbol, made in slopes.items():
+        number, factor = made.as_coeff_Mul()
+        sums.setdefault(factor, []).append(number * symbol)
+    rest = run.rate.xreplace(dict.fromkeys(states, Integer(0)))
+    terms = []
+    for factor, parts in sums.items():
+        numbers = [abs(part.as_coeff_Mul()[0]) for part in parts]
+        least = min(numbers)
+        terms.append(Mul(least * factor, Add(*(part / least for part in parts)), evaluate=False))
+    return Add(rest, *terms)

@@ -1,0 +1,178 @@
+"""The right-hand side as text in four languages, and as machine code: the same numbers as `rhs`."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy
+from numpy.typing import NDArray
+
+import shaftwork as sw
+from shaftwork.core.errors import CompileError, MissingExtraError, ParameterError
+from shaftwork.scenes import SCENES
+
+Array = NDArray[np.float64]
+STEEL = {"length": 1.0, "diameter": 0.02, "density": 7900.0, "shear_modulus": 77.5e9}
+CLOSE = 1e-12
+"""Of the largest term in a sum: coefficients are rounded in another order."""
+
+
+def shaft(model: sw.ShaftModel) -> sw.Network:
+    net = sw.Network("shaft")
+    net.add(sw.TorqueSource("motor", tau=10 * sympy.sin(3 * sw.t)), "a")
+    net.add(sw.Inertia("Je", J=0.025), "a")
+    net.add(sw.Shaft("line", **STEEL, damping=0.1, friction=0.2, model=model), "a", "b")
+    net.add(sw.Inertia("Jm", J=0.11), "b")
+    net.add(sw.TorqueSource("load", tau=-0.1 * sw.omega**2 - sympy.sign(sw.omega)), "b")
+    return net
+
+
+def drive() -> sw.Network:
+    net = sw.Network("drive")
+    net.add(sw.InductionMachine("machine", U=400.0, f=50.0, p=2, R_s=0.5, R_r=0.4, L_s=0.09, L_r=0.09, L_m=0.085), "m")
+    net.add(sw.Inertia("J1", J=0.1), "m")
+    net.add(sw.Gear("gear", ratio=3.0), "m", "w")
+    net.add(sw.Inertia("J2", J=2.0), "w")
+    return net
+
+
+def crane() -> Any:
+    return SCENES["crane"].build().compile().phase("brake slipping forward, load slipping forward")
+
+
+MODELS: dict[str, Callable[[], Any]] = {
+    "lumped": lambda: shaft(sw.Lumped(9)).compile(),
+    "central differences": lambda: shaft(sw.CentralDifference(9)).compile(),
+    "the paper's": lambda: shaft(sw.CentralDifference(9, form="paper")).compile(),
+    "long": lambda: shaft(sw.Lumped(90)).compile(),
+    "crane": crane,
+}
+
+
+def numpy_text(model: Any) -> Callable[[float, Array, Array], Array]:
+    names: dict[str, Any] = {}
+    exec(model.source("numpy"), names)  # noqa: S102 (what is tested)
+    return names["rhs"]  # type: ignore[no-any-return]
+
+
+def c_text(model: Any, folder: Path) -> Callable[[float, Array, Array], Array]:
+    (folder / "rhs.c").write_text(model.source("c"), encoding="utf-8")
+    command = ["gcc", "-O3", "-Wall", "-Werror", "-shared", "-fPIC", "-o", "rhs.so", "rhs.c", "-lm"]
+    subprocess.run(command, cwd=folder, check=True)
+    function = ctypes.CDLL(str(folder / "rhs.so")).rhs
+    doubles = np.ctypeslib.ndpointer(dtype=float, flags="C_CONTIGUOUS")
+    function.argtypes, function.restype = [ctypes.c_double, doubles, doubles, doubles], None
+
+    def rhs(t: float, x: Array, p: Array) -> Array:
+        rates = np.empty(len(x))
+        function(t, x, p, rates)
+        return rates
+
+    return rhs
+
+
+def sympy_text(model: Any) -> Callable[[float, Array, Array], Array]:
+    names: dict[str, Any] = {}
+    exec(model.source("sympy"), names)  # noqa: S102 (what is tested)
+    function = sympy.lambdify([names["t"], names["x"], names["p"]], names["rates"])
+    return lambda t, x, p: np.array(function(t, x, p), dtype=float)
+
+
+def agree(model: Any, function: Callable[[float, Array, Array], Array]) -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(3):
+        x = rng.uniform(0.5, 2.0, len(model.states))
+        p = model.defaults * rng.uniform(0.9, 1.1, len(model.defaults))
+        expected = model.rhs(0.7, x, p)
+        size = np.abs(expected).max()
+        np.testing.assert_allclose(function(0.7, x, p), expected, rtol=CLOSE, atol=100 * CLOSE * size)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_the_text_for_numpy_gives_the_rates(name: str) -> None:
+    model = MODELS[name]()
+    agree(model, numpy_text(model))
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
+@pytest.mark.parametrize("name", MODELS)
+def test_the_text_for_c_gives_the_rates(name: str, tmp_path: Path) -> None:
+    model = MODELS[name]()
+    agree(model, c_text(model, tmp_path))
+
+
+@pytest.mark.parametrize("name", [name for name in MODELS if name != "long"])
+def test_the_text_for_sympy_gives_the_rates(name: str) -> None:
+    model = MODELS[name]()
+    agree(model, sympy_text(model))
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_machine_code_gives_the_rates(name: str) -> None:
+    model = MODELS[name]()
+    agree(model, model.compiled())
+
+
+def test_the_text_of_a_long_shaft_is_no_longer_than_that_of_a_short_one() -> None:
+    short, long = (shaft(sw.Lumped(m)).compile().source("c") for m in (10, 200))
+    assert short.count("\n") == long.count("\n")
+    assert "for (int i = 1; i < 200; i++)" in long
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_rates_of_many_states_are_those_of_each(name: str) -> None:
+    model = MODELS[name]()
+    many = np.random.default_rng(2).uniform(0.5, 2.0, (len(model.states), 4))
+    times = np.array([0.1, 0.2, 0.3, 0.4])
+    expected = np.stack([model.rhs(t, x) for t, x in zip(times, many.T, strict=True)], axis=1)
+    size = np.abs(expected).max()
+    np.testing.assert_allclose(model.rhs(times, many), expected, rtol=CLOSE, atol=CLOSE * size)
+    np.testing.assert_allclose(model.rhs(0.1, many)[:, 0], expected[:, 0], rtol=CLOSE, atol=CLOSE * size)
+    np.testing.assert_allclose(
+        numpy_text(model)(0.1, many, model.defaults)[:, 0], expected[:, 0], rtol=1e-9, atol=1e-10 * size
+    )
+
+
+def test_states_of_another_number_are_refused() -> None:
+    model = MODELS["lumped"]()
+    with pytest.raises(ParameterError, match="x has the shape"):
+        model.rhs(0.0, np.zeros((3, 2)))
+    with pytest.raises(ParameterError, match="t has the shape"):
+        model.rhs(np.zeros(3), np.zeros((len(model.states), 2)))
+
+
+def test_what_has_no_text_is_said() -> None:
+    model = MODELS["lumped"]()
+    with pytest.raises(ParameterError, match="no source in 'fortran'"):
+        model.source("fortran")
+    with pytest.raises(CompileError, match="travelling waves"):
+        shaft_of_waves().compile().source()
+    net = sw.Network("table")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.TorqueSource("motor", tau=sw.Table([0.0, 1.0], [0.0, 1.0])), "a")
+    with pytest.raises(CompileError, match="a table or noise"):
+        net.compile().source("c")
+    with pytest.raises(CompileError, match="each phase has equations of its own"):
+        SCENES["crane"].build().compile().source()
+
+
+def shaft_of_waves() -> sw.Network:
+    net = sw.Network("waves")
+    net.add(sw.Inertia("Je", J=0.025), "a")
+    net.add(sw.Shaft("line", **STEEL, model=sw.Wave()), "a", "b")
+    net.add(sw.Inertia("Jm", J=0.11), "b")
+    return net
+
+
+def test_without_numba_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = MODELS["lumped"]()
+    monkeypatch.setattr("shaftwork.codegen.model.find_spec", lambda _name: None)
+    with pytest.raises(MissingExtraError, match=r"numba.*shaftwork\[fast\]"):
+        model.compiled()
