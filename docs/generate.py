@@ -50,7 +50,7 @@ BLOCK = re.compile(r"^```(?P<language>\w+)\n(?P<body>.*?)^```$", re.MULTILINE | 
 MADE_PART = re.compile(r"(?P<start><!-- made: (?P<name>[\w ]+) -->\n).*?(?P<end><!-- end -->)", re.DOTALL)
 HIDDEN = re.compile(r"<!-- python\n(?P<code>.*?)-->|<!--=(?P<expression>.*?)-->(?P<figure>.*?)<!--/-->", re.DOTALL)
 """Code that runs, and figures that are computed, between the blocks."""
-OUTPUT = ("text", "toml", "latex")
+OUTPUT = ("text", "toml", "latex", "c")
 """Languages of the blocks that hold what the block before them printed."""
 FAMILIES = (
     "rotation",

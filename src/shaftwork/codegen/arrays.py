@@ -124,9 +124,10 @@ class BoundArrays:
     def rhs(self, t: Any, x: Array) -> Array:
         """x' at time t, (n,); or (n, k) for states (n, k) at times (k,)."""
         if (given := self._given) is not None:
-            return np.asarray(self._rows @ x + (given if x.ndim == 1 else given[:, None]))
-        y, u = self.values(t, x)
-        return self.rates(t, x, y, u)
+            rate: Array = self._rows @ x
+            rate += given if x.ndim == 1 else given[:, None]
+            return rate
+        return self.rates(t, x, *self.values(t, x))
 
     def rates(self, t: Any, x: Array, y: Array, u: Array) -> Array:
         """x' from the states and the inputs that go with them."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.util import find_spec
@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 
 from shaftwork.codegen.arrays import ArrayProgram, BoundArrays
-from shaftwork.codegen.code import executed
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.runs import RunProgram
+from shaftwork.codegen.runs import MachineCode, RunProgram
 from shaftwork.codegen.scalar import ScalarProgram
 from shaftwork.components.pieces import pieces_degree
 from shaftwork.core.errors import CompileError, MissingExtraError, ParameterError
@@ -211,11 +210,10 @@ class CompiledModel:
         """
         return self._loops.source(language)
 
-    def compiled(self) -> Callable[[float, Array, Array], Array]:
-        """The right-hand side as machine code, to be called from Python or from code of your own that numba compiles.
+    def compiled(self) -> MachineCode:
+        """The right-hand side as machine code: a function of t in s, (n,) states and (parameters,) values.
 
-        It takes t in s, (n,) states and (parameters,) values, and checks nothing: give float arrays. The first call
-        compiles, which takes seconds.
+        It checks nothing: give float arrays. The first call compiles, which takes seconds.
 
         Raises:
             MissingExtraError: numba is not installed.
@@ -223,8 +221,7 @@ class CompiledModel:
         """
         if find_spec("numba") is None:
             raise MissingExtraError("numba", "fast", "model.compiled()")
-        names: dict[str, Any] = {}
-        return executed(self.source("numba"), "rhs", names, names)
+        return MachineCode(self.source("numba"))
 
     def phase(self, name: Any) -> CompiledModel:
         """The equations of one phase of a network whose parts change their mode: `rhs`, `jacobian`, `code`, `states`.

@@ -18,7 +18,7 @@ FULL = 16_000
 """Multiplications up to which a full array is quicker: a product of scipy.sparse takes 5 us before it begins."""
 
 
-FEW = 2
+FEW = 3
 """Times as many entries as there are stand in the diagonals at most, else these take longer than the rows."""
 
 

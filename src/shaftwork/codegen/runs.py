@@ -12,11 +12,13 @@ from functools import cached_property, reduce
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
 from sympy import Add, Basic, Expr, Function, Integer, Mul, Rational, Symbol
 from sympy.printing.c import C99CodePrinter
 from sympy.printing.str import StrPrinter
 
-from shaftwork.codegen.code import ArrayPrinter, FloatPrinter, RealNumbers
+from shaftwork.codegen.code import ArrayPrinter, FloatPrinter, RealNumbers, executed
+from shaftwork.codegen.elements import Array
 from shaftwork.components.laws import NUMERICAL
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError, ParameterError
@@ -108,6 +110,7 @@ class _Language:
         loop: the lines of a run; by first place, place behind the last and rate.
         foot: the lines behind everything.
         state: a state by its distance in a run, or by its place.
+        view: a line before a run for each state that it reads, from its first place to behind its last.
     """
 
     printer: type[Any]
@@ -117,10 +120,16 @@ class _Language:
     loop: tuple[str, ...]
     foot: tuple[str, ...]
     state: Callable[[Run, int], str]
+    view: str = ""
 
 
 def _indexed(run: Run, distance: int) -> str:
     return f"x[{run.first + distance}]" if run.count == 1 else f"x[i{f'{distance:+d}' if distance else ''}]"
+
+
+def _viewed(run: Run, distance: int) -> str:
+    first = run.first + distance
+    return f"x[{first}]" if run.count == 1 else f"x{first}[i]"
 
 
 def _sliced(run: Run, distance: int) -> str:
@@ -129,7 +138,6 @@ def _sliced(run: Run, distance: int) -> str:
 
 
 _PYTHON = ("for i in range({first}, {last}):", "    rates[i] = {rate}")
-_INDENTED = tuple(f"    {line}" for line in _PYTHON)
 _NUMPY = """from numpy import *
 
 
@@ -138,12 +146,10 @@ def rhs(t, x, p):
 _NUMBA = """from math import *
 
 from numba import njit
-from numpy import empty
 
 
 @njit(error_model="numpy")
-def rhs(t, x, p):
-    rates = empty({states})"""
+def rhs(t, x, p, rates):"""
 _IN_C = """#include <math.h>
 
 void rhs(double t, const double *restrict x, const double *restrict p, double *restrict rates)
@@ -169,9 +175,11 @@ _LANGUAGES = {
         _NUMBA,
         "    {name} = {value}",
         "    rates[{first}] = {rate}",
-        _INDENTED,
-        ("    return rates",),
-        _indexed,
+        ("    made = rates[{first}:{last}]", "    for i in range({count}):", "        made[i] = {rate}"),
+        (),
+        _viewed,
+        # indices that cannot be negative are what LLVM makes vectors of
+        "    x{first} = x[{first}:{last}]",
     ),
     "c": _Language(
         _C,
@@ -185,6 +193,25 @@ _LANGUAGES = {
     "sympy": _Language(_Sympy, _SYMBOLS, "{name} = {value}", "rates[{first}] = {rate}", _PYTHON, (), _indexed),
 }
 LANGUAGES = tuple(_LANGUAGES)
+
+
+class MachineCode:
+    """A right-hand side that numba compiles when it is first called. Nothing is checked: give float arrays.
+
+    Args:
+        source: of a function rhs(t, x, p, rates).
+    """
+
+    def __init__(self, source: str) -> None:
+        names: dict[str, Any] = {}
+        self.into: Callable[[float, Array, Array, Array], None] = executed(source, "rhs", names, names)
+        """Writes the rates into an array, (t, x, p, rates); code of your own that numba compiles may call it, too."""
+
+    def __call__(self, t: float, x: Array, p: Array) -> Array:
+        """The rates (n,) at a time in s of states (n,), with (parameters,) values."""
+        rates = np.empty_like(x)
+        self.into(t, x, p, rates)
+        return rates
 
 
 class RunProgram:
@@ -230,7 +257,10 @@ class RunProgram:
             read = {symbol: made.state(run, distance) for symbol, distance in _read(run.rate)}
             rate = self._printed(made.printer({**known, **read}), run.rate)
             written = (made.single,) if run.count == 1 else made.loop
-            lines += [line.format(first=run.first, last=run.first + run.count, rate=rate) for line in written]
+            begins = [run.first + distance for _, distance in _read(run.rate)] if made.view and run.count > 1 else []
+            lines += [made.view.format(first=begin, last=begin + run.count) for begin in begins]
+            span = {"first": run.first, "last": run.first + run.count, "count": run.count}
+            lines += [line.format(rate=rate, **span) for line in written]
         return "\n".join((*lines, *made.foot, ""))
 
     def _printed(self, printer: Any, expression: Expr) -> str:
