@@ -11,12 +11,12 @@ from unittest import mock
 import numpy as np
 import pytest
 from hypothesis import given
-from sympy import Expr, Symbol, sin
+from sympy import Derivative, Expr, Function, Rational, Symbol, dsolve, exp, simplify, sin
 
 from shaftwork.components.base import REGISTRY, Component, Derived, Port, component
 from shaftwork.components.branches import ACROSS, AcrossStore, Branch
 from shaftwork.components.laws import t
-from shaftwork.components.rotation import Gear, Inertia, Spring
+from shaftwork.components.rotation import Damper, Gear, Inertia, Spring
 from shaftwork.components.shaft_models import (
     CentralDifference,
     Lumped,
@@ -36,6 +36,7 @@ from shaftwork.network.builder import NetworkBuilder
 from shaftwork.reduction.blocks import BlockTooLargeError
 from shaftwork.reduction.form import state_form
 from shaftwork.reduction.rows import explicit_rows
+from shaftwork.scenes import SCENES
 from tests.equations.networks import (
     MECHANICAL,
     crane,
@@ -281,3 +282,39 @@ def test_the_balance_of_a_reversed_source_keeps_its_sign() -> None:
     first, second, *_ = equations_of(net).nodes
     assert first.right.coeff(symbol("T.tau")) == -1
     assert second.right == symbol("T.tau")
+
+
+def test_rows_in_time_are_differential_equations_that_sympy_solves() -> None:
+    net = NetworkBuilder("spin-up")
+    net.add(TorqueSource("motor", tau=3.0), "a")
+    net.add(Inertia("J1", J=2.0), "a")
+    net.add(Damper("D1", d=0.5), "a")
+    equations = equations_of(net)
+    (state,) = equations.states
+    row = equations.in_time(state.equation)
+    speed = Function("J1.omega", real=True)(t)
+    assert row.has(Derivative(speed, t))
+    values = {symbol: Rational(equations.values[symbol.name]) for symbol in row.free_symbols - {t}}
+    solved = dsolve(row.xreplace(values), speed, ics={speed.subs(t, 0): 0})
+    assert simplify(solved.rhs - 6 * (1 - exp(-t / 4))) == 0
+
+
+def test_der_of_der_is_a_second_derivative() -> None:
+    net = NetworkBuilder("pendulum")
+    net.add(Inertia("J1", J=2.0), "a")
+    net.add(Spring("c1", c=5.0), "a", "ground")
+    equations = equations_of(net)
+    angle = equations.second_order.coordinates[0]
+    row = equations.in_time(equations.second_order.residual(0))
+    assert row.has(Derivative(Function(angle.name, real=True)(t), (t, 2)))
+
+
+@pytest.mark.parametrize("scene", ["crane", "bldc-shaft", "shaft-step"])
+def test_no_row_is_an_identity_or_says_what_another_has_said(scene: str) -> None:
+    net = SCENES[scene].build()
+    equations = net.equations(phase=net.start_phase() or None)
+    said = [row.expression for row in equations.rows]
+    assert 0 not in said
+    assert len({*said, *(-expression for expression in said)}) == 2 * len(said)
+    whole = (*equations.nodes, *equations.loops, *equations.couplings, *equations.laws, *equations.states)
+    assert all(row.trivial or {row.expression, -row.expression} & {*said} for row in (*whole, *equations.eliminated))

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal, Protocol
 
-from sympy import Expr, Float, Symbol
+from sympy import Basic, Expr, Float, Function, Symbol
 
+from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.screen import counted, named, on_one_screen
 from shaftwork.equations.assembly import Assembly
@@ -87,10 +88,30 @@ class Equations:
         found = (letter.name for letter in self.letters if letter.name.endswith(INVERSE))
         return {Symbol(name.removesuffix(INVERSE), real=True): Symbol(name, real=True) for name in found}
 
-    @property
+    @cached_property
     def rows(self) -> tuple[Row, ...]:
-        """Every row, in the order in which they are printed."""
-        return (*self.nodes, *self.loops, *self.couplings, *self.laws, *self.states, *self.eliminated)
+        """Every row, in the order in which they are printed, but for identities and what others have said before."""
+        kept, said = list[Row](), set[Expr]()  # only asked for membership
+        for row in (*self.nodes, *self.loops, *self.couplings, *self.laws, *self.states, *self.eliminated):
+            expression = row.expression
+            if not row.trivial and expression not in said:
+                kept.append(row)
+                said |= {expression, -expression}
+        return tuple(kept)
+
+    def in_time(self, expression: Basic) -> Basic:
+        """An expression or equation of these rows as sympy's own: J1.omega as J1.omega(t), der(J1.omega) as Derivative.
+
+        Parameters stay symbols, so the result is what `sympy.dsolve` or `sympy.diff` take.
+        """
+        parameters = {letter.name for letter in self.letters if letter.parameter}
+
+        def function(name: str) -> Expr:
+            inner = name.removeprefix("der(").removesuffix(")") if name.startswith("der(") else ""
+            return function(inner).diff(TIME) if inner else Function(name, real=True)(TIME)
+
+        moving = (symbol for symbol in expression.free_symbols if symbol != TIME and symbol.name not in parameters)
+        return expression.xreplace({symbol: function(symbol.name) for symbol in moving})
 
     @property
     def letters(self) -> tuple[Letter, ...]:
