@@ -181,7 +181,9 @@ class Inputs:
     def constant(self) -> bool:
         """Whether parameters alone tell every input."""
         templates = (group.made_of.template for group in self._groups)
-        return not any(made.kind is Kind.LAW or made.reads or made.law.has(TIME) for made in templates)
+        return not any(
+            made.kind is Kind.LAW or made.reads or made.is_history or made.law.has(TIME) for made in templates
+        )
 
     @property
     def linear(self) -> bool:
