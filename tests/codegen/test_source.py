@@ -64,7 +64,7 @@ def numpy_text(model: Any) -> Callable[[float, Array, Array], Array]:
 
 def c_text(model: Any, folder: Path) -> Callable[[float, Array, Array], Array]:
     (folder / "rhs.c").write_text(model.source("c"), encoding="utf-8")
-    command = ["gcc", "-O3", "-Wall", "-Werror", "-shared", "-fPIC", "-o", "rhs.so", "rhs.c", "-lm"]
+    command = ["gcc", "-std=c99", "-O3", "-Wall", "-Werror", "-shared", "-fPIC", "-o", "rhs.so", "rhs.c", "-lm"]
     subprocess.run(command, cwd=folder, check=True)
     function = ctypes.CDLL(str(folder / "rhs.so")).rhs
     doubles = np.ctypeslib.ndpointer(dtype=float, flags="C_CONTIGUOUS")
@@ -120,6 +120,53 @@ def test_machine_code_gives_the_rates(name: str) -> None:
     agree(model, model.compiled())
 
 
+def inertia(law: Any) -> Any:
+    net = sw.Network("one inertia")
+    net.add(sw.TorqueSource("motor", tau=law), "a")
+    net.add(sw.Inertia("J", J=0.1), "a")
+    return net.compile()
+
+
+LAWS: dict[str, Any] = {
+    "pieces of one slope": sympy.Piecewise((1, sw.omega > 0.4), (-1, True)),
+    "linear pieces": sympy.Piecewise((2 * sw.omega + 1, sw.omega > 0.4), (2 * sw.omega - 3, True)),
+    "the largest": sympy.Max(sw.omega, 0.5) - sympy.Min(sw.omega, 0.3, sw.t),
+    "a cube root": sw.omega ** sympy.Rational(1, 3),
+    "numbers with names": sympy.GoldenRatio * sympy.E * sympy.pi * sw.omega,
+    "steps": sympy.Heaviside(sw.omega - 0.4) + sympy.sign(sw.omega - 0.6),
+    "logic": sympy.Piecewise((1, (sw.omega > 0.2) & (sw.t < 1)), (2 * sw.omega, sw.omega < 0.1), (3, True)),
+}
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
+@pytest.mark.parametrize("law", LAWS)
+def test_laws_have_one_value_in_all_languages(law: str, tmp_path: Path) -> None:
+    model = inertia(LAWS[law])
+    functions = (numpy_text(model), c_text(model, tmp_path), sympy_text(model), model.compiled())
+    for speed in (0.05, 0.3, 0.5, 0.9):
+        x = np.array([speed])
+        expected = model.rhs(0.7, x)
+        for function in functions:
+            np.testing.assert_allclose(function(0.7, x, model.defaults), expected, rtol=1e-14)
+
+
+def test_parts_whose_pieces_are_parameters_have_a_text() -> None:
+    net = sw.Network("drive")
+    net.add(sw.FrequencyDrive("drive", tau_k=50.0, s_k=0.2, n_sync=1500.0), "a")
+    net.add(sw.Inertia("J", J=0.1), "a")
+    model = net.compile()
+    x = np.array([3.0])
+    np.testing.assert_allclose(numpy_text(model)(0.1, x, model.defaults), model.rhs(0.1, x), rtol=1e-14)
+
+
+def test_a_network_without_states_has_no_rates() -> None:
+    net = sw.Network("still")
+    net.add(sw.SpeedSource("source", omega=3.0), "a")
+    net.add(sw.Damper("damper", d=10.0), "a")
+    model = net.compile()
+    assert model.compiled()(0.0, np.empty(0), np.array(model.defaults)).shape == (0,)
+
+
 def test_the_text_of_a_long_shaft_is_no_longer_than_that_of_a_short_one() -> None:
     short, long = (shaft(sw.Lumped(m)).compile().source("c") for m in (10, 200))
     assert short.count("\n") == long.count("\n")
@@ -144,6 +191,7 @@ def test_states_of_another_number_are_refused() -> None:
     model = MODELS["lumped"]()
     with pytest.raises(ParameterError, match="x has the shape"):
         model.rhs(0.0, np.zeros((3, 2)))
+    assert model.rhs(0.0, np.zeros((len(model.states), 0))).shape == (len(model.states), 0)
     with pytest.raises(ParameterError, match="t has the shape"):
         model.rhs(np.zeros(3), np.zeros((len(model.states), 2)))
 

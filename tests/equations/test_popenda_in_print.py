@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterator
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -276,5 +277,76 @@ def test_what_is_no_notation_is_refused(notation: Any, message: str) -> None:
 def test_a_notation_names_quantities_that_are_there() -> None:
     with pytest.raises(ParameterError, match="no quantity 'torque'"):
         sw.Notation({"torque": "M"})
-    with pytest.raises(ParameterError, match="has no"):
-        sw.Notation(rate="d/dt")
+    for rate in ("d/dt", "{0}{1}", r"\dot{x}"):
+        with pytest.raises(ParameterError, match="has no"):
+            sw.Notation(rate=rate)
+
+
+@pytest.mark.parametrize("model", [sw.Wave(), sw.Lumped(3), sw.CentralDifference(4), sw.Spectral(4)], ids=repr)
+def test_a_clamped_end_has_a_speed_and_no_torque(model: sw.ShaftModel) -> None:
+    net = sw.Network("clamped")
+    net.add(sw.Inertia("J", J=0.1), "a")
+    net.add(sw.Shaft("line", **STEEL, model=model), "a", "ground")
+    net.add(sw.Spring("c", c=3.0), "a", "z")
+    net.add(sw.Inertia("J2", J=0.2), "z")
+    equations = net.equations()
+    (field,) = equations.fields
+    assert [str(row.lhs) for row in field.boundary] == [
+        "line.omega(0, t)",
+        "line.tau(0, t)",
+        "line.omega(line.length, t)",
+    ]
+    assert field.boundary[-1].rhs == 0
+    assert r"\omega_{\mathrm{line}}(L_{\mathrm{line}}, t) &= 0" in equations.latex(form="field")
+    assert equations.document()
+
+
+def test_the_end_of_a_shaft_sees_the_torque_along_the_next() -> None:
+    net = sw.Network("stepped")
+    net.add(sw.Inertia("J", J=0.1), "a")
+    net.add(sw.Shaft("p", **STEEL, model=sw.Lumped(4)), "a", "b")
+    net.add(sw.Shaft("q", **STEEL, model=sw.Spectral(4)), "b", "c")
+    first, second = net.equations().fields
+    assert first.boundary[3].rhs == second.torque.subs(X, 0)
+    assert second.boundary[1].rhs == first.torque.subs(X, first.symbol("length"))
+    assert second.boundary[3].rhs == 0  # a free end
+    text = net.equations().latex(form="field", notation="popenda")
+    assert r"M_{\mathrm{p}}(L_{\mathrm{p}}, t) &= M_{\mathrm{q}}(0, t)" in text
+
+
+def test_a_transfer_function_has_the_letters_of_its_equations() -> None:
+    text = chain(2).equations().written_as("popenda").transfer_function("M1.tau", "J2.omega").latex()
+    assert "S_{c," in text
+    assert "c1.c" not in text
+
+
+def test_letters_of_a_notation_may_have_subscripts() -> None:
+    text = chain(3).equations().latex(form="state", notation=sw.Notation({"tau": "M_t"}))
+    assert r"M_{t,c," in text
+
+
+@sw.component
+class Follower(sw.Component):
+    """A node that turns k times as fast as another one.
+
+    Law: omega_c = k omega_a.
+    """
+
+    k: float = sw.parameter("1", "ratio")
+    role: ClassVar[Any] = "source"
+    ports: ClassVar = (sw.Port("a"), sw.Port("c"))
+
+    def branches(self, p: Any) -> Iterator[Any]:
+        yield sw.AcrossLaw(p.k * sw.across_of("a"), ("c", None), "w_c")
+
+
+def test_a_letter_that_stands_in_print_has_its_law_there() -> None:
+    """Beside a spring the sum itself is printed, beside a damper its letter."""
+    for part, letter in ((sw.Damper("d1", d=0.3), True), (sw.Spring("c1", c=0.3), False)):
+        net = sw.Network("follower")
+        net.add(sw.Inertia("J1", J=1.0), "a")
+        net.add(Follower("f1", k=2.0), "a", "c")
+        net.add(part, "c", "a")
+        text = net.equations().latex(form="state")
+        assert (r"\omega_{w,c,1} &= k_{1} \, \omega_{1}" in text) is letter
+        assert (r"\omega_{w,c" in text) is letter

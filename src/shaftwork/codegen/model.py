@@ -144,8 +144,10 @@ class CompiledModel:
     def _of_many(self, t: Any, x: Any, p: Any) -> Array:
         """Rates (n, k) of states (n, k)."""
         states = np.asarray(without_unit("x", x, "of each state"), dtype=float)
-        when, _, values = self._numbers(t, states[:, 0], p)
-        times = np.asarray(when, dtype=float)
+        if len(states) != len(self.states):
+            raise ParameterError(f"x has the shape {states.shape}: give {len(self.states)} rows, one for each state.")
+        values = self.defaults if p is None else self._vector("p", p, len(self.parameters), "parameter")
+        times = np.asarray(t.to("s").magnitude if is_quantity(t) else t, dtype=float)
         if times.shape not in ((), states.shape[1:]):
             raise ParameterError(f"t has the shape {times.shape}: give one time, or one for each of the states.")
         return self.bind(values).rhs(np.broadcast_to(times, states.shape[1:]), states)

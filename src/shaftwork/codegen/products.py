@@ -19,7 +19,7 @@ FULL = 16_000
 
 
 FEW = 3
-"""Times as many entries as there are stand in the diagonals at most, else these take longer than the rows."""
+"""The diagonals may hold so many times the entries of a matrix; beyond that its rows are quicker."""
 
 
 class Diagonals:

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, reduce
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from sympy import Add, Basic, Expr, Function, Integer, Mul, Rational, Symbol
+from sympy import Add, Basic, Expr, Function, Integer, Mul, Rational, S, Symbol
 from sympy.printing.c import C99CodePrinter
 from sympy.printing.str import StrPrinter
 
@@ -69,13 +69,18 @@ def _apart(run: Run) -> Iterator[Run]:
 class _C(RealNumbers, C99CodePrinter):  # type: ignore[misc]
     """C's math functions; the sign and the step are not among them."""
 
-    power, settings = "pow", MappingProxyType({"order": "none"})
+    settings = MappingProxyType({"order": "none", "math_macros": {}})  # M_PI is not in the standard
+
+    def _print_NumberSymbol(self, number: Expr) -> str:
+        return repr(float(number))
 
     def _print_Pow(self, power: Expr, *_: Any) -> str:
-        return str(C99CodePrinter._print_Pow(self, power))  # noqa: SLF001 (its own)
+        if abs(power.exp) == S.Half or power.exp.is_integer:
+            return str(C99CodePrinter._print_Pow(self, power))  # noqa: SLF001 (its own)
+        return f"pow({self._print(power.base)}, {self._print(power.exp)})"
 
     def _print_Rational(self, number: Rational) -> str:
-        return f"({number.p}.0/{number.q}.0)"
+        return f"{number.p}.0/{number.q}.0"
 
     def _print_sign(self, expression: Expr) -> str:
         argument = self._print(expression.args[0])
@@ -104,12 +109,12 @@ class _Language:
 
     Args:
         printer: of expressions.
-        head: what stands before everything, with {states} and {parameters} for their numbers.
+        head: what stands before everything; {states} and {parameters} stand for how many there are.
         constant: a line that names what parameters tell.
         single: a line for one row; by place and rate.
         loop: the lines of a run; by first place, place behind the last and rate.
         foot: the lines behind everything.
-        state: a state by its distance in a run, or by its place.
+        state: a state, by the run in which it stands and its distance from the row.
         view: a line before a run for each state that it reads, from its first place to behind its last.
     """
 
@@ -137,8 +142,9 @@ def _sliced(run: Run, distance: int) -> str:
     return f"x[{first}]" if run.count == 1 else f"x[{first}:{first + run.count}]"
 
 
-_PYTHON = ("for i in range({first}, {last}):", "    rates[i] = {rate}")
-_NUMPY = """from numpy import *
+_NUMPY = """from functools import reduce
+
+from numpy import *
 
 
 def rhs(t, x, p):
@@ -176,7 +182,7 @@ _LANGUAGES = {
         "    {name} = {value}",
         "    rates[{first}] = {rate}",
         ("    made = rates[{first}:{last}]", "    for i in range({count}):", "        made[i] = {rate}"),
-        (),
+        ("    return",),
         _viewed,
         # indices that cannot be negative are what LLVM makes vectors of
         "    x{first} = x[{first}:{last}]",
@@ -190,7 +196,15 @@ _LANGUAGES = {
         ("}",),
         _indexed,
     ),
-    "sympy": _Language(_Sympy, _SYMBOLS, "{name} = {value}", "rates[{first}] = {rate}", _PYTHON, (), _indexed),
+    "sympy": _Language(
+        _Sympy,
+        _SYMBOLS,
+        "{name} = {value}",
+        "rates[{first}] = {rate}",
+        ("for i in range({first}, {last}):", "    rates[i] = {rate}"),
+        (),
+        _indexed,
+    ),
 }
 LANGUAGES = tuple(_LANGUAGES)
 
@@ -240,14 +254,14 @@ class RunProgram:
             ParameterError: it is none of them.
             CompileError: a law has no code in it.
         """
-        if language not in _LANGUAGES:
+        if not isinstance(language, str) or language not in _LANGUAGES:
             raise ParameterError(f"There is no source in {language!r}. Take one of: {', '.join(map(repr, LANGUAGES))}.")
         made, (runs, constants) = _LANGUAGES[language], self._runs
         known: dict[Basic, str] = {TIME: "t"}
         known |= {symbol: f"p[{k}]" for k, symbol in enumerate(self._rows.parameters)}
         known |= {symbol: str(symbol.name) for symbol in constants}
-        numbers = (("{states}", len(self._rows.rates)), ("{parameters}", len(self._rows.parameters)))
-        lines = [reduce(lambda text, number: text.replace(number[0], str(number[1])), numbers, made.head)]
+        head = made.head.replace("{states}", str(len(self._rows.rates)))
+        lines = [head.replace("{parameters}", str(len(self._rows.parameters)))]
         values = made.printer(known)
         lines += [
             made.constant.format(name=symbol.name, value=self._printed(values, value))
@@ -281,10 +295,12 @@ class _Constants:
         self.symbols: dict[Symbol, Expr] = {}
         self._named: dict[Expr, Symbol] = {}
 
-    def taken_out(self, expression: Expr) -> Expr:
+    def taken_out(self, expression: Any) -> Any:
         """An expression with symbols in place of its largest parts of parameters alone."""
         if not expression.args or not expression.free_symbols:
             return expression
+        if not isinstance(expression, Expr):  # a condition, or a piece with its own
+            return expression.func(*map(self.taken_out, expression.args))
         if expression.free_symbols <= self._parameters:
             return self._name(expression)
         if isinstance(expression, Add | Mul):  # what belongs together is one number
@@ -321,9 +337,11 @@ def _by_coefficient(run: Run) -> Expr:
         number, factor = made.as_coeff_Mul()
         sums.setdefault(factor, []).append(number * symbol)
     rest = run.rate.xreplace(dict.fromkeys(states, Integer(0)))
+    total = Add(rest, *(symbol * made for symbol, made in slopes.items()))
+    if (run.rate - total).expand() != 0:  # of other pieces of a law, which may have the same slopes
+        return run.rate
     terms = []
     for factor, parts in sums.items():
-        numbers = [abs(part.as_coeff_Mul()[0]) for part in parts]
-        least = min(numbers)
+        least = min(abs(part.as_coeff_Mul()[0]) for part in parts)
         terms.append(Mul(least * factor, Add(*(part / least for part in parts)), evaluate=False))
     return Add(rest, *terms)

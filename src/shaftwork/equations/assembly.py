@@ -171,7 +171,8 @@ class Assembly:
         factors = {symbol: template.printed.diff(symbol) for symbol in template.reads}
         total = Add(*(symbol * factor for symbol, factor in factors.items()))
         left = (template.printed - total).expand()
-        return bool(factors) and left == 0 and not any(factor.has(*factors, TIME) for factor in factors.values())
+        moving = (*factors, ACROSS, INTEGRAL, TIME)
+        return bool(factors) and left == 0 and not any(factor.has(*moving) for factor in factors.values())
 
     def in_place(self, terms: Iterable[Expr]) -> Terms:
         """Terms in which prescribed across variables that are sums stand by these."""

@@ -257,10 +257,18 @@ class Blocks:
             yield from self.law(flow, {} if across == 0 else {sign * across: known})
         for source in self.equations.form.across_sources:
             prescribed = assembly.law_of_source(source)
-            if not assembly.is_sum(source) and prescribed.groups[0].terms != (prescribed.left,):
+            if self._stands(source) and prescribed.groups[0].terms != (prescribed.left,):
                 yield self.writer.line(prescribed)
         for end, other in assembly.opposite.items():
             yield self.writer.line(assembly.law_of_history(end, Add(*assembly.around(other))))
+
+    def _stands(self, source: int) -> bool:
+        """Whether a prescribed across variable stands anywhere by its letter, and not by the sum that it is."""
+        if not self.equations.assembly.is_sum(source):
+            return True
+        rows = (*self.equations.states, *self.equations.eliminated)
+        letters = self.equations.assembly.quantities.across(self.equations.assembly.ends(source)).free_symbols
+        return any(not letters.isdisjoint(row.expression.free_symbols) for row in rows)
 
     def law(self, flow: Flow, known: Mapping[Expr, Expr]) -> Iterator[Line]:
         """A flow's law, and the letters in it; nothing where the law is a parameter alone."""
@@ -296,7 +304,8 @@ class Blocks:
 
 
 def _rates_in(left: Expr) -> int:
-    return sum(str(symbol.name).startswith("der(") for symbol in left.free_symbols)
+    names = (str(symbol.name) for symbol in left.free_symbols)
+    return sum(name.startswith("der(") and name.endswith(")") for name in names)
 
 
 def _to_rounding(expression: Expr) -> Expr:

@@ -27,7 +27,7 @@ from shaftwork.equations.notation import Letter, without_marks
 from shaftwork.equations.notations import INVERSE
 from shaftwork.equations.printing import Line, Writer, with_rates
 from shaftwork.equations.quantities import Flow
-from shaftwork.network.graph import GraphPart
+from shaftwork.network.graph import GROUND, GraphPart
 
 if TYPE_CHECKING:  # the records make these
     from shaftwork.equations.records import Equations
@@ -100,14 +100,19 @@ class Field:
         for end, place, sign in (("a", Integer(0), 1), ("b", self.symbol("length"), -1)):
             node = self.part.nodes[end]
             found.append(Eq(self.speed.subs(X, place), quantities.node(node), evaluate=False))
-            found.append(Eq(self.torque.subs(X, place), sign * Add(*self._given(node)), evaluate=False))
+            if node != GROUND:  # the frame takes any torque
+                found.append(Eq(self.torque.subs(X, place), sign * Add(*self._given(node)), evaluate=False))
         return tuple(found)
 
     def _given(self, node: int) -> Iterator[Expr]:
         """What the other parts at a node give, less what their inertias take."""
         assembly, graph = self.equations.assembly, self.equations.form.graph
+        for other in self.equations.fields:
+            if other.part is not self.part:
+                ends = (("a", -1, Integer(0)), ("b", 1, other.symbol("length")))
+                yield from (sign * other.torque.subs(X, x) for end, sign, x in ends if other.part.nodes[end] == node)
         for item in assembly.at_node[node]:
-            if graph.part_of(item.branches[0] if isinstance(item, Flow) else item) is self.part:
+            if isinstance(graph.part_of(item.branches[0] if isinstance(item, Flow) else item).component, Shaft):
                 continue
             if isinstance(item, Flow):
                 yield (1 if item.minus == node else -1) * item.sign * assembly.quantities.through(item)
@@ -136,7 +141,7 @@ class Field:
             for symbol, law in self.definitions.items()
         )
         return (
-            tuple(self._line(row, writer) for row in self.rows),
+            tuple(dict.fromkeys(self._line(row, writer) for row in self.rows)),  # (14) and (15) have the same numbers
             tuple(self._line(row, writer) for row in self.boundary),
             () if values else tuple(writer.line(sides(symbol, (law,))) for symbol, law in laws),
         )
@@ -179,11 +184,15 @@ class Field:
         names = (letter.name for letter in self._letters if letter.name.endswith(INVERSE))
         return {Symbol(name.removesuffix(INVERSE), real=True): Symbol(name, real=True) for name in names}
 
+    @cached_property
+    def _names(self) -> dict[str, str]:
+        """The letters of the shaft in LaTeX, with the subscript that its length has."""
+        _, _, subscript = self.equations.symbol_names[f"{self.part.name}.length"].partition("_")
+        return {letter.name: letter.printed(subscript.removeprefix("{").removesuffix("}")) for letter in self._letters}
+
     def _writer(self, values: Mapping[str, float]) -> Writer:
-        known = self.equations.symbol_names
-        _, _, subscript = known[f"{self.part.name}.length"].partition("_")
-        own = {letter.name: letter.printed(subscript.removeprefix("{").removesuffix("}")) for letter in self._letters}
-        rates = with_rates(known, self.equations.source.rate_of)
+        rates = with_rates(self.equations.symbol_names, self.equations.source.rate_of)
+        own = {name: latex for field in self.equations.fields for name, latex in field._names.items()}  # noqa: SLF001
         atoms = {symbol.name: _printed(atom, own) for atom, symbol in self._atoms.items()}
         names = {**own, **atoms, **{name: latex for name, latex in rates.items() if name not in own}}
         parameters = [letter.name for letter in (*self.equations.letters, *self._letters) if letter.parameter]

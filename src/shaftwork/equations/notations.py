@@ -56,8 +56,14 @@ class Notation:
                 f"Notation: there is no quantity {', '.join(map(repr, unknown))}. There are: "
                 f"{', '.join(_QUANTITIES.values())}."
             )
-        if self.rate.format("x") == self.rate.format("y"):
-            raise ParameterError(f"Notation: rate = {self.rate!r} has no {{}} for what is derived.")
+        try:
+            says = self.rate.format("x") != self.rate.format("y")
+        except (IndexError, KeyError, ValueError):  # of braces that are not doubled
+            says = False
+        if not says:
+            raise ParameterError(
+                f"Notation: rate = {self.rate!r} has no {{}} for what is derived; other braces stand twice."
+            )
 
     def written(self, letter: Letter) -> Letter:
         """A letter as this source has it."""
@@ -70,7 +76,10 @@ class Notation:
             return _spelt(letter, chosen)
         sign = r"\Delta " if letter.base.startswith(r"\Delta ") else ""
         quantity = _QUANTITIES.get((letter.base.removeprefix(sign), letter.unit), "")
-        return replace(letter, base=sign + self.quantities[quantity]) if quantity in self.quantities else letter
+        if quantity not in self.quantities:
+            return letter
+        made = _spelt(letter, self.quantities[quantity])
+        return replace(made, base=sign + made.base, mark=",".join(filter(None, (made.mark, letter.mark))))
 
     def rate_of(self, latex: str) -> str:
         """A time derivative."""
@@ -105,14 +114,12 @@ NOTATIONS: Mapping[str, Notation] = {
 """The notations that equations are printed in by name."""
 
 
-def notation_of(asked: str | Notation | None) -> Notation:
+def notation_of(asked: str | Notation) -> Notation:
     """A notation by its name.
 
     Raises:
         ParameterError: there is no such one.
     """
-    if asked is None:
-        return OWN
     if isinstance(asked, Notation):
         return asked
     if not isinstance(asked, str) or asked not in NOTATIONS:

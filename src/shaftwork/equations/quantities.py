@@ -235,7 +235,7 @@ class Quantities:
         """For a node the branch to the reference whose across variable is its own: a source, else the first store."""
         found: dict[int, int] = {}
         for branch in self._defining:
-            if branch.minus == GROUND:
+            if branch.minus == GROUND != branch.plus:
                 found.setdefault(branch.plus, branch.index)
         return found
 

@@ -107,7 +107,7 @@ class Equations:
         parameters = {letter.name for letter in self.letters if letter.parameter}
 
         def function(name: str) -> Expr:
-            inner = name.removeprefix("der(").removesuffix(")") if name.startswith("der(") else ""
+            inner = name[4:-1] if name.startswith("der(") and name.endswith(")") else ""
             return function(inner).diff(TIME) if inner else Function(name, real=True)(TIME)
 
         moving = (symbol for symbol in expression.free_symbols if symbol != TIME and symbol.name not in parameters)

@@ -31,7 +31,9 @@ def in_latex(made: TransferFunction) -> str:
 def _lines(made: TransferFunction) -> Iterator[Line]:
     names, blocks = made.equations.symbol_names, Blocks(made.equations, values=False)
     letters = _letters(made.slopes, set(names.values()))
-    writer = Writer({**names, **letters, REAL.name: "s"}, {*made.equations.values, *letters}, (), {})
+    writer = Writer(
+        {**names, **letters, REAL.name: "s"}, {*made.equations.values, *letters}, (), {}, made.equations.inverses
+    )
     above, below = (writer.pieces(_powers(polynomial)) for polynomial in made.printed)
     left = rf"\frac{{{_named(made.output, names)}}}{{{_named(made.input, names)}}}"
     if 1.5 * max(printed_width(" ".join(pieces)) for pieces in (above, below)) < LINE_WIDTH:

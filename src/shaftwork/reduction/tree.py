@@ -218,7 +218,9 @@ def _rank(graph: CircuitGraph, branch: GraphBranch) -> tuple[Kind, int]:
     they hold.
     """
     kind, modes = branch.template.kind, graph.parts[branch.part].modes
-    return kind, (1 + all(not made.passes_on for made in modes)) * bool(modes and kind is Kind.COUPLING)
+    if kind is not Kind.COUPLING or not modes:
+        return kind, 0
+    return kind, 1 if any(made.passes_on for made in modes) else 2
 
 
 def _is_free(reduced: Row) -> bool:

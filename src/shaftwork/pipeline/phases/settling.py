@@ -229,7 +229,8 @@ class Settling:
                 raise endless(t, changes, blocked)
             if again or impact:
                 seen.clear()
-            tried = Counter() if impact else tried  # what contradicted others need not do so at other speeds
+            if impact:
+                tried.clear()  # what contradicted others need not do so at other speeds
             still = [] if latest else [*still, exceeded]
             seen[moment.regime.modes] = None
             moment, exceeded = self._violated(moment, after, ended, still, repeats)
