@@ -16,6 +16,7 @@ from shaftwork.core.domains import ELECTRICAL, ROTATION, TRANSLATION
 from shaftwork.core.errors import CompileError
 from shaftwork.equations.assembly import Group, Sides, sides, tidy
 from shaftwork.equations.notation import INDEX_CLOSES, INDEX_OPENS
+from shaftwork.equations.notations import in_letters
 from shaftwork.equations.printing import LINE_WIDTH, Line, Writer, with_rates
 from shaftwork.equations.quantities import Flow, rate_of
 from shaftwork.equations.second_order import SecondOrder
@@ -87,11 +88,8 @@ class Blocks:
 
     def derived(self) -> Block:
         """The definitions of the letters that stand for several parameters; nothing where numbers are printed."""
-        definitions, inverses = {} if self.values else self.equations.definitions, self.equations.inverses
-        pairs = (
-            (inverses.get(symbol, symbol), 1 / law if symbol in inverses else law)
-            for symbol, law in definitions.items()
-        )
+        definitions = {} if self.values else self.equations.definitions
+        pairs = in_letters(definitions, self.equations.inverses)
         weights = (WEIGHTS,) if self.sums else ()
         return Block(
             "Derived quantities",

@@ -24,7 +24,7 @@ from shaftwork.core.domains import ROTATION
 from shaftwork.core.parameters import Parameter
 from shaftwork.equations.assembly import sides, terms_of
 from shaftwork.equations.notation import Letter, without_marks
-from shaftwork.equations.notations import INVERSE
+from shaftwork.equations.notations import in_letters, inverses_of
 from shaftwork.equations.printing import Line, Writer, with_rates
 from shaftwork.equations.quantities import Flow
 from shaftwork.network.graph import GROUND, GraphPart
@@ -135,15 +135,12 @@ class Field:
 
     def lines(self, *, values: bool = False) -> tuple[tuple[Line, ...], tuple[Line, ...], tuple[Line, ...]]:
         """The rows, the boundary conditions and the definitions in LaTeX; with values there are no definitions."""
-        writer, inverses = self._writer(self._values if values else {}), self._inverses
-        laws = (
-            (inverses[symbol], 1 / law) if symbol in inverses else (symbol, law)
-            for symbol, law in self.definitions.items()
-        )
+        writer = self._writer(self._values if values else {})
+        defined = () if values else in_letters(self.definitions, self._inverses)
         return (
             tuple(dict.fromkeys(self._line(row, writer) for row in self.rows)),  # (14) and (15) have the same numbers
             tuple(self._line(row, writer) for row in self.boundary),
-            () if values else tuple(writer.line(sides(symbol, (law,))) for symbol, law in laws),
+            tuple(writer.line(sides(symbol, (law,))) for symbol, law in defined),
         )
 
     def _line(self, row: Eq, writer: Writer) -> Line:
@@ -181,8 +178,7 @@ class Field:
 
     @cached_property
     def _inverses(self) -> dict[Symbol, Symbol]:
-        names = (letter.name for letter in self._letters if letter.name.endswith(INVERSE))
-        return {Symbol(name.removesuffix(INVERSE), real=True): Symbol(name, real=True) for name in names}
+        return inverses_of(self._letters)
 
     @cached_property
     def _names(self) -> dict[str, str]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
+
+from sympy import Expr, Symbol
 
 from shaftwork.core.domains import DOMAINS
 from shaftwork.core.errors import ParameterError
@@ -90,6 +92,18 @@ class Notation:
 def _spelt(letter: Letter, latex: str) -> Letter:
     base, _, mark = latex.partition("_")
     return replace(letter, base=base, mark=mark.removeprefix("{").removesuffix("}"))
+
+
+def inverses_of(letters: Iterable[Letter]) -> dict[Symbol, Symbol]:
+    """For each parameter that has a letter for its reciprocal the symbol of that."""
+    names = (letter.name for letter in letters if letter.name.endswith(INVERSE))
+    return {Symbol(name.removesuffix(INVERSE), real=True): Symbol(name, real=True) for name in names}
+
+
+def in_letters(definitions: Mapping[Symbol, Expr], inverses: Mapping[Symbol, Symbol]) -> Iterator[tuple[Symbol, Expr]]:
+    """Definitions, those of parameters that have a letter for their reciprocal as such."""
+    for symbol, law in definitions.items():
+        yield (inverses[symbol], 1 / law) if symbol in inverses else (symbol, law)
 
 
 OWN = Notation()

@@ -14,7 +14,7 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.core.screen import counted, named, on_one_screen
 from shaftwork.equations.assembly import Assembly
 from shaftwork.equations.notation import Letter, notation
-from shaftwork.equations.notations import INVERSE, OWN, Notation, notation_of
+from shaftwork.equations.notations import OWN, Notation, inverses_of, notation_of
 from shaftwork.equations.rows import (
     CouplingEquation,
     Eliminated,
@@ -85,8 +85,7 @@ class Equations:
     @cached_property
     def inverses(self) -> Mapping[Symbol, Symbol]:
         """For each parameter that is printed by its reciprocal the symbol of that."""
-        found = (letter.name for letter in self.letters if letter.name.endswith(INVERSE))
-        return {Symbol(name.removesuffix(INVERSE), real=True): Symbol(name, real=True) for name in found}
+        return inverses_of(self.letters)
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:
