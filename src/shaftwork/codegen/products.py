@@ -18,8 +18,8 @@ FULL = 16_000
 """Multiplications up to which a full array is quicker: a product of scipy.sparse takes 5 us before it begins."""
 
 
-FEW = 3
-"""The diagonals may hold so many times the entries of a matrix; beyond that its rows are quicker."""
+FEW, MOST = 3, 32
+"""The diagonals may hold so many times the entries of a matrix, and be so many; beyond that its rows are quicker."""
 
 
 class Diagonals:
@@ -43,7 +43,7 @@ def by_diagonals(matrix: Any) -> Any:
     """A matrix of scipy.sparse, or its few diagonals."""
     entries = matrix.tocoo()
     count = len(np.unique(entries.coords[1] - entries.coords[0])) if matrix.nnz else 0
-    return Diagonals(matrix) if 0 < count * matrix.shape[0] <= FEW * matrix.nnz else matrix
+    return Diagonals(matrix) if 0 < count <= MOST and count * matrix.shape[0] <= FEW * matrix.nnz else matrix
 
 
 class Factor:
