@@ -13,7 +13,7 @@ from shaftwork.codegen.elements import Array, GainMatrix, potential_matrix, rati
 from shaftwork.codegen.inputs import Inputs
 from shaftwork.codegen.loops import LoopSolver
 from shaftwork.codegen.matrices import LinearPart, MatrixAssembly
-from shaftwork.codegen.products import by_diagonals
+from shaftwork.codegen.products import Factor, by_diagonals
 from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
 
@@ -62,7 +62,6 @@ class BoundArrays:
         self.program, self.p, self.part = program, p, part
         factors: tuple[Any, ...] = part.factors if full else tuple(made.sparse for made in part.factors)
         self._A, self._B, self._B1, self._C, self._D = factors
-        self._rows = self._A if full else by_diagonals(self._A)
         self._has_slopes, self._controls = bool(part.B1.nnz), program.inputs.controls
         loops = program.loop_places
         form = program.form
@@ -113,6 +112,11 @@ class BoundArrays:
         """What jumps or bends a law where its sign changes, (k, m), at times (k,) and states (k, n)."""
         y = self.outputs(t, x.T)
         return self.program.inputs.switches(t, y, x.T, self.p).T
+
+    @cached_property
+    def _rows(self) -> Any:
+        """A, as it is multiplied by states."""
+        return self._A if isinstance(self._A, Factor) else by_diagonals(self._A)
 
     @cached_property
     def _given(self) -> Array | None:

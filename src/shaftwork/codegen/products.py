@@ -16,8 +16,6 @@ from shaftwork.codegen.elements import Array
 
 FULL = 16_000
 """Multiplications up to which a full array is quicker: a product of scipy.sparse takes 5 us before it begins."""
-
-
 FEW, MOST = 3, 32
 """The diagonals may hold so many times the entries of a matrix, and be so many; beyond that its rows are quicker."""
 
