@@ -173,13 +173,15 @@ class Settling:
         found: list[tuple[Moment, list[Change]]] = []
         failed: list[SimulationError] = []
         ways = self._at_once(moment, after, named)
+        least = max(1, len({number for number, made in ways if made.leave.by_twist}))  # an angle waits for nothing
         for first in ways:
             try:
                 found.append(self._consistent(t, after, moment, first))
             except SimulationError as error:
                 failed.append(error)
             else:
-                if len(found[-1][1]) == 1:
+                changes = found[-1][1]
+                if len(changes) == 1 or (len(changes) == least and not any(one.impact for one in changes)):
                     break  # none can be fewer
         if not found:
             raise failed[0]
