@@ -17,8 +17,9 @@ from shaftwork.components.branches import ACROSS, IdealCoupling
 from shaftwork.components.laws import t
 from shaftwork.core.domains import DOMAINS
 from shaftwork.network.graph import resolve
+from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import Placed
-from shaftwork.network.templates import Kind, make_template
+from shaftwork.network.templates import make_template
 
 OWN = [name for name, kind in REGISTRY.items() if kind.__module__.startswith("shaftwork.")]
 

@@ -29,7 +29,7 @@ def problem_of(part: sw.Component) -> str:
         (sw.Inertia("J1", J=None), ("J1", "number")),
         (sw.Inertia("J1", J=True), ("J1", "number")),
         (sw.Inertia("J1", J=[1.0, 2.0]), ("J1", "number", "list")),
-        (sw.Inertia("J1", J=sw.t), ("J1", "number")),
+        (sw.Damper("J1", d=sw.t), ("J1", "number")),
         (sw.Inertia("J1", J=1 + 2j), ("J1", "number")),
         (sw.Brake("b", tau=-5.0), ("b", "tau = -5.0 must be at least 0", "Give tau (torque, also over time) in N*m")),
         (sw.Clutch("b", tau=-5.0), ("b", "tau = -5.0 must be at least 0")),

@@ -131,17 +131,20 @@ def test_a_machine_with_its_terminals_joined_is_allowed() -> None:
         (-1.0, "J = -1.0 must be at least 0"),
         (float("nan"), "J = nan must be a finite number"),
         (float("inf"), "J = inf must be a finite number"),
-        ("heavy", "must be a number, not str 'heavy'"),
-        (None, "must be a number, not NoneType"),
-        (1j, "must be a number, not complex"),
-        ([1.0, 2.0], "must be a number, not list"),
-        (np.zeros(3), "must be a number, not ndarray"),
+        ("heavy", "must be a number or a law, not str 'heavy'"),
+        (None, "must be a number or a law, not NoneType"),
+        (1j, "must be a number or a law, not complex"),
+        ([1.0, 2.0], "must be a number or a law, not list"),
+        (np.zeros(3), "must be a number or a law, not ndarray"),
     ],
 )
 def test_a_bad_value_is_said_with_unit_and_bounds(value: Any, words: str) -> None:
     problem = typed(rotation.Inertia("J3", J=value), "wheel")
     assert words in problem.message
-    assert (problem.kind, problem.hint) == ("parameter", "Give J (moment of inertia) in kg*m^2, at least 0.")
+    assert (problem.kind, problem.hint) == (
+        "parameter",
+        "Give J (moment of inertia, also over its angle or time) in kg*m^2, at least 0.",
+    )
     assert (problem.parts, problem.nodes) == (("J3",), ("wheel",))
 
 
@@ -236,7 +239,7 @@ def odd(make: Callable[[Any], Iterable[Any]]) -> Component:
     [
         (lambda p: [AcrossStore(p.k / p.missing)], "missing"),
         (lambda _: [ThroughLaw(ACROSS, ("a", "nowhere"))], "'nowhere', which is no port"),
-        (lambda _: [AcrossStore(laws.t)], "a branch law depends on t"),
+        (lambda _: [AcrossStore(laws.t)], "is 0 at the angle and the time zero"),
         (lambda _: ["a"], "branch 1 is 'a', which is no branch"),
         (lambda _: [AcrossStore(1.0), None], "branch 2 is None, which is no branch"),
         (lambda _: [ThroughLaw("2*across")], "branch 1 (ThroughLaw) has '2*across', not a number or an expression"),

@@ -145,7 +145,7 @@ def written(tmp_path: Path, part: str) -> Path:
     [
         ('type = "Inertiaa"\nname = "J"\nnodes = ["a"]\nJ = 1.0', "Inertia"),
         ('type = "Inertia"\nname = "J"\nnodes = ["a"]\nj = 1.0', "moment of inertia"),
-        ('type = "Inertia"\nname = "J"\nnodes = ["a"]\nJ = "2*t"', "must be a number"),
+        ('type = "Gear"\nname = "J"\nnodes = ["a", "b"]\nratio = "2*t"', "must be a pure number"),
         ('type = "TorqueSource"\nname = "T"\nnodes = ["a"]\ntau = "sine(t)"', "sin"),
         ('type = "TorqueSource"\nname = "T"\nnodes = ["a"]\ntau = "__import__(\'os\')"', "T"),
     ],

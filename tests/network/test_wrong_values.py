@@ -20,8 +20,9 @@ def written(folder: Path, part: str) -> Path:
 @pytest.mark.parametrize(
     ("part", "line", "words"),
     [
-        ('type = "Inertia"\nname = "J1"\nnodes = ["a"]\nJ = "1 kg*m^2"', 14, ("J = '1 kg*m^2'", "number in kg*m^2")),
-        ('type = "Inertia"\nJ = "two"\nname = "J1"\nnodes = ["a"]', 12, ("J = 'two'", "moment of inertia")),
+        ('type = "Damper"\nname = "J1"\nnodes = ["a"]\nd = "1 N*m*s"', 14, ("d = '1 N*m*s'", "number in N*m*s/rad")),
+        ('type = "Damper"\nd = "two"\nname = "J1"\nnodes = ["a"]', 12, ("d = 'two'", "damping")),
+        ('type = "Inertia"\nname = "J1"\nnodes = ["a"]\nJ = "1 kg*m^2"', 14, ("contains '^'", "a law for J in kg*m^2")),
         ('type = "Gear"\nname = "J1"\nnodes = ["a", "b"]\nratio = "3:1"', 14, ("ratio = '3:1'", "pure number")),
         ('type = "Inertia"\nname = "J1"\nnodes = ["a"]\n# a note\nJ = 1.0\nmass = 3', 16, ("mass", "J [kg*m^2]")),
         ('type = "Inertia"\nname = "J1"\nnodes = ["a"]', 10, ("J [kg*m^2]", "missing")),
@@ -50,7 +51,7 @@ def test_what_cannot_be_read_is_told_with_its_line(
     ("part", "line", "words"),
     [
         ('type = "Inertia"\nname = "J1"\nnodes = ["a"]\nJ = -1.0', 14, ("J = -1.0 must be at least 0", "in kg*m^2")),
-        ('type = "Inertia"\nname = "J1"\nnodes = ["a"]\nJ = { x = [0.0, 1.0], y = [1.0, 2.0] }', 14, ("in kg*m^2",)),
+        ('type = "Damper"\nname = "J1"\nnodes = ["a"]\nd = { x = [0.0, 1.0], y = [1.0, 2.0] }', 14, ("in N*m*s/rad",)),
         ('type = "TorqueSource"\nname = "J1"\nnodes = ["a"]\ntau = "v"', 14, ("tau reads v",)),
         ('type = "Spring"\nname = "J1"\nnodes = ["a"]\nc = 1.0', 10, ("node count",)),
     ],

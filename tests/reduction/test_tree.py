@@ -7,7 +7,7 @@ import sympy
 
 import shaftwork as sw
 from shaftwork.network.graph import CircuitGraph, build_graph
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.gains import exact_of, value_of
 from shaftwork.reduction.tree import NormalTree, normal_tree
 

@@ -147,11 +147,10 @@ def test_small_motions_about_a_contact_change_its_energy_by_its_torque() -> None
     ("law", "stored"),
     [
         (sw.INTEGRAL, sw.ACROSS**2),
-        (sw.INTEGRAL, sw.t * sw.INTEGRAL**2),
         (sw.ACROSS, sw.INTEGRAL**2),
         (5 + sw.ACROSS**3, sw.INTEGRAL**2),
     ],
-    ids=["of a speed", "of time", "of an angle that a damper does not read", "nor a drag"],
+    ids=["of a speed", "of an angle that a damper does not read", "nor a drag"],
 )
 def test_an_energy_that_is_not_that_of_the_angle_in_the_law_is_refused(law: object, stored: object) -> None:
     @sw.component

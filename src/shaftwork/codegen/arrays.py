@@ -14,7 +14,7 @@ from shaftwork.codegen.inputs import Inputs
 from shaftwork.codegen.loops import LoopSolver
 from shaftwork.codegen.matrices import LinearPart, MatrixAssembly
 from shaftwork.codegen.products import Factor, by_diagonals
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm
 
 
@@ -30,8 +30,9 @@ class ArrayProgram:
         self.assembly = MatrixAssembly(form, form.outputs)
         order = self.assembly.inputs.tolist()
         self.inputs = Inputs(form, order)
-        self.loop_places = np.array([order.index(branch) for branch in form.loop_laws], dtype=np.intp)
-        self.loop_in_tree = np.array([branch in form.tree.tree[Kind.LAW] for branch in form.loop_laws], dtype=bool)
+        solved = tuple(dict.fromkeys((*form.loop_laws, *form.inertial)))
+        self.loop_places = np.array([order.index(branch) for branch in solved], dtype=np.intp)
+        self.loop_in_tree = np.array([branch in form.tree.tree[Kind.LAW] for branch in solved], dtype=bool)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return ArrayProgram, (self.form,)  # compiled code cannot be stored
@@ -68,7 +69,8 @@ class BoundArrays:
         owners = tuple(dict.fromkeys(form.graph.part_of(law).name for law in form.loop_laws)) if form.waves else ()
         self.loops = None
         if loops.size:
-            self.loops = LoopSolver(program.inputs, part, loops, program.loop_in_tree, self.p, owners)
+            linear = not form.loop_laws
+            self.loops = LoopSolver(program.inputs, part, loops, program.loop_in_tree, self.p, owners, linear=linear)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _bound_again, (self.program, self.p, self.part, None if self.loops is None else self.loops.last)
@@ -80,7 +82,7 @@ class BoundArrays:
     def values(self, t: Any, x: Array) -> tuple[Array, Array]:
         """Outputs y and inputs u at states x, (n,) or (n, k) with t (k,)."""
         if self.loops is not None:
-            return self.loops.inputs_at(t, x, self.loops.solve(t, x))[:2]
+            return self.loops.values(t, x)
         inputs = self.program.inputs
         y = self._outputs(t, x)
         return y, inputs.values(t, y, x, self.p)

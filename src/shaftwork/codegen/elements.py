@@ -15,7 +15,8 @@ from sympy import Expr
 from shaftwork.codegen.code import scalar, vectorised
 from shaftwork.core.errors import ParameterError
 from shaftwork.network.graph import CircuitGraph
-from shaftwork.network.templates import BranchTemplate, Kind
+from shaftwork.network.kinds import Kind
+from shaftwork.network.templates import BranchTemplate
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.gains import Gain, Number, any_sum_vanishes, coefficients_in, fold, value_of
 from shaftwork.reduction.tree import Row

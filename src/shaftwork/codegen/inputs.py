@@ -18,7 +18,8 @@ from shaftwork.components.laws import bells, switches
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import jumps, slope
 from shaftwork.network.controlled import Reading, readings_of
-from shaftwork.network.templates import BranchTemplate, Kind
+from shaftwork.network.kinds import Kind
+from shaftwork.network.templates import BranchTemplate
 from shaftwork.reduction.form import StateForm
 
 Function = Callable[..., Any]
@@ -89,6 +90,7 @@ class Inputs:
             elif group.made_of.template.reads:
                 self.of_time[group.inputs], self.controlled[group.inputs] = False, True
         self.controls = np.flatnonzero(self.controlled)
+        self.rates = np.array([output[made] for made in form.readings if made.kind == "rate"], dtype=np.intp)
         self._last: tuple[Array, tuple[tuple[Any, ...], ...]] = np.empty(0), ()
 
     def _group(self, made: TemplateGroup, place: Any, output: Any, integral: Any) -> _Group:

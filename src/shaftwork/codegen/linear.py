@@ -23,11 +23,11 @@ from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.recovery import History
 from shaftwork.codegen.waves import Dense
-from shaftwork.components.branches import INTEGRAL
+from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.slopes import slope
 from shaftwork.core.errors import SimulationError
 from shaftwork.network.graph import GROUND, GraphPart
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.inputs import places_of, with_inputs
 
@@ -208,8 +208,9 @@ class _Deviations(History):
                 case Kind.THROUGH_STORE:
                     energy += self._nominal.through[index] * self.through[index] / coefficient
         for index, template in self._sprung(part):
-            force = self._nominal.by_angle(part, index, slope(template.stored, INTEGRAL))
-            energy += force * self.by_angle(part, index, INTEGRAL)
+            for symbol in template.stored.free_symbols & {INTEGRAL, ACROSS}:
+                force = self._nominal.of_law(part, index, slope(template.stored, symbol))
+                energy += force * self.of_law(part, index, symbol)
         return energy
 
     def absorbed(self, part: GraphPart) -> Array:

@@ -3,7 +3,9 @@
 The unknowns a are the inputs u at the places of these laws: the through variable w of a law that is a link, the across
 variable of a law that is in the tree. With g the values of all laws,
 
-    link:  a - g(y) = 0,    tree:  P x + Q u - g(y) = 0,    y = C x + D u.
+    link:  a - g(y) = 0,    tree:  P x + Q u - g(y) = 0,    y = C x + D u + D1 u'.
+
+So do laws of inertias that change, which read the rate of the speed that they help to determine.
 
 They are solved by Newton's method with the exact slopes, starting from the last solution, so that a motion stays on its
 branch where there are several. Along a motion each instant starts from the one before: all start from guesses at once,
@@ -43,6 +45,7 @@ class LoopSolver:
         in_tree: which of them are in the tree, in the order of the rows of P and Q.
         p: parameter vector.
         beside_waves: the parts of the laws, where lines are at their nodes; there another solution is refused.
+        linear: whether all of them are laws of inertias, which are linear in the rates that they read.
     """
 
     def __init__(
@@ -53,11 +56,18 @@ class LoopSolver:
         in_tree: NDArray[np.bool_],
         p: Array,
         beside_waves: tuple[str, ...] = (),
+        *,
+        linear: bool = False,
     ) -> None:
         self._inputs, self._part, self._p, self._beside_waves = inputs, part, p, beside_waves
         self.places, self._tree = places, in_tree
         self._controls = inputs.controls
         self._D = part.D.toarray()
+        self._D1 = part.D1 if part.D1.nnz else None
+        free = ~inputs.of_time
+        free[places] = False
+        self._free, self._rates = np.flatnonzero(free), inputs.rates
+        self._linear = linear
         self._P, self._Q = part.tree_law_x.toarray(), part.tree_law_u.toarray()
         self._last = np.zeros(len(places))
         self._sign = 0.0
@@ -70,11 +80,25 @@ class LoopSolver:
 
         They are NaN where Newton's method finds none.
         """
+        if self._linear:
+            return self.values(t, x)[1][self.places]
         if x.ndim == 1:
             return self._followed(np.array([t]), x[:, None])[:, 0]
         size = max(1, AT_ONCE // (self._inputs.size * len(self.places)))
         blocks = (slice(first, first + size) for first in range(0, len(t), size))
         return np.concatenate([self._followed(t[block], x[:, block]) for block in blocks], axis=1)
+
+    def values(self, t: Any, x: Array) -> tuple[Array, Array]:
+        """Outputs y and inputs u at states x, (n,) or (n, k) with t (k,)."""
+        if not self._linear:
+            return self.inputs_at(t, x, self.solve(t, x))[:2]
+        own = self._D[:, self.places]
+        y, _, u = self.inputs_at(t, x, np.zeros((len(self.places), *x.shape[1:])))
+        slope = self._inputs.along(t, y, x, self._p, own)[self.places]
+        matrix = np.eye(len(slope)).reshape(*slope.shape[:2], *(1,) * (x.ndim - 1)) - slope
+        a = _solved(matrix, u[self.places])
+        u[self.places] = a
+        return y + own @ a, u
 
     @property
     def last(self) -> Array:
@@ -157,8 +181,12 @@ class LoopSolver:
         known[~inputs.of_time] = 0.0
         known[self.places] = a
         y = part.C @ x[: inputs.states] + self._D @ known
+        if self._D1 is not None:
+            y = y + self._D1 @ (inputs.time_slopes(t, y, x, self._p).T * inputs.of_time).T
         if self._controls.size:  # they read nothing that depends on others of their kind
             y = y + self._D[:, self._controls] @ inputs.values(t, y, x, self._p)[self._controls]
+        if self._rates.size:  # of speeds, to which the laws contribute that are no loops
+            y[self._rates] += self._D[np.ix_(self._rates, self._free)] @ inputs.values(t, y, x, self._p)[self._free]
         g = inputs.values(t, y, x, self._p)
         u = g.copy()
         u[self.places] = a
@@ -184,10 +212,13 @@ class LoopSolver:
         """Of all laws by q variables that move the outputs and the states; (m, q), or at k instants (m, q, k)."""
         y, _, _ = self.inputs_at(t, x, a)
         made = self._inputs.along(t, y, x, self._p, through_y, through_x)
-        if not self._controls.size:
-            return made
-        by_controls = self._inputs.along(t, y, x, self._p, self._D[:, self._controls])
-        return np.asarray(made + np.einsum("mc...,cq...->mq...", by_controls, made[self._controls]))
+        for rows, laws in ((np.arange(len(y)), self._controls), (self._rates, self._free)):
+            if laws.size and rows.size:
+                through = np.zeros((len(y), laws.size))
+                through[rows] = self._D[np.ix_(rows, laws)]
+                by_laws = self._inputs.along(t, y, x, self._p, through)
+                made = made + np.einsum("mc...,cq...->mq...", by_laws, made[laws])
+        return np.asarray(made)
 
     def _total(self, own: Array, by: Array, states: Array | None = None) -> tuple[Array, Array]:
         """The residual and the inputs by q variables.
@@ -213,3 +244,14 @@ class LoopSolver:
         r_state, u_state = self._total(np.zeros((len(a), size)), by_state, np.eye(size))
         total = u_state - u_loop @ np.linalg.lstsq(r_loop, r_state, rcond=None)[0]
         return sparse.csc_array(part.A + part.B @ sparse.csr_array(total))
+
+
+def _solved(matrix: Array, right: Array) -> Array:
+    """(q,) or (q, k) solutions of one or k linear systems (q, q) or (q, q, k); NaN where there is none."""
+    if len(right) == 1:
+        return np.asarray(right / matrix[0])
+    many = np.moveaxis(matrix, 2, 0) if matrix.ndim == 3 else matrix[None]
+    known = np.isfinite(many).all(axis=(1, 2))
+    made = np.full((len(many), len(right)), np.nan)
+    made[known] = np.einsum("kij,jk->ki", np.linalg.pinv(many[known]), right.reshape(len(right), -1)[:, known])
+    return made.T.reshape(right.shape)

@@ -1,10 +1,10 @@
 """The linear part of a network as sparse matrices of the parameter vector.
 
-    x' = A x + B u + B1 u',    y = C x + D u,    u = (w, e)
+    x' = A x + B u + B1 u',    y = C x + D u + D1 u',    u = (w, e)
 
 with w the through variables of the nonlinear laws and sources, e the prescribed across variables, y the across
-variables that the laws and the integrals read, and after them what controlled sources read. The equations are those of
-`reduction.form`.
+variables that the laws and the integrals read, and after them what laws read of others, rates of speeds at last. The
+equations are those of `reduction.form`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from scipy.sparse.csgraph import connected_components
 from shaftwork.codegen.elements import Coefficients, cutset_matrix, inverse_of_fractions, loop_matrix, potential_matrix
 from shaftwork.codegen.products import Factor
 from shaftwork.core.errors import CompileError
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm
 
 Array = NDArray[np.float64]
@@ -39,7 +39,7 @@ class LinearPart:
     """The matrices above (scipy.sparse.csr_array), the maps needed to recover eliminated quantities, and F itself.
 
     Args:
-        A: (n, n); B: (n, m); B1: (n, m); C: (k, n); D: (k, m), with n states, m inputs, k outputs y.
+        A: (n, n); B, B1: (n, m); C: (k, n); D, D1: (k, m), with n states, m inputs, k outputs y.
         conductance_x: (tree conductances, n) their across variables from the states.
         conductance_u: (tree conductances, m) the same from the inputs.
         tree_law_x: (tree laws, n) what the cutsets of the laws in the tree leave for their through variables.
@@ -54,6 +54,7 @@ class LinearPart:
     B1: Any
     C: Any
     D: Any
+    D1: Any
     conductance_x: Any
     conductance_u: Any
     tree_law_x: Any
@@ -143,12 +144,15 @@ class MatrixAssembly:
         z_x, z_u = blocks.integral_rows(self.outputs, C, D)
         if potentials is not None:
             C, D = blocks.with_readings(C, D, potentials, g_x, g_u)
+        rate_x, rate_u, rate_du = blocks.rate_rows(c_x, c_u, c_du)
+        D1 = blocks.stack([blocks.nothing(*D.shape), rate_du])
         return LinearPart(
             A=blocks.stack([c_x, l_x, z_x]),
             B=blocks.stack([c_u, l_u, z_u]),
             B1=blocks.stack([c_du, l_du, blocks.nothing(*z_u.shape)]),
-            C=C,
-            D=D,
+            C=blocks.stack([C, rate_x]),
+            D=blocks.stack([D, rate_u]),
+            D1=D1,
             conductance_x=g_x,
             conductance_u=g_u,
             tree_law_x=t_x,
@@ -303,6 +307,13 @@ class _Blocks:
         own = self._selection(np.array([place[int(branch)] for branch in integrals], dtype=np.intp), self._states)
         none = self.nothing(len(integrals), self._inputs)
         return self.stack([C, across_x, through_x, own]), self.stack([D, across_u, through_u, none])
+
+    def rate_rows(self, c_x: Any, c_u: Any, c_du: Any) -> tuple[Any, Any, Any]:
+        """The rates of what is across links that laws read, from those of the states and of the prescribed speeds."""
+        links = [reading.of for reading in self._readings if reading.kind == "rate"]
+        rows = self._loops[:, np.array(links, dtype=np.intp)].T
+        stores = rows[:, self.C]
+        return stores @ c_x, stores @ c_u, stores @ c_du + rows[:, self.E] @ self.input("E")
 
     def integral_rows(self, outputs: NDArray[np.intp], C: Any, D: Any) -> tuple[Any, Any]:
         """The rows z' = y of the integrals."""

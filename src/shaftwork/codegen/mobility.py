@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.network.graph import GROUND
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm
 
 ROUNDING = 1e-12

@@ -21,7 +21,7 @@ from shaftwork.core.errors import CompileError, MissingExtraError, ParameterErro
 from shaftwork.core.kept import Kept
 from shaftwork.core.parameters import in_si, is_quantity, without_unit
 from shaftwork.network.graph import CircuitGraph
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.blocks import BlockTooLargeError
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.rows import Rows, explicit_rows

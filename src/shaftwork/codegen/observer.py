@@ -17,7 +17,7 @@ from shaftwork.codegen.waves import Carrying, Dense, along_lines
 from shaftwork.components.base import Component, Profile
 from shaftwork.core.errors import SignalError
 from shaftwork.network.graph import CircuitGraph, GraphPart
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.names import Names
 

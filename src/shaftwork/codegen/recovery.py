@@ -14,11 +14,13 @@ from shaftwork.codegen.code import vectorised
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.valueless import without_value
 from shaftwork.components.base import Profile, Signal
-from shaftwork.components.branches import INTEGRAL, End
+from shaftwork.components.branches import ACROSS, INTEGRAL, RATE, End
+from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import slope
 from shaftwork.core.errors import no_value
 from shaftwork.network.graph import GROUND, GraphPart
-from shaftwork.network.templates import BranchTemplate, Kind
+from shaftwork.network.kinds import Kind
+from shaftwork.network.templates import BranchTemplate
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.readings import Quantity
 
@@ -129,32 +131,42 @@ class History:
                     energy += 0.5 * coefficient * self.across[index] ** 2
                 case Kind.THROUGH_STORE:
                     energy += 0.5 * self.through[index] ** 2 / coefficient
-        return sum((self.by_angle(part, k, template.stored) for k, template in self._sprung(part)), start=energy)
+        return sum((self.of_law(part, k, template.stored) for k, template in self._sprung(part)), start=energy)
 
     def _sprung(self, part: GraphPart) -> Iterator[tuple[int, BranchTemplate]]:
         """The branches of a part whose laws store energy."""
         templates = ((k, self.form.graph.branches[k].template) for k in part.branches)
         return ((k, template) for k, template in templates if template.stored != 0)
 
-    def by_angle(self, part: GraphPart, index: int, law: Expr) -> Array:
-        """(k,) an expression of the integral of a branch and of its template's symbols."""
+    def of_law(self, part: GraphPart, index: int, law: Expr) -> Array:
+        """(k,) an expression of time, of what is across a branch, its integral and its template's symbols."""
         symbols, integrals = self.form.graph.branches[index].template.symbols, self.form.integrals
-        place = len(self.form.states) - len(integrals) + integrals.index(index)
+        angle: Any = 0.0
+        if index in integrals:
+            angle = self.x[len(self.form.states) - len(integrals) + integrals.index(index)]
         values = self.bound.p[[part.parameters[symbol.name] for symbol in symbols]]
-        return np.asarray(vectorised((INTEGRAL, *symbols), law)(self.x[place], *values))
+        function = vectorised((TIME, ACROSS, INTEGRAL, *symbols), law)
+        return np.asarray(function(self.t, self.across[index], angle, *values))
 
     def absorbed(self, part: GraphPart) -> Array:
         """(k,) power that goes into a part at its ports, W."""
         return self._power(part, part.branches)
 
     def lost(self, part: GraphPart) -> Array:
-        """(k,) power that a part takes in without storing it, W; negative where it supplies."""
+        """(k,) power that a part takes in without storing it, W; negative where it supplies.
+
+        Law: of energies V(s, t) in springs and T(s, v, t) in inertias, dV/dt = V_s v + V_t, dT/dt = i v - T_t.
+        """
         kinds = (Kind.CONDUCTANCE, Kind.LAW, Kind.THROUGH_SOURCE, Kind.ACROSS_SOURCE)
         branches = self.form.graph.branches
         templates = ((k, branches[k].template) for k in part.branches)
         power = self._power(part, (k for k, t in templates if t.through or (t.kind in kinds and not t.line)))
         for k, template in self._sprung(part):
-            power -= self.by_angle(part, k, slope(template.stored, INTEGRAL)) * self.across[k]
+            in_time = self.of_law(part, k, slope(template.stored, TIME))
+            if RATE in template.reads:
+                power += in_time - self._power(part, (k,))
+            else:
+                power -= in_time + self.of_law(part, k, slope(template.stored, INTEGRAL)) * self.across[k]
         return power
 
     def lifted(self, part: GraphPart) -> Array:

@@ -21,7 +21,8 @@ from shaftwork.codegen.elements import Array, GainMatrix, potential_matrix, shar
 from shaftwork.codegen.matrices import LinearPart
 from shaftwork.codegen.mobility import Mobility
 from shaftwork.codegen.recovery import History
-from shaftwork.network.templates import Kind
+from shaftwork.core.errors import CompileError
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm, store_name
 
 
@@ -139,7 +140,14 @@ class Stores:
         return max((abs(float(bound.part.coefficients[k]) * held[name]) for name, k in inertias), default=0.0)
 
     def mobility(self, bound: BoundArrays, pairs: Sequence[tuple[int, int]]) -> Mobility:
-        """The answer to impulses at pairs of nodes."""
+        """The answer to impulses at pairs of nodes.
+
+        Raises:
+            CompileError: an inertia changes with its angle or time, whose value at the instant it would need.
+        """
+        if self._form.inertial:
+            part = self._form.graph.part_of(self._form.inertial[0]).name
+            raise CompileError(f"An impulse meets '{part}', whose inertia changes: no impact can be told there.")
         nodes, shares = (matrix(bound.p).toarray() for matrix in self._nodes)
         return Mobility(self._form, bound, nodes, shares, pairs)
 

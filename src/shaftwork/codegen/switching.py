@@ -21,7 +21,7 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.kept import Kept
 from shaftwork.network.graph import GraphPart
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm
 
 # A law of time is looked at so many times, and again at four times as many, until it changes sides no more often.

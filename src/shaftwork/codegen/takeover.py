@@ -20,7 +20,7 @@ from sympy import Add, Dummy, Expr, Symbol
 from shaftwork.codegen.derivatives import SlopeMatrix, Values
 from shaftwork.codegen.elements import Array
 from shaftwork.components.laws import t as TIME
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.expressed import Expressed
 from shaftwork.reduction.form import State, StateForm, store_name
 from shaftwork.reduction.gains import Number, exact_of

@@ -14,7 +14,7 @@ from shaftwork.codegen.linear_readings import GivenSpeeds
 from shaftwork.codegen.recovery import History
 from shaftwork.components.base import Profile
 from shaftwork.network.graph import GraphPart
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm, store_name
 
 

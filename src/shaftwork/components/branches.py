@@ -24,6 +24,9 @@ INTEGRAL = Symbol("integral", real=True)
 THROUGH = Symbol("through", real=True)
 """The through variable of a part, what its first node gives to it; guards of modes read it, laws do not."""
 
+RATE = Symbol("rate of across", real=True)
+"""The rate of the across variable of the branch in whose law it stands: of what a store has beyond a constant."""
+
 HISTORY = Symbol("history", real=True)
 """What has come from the other end of the line in whose law it stands."""
 
@@ -53,7 +56,7 @@ def integral_of(label: str) -> Symbol:
 
 
 def named_in(symbol: Symbol) -> tuple[str, str]:
-    """What `across_of`, `through_of` or `integral_of` stands for: its kind and the name given to it; else ("", "")."""
+    """What `across_of`, `through_of`, `integral_of` or `RATE` stands for: its kind and the name; else ("", "")."""
     kind, of, name = symbol.name.partition(" of ")
     return (kind, name) if of else ("", "")
 
@@ -94,7 +97,10 @@ def _refuse_terms(coupling: Any) -> None:
 
 @dataclass(frozen=True)
 class AcrossStore:
-    """Through = capacity * d(across)/dt: inertia, mass, capacitor."""
+    """Through = capacity * d(across)/dt: inertia, mass, capacitor.
+
+    A capacity may depend on INTEGRAL and t, the across variable then is against the reference: d(C v)/dt - C_s v^2 / 2.
+    """
 
     capacity: Expr
     ends: tuple[End, End] | None = None
@@ -106,7 +112,10 @@ class AcrossStore:
 
 @dataclass(frozen=True)
 class ThroughStore:
-    """d(through)/dt = stiffness * across: shaft compliance, spring, inductor (stiffness 1/L)."""
+    """d(through)/dt = stiffness * across: shaft compliance, spring, inductor (stiffness 1/L).
+
+    A stiffness may depend on INTEGRAL and t: through = stiffness * INTEGRAL.
+    """
 
     stiffness: Expr
     ends: tuple[End, End] | None = None
@@ -122,7 +131,7 @@ class ThroughLaw:
 
     It may read other ports and branches of its part besides, and is then a controlled source. A `conservative` one, as
     a weight, gives back what it takes: in a part that loses energy its work is supplied, and not lost. One that springs
-    back, as a contact, has `stored` energy, in J in INTEGRAL and parameters: what it takes beyond that is lost.
+    back, as a contact, has `stored` energy, in J in INTEGRAL, t and parameters: what it takes beyond that is lost.
     """
 
     through: Expr

@@ -14,12 +14,16 @@ from shaftwork.core.parameters import parameter
 
 @component
 class Inertia(Component):
-    """A rigid rotating mass: rotor, disc, flywheel.
+    """A rigid rotating mass: rotor, disc, flywheel; or an arm or mechanism whose inertia changes.
 
-    Law: tau = J d(omega)/dt. Analogue: a capacitor J to the reference. Source: Popenda 2019, (1)-(3).
+    Law: tau = J d(omega)/dt. Of a law J(phi, t), tau = d(J omega)/dt - J_phi omega^2 / 2, with phi the angle of its
+    node from the start, or from `name.phi` among the start values: the momentum is J omega and the energy
+    J omega^2 / 2, of which what moves the masses takes J_t omega^2 / 2, counted as lost, or gives it where that is
+    negative. J is above zero at all times and does not jump. Analogue: a capacitor J to the reference.
+    Source: Popenda 2019, (1)-(3); of a law: Lagrange's equation.
     """
 
-    J: float = parameter("kg*m^2", "moment of inertia", at_least=0)
+    J: Any = parameter("kg*m^2", "moment of inertia, also over its angle or time", at_least=0, law=True)
 
     ports: ClassVar = (Port("a"),)
 
@@ -31,11 +35,13 @@ class Inertia(Component):
 class Spring(Component):
     """A massless shaft between two nodes: torsional stiffness with internal damping beside it.
 
-    Law: tau = tau_c + d omega_rel, d(tau_c)/dt = c omega_rel, with tau the torque that node a gives to node b.
-    Analogue: an inductor 1/c beside a conductance d. Source: Popenda 2019, (2), (4); Marinkovic 2012, (14), (17).
+    Law: tau = tau_c + d omega_rel, d(tau_c)/dt = c omega_rel, with tau the torque that node a gives to node b. Of a
+    law c(phi, t), tau = c phi + d omega_rel, with phi the twist of a against b: it stores the integral of c phi over
+    the twist; what a change over time gives or takes counts as lost. Analogue: an inductor 1/c beside a conductance d.
+    Source: Popenda 2019, (2), (4); Marinkovic 2012, (14), (17).
     """
 
-    c: float = parameter("N*m/rad", "torsional stiffness", at_least=0)
+    c: Any = parameter("N*m/rad", "torsional stiffness, also over its twist or time", at_least=0, law=True)
     d: float = parameter("N*m*s/rad", "internal damping", at_least=0, default=0.0)
 
     def branches(self, p: Any) -> Iterator[Branch]:

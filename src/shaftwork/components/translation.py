@@ -17,9 +17,12 @@ ENDS = (Port("a", TRANSLATION), Port("b", TRANSLATION))
 
 @component
 class Mass(Component):
-    """A rigid translating mass. Law: f = m dv/dt. Analogue: a capacitor m. Source: Abdelkader 2016, (6)."""
+    """A rigid translating mass. Law: f = m dv/dt; of a law m(s, t) as of an `Inertia`. Analogue: a capacitor m.
 
-    m: float = parameter("kg", "mass", at_least=0)
+    Source: Abdelkader 2016, (6).
+    """
+
+    m: Any = parameter("kg", "mass, also over its position or time", at_least=0, law=True)
 
     ports: ClassVar = (Port("a", TRANSLATION),)
 
@@ -31,10 +34,11 @@ class Mass(Component):
 class TranslationalSpring(Component):
     """A massless rod or spring with internal damping beside it. It pushes as it pulls; what only pulls is a `Rope`.
 
-    Law: f = f_c + d v_rel, d(f_c)/dt = c v_rel. Analogue: an inductor 1/c beside a conductance d.
+    Law: f = f_c + d v_rel, d(f_c)/dt = c v_rel; of a law c(s, t) as of a `Spring`. Analogue: an inductor 1/c beside a
+    conductance d.
     """
 
-    c: float = parameter("N/m", "stiffness", at_least=0)
+    c: Any = parameter("N/m", "stiffness, also over its stretch or time", at_least=0, law=True)
     d: float = parameter("N*s/m", "internal damping", at_least=0, default=0.0)
 
     ports: ClassVar = ENDS

@@ -16,7 +16,7 @@ from shaftwork.components.branches import ACROSS, HISTORY, INTEGRAL
 from shaftwork.components.laws import t as TIME
 from shaftwork.equations.quantities import Flow, Quantities, rate_of
 from shaftwork.network.graph import GROUND
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.gains import Number, simplified
 

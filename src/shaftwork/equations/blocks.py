@@ -23,7 +23,7 @@ from shaftwork.equations.second_order import SecondOrder
 from shaftwork.equations.spelling import in_text
 from shaftwork.equations.sums import MEANING, WEIGHTS, Sums, sums_of
 from shaftwork.equations.widths import printed_width
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 
 if TYPE_CHECKING:  # the records print themselves through this module
     from shaftwork.equations.records import Equations

@@ -16,7 +16,7 @@ from sympy.polys.matrices import DomainMatrix
 from shaftwork.components.laws import t as TIME
 from shaftwork.equations.quantities import Quantities, rate_of
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.gains import exactly, in_decimals
 
 INDEPENDENT = 1e-9

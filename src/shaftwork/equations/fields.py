@@ -16,6 +16,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from sympy import Add, Derivative, Eq, Expr, Float, Function, Integer, Symbol, sqrt
+from sympy.core.function import AppliedUndef
 
 from shaftwork.components.base import Derived, symbols_of
 from shaftwork.components.laws import t
@@ -157,10 +158,8 @@ class Field:
     @cached_property
     def _atoms(self) -> dict[Expr, Symbol]:
         """A symbol for every function and derivative in the rows."""
-        atoms = (
-            atom for row in (*self.rows, *self.boundary) for atom in sorted(row.atoms(Derivative, Function), key=str)
-        )
-        return {atom: Symbol(str(atom), real=True) for atom in atoms}
+        rows = (row.atoms(Derivative, AppliedUndef) for row in (*self.rows, *self.boundary))
+        return {atom: Symbol(str(atom), real=True) for atoms in rows for atom in sorted(atoms, key=str)}
 
     @cached_property
     def _letters(self) -> tuple[Letter, ...]:

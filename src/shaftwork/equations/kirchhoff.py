@@ -20,7 +20,7 @@ from shaftwork.equations.rows import (
 )
 from shaftwork.equations.solution import SolvedForm, System
 from shaftwork.network.graph import GROUND
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm, branch_name
 from shaftwork.reduction.gains import Number
 

@@ -25,7 +25,7 @@ from shaftwork.equations.records import Equations
 from shaftwork.equations.rows import Row
 from shaftwork.equations.second_order import linear_stiffness
 from shaftwork.network.graph import GROUND, GraphBranch
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 
 if TYPE_CHECKING:  # the record proves and prints itself through these modules
     from shaftwork.equations.lagrange_proof import Proof

@@ -12,7 +12,7 @@ from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.equations.coordinates import Coordinates, is_prescribed
 from shaftwork.equations.quantities import Flow, Quantities, rate_of
 from shaftwork.network.graph import CircuitGraph, GraphBranch
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from shaftwork.equations.notations import Notation
 from shaftwork.equations.quantities import Quantities, running_number
 from shaftwork.equations.spelling import GREEK, chosen_subscript, escaped
 from shaftwork.network.graph import GraphBranch, GraphPart
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm
 
 INDEX_OPENS, INDEX_CLOSES = "\ue000", "\ue001"

@@ -13,7 +13,7 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ParameterError, no_quantity
 from shaftwork.equations.slopes import VARIED, Slope
 from shaftwork.network.graph import GROUND, CircuitGraph
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.names import Names
 
 if TYPE_CHECKING:

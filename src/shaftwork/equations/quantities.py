@@ -14,12 +14,12 @@ from functools import cached_property
 
 from sympy import Expr, Integer, Symbol
 
-from shaftwork.components.branches import End
+from shaftwork.components.branches import INTEGRAL, RATE, End
 from shaftwork.core.domains import ELECTRICAL, Domain, Quantity
 from shaftwork.core.errors import CompileError
 from shaftwork.network.controlled import readings_of
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import branch_name, integral_name
 
 Ends = tuple[int, int]
@@ -115,11 +115,14 @@ class Quantities:
 
     def law(self, branch: int) -> Expr:
         """Coefficient or law of a branch in the parameters and derived quantities of the network."""
-        return self.history(branch) if self.graph.branches[branch].template.is_history else self.printed(branch)
+        template = self.graph.branches[branch].template
+        if template.kind is Kind.ACROSS_STORE and template.printed.has(INTEGRAL):
+            return self.printed(branch).xreplace({INTEGRAL: self.integral(branch + 1)})  # of the law behind it
+        return self.history(branch) if template.is_history else self.printed(branch)
 
     def printed(self, branch: int) -> Expr:
         """The same; of a wave that arrives, what left the other end."""
-        read = {"across": self.node, "through": self.store, "integral": self.integral}
+        read = {"across": self.node, "through": self.store, "integral": self.integral, "rate": self.rate}
         others = readings_of(self.graph, branch).items()
         return self.own_law(branch).xreplace({symbol: read[made.kind](made.of) for symbol, made in others})
 
@@ -176,6 +179,12 @@ class Quantities:
         number_within = running_number(self.graph.branches[owner].template.label)
         ending = f"_{number_within}" if number_within else ""
         return f"{self.graph.part_of(owner).name}.{quantity.name}{ending}"
+
+    def rate(self, branch: int) -> Expr:
+        """The rate of what is across a branch."""
+        made = self.graph.branches[branch]
+        across = self.across((made.plus, made.minus))
+        return across.xreplace({symbol: rate_of(symbol) for symbol in across.free_symbols})
 
     def integral(self, branch: int) -> Symbol:
         """The integral of what is across a branch: of a law that reads it, or of a prescribed speed."""
@@ -306,7 +315,7 @@ class Quantities:
                 together.setdefault((branch.plus, branch.minus, prescribes), []).append(index)
         joints = [self.graph.branches[index].terms for index in part.branches if self.graph.branches[index].terms]
         held = any(len(terms) == 1 and (*terms[0][1:], False) in together for terms in joints)  # by a torque beside it
-        several = len(together) > 1 or held
+        several = len(together) > 1 or held or any(RATE in self.graph.branches[k].template.reads for k in part.branches)
         labels = [self._label(self.graph.branches[branches[0]]) if several else "" for branches in together.values()]
         numbers = [running_number(label) or label for label in labels]
         alike = len(set(numbers)) < len(numbers)  # springs and dampers in different places: the numbers do not do

@@ -19,7 +19,7 @@ from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import CompileError
 from shaftwork.equations.quantities import INSTEAD, Quantities, rate_of, refuse_controlled
 from shaftwork.network.graph import GROUND, CircuitGraph
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.gains import Number, add, divide, simplified
 from shaftwork.reduction.tree import column_of
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from sympy import Expr, Integer, Symbol
 
-from shaftwork.components.branches import ACROSS, INTEGRAL
+from shaftwork.components.branches import ACROSS, INTEGRAL, RATE
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import jumps, slope
 from shaftwork.equations.quantities import Quantities
@@ -57,7 +57,10 @@ class Slopes:
     def _made(self, branch: GraphBranch) -> Iterator[tuple[Symbol, Expr]]:
         quantities, index = self._quantities, branch.index
         law, reads = quantities.own_law(index), readings_of(quantities.graph, index)
+        if RATE in reads:  # printed it lacks what stands with the store
+            law = quantities.graph.in_network_symbols(branch.template.law, branch)
         names = {"across": quantities.node, "through": quantities.store, "integral": quantities.integral}
+        names["rate"] = quantities.rate
         point = {ACROSS: quantities.across((branch.plus, branch.minus)), INTEGRAL: quantities.integral(index)}
         point |= {symbol: names[of.kind](of.of) for symbol, of in reads.items()}
         for symbol in point:

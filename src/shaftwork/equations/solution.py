@@ -16,7 +16,7 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import slope
 from shaftwork.equations.assembly import Assembly, Group, Sides, Terms, rising_first, sides
 from shaftwork.equations.quantities import rate_of
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.blocks import LARGEST_BLOCK, solve_blocks
 
 Matrix = Mapping[tuple[int, int], Expr]

@@ -14,7 +14,7 @@ from shaftwork.core.errors import CompileError, SignalError, no_quantity
 from shaftwork.equations.slopes import Slope, Slopes
 from shaftwork.equations.tableau import refuse_waves
 from shaftwork.network.graph import GraphBranch
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.blocks import BlockTooLargeError
 from shaftwork.reduction.expressed import Expressed
 from shaftwork.reduction.form import StateForm

@@ -15,7 +15,7 @@ from shaftwork.equations.notation import INDEX_CLOSES, INDEX_OPENS
 from shaftwork.equations.printing import Line, Writer
 from shaftwork.equations.quantities import Quantities, rate_of
 from shaftwork.network.graph import GraphPart
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 
 LARGEST_WRITTEN_OUT = 6
 """Degree up to which the weights are printed as numbers."""

@@ -22,7 +22,7 @@ from shaftwork.equations.assembly import Assembly
 from shaftwork.equations.slopes import Slopes
 from shaftwork.network.controlled import Reading, readings_of
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.inputs import Place
 
@@ -79,10 +79,11 @@ class Tableau:
     def rows(self, read: Sum) -> dict[Unknown, Sum]:
         """As many rows as unknowns, each by the one that it is the row of; with what a sum contains among them."""
         made: dict[Unknown, Sum] = {("across", node): self._balance(node) for node in range(len(self._graph.nodes))}
-        left = {unknown for row in (*made.values(), read) for unknown in row} - made.keys()
-        while left:
-            made |= {unknown: self._imposed(*unknown) for unknown in left}
-            left = {unknown for row in made.values() for unknown in row} - made.keys()
+        left = [unknown for row in (*made.values(), read) for unknown in row]
+        while missing := [unknown for unknown in dict.fromkeys(left) if unknown not in made]:
+            found = {unknown: self._imposed(*unknown) for unknown in missing}
+            made |= found
+            left = [unknown for row in found.values() for unknown in row]
         return made
 
     def entered(self, place: Place) -> dict[Unknown, int]:
@@ -130,7 +131,8 @@ class Tableau:
         index = branch.index
         match branch.template.kind:
             case Kind.ACROSS_STORE:
-                return total([(S * self.assembly.quantities.law(index), self.across(branch))])
+                constant = self._graph.in_network_symbols(branch.template.law, branch)
+                return total([(S * constant, self.across(branch))])
             case Kind.CONDUCTANCE:
                 return total([(self.assembly.quantities.law(index), self.across(branch))])
             case Kind.LAW:
@@ -171,4 +173,6 @@ class Tableau:
         if reading.kind == "across":
             return self.node(reading.of)
         branch = self._graph.branches[reading.of]
+        if reading.kind == "rate":
+            return total([(S, self.across(branch))])
         return self.through(branch) if reading.kind == "through" else self.integral(branch)

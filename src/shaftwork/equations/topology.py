@@ -10,7 +10,7 @@ from functools import cached_property
 from sympy import Add, Expr, ImmutableMatrix, Integer
 
 from shaftwork.equations.assembly import Assembly
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import branch_name
 
 

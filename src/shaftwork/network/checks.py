@@ -20,10 +20,10 @@ from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.core.domains import Domain
 from shaftwork.core.errors import Problem, ShaftworkError
 from shaftwork.network.graph import GROUND, CircuitGraph, resolve, signals_of
+from shaftwork.network.kinds import Kind
 from shaftwork.network.law_faults import Fault, instead_of, law_faults
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
 from shaftwork.network.sharing import Shared
-from shaftwork.network.templates import Kind
 from shaftwork.network.textfile import MAXIMUM_NAME, is_name
 from shaftwork.network.wording import Spelling, at_nodes, listed, title
 

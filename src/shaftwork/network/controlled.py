@@ -11,7 +11,8 @@ from sympy import Symbol
 from shaftwork.components.base import Component
 from shaftwork.components.branches import named_in
 from shaftwork.network.graph import CircuitGraph
-from shaftwork.network.templates import BranchTemplate, Kind
+from shaftwork.network.kinds import Kind
+from shaftwork.network.templates import BranchTemplate
 
 
 @dataclass(frozen=True)
@@ -19,11 +20,11 @@ class Reading:
     """A quantity of the circuit that a law reads.
 
     Args:
-        kind: "across" (of a node against the reference), "through" or "integral" (of a branch).
+        kind: "across" (of a node against the reference), "through", "integral" or "rate" of across (of a branch).
         of: number of the node or branch.
     """
 
-    kind: Literal["across", "through", "integral"]
+    kind: Literal["across", "through", "integral", "rate"]
     of: int
 
 
@@ -38,6 +39,8 @@ def readings_of(graph: CircuitGraph, branch: int) -> Mapping[Symbol, Reading]:
         kind, name = named_in(symbol)
         if kind == "across":
             found[symbol] = Reading("across", part.nodes[name])
+        elif kind == "rate":
+            found[symbol] = Reading("rate", branch)
         else:
             of = next(k for k in part.branches if _stands_for(graph.branches[k].template, kind, name))
             found[symbol] = Reading("through" if kind == "through" else "integral", of)
@@ -61,6 +64,6 @@ def check_readings(part: Component, templates: tuple[BranchTemplate, ...]) -> No
         kind, name = named_in(symbol)
         if kind == "across" and name not in ports:
             raise ValueError(f"a law reads across_of({name!r}), but the part has no such port")
-        if kind != "across" and not any(_stands_for(made, kind, name) for made in templates):
+        if kind in ("through", "integral") and not any(_stands_for(made, kind, name) for made in templates):
             what = "spring or inductor" if kind == "through" else "branch between two nodes"
             raise ValueError(f"a law reads {kind}_of({name!r}), but the part has no {what} of that label")

@@ -11,7 +11,8 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import ANEW, Modes
 from shaftwork.core.declarations import is_label
 from shaftwork.core.domains import ROTATION
-from shaftwork.network.templates import BranchTemplate, Kind, Template
+from shaftwork.network.kinds import Kind
+from shaftwork.network.templates import BranchTemplate, Template
 
 _STORES = (Kind.ACROSS_STORE, Kind.THROUGH_STORE)
 

@@ -16,10 +16,11 @@ from shaftwork.components.laws import as_expression
 from shaftwork.components.modes import Modes
 from shaftwork.components.tables import Table
 from shaftwork.core.domains import ROTATION, Domain
+from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
 from shaftwork.network.overview import overview
 from shaftwork.network.sharing import Shared
-from shaftwork.network.templates import BranchTemplate, Kind, make_template, with_factors
+from shaftwork.network.templates import BranchTemplate, make_template, with_factors
 
 GROUND = -1
 """Node number of the reference."""

@@ -15,10 +15,12 @@ from shaftwork.components.branches import ACROSS, HISTORY, INTEGRAL
 from shaftwork.components.laws import SYMBOLS, t
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.components.tables import Interpolation, InterpolationSlope, Table
+from shaftwork.network.changing import StoreFaultError
 from shaftwork.network.controlled import check_readings
 from shaftwork.network.declared import check_declared
 from shaftwork.network.grammar import FUNCTION_NAMES, FUNCTIONS
-from shaftwork.network.templates import BranchTemplate, Kind, make_template, substitution
+from shaftwork.network.kinds import Kind
+from shaftwork.network.templates import BranchTemplate, make_template, substitution
 
 _READS: Mapping[Kind, frozenset[sympy.Symbol]] = {
     Kind.ACROSS_SOURCE: frozenset({t}),
@@ -60,7 +62,12 @@ def law_faults(part: Component, values: Mapping[str, Any]) -> Iterator[Fault]:
     faults = tuple(fault for name, law in laws.items() if (fault := _fault_of_law(part, name, law)))
     yield from faults
     sound = {**values, **dict.fromkeys((fault.parameter for fault in faults), 1.0)}
-    made = make_template(part, sound)
+    try:
+        made = make_template(part, sound)
+    except StoreFaultError as error:
+        moving = [name for name, law in laws.items() if law.free_symbols]
+        yield Fault(moving[0] if len(moving) == 1 else "", str(error), error.hint)
+        return
     templates = made.branches
     _check_ends(part, templates)
     check_readings(part, templates)

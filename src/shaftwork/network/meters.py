@@ -12,7 +12,8 @@ from shaftwork.components.branches import End
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import SignalError
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch
-from shaftwork.network.templates import BranchTemplate, Kind
+from shaftwork.network.kinds import Kind
+from shaftwork.network.templates import BranchTemplate
 from shaftwork.network.wording import listed
 
 

@@ -10,17 +10,17 @@ import dataclasses
 import reprlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from enum import IntEnum
 from functools import cached_property
 from typing import Any, TypeVar, get_args
 
-from sympy import Expr, Float, I, Integer, S, Symbol, nan, oo, zoo
+from sympy import Expr, Float, Integer, S, Symbol
 
 from shaftwork.components.base import Component, Derived, symbols_of
 from shaftwork.components.branches import (
     ACROSS,
     HISTORY,
     INTEGRAL,
+    RATE,
     AcrossLaw,
     AcrossStore,
     Branch,
@@ -35,26 +35,14 @@ from shaftwork.components.branches import (
     rigid,
     through_of,
 )
-from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Choice, Modes, has_mode, mode_symbol
-from shaftwork.components.slopes import jumps, slope
 from shaftwork.core.domains import DOMAINS
-from shaftwork.core.errors import ParameterError, ShaftworkError
+from shaftwork.core.errors import ShaftworkError
+from shaftwork.network.changing import CHANGE, beyond_constant, changes, spring
+from shaftwork.network.kinds import Kind, Resolved, law_of, resolved
 
 T = TypeVar("T")
-
-
-class Kind(IntEnum):
-    """The kinds of branches, in the order in which the normal tree prefers them."""
-
-    COUPLING = 0
-    ACROSS_SOURCE = 1
-    ACROSS_STORE = 2
-    CONDUCTANCE = 3
-    LAW = 4
-    THROUGH_STORE = 5
-    THROUGH_SOURCE = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,12 +56,12 @@ class BranchTemplate:
         terms: of a coupling, (coefficient, first end, second end); else empty.
         label: name of its through variable where the part has several.
         symbols: the parameters that the expressions contain, in the order of their declaration.
-        printed: the law as equations print it, in letters of derived quantities.
+        printed: the law as equations print it, in letters of derived quantities; of a store that changes, all of it.
         line: at an end of a line, its impedance and delay: of the conductance and of the history, whose law is
             `HISTORY`; the next two branches of a line are its other end.
         through: of a coupling that loses power, the factors of its through variable, one for each term; else empty.
         conservative: what a through law takes in it gives back.
-        stored: what a through law stores, J, in INTEGRAL and parameters.
+        stored: what a through law stores, J, in INTEGRAL, time and parameters; of a store that changes, of ACROSS too.
         meter: whether nothing passes through it, and its angle alone is recorded.
     """
 
@@ -116,9 +104,6 @@ def with_factors(terms: tuple[tuple[Expr, T, T], ...], factors: tuple[Expr, ...]
     if not factors:
         return terms
     return tuple((factor, plus, minus) for factor, (_, plus, minus) in zip(factors, terms, strict=True))
-
-
-_Resolved = tuple[Kind, Expr]
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,7 +224,7 @@ class _Resolver:
 
     def __init__(self, default: tuple[End, End], symbols: tuple[Symbol, ...], derived: Mapping[Symbol, Expr]) -> None:
         self._default, self._symbols, self._derived = default, symbols, derived
-        self._known: dict[Any, tuple[_Resolved, ...]] = {}
+        self._known: dict[Any, tuple[Resolved, ...]] = {}
         self._read: dict[Any, tuple[tuple[Expr, ...], tuple[Symbol, ...]]] = {}
 
     @property
@@ -251,12 +236,14 @@ class _Resolver:
         """None when the law vanishes, a rigid joint when it is infinite, two when it is affine."""
         match branch:
             case IdealCoupling(terms, label):
-                exact = tuple((_law(factor, branch, number), plus, minus) for factor, plus, minus in terms)
+                exact = tuple((law_of(factor, branch, number), plus, minus) for factor, plus, minus in terms)
                 yield self._template(Kind.COUPLING, Integer(0), (None, None), exact, label)
             case LossyCoupling(terms, through, label):
-                exact = tuple((_law(factor, branch, number), plus, minus) for factor, plus, minus in terms)
-                factors = tuple(_law(factor, branch, number) for factor in through)
+                exact = tuple((law_of(factor, branch, number), plus, minus) for factor, plus, minus in terms)
+                factors = tuple(law_of(factor, branch, number) for factor in through)
                 yield self._template(Kind.COUPLING, Integer(0), (None, None), exact, label, factors)
+            case AcrossStore(law) | ThroughStore(law) if self._changes(branch, law, number):
+                yield from self._changing(branch, law_of(law, branch, number), number)
             case AcrossStore(law, ends, label) | ThroughStore(law, ends, label) | ThroughLaw(law, ends, label):
                 for kind, found in self._resolved(branch, law, number):
                     joint = rigid(ends or self._default).terms if kind is Kind.COUPLING else ()
@@ -264,7 +251,7 @@ class _Resolver:
                     made = self._template(kind, found, where, joint, label)
                     yield self._with_energy(made, branch, number) if isinstance(branch, ThroughLaw) else made
             case DelayLine(impedance, delay, ends, label):
-                impedance, delay = _law(impedance, branch, number), _law(delay, branch, number)
+                impedance, delay = law_of(impedance, branch, number), law_of(delay, branch, number)
                 line, symbols = self._in_parameters(impedance, delay)
                 arrived = -Delayed(2 * impedance * ACROSS + HISTORY, delay)
                 for end in ends or self._default:
@@ -273,7 +260,7 @@ class _Resolver:
                     yield dataclasses.replace(impedes, line=(line[0], line[1]))
                     yield dataclasses.replace(history, symbols=symbols, printed=arrived, line=(line[0], line[1]))
             case AcrossLaw(law, ends, label):
-                made = _law(law, branch, number)
+                made = law_of(law, branch, number)
                 yield self._template(Kind.ACROSS_SOURCE, made, ends or self._default, (), label)
             case _:
                 kinds = ", ".join(kind.__name__ for kind in get_args(Branch))
@@ -281,12 +268,43 @@ class _Resolver:
                     f"branch {number} is {reprlib.repr(branch)}, which is no branch. branches() yields: {kinds}."
                 )
 
-    def _resolved(self, branch: Branch, law: Any, number: int) -> tuple[_Resolved, ...]:
+    def _changes(self, branch: Branch, law: Any, number: int) -> bool:
+        """Whether a store depends on its angle or on time."""
+        try:
+            if (type(branch), law) in self._known:
+                return False
+        except TypeError:  # no expression, as `law_of` says
+            pass
+        return changes(law_of(law, branch, number))
+
+    def _changing(self, branch: AcrossStore | ThroughStore, law: Expr, number: int) -> Iterator[BranchTemplate]:
+        """A store that depends on its angle or on time.
+
+        Raises:
+            ShaftworkError: it is an inertia that jumps, or is not above zero at the start.
+        """
+        ends, label = branch.ends or self._default, branch.label
+        if isinstance(branch, ThroughStore):
+            through, stored = spring(law)
+            made = ThroughLaw(through, ends, label, stored is None, Integer(0) if stored is None else stored)
+            yield from self.templates(made, number)
+            return
+        constant, beyond, energy = beyond_constant(law)
+        store, rest = (
+            self._template(kind, made, ends, (), f"{label}{ending}")
+            for kind, made, ending in ((Kind.ACROSS_STORE, constant, ""), (Kind.LAW, beyond, CHANGE))
+        )
+        yield dataclasses.replace(store, printed=law)
+        yield dataclasses.replace(
+            rest, printed=rest.printed.xreplace({RATE: Integer(0)}), stored=energy.xreplace(self._derived)
+        )
+
+    def _resolved(self, branch: Branch, law: Any, number: int) -> tuple[Resolved, ...]:
         key = (type(branch), law)
         try:
             return self._known[key]
         except (KeyError, TypeError):  # a law that is no expression may have no hash
-            made = tuple(_resolve(branch, _law(law, branch, number)))
+            made = tuple(resolved(branch, law_of(law, branch, number)))
         self._known[key] = made
         return made
 
@@ -309,9 +327,9 @@ class _Resolver:
         Raises:
             ShaftworkError: what it stores is not that of its angle.
         """
-        stored = _law(branch.stored, branch, number).xreplace(self._derived)
-        strange = stored.free_symbols - {INTEGRAL, *self._symbols}
-        if strange or has_mode(stored) or not (stored == 0 or _law(branch.through, branch, number).has(INTEGRAL)):
+        stored = law_of(branch.stored, branch, number).xreplace(self._derived)
+        strange = stored.free_symbols - {INTEGRAL, TIME, *self._symbols}
+        if strange or has_mode(stored) or not (stored == 0 or law_of(branch.through, branch, number).has(INTEGRAL)):
             raise ShaftworkError(
                 f"branch {number} (ThroughLaw) has stored = {reprlib.repr(stored)}. Write it in p.name and "
                 "in INTEGRAL, which its law must read, for all modes alike."
@@ -331,61 +349,5 @@ class _Resolver:
         return self._read[laws]
 
 
-def _law(law: Any, branch: Branch, number: int) -> Expr:
-    """A law or coefficient of a branch as an expression; infinity stands for a rigid joint, where one is possible.
-
-    Raises:
-        ShaftworkError: it is no number or expression, or has no finite real value.
-    """
-    try:
-        made = as_expression(law)
-    except ParameterError:
-        objection = "not a number or an expression of p.name, ACROSS, INTEGRAL and t"
-    else:
-        if not made.has(nan, I, -oo) and (not made.has(oo, zoo) or _is_rigid(branch, made)):
-            return made
-        objection = "which has no finite real value: look for a division by zero"
-    label = f" {branch.label!r}" if branch.label else ""
-    raise ShaftworkError(f"branch {number} ({type(branch).__name__}{label}) has {reprlib.repr(law)}, {objection}.")
-
-
-def _is_rigid(branch: Branch, law: Expr) -> bool:
-    """Whether an infinite law stands for a rigid joint: an infinite store, or a conductance such as 1/R with R = 0."""
-    if isinstance(branch, ThroughLaw):
-        found = slope(law, ACROSS)
-        return bool(found.has(oo, zoo)) and not found.has(ACROSS, INTEGRAL, TIME) and not readings_in(law)
-    return isinstance(branch, AcrossStore | ThroughStore)
-
-
 def _default_ends(part: Component) -> tuple[End, End]:
     return (part.ports[0].name, part.ports[1].name if len(part.ports) > 1 else None)
-
-
-def _resolve(branch: Branch, law: Expr) -> Iterator[_Resolved]:
-    """A store or law as kinds and laws: none when it vanishes, a coupling if it is infinite, two if it is affine."""
-    match branch:
-        case AcrossStore():
-            yield from _linear(Kind.ACROSS_STORE, law)
-        case ThroughStore():
-            yield from _linear(Kind.THROUGH_STORE, law)
-        case ThroughLaw():
-            yield from _through_law(law)
-
-
-def _linear(kind: Kind, coefficient: Expr) -> Iterator[_Resolved]:
-    if coefficient.has(zoo, oo, nan):
-        yield Kind.COUPLING, Integer(0)
-    elif coefficient != 0:
-        yield kind, coefficient
-
-
-def _through_law(through: Expr) -> Iterator[_Resolved]:
-    conductance = slope(through, ACROSS)
-    varies = conductance.has(ACROSS, INTEGRAL, TIME) or has_mode(conductance) or readings_in(conductance)
-    if varies or jumps(through, ACROSS):
-        yield Kind.LAW, through
-        return
-    yield from _linear(Kind.CONDUCTANCE, conductance)
-    rest = through.subs(ACROSS, 0)
-    if rest != 0 and not rest.has(nan):
-        yield Kind.LAW if rest.has(INTEGRAL) or readings_in(rest) else Kind.THROUGH_SOURCE, rest

@@ -16,7 +16,7 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.core.hints import hint
 from shaftwork.core.notices import once
 from shaftwork.core.parameters import briefly, in_si
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.network.wording import listed
 from shaftwork.pipeline.point_speeds import as_multiple, speeds_to_give, warn_of_speeds_left, warn_of_turning_angles
 from shaftwork.pipeline.settled import SteadyState

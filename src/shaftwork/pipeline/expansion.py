@@ -13,8 +13,8 @@ from shaftwork.components.shaft_models import Rigid
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import ParameterError
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
+from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
-from shaftwork.network.templates import Kind
 
 
 def expanded(netlist: Netlist, graph: CircuitGraph) -> Netlist:

@@ -21,7 +21,7 @@ from shaftwork.core.hints import hint
 from shaftwork.core.notices import PulsationWarning, warn
 from shaftwork.network.controlled import Reading, readings_of
 from shaftwork.network.graph import CircuitGraph
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.network.wording import listed
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.gains import value_of

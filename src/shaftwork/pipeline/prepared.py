@@ -15,7 +15,7 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.recovery import History
 from shaftwork.integrate.problem import LinearInputs, Observed
 from shaftwork.network.graph import GROUND
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm
 
 NOMINAL = 1e-3

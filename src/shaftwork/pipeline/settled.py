@@ -19,7 +19,7 @@ from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.errors import NetworkWarning, SimulationError
 from shaftwork.core.hints import hint
 from shaftwork.core.notices import warn
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.network.wording import listed
 
 if TYPE_CHECKING:

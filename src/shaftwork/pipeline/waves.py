@@ -27,8 +27,8 @@ from shaftwork.integrate.lossless.engine import solve
 from shaftwork.integrate.lossless.lines import DelayProblem, DelayTrajectory, Past, past_of
 from shaftwork.integrate.lossless.waveforms import Polynomials
 from shaftwork.integrate.problem import Problem, Trajectory
+from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import Netlist
-from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
 
 WHY = "Shafts are travelling waves, so states and delays are solved together."

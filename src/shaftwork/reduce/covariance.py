@@ -16,8 +16,9 @@ from shaftwork.components.laws import t
 from shaftwork.components.modes import Choice, Mode, Modes
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.network.graph import resolve
+from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import Placed
-from shaftwork.network.templates import BranchTemplate, Kind, Template, make_template
+from shaftwork.network.templates import BranchTemplate, Template, make_template
 from shaftwork.reduce.scales import Scale
 
 POINTS = (0.37, -1.93, 41.7, 0.0083)

@@ -12,7 +12,7 @@ from shaftwork.components.lossy_gear import LossyGear
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import Problem
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.network.wording import listed
 from shaftwork.reduce.scales import AGREE, Clusters, Scale
 

@@ -12,7 +12,7 @@ from shaftwork.components.branches import ACROSS
 from shaftwork.core.errors import Problem
 from shaftwork.network.controlled import Reading, readings_of
 from shaftwork.network.graph import GROUND
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.network.wording import at_nodes, title
 from shaftwork.reduction.view import View, Words, words_of
 

@@ -15,10 +15,11 @@ from shaftwork.components.tables import InterpolationSlope
 from shaftwork.core.errors import Problem
 from shaftwork.network.checks import LEFT_OUT, connection_problems, examine
 from shaftwork.network.graph import CircuitGraph, build_graph
+from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import Netlist
-from shaftwork.network.templates import Kind
 from shaftwork.network.wording import at_nodes, listed, title
 from shaftwork.reduction.cancelling import extreme_ratios, numeric_problems
+from shaftwork.reduction.changing import changing_problems
 from shaftwork.reduction.controlled import controlled_problems, reads_itself
 from shaftwork.reduction.form import StateForm, state_form
 from shaftwork.reduction.gains import value_of
@@ -79,6 +80,7 @@ def _causes(typed: Sequence[Problem], found: Sequence[Problem]) -> Iterator[Prob
 def structural_problems(form: StateForm) -> tuple[Problem, ...]:
     """What the normal tree says: errors, then warnings, then notes, whatever the values are."""
     view = _Structure(form)
+    jumping = tuple(view.jumping())
     return (
         *view.prescribed_twice(),
         *controlled_problems(view),
@@ -88,7 +90,8 @@ def structural_problems(form: StateForm) -> tuple[Problem, ...]:
             else (*view.massless(), *view.implicit(), *view.wound(), *view.undetermined())
         ),
         *view.locked(),
-        *view.jumping(),
+        *jumping,
+        *changing_problems(view, jumping),
         *view.redundant(),
         *view.fixed_ratios(),
     )

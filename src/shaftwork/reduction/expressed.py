@@ -8,7 +8,7 @@ from sympy import Expr, Symbol
 
 from shaftwork.components.base import Signal
 from shaftwork.network.graph import GROUND, GraphPart, signals_of
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm, store_name
 from shaftwork.reduction.readings import Readings
 from shaftwork.reduction.rows import Rows

@@ -18,11 +18,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+from shaftwork.components.branches import RATE
 from shaftwork.core.domains import Domain
 from shaftwork.network.controlled import Reading, readings_of
 from shaftwork.network.graph import CircuitGraph, GraphBranch
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.tree import NormalTree, normal_tree
+
+KINDS = ("across", "through", "integral", "rate")
+"""What laws read besides what is across their own branches, in the order of `StateForm.readings`."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +74,11 @@ class StateForm:
         conductances = frozenset(self.tree_conductances)
         links = (link for link in self.tree.links[Kind.LAW] if not conductances.isdisjoint(self.tree.loops[link]))
         return (*self.tree.tree[Kind.LAW], *links)
+
+    @cached_property
+    def inertial(self) -> tuple[int, ...]:
+        """Laws of what stores have beyond a constant: they read the rate of a speed that they help to determine."""
+        return tuple(k for k in self.tree.links[Kind.LAW] if RATE in self.graph.branches[k].template.reads)
 
     @property
     def across_states(self) -> tuple[int, ...]:
@@ -130,7 +139,7 @@ class StateForm:
         """What laws read besides what is across their own branches, each once: nodes, then branches."""
         laws = (*self.tree.links[Kind.LAW], *self.tree.tree[Kind.LAW], *self.controlled)
         found = dict.fromkeys(reading for law in laws for reading in readings_of(self.graph, law).values())
-        return tuple(sorted(found, key=lambda reading: ("across", "through", "integral").index(reading.kind)))
+        return tuple(sorted(found, key=lambda reading: KINDS.index(reading.kind)))
 
     @cached_property
     def waves(self) -> tuple[int, ...]:

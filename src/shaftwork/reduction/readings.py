@@ -21,7 +21,7 @@ from shaftwork.components.pieces import parts
 from shaftwork.components.slopes import slope
 from shaftwork.core.errors import NetworkError, Problem
 from shaftwork.network.graph import GROUND, GraphBranch, GraphPart
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.gains import exact_of
 from shaftwork.reduction.rows import Rows

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 from sympy import Add, Dummy, Expr, Integer, Symbol
 
-from shaftwork.components.branches import ACROSS, INTEGRAL
+from shaftwork.components.branches import ACROSS, INTEGRAL, RATE
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import slope
 from shaftwork.network.controlled import Reading, readings_of
 from shaftwork.network.graph import GROUND
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.blocks import BlockTooLargeError, Tie, solve_blocks, solve_tied
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.gains import exact_of
@@ -70,6 +70,7 @@ class _Solution:
         self.across.update({k: Dummy(real=True) for k in form.controlled})
         self.through: dict[int, Expr] = {k: own["through", k] for k in form.through_states}
         self.integral = {k: own["integral", k] for k in form.integrals}
+        self.beyond: dict[int, Expr] = {}
 
     def law(self, branch: int) -> Expr:
         """Coefficient or law of a branch in the symbols of the network."""
@@ -96,17 +97,23 @@ class _Solution:
             self.through[link] = self.law(link) * self.across[link]
         for link in form.tree.links[Kind.LAW]:
             self.across[link] = self.around(link)
-            known = {ACROSS: self.across[link], INTEGRAL: self.integral.get(link, INTEGRAL)}
-            self.through[link] = self.law(link).xreplace({**known, **self.read(link)})
+            known = {ACROSS: self.across[link], INTEGRAL: self.integral.get(link, INTEGRAL), **self.read(link)}
+            law = self.law(link)
+            if link in form.inertial:
+                self.beyond[link], law = slope(law, RATE).xreplace(known), law.xreplace({RATE: Integer(0)})
+            self.through[link] = law.xreplace(known)
         for link in (*sources, *form.through_states, *form.dependent_across):
             self.across[link] = self.around(link)
         rates = (*self._speed_rates(), *self._torque_rates(), *(self.across[k] for k in form.integrals))
+        for link, capacity in self.beyond.items():
+            self.through[link] += capacity * self._rate(link, dict(zip(form.across_states, rates, strict=False)))
         parameters = tuple(Symbol(name, real=True) for name in self.graph.parameters)
         return Rows(self.states, parameters, rates, self.across, self.through)
 
     def read(self, branch: int) -> dict[Symbol, Expr]:
         """What the law of a branch reads of other ports and branches of its part."""
-        return {symbol: self.value(made) for symbol, made in readings_of(self.graph, branch).items()}
+        reads = readings_of(self.graph, branch).items()
+        return {symbol: self.value(made) for symbol, made in reads if made.kind != "rate"}
 
     def value(self, reading: Reading) -> Expr:
         """A quantity that a law reads, in states and sources of time."""
@@ -146,18 +153,21 @@ class _Solution:
         unknowns = form.across_states
         links = (*form.link_conductances, *form.through_states, *form.laws)
         right = {tree: -self.out_of(tree, links) for tree in unknowns}
-        ties = [self._tie(link, right.keys()) for link in form.dependent_across]
+        ties = [self._tie(link, self.law(link), right.keys()) for link in form.dependent_across]
+        ties += [self._tie(link, capacity, right.keys()) for link, capacity in self.beyond.items()]
         return solve_tied({tree: self.law(tree) for tree in unknowns}, ties, right)
 
-    def _tie(self, link: int, unknowns: Container[int]) -> Tie:
-        """A dependent store as what it does to the stores that carry it."""
+    def _tie(self, link: int, capacity: Expr, unknowns: Container[int]) -> Tie:
+        """A dependent store, or what one has beyond a constant, as what it does to the stores that carry it."""
         columns, row = (
             {tree: gain for tree, gain in members[link] if tree in unknowns} for members in (self.balances, self.loops)
         )
-        driven = (
-            gain * slope(self.law(tree), TIME) for tree, gain in self.loops[link] if tree in self.form.across_sources
-        )
-        return Tie(self.law(link), columns, row, Add(*driven))
+        return Tie(capacity, columns, row, self._rate(link, {}))
+
+    def _rate(self, link: int, rates: Mapping[int, Expr]) -> Expr:
+        """The rate of what is across a link, from known rates of stores and those of prescribed speeds."""
+        known = {**{tree: slope(self.law(tree), TIME) for tree in self.form.across_sources}, **rates}
+        return Add(*(gain * known[tree] for tree, gain in self.loops[link] if tree in known))
 
     def _torque_rates(self) -> tuple[Expr, ...]:
         form = self.form

@@ -10,7 +10,7 @@ from sympy import Float, Symbol
 from shaftwork.components.branches import THROUGH
 from shaftwork.core.errors import Problem
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.network.wording import at_nodes, title
 from shaftwork.reduction.gains import value_of
 from shaftwork.reduction.tree import column_of

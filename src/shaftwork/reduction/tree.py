@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from sympy import Expr
 
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.reduction.gains import Gain, Number, add, coefficient, coefficients_in, divide, value_of
 
 Row = dict[int, Number]

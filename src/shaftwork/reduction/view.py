@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from shaftwork.components.branches import ACROSS
 from shaftwork.core.domains import Domain
 from shaftwork.network.graph import GROUND, ends_of
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.network.wording import Spelling, title
 from shaftwork.reduction.form import StateForm
 

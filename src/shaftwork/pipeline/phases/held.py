@@ -29,7 +29,7 @@ from shaftwork.components.pieces import parts
 from shaftwork.core.kept import Kept
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.graph import GROUND
-from shaftwork.network.templates import Kind
+from shaftwork.network.kinds import Kind
 from shaftwork.pipeline.phases.assemblies import Assembly
 from shaftwork.pipeline.phases.elements import Element, ModeNames, is_same
 from shaftwork.reduction.form import StateForm
@@ -187,7 +187,7 @@ def laws_that_hold(model: Model, elements: Sequence[Element]) -> list[int | None
         an end, or torques depend on each other.
     """
     form = model.form
-    if form.loop_laws or form.across_inputs or form.waves or form.dependent_through:
+    if form.loop_laws or form.inertial or form.across_inputs or form.waves or form.dependent_through:
         return None
     found = [_law(form, element) if holds(element) else None for element in elements]
     return None if any(law is None and holds(element) for law, element in zip(found, elements, strict=True)) else found

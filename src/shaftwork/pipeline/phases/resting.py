@@ -10,8 +10,8 @@ from itertools import chain
 from shaftwork.components.branches import End
 from shaftwork.components.modes import Choice, Modes
 from shaftwork.network.graph import GROUND, GraphPart
+from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import Netlist
-from shaftwork.network.templates import Kind
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.gains import Number, add, value_of
 

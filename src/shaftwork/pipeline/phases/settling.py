@@ -15,12 +15,7 @@ from shaftwork.pipeline.phases.commutation import Commutation, by_time, is_switc
 from shaftwork.pipeline.phases.courses import Way, chosen, endless, leaving
 from shaftwork.pipeline.phases.elements import ModeNames, Watched
 from shaftwork.pipeline.phases.impacts import Impacts
-from shaftwork.pipeline.phases.moments import (
-    Change,
-    Moment,
-    clear_of_limits,
-    together,
-)
+from shaftwork.pipeline.phases.moments import Change, Moment, clear_of_limits, together
 from shaftwork.pipeline.phases.regimes import Regimes, anew, refuse_beyond, with_modes
 
 if TYPE_CHECKING:

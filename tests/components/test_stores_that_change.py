@@ -1,0 +1,310 @@
+"""Inertias and springs that depend on their angle and on time, against Lagrange's equations made by sympy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+import sympy
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+from sympy import Piecewise, cos, sin
+
+import shaftwork as sw
+from shaftwork.reduce import refer
+
+PHI = sympy.symbols("phi_:4", real=True)
+OMEGA = sympy.symbols("omega_:4", real=True)
+
+
+def accelerations(T: sympy.Expr, V: sympy.Expr, torques: Sequence[sympy.Expr]) -> sympy.Matrix:
+    """The accelerations by Lagrange's equations of energies in PHI, OMEGA and time."""
+    n = len(torques)
+    mass = sympy.Matrix(n, n, lambda i, k: sympy.diff(T, OMEGA[i], OMEGA[k]))
+    right = []
+    for i, torque in enumerate(torques):
+        momentum = sympy.diff(T, OMEGA[i])
+        moved = sum(sympy.diff(momentum, PHI[k]) * OMEGA[k] for k in range(n)) + sympy.diff(momentum, sw.t)
+        right.append(torque + sympy.diff(T - V, PHI[i]) - moved)
+    return mass.LUsolve(sympy.Matrix(right))
+
+
+def two_masses() -> sw.Network:
+    net = sw.Network("arm")
+    net.add(sw.Inertia("motor", J=0.5), "a")
+    net.add(sw.Spring("shaft", c=40.0), "a", "b")
+    net.add(sw.Inertia("arm", J=2 + cos(sw.phi)), "b")
+    return net
+
+
+def hand_derived(_: float, x: np.ndarray) -> list[float]:
+    """Lagrange: T = 0.25 w1^2 + (2 + cos f) w2^2 / 2, V = 20 (f1 - f)^2; states w1, w2, twist, f."""
+    w1, w2, twist, f = x
+    return [-80 * twist, (40 * twist + 0.5 * np.sin(f) * w2**2) / (2 + np.cos(f)), w1 - w2, w2]
+
+
+@pytest.mark.parametrize(
+    ("engine", "rtol", "within"), [("scipy", 1e-12, 1e-10), ("heyoka", 1e-12, 1e-10), ("sundials", 1e-9, 1e-5)]
+)
+def test_an_arm_moves_as_lagrange_says_and_keeps_its_energy(engine: str, rtol: float, within: float) -> None:
+    start = {"motor.omega": 3.0, "arm.omega": 1.0, "arm.phi": 0.4}
+    made = two_masses().simulate(10.0, engine=engine, rtol=rtol, initial=start)
+    found = solve_ivp(hand_derived, (0, 10), [3, 1, 0, 0.4], "DOP853", t_eval=made.t, rtol=3e-14, atol=1e-14).y
+    for name, course in zip(("motor.omega", "arm.omega", "arm.phi"), found[[0, 1, 3]], strict=True):
+        assert np.abs(made[name] - course).max() < within * np.abs(course).max()
+    assert made.energy.residual < within
+
+
+class Train(NamedTuple):
+    """A network, its energies and the torques besides, and what its states are, in PHI and OMEGA."""
+
+    net: sw.Network
+    T: sympy.Expr
+    V: sympy.Expr
+    torques: list[sympy.Expr]
+    states: dict[str, sympy.Expr]
+
+
+@st.composite
+def trains(draw: st.DrawFn) -> Train:
+    """A chain of inertias, some of them on gears, with springs between them and fans at its nodes."""
+    numbers = st.floats(0.2, 3.0)
+    count = draw(st.integers(1, 3))
+    made = Train(sw.Network("train"), sympy.Integer(0), sympy.Integer(0), [sympy.Integer(0)] * count, {})
+    net, T, V, torques, states = made
+    for k in range(count):
+        for part in range(draw(st.integers(1, 2))):
+            a, b, d = (draw(numbers) for _ in range(3))
+            both = a + b * (1.1 + cos(draw(st.integers(1, 3)) * sw.phi)) + d * sw.t
+            law = draw(st.sampled_from([both, sympy.Float(a), a + b * sin(sw.phi) ** 2]))
+            ratio, name, node = draw(st.sampled_from([1.0, -2.0, 0.5])), f"J{k}{part}", f"n{k}"
+            if ratio != 1.0:
+                node = f"n{k} {part}"
+                net.add(sw.Gear(f"g{k}{part}", ratio=ratio), f"n{k}", node)
+            net.add(sw.Inertia(name, J=law), node)
+            T += law.subs(sw.phi, PHI[k] / ratio) * (OMEGA[k] / ratio) ** 2 / 2
+            states |= {f"{name}.omega": OMEGA[k] / ratio, f"{name}.phi": PHI[k] / ratio}
+        friction, speed = draw(numbers), OMEGA[k] / (100 * 2 * sympy.pi / 60)
+        net.add(sw.FanLoad(f"fan{k}", tau_n=friction, n_n=100.0), f"n{k}")
+        torques[k] -= friction * speed * sympy.Abs(speed)
+        if k:
+            c, bend, d = (draw(numbers) for _ in range(3))
+            twist, rel = PHI[k - 1] - PHI[k], OMEGA[k - 1] - OMEGA[k]
+            net.add(sw.Spring(f"c{k}", c=c + bend * sw.phi**2 + sin(sw.t) / 9, d=d), f"n{k - 1}", f"n{k}")
+            V += (c + sin(sw.t) / 9) * twist**2 / 2 + bend * twist**4 / 4
+            torques[k - 1] -= d * rel
+            torques[k] += d * rel
+            states[f"c{k}.phi"] = twist
+    return Train(net, T, V, torques, states)
+
+
+@given(trains(), st.integers(0, 10_000))
+def test_rates_are_those_of_lagrange_in_scalar_and_in_array_code(train: Train, seed: int) -> None:
+    rng, model, n = np.random.default_rng(seed), train.net.compile(), len(train.torques)
+    t, values = rng.uniform(0, 3), rng.normal(size=2 * n)
+    point = dict(zip((*PHI[:n], *OMEGA[:n], sw.t), (*values, t), strict=True))
+    moved = accelerations(train.T, train.V, train.torques).subs(point).evalf()
+    rates_of = dict(zip((*PHI[:n], *OMEGA[:n]), (*values[n:], *moved), strict=True))
+    quantities = [train.states[name] for name in model.states]
+    x = np.array([quantity.subs(point) for quantity in quantities], dtype=float)
+    wanted = [sum(quantity.diff(one) * rate for one, rate in rates_of.items()) for quantity in quantities]
+    size = max(map(abs, wanted))
+    for rates in (model.rhs(t, x), model.bind().rhs(t, x)):
+        # what is left of sums whose terms are a few hundred times as large
+        np.testing.assert_allclose(rates, np.array(wanted, dtype=float), rtol=1e-11, atol=float(1e-12 * size))
+    steps = 1e-6 * np.eye(len(x))
+    slopes = np.array([(model.rhs(t, x + h) - model.rhs(t, x - h)) / 2e-6 for h in steps]).T
+    # central differences of such a step are good to 1e-9 of the largest slope
+    np.testing.assert_allclose(model.jacobian(t, x).toarray(), slopes, rtol=0, atol=1e-8 * np.abs(slopes).max())
+
+
+@given(trains())
+def test_printed_state_equations_are_what_is_integrated(train: Train) -> None:
+    equations, model = train.net.equations(), train.net.compile()
+    x = np.random.default_rng(1).normal(size=len(model.states))
+    known = {sympy.Symbol(name, real=True): value for name, value in zip(model.states, x, strict=True)}
+    known |= {sympy.Symbol(name, real=True): value for name, value in model.parameters.items()} | {sw.t: 0.7}
+    laws = {row.left: row.right for row in (*equations.laws, *equations.eliminated, *equations.loops)}
+    for row, rate in zip(equations.states, model.rhs(0.7, x), strict=True):
+        right = row.right
+        for _ in range(4):  # torques and speeds that are no states by what they are
+            right = right.xreplace(laws)
+        assert float(right.xreplace(known)) == pytest.approx(rate, rel=1e-11, abs=1e-11)
+
+
+def test_a_free_mass_keeps_its_momentum_where_the_time_changes_its_inertia() -> None:
+    net = sw.Network("skater")
+    net.add(sw.Inertia("skater", J=sw.Ramp(-2.0, 1.0, start=0.5, before=3.0)), "a")
+    net.add(sw.Damper("none", d=0.0), "a")
+    made = net.simulate(2.0, initial={"skater.omega": 2.0}, rtol=1e-11)
+    assert made["skater.omega"][-1] == pytest.approx(6.0, rel=1e-9)
+    # the arms have put in what there is more: J omega^2 / 2 from 6 J to 18 J
+    assert made.energy.lost_in["skater"] == pytest.approx(-12.0, rel=1e-9)
+    assert made.energy.residual < 1e-9
+
+
+def test_a_prescribed_speed_takes_the_torque_that_a_crank_asks() -> None:
+    net = sw.Network("press")
+    net.add(sw.SpeedSource("drive", omega=3 + sin(2 * sw.t)), "a")
+    net.add(sw.Inertia("crank", J=2 + cos(sw.phi)), "a")
+    made = net.simulate(5.0, rtol=1e-11)
+    t = made.t
+    angle, speed, rate = 3 * t + (1 - np.cos(2 * t)) / 2, 3 + np.sin(2 * t), 2 * np.cos(2 * t)
+    wanted = (2 + np.cos(angle)) * rate - np.sin(angle) * speed**2 / 2
+    np.testing.assert_allclose(made["drive.tau"], wanted, rtol=0, atol=1e-9 * np.abs(wanted).max())
+    np.testing.assert_allclose(made["crank.tau"], wanted, rtol=0, atol=1e-9 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize(
+    ("law", "potential"),
+    [
+        (5 + sw.phi**2, lambda s: 2.5 * s**2 + s**4 / 4),
+        (5 + cos(sw.phi), lambda s: 2.5 * s**2 + s * np.sin(s) + np.cos(s) - 1),
+        (sw.Table([-1, 0, 1], [4, 5, 4])(sw.phi), lambda s: 2.5 * s**2 - np.abs(s) ** 3 / 3),
+    ],
+)
+def test_a_spring_over_its_twist_gives_back_what_it_took(law: sympy.Expr, potential: Callable[[float], float]) -> None:
+    net = sw.Network("swing")
+    net.add(sw.Inertia("J", J=2.0), "a")
+    net.add(sw.Spring("c", c=law), "a", "ground")
+    made = net.simulate(6.0, initial={"J.omega": 1.0}, rtol=1e-11)
+    energies = made["J.omega"] ** 2 + np.vectorize(potential)(made["c.phi"])
+    np.testing.assert_allclose(energies, 1.0, rtol=1e-9)
+    assert made.energy.residual < 1e-9
+
+
+def test_a_stiffness_over_time_does_the_work_that_the_balance_says() -> None:
+    net = sw.Network("mathieu")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.Spring("c", c=5 + 2 * cos(3 * sw.t)), "a", "ground")
+    made = net.simulate(6.0, initial={"J.omega": 1.0}, rtol=1e-11)
+    found = solve_ivp(
+        lambda t, x: [x[1], -(5 + 2 * np.cos(3 * t)) * x[0]],
+        (0, 6),
+        [0, 1],
+        "DOP853",
+        t_eval=made.t,
+        rtol=1e-13,
+        atol=1e-13,
+    ).y
+    np.testing.assert_allclose(made["c.phi"], found[0], rtol=0, atol=1e-9 * np.abs(found[0]).max())
+    energy = made["J.omega"][-1] ** 2 / 2 + (5 + 2 * np.cos(18)) * made["c.phi"][-1] ** 2 / 2
+    assert made.energy.lost_in["c"] == pytest.approx(0.5 - energy, rel=1e-8)
+    assert made.energy.residual < 1e-9
+
+
+def test_a_clutch_couples_a_crank_whose_inertia_changes() -> None:
+    """By hand: before it holds motor and crank move by the clutch's torque, then together with J + 1."""
+    net = sw.Network("press")
+    net.add(sw.Inertia("motor", J=1.0), "m")
+    net.add(sw.Clutch("clutch", tau=6.0), "m", "c")
+    net.add(sw.Inertia("crank", J=2 + cos(sw.phi)), "c")
+    made = net.simulate(4.0, initial={"motor.omega": 8.0}, rtol=1e-11)
+
+    def slipping(_t: float, x: np.ndarray) -> list[float]:
+        _, w2, f = x
+        return [-6.0, (6 + 0.5 * np.sin(f) * w2**2) / (2 + np.cos(f)), w2]
+
+    def meet(_: float, x: np.ndarray) -> float:
+        return float(x[0] - x[1])
+
+    meet.terminal = True  # type: ignore[attr-defined]
+    first = solve_ivp(slipping, (0, 4), [8, 0, 0], "DOP853", events=meet, rtol=1e-13, atol=1e-13)
+    together = solve_ivp(
+        lambda _, x: [0.5 * np.sin(x[1]) * x[0] ** 2 / (3 + np.cos(x[1])), x[0]],
+        (first.t[-1], 4),
+        first.y[1:, -1],
+        "DOP853",
+        rtol=1e-13,
+        atol=1e-13,
+    )
+    assert [phase.name for phase in made.phases] == ["clutch slipping forward", "clutch engaged"]
+    assert made.phases[1].start == pytest.approx(first.t[-1], rel=1e-9)
+    assert made["crank.omega"][-1] == pytest.approx(together.y[0, -1], rel=1e-8)
+    assert made.energy.residual < 1e-9
+
+
+def test_transfer_functions_have_the_slopes_of_an_inertia_that_changes() -> None:
+    net = two_masses()
+    net.add(sw.TorqueSource("T", tau=0.0), "a")
+    net.add(sw.Spring("stop", c=10.0), "b", "ground")
+    transfer = net.equations().transfer_function("T.tau", "arm.omega", values=True)
+    s = transfer.s if hasattr(transfer, "s") else sympy.Symbol("s")
+    wanted = 40 * s / ((0.5 * s**2 + 40) * (3 * s**2 + 50) - 1600)
+    at = sympy.Rational(7, 3)
+    assert float(sympy.sympify(transfer.expression).subs(s, at)) == pytest.approx(float(wanted.subs(s, at)), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("law", "said"),
+    [
+        (sw.Step(2.0, 1.0, before=1.0), "jumps at t = 1 s"),
+        (Piecewise((1, sw.phi < 1), (2, True)), "jumps at the angle 1"),
+        (2 + sympy.floor(sw.t), "jumps at steps of floor"),
+        (sw.t, "is 0 at the angle and the time zero"),
+        (1 / sw.phi, "is not finite at the angle and the time zero"),
+        (1 + sw.omega, "depends on its speed"),
+        (2 + sw.phi * sw.omega, "depends on its speed"),
+    ],
+)
+def test_an_inertia_that_cannot_be_is_named_with_the_reason(law: sympy.Expr, said: str) -> None:
+    net = sw.Network("wrong")
+    net.add(sw.Inertia("arm", J=law), "a")
+    net.add(sw.Spring("c", c=1.0), "a", "ground")
+    with pytest.raises(sw.NetworkError, match=rf"Inertia 'arm': J {said}"):
+        net.compile()
+
+
+def test_what_has_no_equations_beside_it_is_refused_with_the_next_step() -> None:
+    def beside(*parts: tuple[sw.Component, str, str]) -> sw.Network:
+        net = sw.Network("beside")
+        net.add(sw.Inertia("arm", J=2 + cos(sw.phi)), "b")
+        net.add(sw.Inertia("motor", J=1.0), "a")
+        for part, *nodes in parts:
+            net.add(part, *nodes)
+        return net
+
+    with pytest.raises(sw.NetworkError, match=r"'gap' strikes rigidly. Give the contact a stiffness c"):
+        beside((sw.Backlash("gap", gap=0.1), "a", "b")).compile()
+    with pytest.raises(sw.NetworkError, match=r"'line' is a travelling wave. Take model=Spectral\(24\)"):
+        beside((sw.Shaft("line", length=1.0, diameter=0.1, model=sw.Wave()), "a", "b")).compile()
+    net = sw.Network("jump")
+    net.add(sw.SpeedSource("drive", omega=sw.Step(2.0, 1.0)), "a")
+    net.add(sw.PlanetaryGear("gear", ratio=3.0), "a", "b", "c")
+    net.add(sw.Inertia("arm", J=2 + cos(sw.phi)), "b")
+    net.add(sw.Inertia("wheel", J=1.0), "c")
+    with pytest.raises(sw.NetworkError, match="'drive' jumps, which is an impulse"):
+        net.compile()
+    with pytest.raises(sw.CompileError, match="reads other quantities"):
+        two_masses().equations().latex("second-order")
+    geared = two_masses()
+    geared.add(sw.Gear("gear", ratio=2.0), "a", "c")
+    geared.add(sw.Inertia("load", J=1.0), "c")
+    with pytest.raises(sw.NetworkError, match="Inertia 'arm' cannot be referred"):
+        refer(geared, "c")
+
+
+def test_a_long_shaft_beside_it_is_the_same_in_array_code() -> None:
+    def train(model: sw.ShaftModel) -> sw.Network:
+        net = two_masses()
+        net.add(sw.Shaft("line", length=20.0, diameter=0.05, model=model), "b", "c")
+        net.add(sw.Inertia("wheel", J=1 + 0.3 * sin(sw.phi)), "c")
+        return net
+
+    start = {"motor.omega": 3.0}
+    few, many = (train(model).simulate(0.03, initial=start, rtol=1e-9) for model in (sw.Spectral(16), sw.Spectral(35)))
+    assert train(sw.Spectral(35)).compile().scalar is None
+    # what 16 nodes leave out of a motion that starts without a jump
+    assert few["wheel.omega"][-1] == pytest.approx(many["wheel.omega"][-1], rel=1e-6)
+
+
+def test_it_is_stored_and_read_again(tmp_path: Path) -> None:
+    net = two_masses()
+    net.save(tmp_path / "arm.toml")
+    again = sw.Network.load(tmp_path / "arm.toml")
+    start = {"motor.omega": 3.0}
+    assert again.simulate(1.0, initial=start)["arm.omega"][-1] == net.simulate(1.0, initial=start)["arm.omega"][-1]
