@@ -40,6 +40,7 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
     from shaftwork.components.friction import *
     from shaftwork.components.induction_machine import *
     from shaftwork.components.laws import (
+        PWM as PWM,
         Ramp as Ramp,
         Step as Step,
         omega as omega,
@@ -124,7 +125,7 @@ _HOME = {
     "shaftwork.components.bucket_wheel": ("Soil",),
     "shaftwork.components.noise": ("HeldNoise", "SmoothNoise"),
     "shaftwork.components.tables": ("Table",),
-    "shaftwork.components.laws": ("Ramp", "Step", "omega", "phi", "psi", "s", "t", "u", "v"),
+    "shaftwork.components.laws": ("PWM", "Ramp", "Step", "omega", "phi", "psi", "s", "t", "u", "v"),
     "shaftwork.core.domains": ("ELECTRICAL", "ROTATION", "TRANSLATION"),
     "shaftwork.core.errors": (
         "AccuracyWarning",

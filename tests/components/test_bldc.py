@@ -12,6 +12,7 @@ import sympy
 import shaftwork as sw
 from shaftwork.components.bldc import _shape
 from tests.reference.bldc import Motor, simulate
+from tests.reference.chopper import Chopper
 
 # Popenda 2019: back EMF 212 V at 3000 1/min, taken as the flat top of a phase; L_mu 7.4 mH and L_sigma 1.6 mH together
 # as the inductance of a phase. Chosen: the mean rectified voltage of 400 V mains, and two pole pairs.
@@ -206,3 +207,56 @@ def test_copper_is_lost_in_the_motor_and_all_that_its_source_gives_is_supplied()
         2 * R * current**2 * (t - 2 * rise * once + rise / 2 * twice), rel=1e-9
     )
     assert energy.supplied_by["motor"] == pytest.approx(U * current * (t - rise * once), rel=1e-9)
+
+
+CONTROL = {"i_ref": 8.0, "k_p": 15.0, "t_i": 0.004, "f_c": 1500.0}
+
+
+@pytest.mark.parametrize("engine", [pytest.param("scipy", marks=pytest.mark.slow), "heyoka"])
+def test_a_controlled_current_is_that_of_its_chopper_by_hand(engine: str) -> None:
+    pytest.importorskip({"heyoka": "heyoka"}.get(engine, "scipy"))
+    net = sw.Network("locked")
+    net.add(sw.BLDCMotor("m", **DATA, **CONTROL), "rotor")
+    net.add(sw.SpeedSource("lock", omega=0.0), "rotor", "ground")
+    times = np.linspace(0, 0.006, 61)[1:]
+    made = net.simulate(0.006, initial={"m.phi": (math.pi / 6 + 0.05) / 2}, rtol=1e-10, engine=engine, t_eval=times)
+    values = {name: DATA[name] for name in ("U", "R", "L")}
+    i, control = Chopper(**values, **CONTROL).run(times).T
+    # a switch moves in time by the error of the current before it
+    assert np.abs(made["m.i_a"] - i).max() < 1e-7 * i.max()
+    assert np.abs(made["m.i_b"] + i).max() < 1e-7 * i.max()
+    assert np.abs(made["m.u_i"] - control).max() < 1e-7 * np.abs(control).max()
+    assert made.energy.residual < 1e-9
+
+
+def test_the_mean_current_is_the_one_that_is_asked_for_once_it_has_settled() -> None:
+    net = sw.Network("locked")
+    net.add(sw.BLDCMotor("m", **DATA, **CONTROL), "rotor")
+    net.add(sw.SpeedSource("lock", omega=0.0), "rotor", "ground")
+    made = net.simulate(0.06, initial={"m.phi": 0.3}, rtol=1e-8, t_eval=np.linspace(0.04, 0.06, 6001))
+    # a triangle about its mean, sampled evenly over whole periods
+    assert np.mean(made["m.i_a"]) == pytest.approx(8.0, rel=1e-3)
+
+
+def test_pulses_of_a_share_of_the_time_give_that_share_of_the_voltage() -> None:
+    net = sw.Network("pulses")
+    net.add(sw.VoltageSource("supply", u=300 * sw.PWM(0.3, 2000.0)), "p", "ground")
+    net.add(sw.Resistor("R", R=2.0), "p", "q")
+    net.add(sw.Inductor("L", L=0.05), "q", "ground")
+    made = net.simulate(0.4, rtol=1e-8, t_eval=np.linspace(0.38, 0.4, 4001))
+    # a triangle about its mean, sampled evenly over whole periods
+    assert np.mean(made["L.i"]) == pytest.approx(0.3 * 300 / 2, rel=2e-4)
+    assert np.ptp(made["L.i"]) == pytest.approx(300 / 0.05 * 0.3 * 0.7 / 2000, rel=1e-2)
+
+
+@pytest.mark.parametrize(("duty", "value"), [(-0.2, 0), (0.0, 0), (1.0, 1), (1.4, 1)])
+def test_pulses_of_no_share_and_of_all_have_neither_pulses_nor_gaps(duty: float, value: int) -> None:
+    law = sw.PWM(duty, 10.0)
+    # at whole and half periods the triangle touches 0 and 1
+    assert {int(law.subs(sw.t, t)) for t in np.linspace(0.001, 0.098, 41)} == {value}
+
+
+@pytest.mark.parametrize("given", [{"i_ref": 8.0}, {"i_ref": 8.0, "k_p": 2.0}, {"k_p": 2.0}, {"f_c": 1e3}])
+def test_half_a_current_controller_is_refused(given: dict[str, float]) -> None:
+    with pytest.raises(sw.ParameterError, match="Give i_ref, k_p and f_c, or none of them"):
+        sw.BLDCMotor("m", **DATA, **given)

@@ -288,6 +288,7 @@ def test_what_has_no_equations_beside_it_is_refused_with_the_next_step() -> None
         refer(geared, "c")
 
 
+@pytest.mark.slow
 def test_a_long_shaft_beside_it_is_the_same_in_array_code() -> None:
     def train(model: sw.ShaftModel) -> sw.Network:
         net = two_masses()

@@ -99,6 +99,10 @@ class ArrayPrinter(RealNumbers, NumPyPrinter):  # type: ignore[misc]
         pairs = [(self._print(piece.args[1]), self._print(piece.args[0])) for piece in pieces.args]
         return reduce(lambda rest, pair: f"where({pair[0]}, {pair[1]}, {rest})", reversed(pairs), "nan")
 
+    def _print_Heaviside(self, expression: Expr) -> str:
+        # sympy's printer makes pieces of it and of all maxima in it, which takes minutes
+        return f"heaviside({', '.join(self._print(part) for part in expression.args)})"
+
     def _print_ITE(self, choice: ITE) -> str:
         return f"where({', '.join(self._print(part) for part in choice.args)})"
 

@@ -13,6 +13,7 @@ from shaftwork.components.branches import (
     ACROSS,
     INTEGRAL,
     AcrossLaw,
+    AcrossStore,
     Branch,
     ThroughLaw,
     ThroughStore,
@@ -20,9 +21,10 @@ from shaftwork.components.branches import (
     integral_of,
     through_of,
 )
-from shaftwork.components.laws import as_expression
+from shaftwork.components.laws import PWM, as_expression
 from shaftwork.components.modes import ANEW, Leave, Mode, Modes
 from shaftwork.core.domains import ELECTRICAL, ROTATION
+from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter
 
 PHASES = {"a": Integer(0), "b": 2 * pi / 3, "c": -2 * pi / 3}
@@ -49,10 +51,13 @@ class BLDCMotor(Component):
     -U/2 for 210 < theta < 330, whatever the current's sign; between them the current goes on through a diode to the
     other side until it is zero, and the phase is open until a diode conducts again. After `dead_time` a switch follows
     the one before it, at the speed of that instant. The inductance of a phase has its share of the mutual ones in it,
-    L = L_mu + L_sigma. U may be a law, of pulses of a chopper before the inverter for one: at zero its legs short the
-    motor. Rotor inertia is a part of its own. Modes of each leg: high, low, freewheeling high,
-    freewheeling low, open. Source: Popenda 2019, figs 4-13. Analogue: three transformers whose ratios turn
-    with the rotor.
+    L = L_mu + L_sigma. U may be a law, of pulses of a chopper before the inverter for one, 540 * PWM(0.3, 8e3): at zero
+    its legs short the motor. With i_ref a PI controller with limits holds i = (|i_a| + |i_b| + |i_c|) / 2 by such
+    pulses: u = k_p (i_ref - i) + u_i, du_i/dt = k_p / t_i (i_ref - i) + (min(U, max(0, u)) - u) / t_i, and U is on
+    while u / U is above the carrier of f_c; without t_i there is no u_i. What u_i stores, t_i u_i^2 / (2 k_p), stands
+    in the balance as energy of the part. Rotor inertia is a part of its own. Modes of each leg: high, low,
+    freewheeling high, freewheeling low, open. Source: Popenda 2019, figs 4-13. Analogue: three transformers whose ratios
+    turn with the rotor.
     """
 
     U: Any = parameter("V", "direct voltage of the inverter, also over time or the rotor's speed", at_least=0, law=True)
@@ -64,6 +69,16 @@ class BLDCMotor(Component):
         "rad", "electrical angle of the flat top", above=0, at_most=3, default=2 * 3.141592653589793 / 3, latex=r"\beta"
     )
     dead_time: float = parameter("s", "delay of every switch that closes", at_least=0, default=0.0, latex=r"t_d")
+    i_ref: Any = parameter(
+        "A",
+        "current to be held, over time or the rotor's speed; by default none",
+        law=True,
+        default=None,
+        latex="i_{ref}",
+    )
+    k_p: float | None = parameter("V/A", "gain of the current controller", above=0, default=None)
+    t_i: float | None = parameter("s", "integral time of the current controller", above=0, default=None)
+    f_c: float | None = parameter("Hz", "frequency of the chopper's carrier", above=0, default=None)
 
     role: ClassVar[Role] = "source"
     ports: ClassVar = (Port("rotor"),)
@@ -77,7 +92,7 @@ class BLDCMotor(Component):
         for phase, shape in shapes.items():
             leg, winding, emf = (f"{place}_{phase}" for place in ("leg", "winding", "emf"))
             if getattr(p, f"form_{phase}") != OPEN:
-                yield AcrossLaw(getattr(p, f"mode_{phase}") * _supply(p) / 2, (leg, None), f"u_{phase}")
+                yield AcrossLaw(getattr(p, f"mode_{phase}") * _bus(p) / 2, (leg, None), f"u_{phase}")
             yield ThroughLaw(ACROSS / p.R, (leg, winding), f"R_{phase}")
             yield ThroughStore(1 / p.L, (winding, emf), f"i_{phase}")
             yield AcrossLaw(p.k * shape * across_of("rotor"), (emf, "star"), f"u_e_{phase}")
@@ -85,10 +100,30 @@ class BLDCMotor(Component):
         yield ThroughLaw(-torque, ("rotor", None), "e")
         if all(getattr(p, f"form_{phase}") == OPEN for phase in PHASES):  # then nothing else holds the star point
             yield AcrossLaw(Integer(0), ("star", None), "u_star")
+        if p.i_ref is not None and p.t_i is not None:
+            wanted = _wanted(p)
+            wound = (Max(0, Min(_supply(p), wanted)) - wanted) / p.k_p
+            yield AcrossStore(p.t_i / p.k_p, ("control", None), "u_i")
+            yield ThroughLaw(-(_lag(p) + wound), ("control", None), "lag")
 
     def modes(self, p: Any) -> Iterator[Modes]:
         for phase in PHASES:
             yield _leg(p, phase)
+
+    def inner_ports(self) -> tuple[Port, ...]:
+        """Those of the circuit, and the integrator of the current controller where there is one."""
+        integrates = self.i_ref is not None and self.t_i is not None
+        return (*self.inner, Port("control", ELECTRICAL)) if integrates else self.inner
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        controls = {"k_p": self.k_p, "f_c": self.f_c}
+        for name, value in controls.items():
+            if (value is None) != (self.i_ref is None):
+                says = "controls nothing without i_ref" if self.i_ref is None else "is missing beside i_ref"
+                raise ParameterError(
+                    f"BLDCMotor '{self.name}': {name} {says}. Give i_ref, k_p and f_c, or none of them."
+                )
 
     def signals(self) -> dict[str, Signal]:
         """Speed and torque of the rotor, currents into the phases and their voltages against the star point."""
@@ -107,9 +142,29 @@ def _angle(p: Any, phase: str) -> Expr:
     return p.pole_pairs * integral_of("e") - PHASES[phase]
 
 
+def _of_rotor(law: Any) -> Expr:
+    """A law in which speed and angle are those of the rotor."""
+    return as_expression(law).xreplace({ACROSS: across_of("rotor"), INTEGRAL: integral_of("e")})
+
+
 def _supply(p: Any) -> Expr:
-    """The voltage of the inverter, in which speed and angle are those of the rotor."""
-    return as_expression(p.U).xreplace({ACROSS: across_of("rotor"), INTEGRAL: integral_of("e")})
+    """The direct voltage before the chopper."""
+    return _of_rotor(p.U)
+
+
+def _bus(p: Any) -> Expr:
+    """The direct voltage of the inverter, behind the chopper where there is one."""
+    return _supply(p) if p.i_ref is None else _supply(p) * PWM(_wanted(p) / _supply(p), p.f_c)
+
+
+def _lag(p: Any) -> Expr:
+    """By how much the current in the phases that conduct is less than it is to be."""
+    return _of_rotor(p.i_ref) - sum(Abs(through_of(f"i_{phase}")) for phase in PHASES) / 2
+
+
+def _wanted(p: Any) -> Expr:
+    """The voltage that the current controller asks for."""
+    return p.k_p * _lag(p) + (0 if p.t_i is None else across_of("control"))
 
 
 def _leg(p: Any, phase: str) -> Modes:
@@ -120,7 +175,7 @@ def _leg(p: Any, phase: str) -> Modes:
     above = sin(angle) - EDGE if turned == 0 else Min(sin(angle), sin(before)) - EDGE
     below = -sin(angle) - EDGE if turned == 0 else Min(-sin(angle), -sin(before)) - EDGE
     closes = (Leave(above, "high"), Leave(below, "low"))
-    opens, half = ("upper diode", "lower diode"), _supply(p) / 2
+    opens, half = ("upper diode", "lower diode"), _bus(p) / 2
     return Modes(
         (
             Mode("high", (Leave(EDGE - sin(angle), ANEW),), 1.0, starts=above > 0),

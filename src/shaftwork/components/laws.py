@@ -106,6 +106,29 @@ def Ramp(height: Any, duration: Any, start: Any = 0.0, before: Any = 0.0) -> sym
     return sympy.Piecewise((base, t < begin), (line, t < begin + length), (base + rise, True))
 
 
+def PWM(duty: Any, frequency: Any) -> sympy.Expr:
+    """A law of pulses: 1 while the duty is above a triangle of this frequency between 0 and 1, and 0 while it is below.
+
+    Law: the triangle is acos(cos(2 pi frequency t)) / pi, zero at t = 0, so that pulses stand around whole periods
+    (natural sampling). Multiply it by what is pulsed: 540 * PWM(0.3, 8e3) for a voltage.
+
+    Args:
+        duty: share of the time: a number or a law; of 0 and less there is no pulse, of 1 and more no gap.
+        frequency: of the triangle, Hz, or a quantity.
+
+    Raises:
+        ParameterError: an argument is not finite, or the frequency is not positive.
+    """
+    rate = sympy.sympify(
+        frequency if isinstance(frequency, sympy.Expr) else in_si("PWM: frequency", frequency, "Hz", above=0)
+    )
+    (share,) = _finite("PWM", duty=duty)
+    inside = sympy.Max(0, sympy.Min(1, share))
+    # the second difference keeps the two apart beyond 0 and 1, where they would touch at each turn of the triangle
+    above = sympy.cos(2 * sympy.pi * rate * t) - sympy.cos(sympy.pi * inside) + share - inside
+    return sympy.Piecewise((1, above > 0), (0, True))
+
+
 def breakpoints(expression: sympy.Basic, values: Mapping[sympy.Symbol, float] | None = None) -> tuple[float, ...]:
     """Times in s at which an expression jumps or kinks because of the time alone, increasing.
 
@@ -171,8 +194,11 @@ def narrow_places(expression: sympy.Basic) -> Iterator[tuple[sympy.Expr, bool]]:
     Law: a function f(g(t)) of an edge, tanh((t - 5) / 1e-3), has it where g is zero; that of a pulse,
     exp(-((t - 5) / 1e-3)^2) or 1 / (1 + ((t - 5) / 1e-3)^2), where g has its turning point, and between the edges of a
     train, tanh(300 sin(20 t)), it has one too. What a fraction of a polynomial has goes on far away from there, which
-    is told with it.
+    is told with it. What switches where a wave in time passes something that moves, as a pulse width does that follows
+    a current, may do so twice between two turning points of the wave and no more often.
     """
+    waves = dict.fromkeys(wave for argument, _ in switches(expression) for wave in _waves(argument))
+    yield from ((wave.diff(t), False) for wave in waves)
     for node in sympy.preorder_traversal(expression):
         if isinstance(node, EDGES):
             argument, fraction = _inside(node)
@@ -196,6 +222,13 @@ def unsolved_places(expression: sympy.Basic, symbols: Iterable[sympy.Symbol]) ->
             if not whole and not (argument.has(t) and _is_simple(argument)):
                 nodes.skip()
                 yield node
+
+
+def _waves(argument: sympy.Expr) -> Iterator[sympy.Expr]:
+    """The sines of lines in time in an argument that moves besides."""
+    if argument.has(t) and argument.has(*SYMBOLS[1:], ACROSS, INTEGRAL, *readings_in(argument)):
+        waves = sorted(argument.atoms(sympy.sin, sympy.cos), key=sympy.default_sort_key)
+        yield from (wave for wave in waves if wave.has(t) and line(wave.args[0]) is not None)
 
 
 def _inside(node: sympy.Basic) -> tuple[sympy.Expr, bool]:

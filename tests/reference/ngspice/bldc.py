@@ -35,8 +35,6 @@ MOTOR = f"""
 .func back(x) {{steep*asin(max(-0.5,min(0.5,sin(x))))}}
 .model switch SW(vt=0 vh=0 ron=1u roff=100k)
 .model diode D(is=1e-9 n=0.005)
-Vupper p 0 270
-Vlower n 0 -270
 Bgate1 ga 0 V=sin(2*V(phi))-0.5
 Bgate2 gb 0 V=sin(2*V(phi)-third)-0.5
 Bgate3 gc 0 V=sin(2*V(phi)+third)-0.5
@@ -69,6 +67,26 @@ Beb eb star V=k*V(w)*back(2*V(phi)-third)
 Bec ec star V=k*V(w)*back(2*V(phi)+third)
 Bturn 0 phi I=V(w)
 """
+SUPPLIES = {
+    "direct": "Vupper p 0 270\nVlower n 0 -270",
+    "pulsed": """
+Bchop chop 0 V=cos(2*pi*1000*time)-cos(pi*0.3)
+Bupper p 0 V=270*u(V(chop))
+Blower n 0 V=-270*u(V(chop))
+""",
+    "controlled": """
+Blag lag 0 V=12+4*sin(200*time)-(abs(I(Va))+abs(I(Vb))+abs(I(Vc)))/2
+Bwant want 0 V=20*V(lag)+V(control)
+Blimited limited 0 V=min(540,max(0,V(want)))
+Bintegral 0 control I=V(lag)+(V(limited)-V(want))/20
+Cintegral control 0 250u
+Bchop chop 0 V=cos(2*pi*2000*time)-cos(pi*V(limited)/540)+(V(want)-V(limited))/540
+Bupper p 0 V=270*u(V(chop))
+Blower n 0 V=-270*u(V(chop))
+""",
+}
+"""Direct voltage; pulses around whole milliseconds, on for 0.3 of the time; and the same of 2 kHz by a PI controller of
+20 V/A and 5 ms for 12 A that swing, with limits of 0 and 540 V and back-calculation."""
 ROTOR = f"""
 Btorque 0 w I=k*(I(Va)*back(2*V(phi))+I(Vb)*back(2*V(phi)-third)+I(Vc)*back(2*V(phi)+third))
 CJ w 0 {INERTIA}
@@ -85,12 +103,14 @@ class Motion:
         t_end: end, s.
         steps: time steps of ngspice, s, the second half of the first.
         locked: whether the rotor is held.
+        supply: one of `SUPPLIES`.
     """
 
     start: float
     t_end: float
     steps: tuple[float, float]
     locked: bool = False
+    supply: str = "direct"
 
     @property
     def times(self) -> Array:
@@ -101,7 +121,7 @@ class Motion:
     def netlist(self) -> str:
         """The whole circuit."""
         held = "Vheld w 0 0" if self.locked else ROTOR
-        return f"{MOTOR}{held}\nCphi phi 0 1 ic={self.start!r}"
+        return f"{MOTOR}{SUPPLIES[self.supply]}\n{held}\nCphi phi 0 1 ic={self.start!r}"
 
     def run(self, step: float) -> Array:
         """The signals at the times, shape (times, signals)."""
@@ -112,6 +132,8 @@ class Motion:
 MOTIONS = {
     "locked": Motion(math.pi / 6 + 0.05, 0.1, locked=True, steps=(8e-6, 4e-6)),
     "running": Motion(0.0, 0.05, locked=False, steps=(5e-7, 2.5e-7)),
+    "pulsed": Motion(0.0, 0.025, steps=(2.5e-7, 1.25e-7), supply="pulsed"),
+    "controlled": Motion(0.0, 0.03, steps=(2.5e-7, 1.25e-7), supply="controlled"),
 }
 """At the angle of the locked rotor a is high, b is low and c is open."""
 

@@ -12,11 +12,17 @@ import sympy
 import shaftwork as sw
 from tests.reference.ngspice.bldc import IMPERFECT, INERTIA, MOTIONS, RATED, K, Motion, largest, stored
 
+SUPPLIES = {
+    "direct": {"U": 540.0},
+    "pulsed": {"U": 540.0 * sw.PWM(0.3, 1000.0)},
+    "controlled": {"U": 540.0, "i_ref": 12 + 4 * sympy.sin(200 * sw.t), "k_p": 20.0, "t_i": 0.005, "f_c": 2000.0},
+}
+
 
 def ours(motion: Motion) -> np.ndarray:
     """The signals at the times, shape (times, signals)."""
     net = sw.Network("six steps")
-    net.add(sw.BLDCMotor("m", U=540.0, R=0.5, L=0.009, k=K, pole_pairs=2.0), "rotor")
+    net.add(sw.BLDCMotor("m", R=0.5, L=0.009, k=K, pole_pairs=2.0, **SUPPLIES[motion.supply]), "rotor")
     if motion.locked:
         net.add(sw.SpeedSource("lock", omega=0.0), "rotor", "ground")
     else:
