@@ -56,8 +56,8 @@ class BLDCMotor(Component):
     pulses: u = k_p (i_ref - i) + u_i, du_i/dt = k_p / t_i (i_ref - i) + (min(U, max(0, u)) - u) / t_i, and U is on
     while u / U is above the carrier of f_c; without t_i there is no u_i. What u_i stores, t_i u_i^2 / (2 k_p), stands
     in the balance as energy of the part. Rotor inertia is a part of its own. Modes of each leg: high, low,
-    freewheeling high, freewheeling low, open. Source: Popenda 2019, figs 4-13. Analogue: three transformers whose ratios
-    turn with the rotor.
+    freewheeling high, freewheeling low, open. Source: Popenda 2019, figs 4-13. Analogue: three transformers whose
+    ratios turn with the rotor.
     """
 
     U: Any = parameter("V", "direct voltage of the inverter, also over time or the rotor's speed", at_least=0, law=True)

@@ -15,6 +15,7 @@ import numpy as np
 from shaftwork.core.errors import MissingExtraError, SimulationError
 from shaftwork.integrate.engines import ENGINES
 from shaftwork.integrate.heyoka_recorders import GUARD, GridRecorder, SegmentRecorder
+from shaftwork.integrate.heyoka_series import Rates, satisfied
 from shaftwork.integrate.pieces import (
     Piece,
     PiecewiseDense,
@@ -35,14 +36,12 @@ LOOSEST_TOLERANCE = 1e-10
 # measured motions with gaps and clutches; where torques are larger beside them, it is tightened by so much.
 MORE_DIGITS = 1e5
 
-# The series of a first step must satisfy the equations to this part of the state and its change; each trial that does
-# not is followed by one of a quarter of its length.
-FIRST_DEFECT, FIRST_TRIALS, SHORTER = 1e-8, 30, 0.25
+# A trial of a first step whose series does not satisfy the equations is followed by one of a quarter of its length.
+FIRST_TRIALS, SHORTER = 30, 0.25
 
 # Where in a step a series is compared with the equations, as parts of the step: not at its end, where a law may jump.
 INSIDE = (0.5, 0.9)
 
-Rates = Callable[[float, Array], Array]
 # From (integrator, step callback, step limit, longest step) to (outcome, its name, steps taken); called again after an
 # interruption. It returns to Python after some steps each, which changes them by rounding alone.
 Advance = Callable[[Any, Watch | None, int, float], tuple[Any, str, int]]
@@ -92,6 +91,10 @@ def _tolerance(problem: Problem) -> float:
     tightened = problem.rtol * MORE_DIGITS * finest / coarsest if 0.0 < finest < coarsest else ordinary
     # in powers of ten, as each value compiles an integrator of its own
     return problem.overall * (ordinary if ordinary <= tightened else 10.0 ** math.floor(math.log10(tightened)))
+
+
+NEAR = 1e-12
+"""Part of its size by which a guard at the instant of a switch may be below its limit and be met by rounding."""
 
 
 class _Run:
@@ -182,9 +185,19 @@ class _Run:
             return met
         if watch is None or self.problem.guards is None or watch.reason is not None:
             return None
-        values = self.program.guard_values(self.integrator.time, self.integrator.state, self.integrator.pars)
-        beyond = np.where(self._sides == 0.0, -np.inf, self._sides * values - self._offsets)
-        return int(np.argmax(beyond)) if beyond.size and beyond.max() > 0.0 else None
+        time, state = self.integrator.time, self.integrator.state
+        beyond = self._beyond(time, state)
+        most = beyond.max(initial=-np.inf)
+        if -NEAR < most <= 0.0:  # a law that bends where a guard is met, as |i| does where a current ends, may hide it
+            ahead = NEAR * (self.problem.t_end - self.problem.t0)
+            later = self._beyond(time + ahead, state + ahead * self.program.slopes(time, state, self.integrator.pars))
+            beyond = np.where((beyond > -NEAR) & (later > beyond), later, -np.inf)
+        return int(np.argmax(beyond)) if beyond.max(initial=-np.inf) > 0.0 else None
+
+    def _beyond(self, time: float, state: Array) -> Array:
+        """How far the guards that are watched are beyond their limits, in parts of their sizes."""
+        values = self.program.guard_values(time, state, self.integrator.pars)
+        return np.where(self._sides == 0.0, -np.inf, self._sides * values - self._offsets)
 
     def _reacts(self, met: int) -> bool:
         """Whether the run goes on past the guard that it has met."""
@@ -228,7 +241,7 @@ class _Run:
 
     def _satisfied(self, piece: Piece, start: float, elapsed: float) -> bool:
         """Whether the series of the last step satisfies the equations at a time inside it."""
-        return _satisfied(self.problem, self.problem.rhs, piece, self.integrator.tc, start, elapsed, 0.0)
+        return satisfied(self.problem, self.problem.rhs, piece, self.integrator.tc, start, elapsed, 0.0)
 
     def verify(self, piece: Piece, segments: Sequence[Any]) -> None:
         """Refuse series that have passed a root or a pole of a law, and gone on otherwise than the law.
@@ -246,7 +259,7 @@ class _Run:
                 if (now := bisect_right(changes, start)) > past:
                     rhs, past = self.reactions[now - 1][1](), now
                 for part in INSIDE:
-                    if not _satisfied(self.problem, rhs, piece, terms, start, part * (end - start), sizes):
+                    if not satisfied(self.problem, rhs, piece, terms, start, part * (end - start), sizes):
                         reason = f"up to t = {end:.9g} s a law has a root or a pole that a Taylor series does not show"
                         made = failure(self.problem, "heyoka", start, terms[:, 0], reason)
                         raise SeriesError(str(made), reason)
@@ -296,19 +309,6 @@ class _Run:
         if watch is not None and watch.reason is not None:
             return watch.reason
         return f"heyoka stopped with the outcome {outcome!r}"
-
-
-def _satisfied(
-    problem: Problem, rhs: Rates, piece: Piece, terms: Array, start: float, elapsed: float, sizes: Array | float
-) -> bool:
-    """Whether a series (n, orders) from a start in s satisfies equations after some time; `sizes` are of states."""
-    orders = np.arange(terms.shape[1])
-    powers = elapsed**orders
-    state, change = terms @ powers, terms @ (orders * powers)  # what it is, and by how much its slope would move it
-    with np.errstate(all="ignore"):
-        defect = np.abs(np.multiply(elapsed, rhs(piece.inside(start + elapsed), state)) - change)
-    moved = np.maximum(np.abs(state), sizes) + np.abs(change)
-    return bool((defect <= FIRST_DEFECT * moved + problem.atol).all())
 
 
 def _on_grid(problem: Problem, times: Array) -> Trajectory:
