@@ -36,8 +36,7 @@ LOOSEST_TOLERANCE = 1e-10
 # measured motions with gaps and clutches; where torques are larger beside them, it is tightened by so much.
 MORE_DIGITS = 1e5
 
-# A trial of a first step whose series does not satisfy the equations is followed by one of a quarter of its length.
-FIRST_TRIALS, SHORTER = 30, 0.25
+FIRST_TRIALS, SHORTER = 30, 0.25  # trials of a first step whose series does not satisfy the equations, each so shorter
 
 # Where in a step a series is compared with the equations, as parts of the step: not at its end, where a law may jump.
 INSIDE = (0.5, 0.9)
@@ -188,7 +187,8 @@ class _Run:
         time, state = self.integrator.time, self.integrator.state
         beyond = self._beyond(time, state)
         most = beyond.max(initial=-np.inf)
-        if -NEAR < most <= 0.0:  # a law that bends where a guard is met, as |i| does where a current ends, may hide it
+        # a law that bends where a guard is met, as |i| does where a current ends, may hide it
+        if -NEAR < most <= 0.0 and outcome == "cb_stop":
             ahead = NEAR * (self.problem.t_end - self.problem.t0)
             later = self._beyond(time + ahead, state + ahead * self.program.slopes(time, state, self.integrator.pars))
             beyond = np.where((beyond > -NEAR) & (later > beyond), later, -np.inf)

@@ -192,8 +192,9 @@ class Watch:
             for number in cooled:
                 wrong[number] = wrong[number] and self._matters(integrator, number)
             signs[past & ~wrong & self._turns] *= -1.0  # the step ended at another event, at the very same instant
-        # A switch that rested at zero and now leaves it needs its sign.
-        self.leaves = bool((values[(signs == 0.0) & self._moving] != 0.0).any())
+        # A switch that rested at zero and now leaves it needs its sign, and it may do so where another one turns.
+        resting = (signs == 0.0) & self._moving
+        self.leaves = bool(resting.any()) and (bool(values[resting].any()) or self._ended_at_a_switch(integrator))
         # Where a switch turns a guard may be met too, and heyoka would not see it any more.
         return self._goes_on(integrator, values, wrong) and not (
             self.leaves or (self._program.guards and self._ended_at_a_switch(integrator))
