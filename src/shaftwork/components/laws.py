@@ -119,9 +119,8 @@ def PWM(duty: Any, frequency: Any) -> sympy.Expr:
     Raises:
         ParameterError: an argument is not finite, or the frequency is not positive.
     """
-    rate = sympy.sympify(
-        frequency if isinstance(frequency, sympy.Expr) else in_si("PWM: frequency", frequency, "Hz", above=0)
-    )
+    given = frequency if isinstance(frequency, sympy.Expr) else in_si("PWM: frequency", frequency, "Hz", above=0)
+    rate = sympy.sympify(given, strict=True)
     (share,) = _finite("PWM", duty=duty)
     inside = sympy.Max(0, sympy.Min(1, share))
     # the second difference keeps the two apart beyond 0 and 1, where they would touch at each turn of the triangle
