@@ -118,6 +118,10 @@ class BLDCMotor(Component):
     def __post_init__(self) -> None:
         super().__post_init__()
         controls = {"k_p": self.k_p, "f_c": self.f_c}
+        if self.i_ref is None and self.t_i is not None:
+            raise ParameterError(
+                f"BLDCMotor '{self.name}': t_i controls nothing without i_ref. Give both, or leave it out."
+            )
         for name, value in controls.items():
             if (value is None) != (self.i_ref is None):
                 says = "controls nothing without i_ref" if self.i_ref is None else "is missing beside i_ref"

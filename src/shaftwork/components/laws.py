@@ -119,7 +119,8 @@ def PWM(duty: Any, frequency: Any) -> sympy.Expr:
     Raises:
         ParameterError: an argument is not finite, or the frequency is not positive.
     """
-    given = frequency if isinstance(frequency, sympy.Expr) else in_si("PWM: frequency", frequency, "Hz", above=0)
+    free = isinstance(frequency, sympy.Expr) and frequency.free_symbols.isdisjoint(SYMBOLS)
+    given = frequency if free and frequency.free_symbols else in_si("PWM: frequency", frequency, "Hz", above=0)
     rate = sympy.sympify(given, strict=True)
     (share,) = _finite("PWM", duty=duty)
     inside = sympy.Max(0, sympy.Min(1, share))
