@@ -245,6 +245,7 @@ def test_transfer_functions_have_the_slopes_of_an_inertia_that_changes() -> None
         (sw.Step(2.0, 1.0, before=1.0), "jumps at t = 1 s"),
         (Piecewise((1, sw.phi < 1), (2, True)), "jumps at the angle 1"),
         (2 + sympy.floor(sw.t), "jumps at steps of floor"),
+        (2 + sw.PWM(0.3, 10.0), "jumps at what cos"),
         (sw.t, "is 0 at the angle and the time zero"),
         (1 / sw.phi, "is not finite at the angle and the time zero"),
         (1 + sw.omega, "depends on its speed"),

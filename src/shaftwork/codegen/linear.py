@@ -208,7 +208,7 @@ class _Deviations(History):
                 case Kind.THROUGH_STORE:
                     energy += self._nominal.through[index] * self.through[index] / coefficient
         for index, template in self._sprung(part):
-            for symbol in template.stored.free_symbols & {INTEGRAL, ACROSS}:
+            for symbol in (one for one in (INTEGRAL, ACROSS) if template.stored.has(one)):
                 force = self._nominal.of_law(part, index, slope(template.stored, symbol))
                 energy += force * self.of_law(part, index, symbol)
         return energy

@@ -15,9 +15,10 @@ from collections.abc import Iterator
 
 import sympy
 from sympy import Expr
+from sympy.core.relational import Relational
 
 from shaftwork.components.branches import ACROSS, INTEGRAL, RATE, readings_in
-from shaftwork.components.laws import breakpoints
+from shaftwork.components.laws import breakpoints, line
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import slope
 from shaftwork.core.errors import ShaftworkError
@@ -87,6 +88,9 @@ def _jumps(capacity: Expr) -> Iterator[str]:
         course = capacity.subs(other, 0).xreplace({symbol: TIME})
         if any(node.has(TIME) for node in course.atoms(*ENDLESS)):
             yield f"steps of {' and '.join(sorted({node.func.__name__ for node in course.atoms(*ENDLESS)}))}"
+        for node in sorted(course.atoms(Relational), key=str):
+            if node.has(TIME) and line(node.lhs - node.rhs) is None:  # where that is, breakpoints do not tell
+                yield f"what {str(node)[:60]} decides"
         for place in breakpoints(course):
             sides = [course.subs(TIME, math.nextafter(place, way)) for way in (-math.inf, math.inf)]
             if all(side.is_number for side in sides) and abs(sides[1] - sides[0]) > JUMP * max(map(abs, sides)):
