@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -229,6 +230,28 @@ def test_a_controlled_current_is_that_of_its_chopper_by_hand(engine: str) -> Non
     assert made.energy.residual < 1e-9
 
 
+def test_a_supply_that_comes_after_whole_periods_of_the_carrier_gives_the_same_current_later() -> None:
+    def current(later: float, supply: Any) -> Any:
+        net = sw.Network("locked")
+        net.add(sw.BLDCMotor("m", **DATA | {"U": supply}, **CONTROL), "rotor")
+        net.add(sw.SpeedSource("lock", omega=0.0), "rotor", "ground")
+        times = later + np.linspace(0, 0.004, 41)[1:]
+        return net.simulate(times[-1], initial={"m.phi": 0.3}, rtol=1e-10, t_eval=times)
+
+    later = 3 / CONTROL["f_c"]
+    once, again = current(0.0, DATA["U"]), current(later, sw.Step(DATA["U"], start=later))
+    assert np.abs(again["m.i_a"] - once["m.i_a"]).max() < 1e-7 * np.abs(once["m.i_a"]).max()
+    assert again.energy.residual < 1e-9
+
+
+def test_a_current_below_zero_is_refused_as_it_cannot_be_held() -> None:
+    net = sw.Network("locked")
+    net.add(sw.BLDCMotor("m", **DATA, **CONTROL | {"i_ref": -8.0}), "rotor")
+    net.add(sw.SpeedSource("lock", omega=0.0), "rotor", "ground")
+    with pytest.raises(sw.NetworkError, match=r"i_ref = -8\.0 must be at least 0"):
+        net.compile()
+
+
 def test_the_mean_current_is_the_one_that_is_asked_for_once_it_has_settled() -> None:
     net = sw.Network("locked")
     net.add(sw.BLDCMotor("m", **DATA, **CONTROL), "rotor")
@@ -247,6 +270,30 @@ def test_pulses_of_a_share_of_the_time_give_that_share_of_the_voltage() -> None:
     # a triangle about its mean, sampled evenly over whole periods
     assert np.mean(made["L.i"]) == pytest.approx(0.3 * 300 / 2, rel=2e-4)
     assert np.ptp(made["L.i"]) == pytest.approx(300 / 0.05 * 0.3 * 0.7 / 2000, rel=1e-2)
+
+
+@pytest.mark.parametrize("engine", ["heyoka", "scipy"])
+@pytest.mark.parametrize(("duty", "frequency"), [(0.3, 1e3), (0.3, 2e3), (0.5, 500.0)])
+def test_pulses_at_a_coil_are_exponentials_from_edge_to_edge(engine: str, duty: float, frequency: float) -> None:
+    pytest.importorskip(engine)
+    net = sw.Network("coil")
+    net.add(sw.VoltageSource("supply", u=100 * sw.PWM(duty, frequency)), "p", "ground")
+    net.add(sw.Resistor("R", R=1.0), "p", "q")
+    net.add(sw.Inductor("L", L=5e-3), "q", "ground")
+    made = net.simulate(0.02, rtol=1e-10, engine=engine)
+    i, before = 0.0, 0.0
+    for edge in (place for k in range(round(0.02 * frequency)) for place in (k + duty / 2, k + 1 - duty / 2)):
+        voltage = 100.0 * (edge % 1 < 0.5)  # a pulse ends in the first half of a period
+        i = voltage + (i - voltage) * math.exp(-(edge - before) / frequency / 5e-3)
+        before = edge
+    i = 100.0 + (i - 100.0) * math.exp(-(round(0.02 * frequency) - before) / frequency / 5e-3)
+    assert made["L.i"][-1] == pytest.approx(i, rel=1e-8)
+
+
+@pytest.mark.parametrize("duty", ["0.3", None, True, 0.3 + 1j, [0.3]])
+def test_a_duty_that_is_no_law_is_refused_by_its_name(duty: Any) -> None:
+    with pytest.raises(sw.ParameterError, match=r"PWM: duty = .* (is no law|is not finite and real)"):
+        sw.PWM(duty, 1e3)
 
 
 @pytest.mark.parametrize(("duty", "value"), [(-0.2, 0), (0.0, 0), (1.0, 1), (1.4, 1)])

@@ -244,10 +244,8 @@ def test_transfer_functions_have_the_slopes_of_an_inertia_that_changes() -> None
     [
         (sw.Step(2.0, 1.0, before=1.0), "jumps at t = 1 s"),
         (Piecewise((1, sw.phi < 1), (2, True)), "jumps at the angle 1"),
-        (2 + sympy.floor(sw.t), "jumps at steps of floor"),
-        (2 + sw.PWM(0.3, 10.0), "jumps at what cos"),
-        (sw.t, "is 0 at the angle and the time zero"),
-        (1 / sw.phi, "is not finite at the angle and the time zero"),
+        (2 + sympy.floor(sw.t), "jumps at what floor"),
+        (2 + sw.PWM(0.3, 10.0), "jumps at what Heaviside"),
         (1 + sw.omega, "depends on its speed"),
         (2 + sw.phi * sw.omega, "depends on its speed"),
     ],
@@ -258,6 +256,44 @@ def test_an_inertia_that_cannot_be_is_named_with_the_reason(law: sympy.Expr, sai
     net.add(sw.Spring("c", c=1.0), "a", "ground")
     with pytest.raises(sw.NetworkError, match=rf"Inertia 'arm': J {said}"):
         net.compile()
+
+
+@pytest.mark.parametrize("engine", ["scipy", "heyoka"])
+@pytest.mark.parametrize(
+    ("law", "said"),
+    [
+        (sw.t, "At t = 0 s J = t of Inertia 'arm' is 0"),
+        (1.2 - 0.4 * sw.phi, "At t = 0 s J = .* is -0.8"),
+        (1 / (sw.phi - 5), "At t = 0 s J = .* has no real value"),
+        (1 - sw.t, "At t = 1 s J = 1 - t of Inertia 'arm' is "),
+        (1 - 2 * sin(sw.t), r"At t = 0\.5235\d* s J = .* is "),
+        (6 - sw.phi, r"At t = 0\.6666\d* s J = 6 - phi of Inertia 'arm' is "),
+        (sympy.sqrt(1 - sw.t), "At t = 1 s J = .* has no real value"),
+        (2 + sympy.tan(sw.t) ** 2, r"At t = 1\.570796\d* s J = .* is .*, and 2 at t = 0 s"),
+    ],
+)
+def test_an_inertia_that_is_not_above_zero_stops_the_motion_there(engine: str, law: sympy.Expr, said: str) -> None:
+    pytest.importorskip(engine)
+    net = sw.Network("wrong")
+    net.add(sw.Inertia("arm", J=law), "a")
+    start = {"arm.omega": 1.0} | ({"arm.phi": 5.0} if law.has(sw.phi) else {})
+    with pytest.raises(sw.SimulationError, match=said):
+        net.simulate(3.0, initial=start, engine=engine)
+
+
+def test_an_inertia_that_vanishes_elsewhere_than_the_motion_goes_is_none_the_worse() -> None:
+    """J = phi^2 from phi = 5, without a torque: J omega^2 is constant, so that phi^2 = 25 + 10 omega_0 t."""
+    net = sw.Network("cone")
+    net.add(sw.Inertia("arm", J=sw.phi**2), "a")
+    made = net.simulate(4.0, initial={"arm.omega": 1.0, "arm.phi": 5.0}, rtol=1e-11)
+    np.testing.assert_allclose(made["arm.phi"], np.sqrt(25 + 10 * made.t), rtol=1e-9)
+    kinked = sw.Network("kinked")
+    kinked.add(sw.Inertia("arm", J=2 + sw.phi * sympy.sign(sw.phi)), "a")
+    bent = sw.Network("bent")
+    bent.add(sw.Inertia("arm", J=2 + sympy.Abs(sw.phi)), "a")
+    start = {"arm.omega": 1.0, "arm.phi": -1.0}
+    one, other = (net.simulate(3.0, initial=start, rtol=1e-10)["arm.omega"][-1] for net in (kinked, bent))
+    assert one == pytest.approx(other, rel=1e-9)
 
 
 def test_what_has_no_equations_beside_it_is_refused_with_the_next_step() -> None:

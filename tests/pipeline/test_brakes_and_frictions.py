@@ -469,3 +469,20 @@ def test_an_engine_does_not_follow_the_rounding_of_a_torque_that_is_zero(engine:
     sol = net.simulate(0.6, engine=engine)
     assert sol["A.omega"][-1] == pytest.approx((1 - math.cos(4.8)) / 8 / 0.7, rel=1e-6)
     assert sol.statistics["steps"] < 1000
+
+
+@pytest.mark.parametrize("engine", ["heyoka", "scipy"])
+def test_a_brake_whose_torque_grows_with_the_angle_stops_and_holds(engine: str) -> None:
+    """J omega' = 1 up to t = 1, then 1 - (5 + phi) with phi from the first motion, until rest."""
+    pytest.importorskip(engine)
+    net = sw.Network("brake")
+    net.add(sw.Inertia("wheel", J=2.0), "s")
+    net.add(sw.Brake("brake", tau=5 + sw.phi, t_on=1.0), "s")
+    net.add(sw.TorqueSource("drive", tau=1.0), "s")
+    made = net.simulate(3.0, rtol=1e-10, engine=engine)
+    assert made.phases[-1].modes["brake"] == "locked"
+    assert made["wheel.omega"][-1] == 0
+    # from there on phi'' = -(4 + phi) / 2: a quarter of a cosine about phi = -4
+    rate, start, speed = 2**-0.5, 0.25, 0.5
+    stop = 1 + sympy.atan(speed / rate / (4 + start)).evalf() / rate
+    assert made.phases[-1].start == pytest.approx(float(stop), rel=1e-7)

@@ -209,8 +209,8 @@ class _Deviations(History):
                     energy += self._nominal.through[index] * self.through[index] / coefficient
         for index, template in self._sprung(part):
             for symbol in (one for one in (INTEGRAL, ACROSS) if template.stored.has(one)):
-                force = self._nominal.of_law(part, index, slope(template.stored, symbol))
-                energy += force * self.of_law(part, index, symbol)
+                force = self._nominal.of_law(index, slope(template.stored, symbol))
+                energy += force * self.of_law(index, symbol)
         return energy
 
     def absorbed(self, part: GraphPart) -> Array:

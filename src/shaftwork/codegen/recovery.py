@@ -10,14 +10,12 @@ import numpy as np
 from sympy import Expr
 
 from shaftwork.codegen.arrays import BoundArrays
-from shaftwork.codegen.code import vectorised
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.valueless import without_value
+from shaftwork.codegen.valueless import of_law, without_value
 from shaftwork.components.base import Profile, Signal
-from shaftwork.components.branches import ACROSS, INTEGRAL, RATE, End
+from shaftwork.components.branches import INTEGRAL, RATE, End
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import slope
-from shaftwork.core.errors import no_value
 from shaftwork.network.graph import GROUND, GraphPart
 from shaftwork.network.kinds import Kind
 from shaftwork.network.templates import BranchTemplate
@@ -46,8 +44,8 @@ class History:
             SimulationError: a law has no value.
         """
         y, u = self.bound.values(self.t, self.x)
-        if not np.isfinite(u).all() and (law := without_value(self.bound, self.t, self.x.T)) is not None:
-            raise no_value(*law)
+        if not np.isfinite(u).all() and (error := without_value(self.bound, self.t, self.x.T)) is not None:
+            raise error
         return y, u
 
     @cached_property
@@ -131,22 +129,16 @@ class History:
                     energy += 0.5 * coefficient * self.across[index] ** 2
                 case Kind.THROUGH_STORE:
                     energy += 0.5 * self.through[index] ** 2 / coefficient
-        return sum((self.of_law(part, k, template.stored) for k, template in self._sprung(part)), start=energy)
+        return sum((self.of_law(k, template.stored) for k, template in self._sprung(part)), start=energy)
 
     def _sprung(self, part: GraphPart) -> Iterator[tuple[int, BranchTemplate]]:
         """The branches of a part whose laws store energy."""
         templates = ((k, self.form.graph.branches[k].template) for k in part.branches)
         return ((k, template) for k, template in templates if template.stored != 0)
 
-    def of_law(self, part: GraphPart, index: int, law: Expr) -> Array:
+    def of_law(self, index: int, law: Expr) -> Array:
         """(k,) an expression of time, of what is across a branch, its integral and its template's symbols."""
-        symbols, integrals = self.form.graph.branches[index].template.symbols, self.form.integrals
-        angle: Any = 0.0
-        if index in integrals:
-            angle = self.x[len(self.form.states) - len(integrals) + integrals.index(index)]
-        values = self.bound.p[[part.parameters[symbol.name] for symbol in symbols]]
-        function = vectorised((TIME, ACROSS, INTEGRAL, *symbols), law)
-        return np.asarray(function(self.t, self.across[index], angle, *values))
+        return of_law(self.bound, index, law, self.t, self.x, self.across[index])
 
     def absorbed(self, part: GraphPart) -> Array:
         """(k,) power that goes into a part at its ports, W."""
@@ -162,11 +154,11 @@ class History:
         templates = ((k, branches[k].template) for k in part.branches)
         power = self._power(part, (k for k, t in templates if t.through or (t.kind in kinds and not t.line)))
         for k, template in self._sprung(part):
-            in_time = self.of_law(part, k, slope(template.stored, TIME))
+            in_time = self.of_law(k, slope(template.stored, TIME))
             if RATE in template.reads:
                 power += in_time - self._power(part, (k,))
             else:
-                power -= in_time + self.of_law(part, k, slope(template.stored, INTEGRAL)) * self.across[k]
+                power -= in_time + self.of_law(k, slope(template.stored, INTEGRAL)) * self.across[k]
         return power
 
     def lifted(self, part: GraphPart) -> Array:

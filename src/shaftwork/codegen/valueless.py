@@ -1,24 +1,40 @@
-"""Laws that have no value at a time and a state, such as a root of what is below zero: which, and whose."""
+"""What has no value at a time and a state, such as a root of what is below zero, and inertias that vanish: whose."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from sympy import Basic, Expr
 
 from shaftwork.codegen.arrays import BoundArrays
+from shaftwork.codegen.code import vectorised
 from shaftwork.codegen.elements import Array
+from shaftwork.components.branches import ACROSS, INTEGRAL, RATE
 from shaftwork.components.laws import as_expression
+from shaftwork.components.laws import t as TIME
+from shaftwork.components.slopes import slope
 from shaftwork.components.tables import Table
+from shaftwork.core.errors import SimulationError, no_value
 from shaftwork.network.graph import GraphPart
 from shaftwork.network.templates import substitution
 from shaftwork.network.wording import title
+from shaftwork.reduction.form import StateForm
 
 LONGEST = 60
 """Characters of a law in a message."""
+WIDEST = 1 / np.finfo(float).eps
+"""So many times as large an inertia may become: beside its momentum, that of the smallest is rounding."""
 
 
-def without_value(bound: BoundArrays, times: Array, states: Array) -> tuple[float, str] | None:
-    """The first of times (k,) at which a law has no value with states (k, n), and the law; None where all have one."""
+def without_value(bound: BoundArrays, times: Array, states: Array) -> SimulationError | None:
+    """The error of the first of times (k,) at which a law has no value with states (k, n); None where all have one.
+
+    It is also that of an inertia that changes and is not above zero.
+    """
+    if (error := vanishing(bound, times, states)) is not None:
+        return error
     inputs = bound.program.inputs
     if bound.loops is None:
         u = bound.values(times, states.T)[1]
@@ -29,7 +45,72 @@ def without_value(bound: BoundArrays, times: Array, states: Array) -> tuple[floa
     order = np.argsort(~inputs.of_time, kind="stable")
     if (found := first_missing(times, u[order].T)) is None:
         return None
-    return found[0], _law_of(bound, int(order[found[1]]))
+    return no_value(found[0], _law_of(bound, int(order[found[1]])))
+
+
+def refuse_vanishing(
+    form: StateForm, bind: Callable[[], BoundArrays], times: Array, x: Callable[[Array], Array]
+) -> None:
+    """Refuse a motion in which an inertia that changes is not above zero.
+
+    Args:
+        form: the equations.
+        bind: makes them for their parameters.
+        times: (k,) s.
+        x: from times to (k, n) states, or more.
+
+    Raises:
+        SimulationError: says when and which.
+    """
+    if form.inertial and (error := vanishing(bind(), times, x(times)[:, : len(form.states)])) is not None:
+        raise error
+
+
+def vanishing(bound: BoundArrays, times: Array, states: Array) -> SimulationError | None:
+    """The error of the first inertia that is not above zero at times (k,) and states (k, n), or that has a pole."""
+    form = bound.program.form
+    for link in form.inertial:
+        law = form.graph.branches[link].template.law
+        name = in_words(form.graph.part_of(link), law)
+        with np.errstate(all="ignore"):
+            beyond = of_law(bound, link, slope(law, RATE), times, states.T)
+        capacity = np.broadcast_to(bound.part.coefficients[link - 1] + beyond, times.shape)
+        if (missing := first_missing(times, capacity[:, None])) is not None:
+            return no_value(missing[0], name)
+        large, small = int(capacity.argmax()), int(capacity.argmin())
+        if capacity[small] <= 0:
+            place = int(np.argmax(capacity <= 0))
+            says = f"is {capacity[place]:.6g}"
+        elif capacity[large] > WIDEST * capacity[small]:
+            place, says = large, f"is {capacity[large]:.3g}, and {capacity[small]:.3g} at t = {times[small]:.9g} s"
+        else:
+            continue
+        return SimulationError(
+            f"At t = {times[place]:.9g} s {name} {says}. "
+            "It must be above zero, and finite, at all times and angles of the motion."
+        )
+    return None
+
+
+def of_law(bound: BoundArrays, index: int, law: Expr, t: Array, x: Array, across: Any = 0.0) -> Array:
+    """(k,) an expression of time, of what is across a branch, its integral and its template's symbols.
+
+    Args:
+        bound: the equations.
+        index: of the branch.
+        law: the expression.
+        t: (k,) times, s.
+        x: (n, k) states.
+        across: (k,) what is across the branch, where the expression reads it.
+    """
+    form = bound.program.form
+    branch, integrals = form.graph.branches[index], form.integrals
+    angle: Any = 0.0
+    if index in integrals:
+        angle = x[len(form.states) - len(integrals) + integrals.index(index)]
+    symbols, names = branch.template.symbols, form.graph.parts[branch.part].parameters
+    values = bound.p[[names[symbol.name] for symbol in symbols]]
+    return np.asarray(vectorised((TIME, ACROSS, INTEGRAL, *symbols), law)(t, across, angle, *values))
 
 
 def rough(bound: BoundArrays, times: Array, states: Array) -> tuple[float, str] | None:

@@ -21,6 +21,7 @@ from shaftwork.components.branches import (
     integral_of,
     through_of,
 )
+from shaftwork.components.clips import larger, smaller
 from shaftwork.components.laws import PWM, as_expression
 from shaftwork.components.modes import ANEW, Leave, Mode, Modes
 from shaftwork.core.domains import ELECTRICAL, ROTATION
@@ -30,6 +31,8 @@ from shaftwork.core.parameters import parameter
 PHASES = {"a": Integer(0), "b": 2 * pi / 3, "c": -2 * pi / 3}
 """By how much the electrical angle of each phase lags that of phase a."""
 OPEN = "open"
+DEAD = 1e-6
+"""Supply in V below which the share of pulses is as at this one: it drives no current."""
 EDGE = Rational(1, 2)
 """Sine of the angle at which a switch closes or opens: 30 degrees."""
 
@@ -54,8 +57,9 @@ class BLDCMotor(Component):
     L = L_mu + L_sigma. U may be a law, of pulses of a chopper before the inverter for one, 540 * PWM(0.3, 8e3): at zero
     its legs short the motor. With i_ref a PI controller with limits holds i = (|i_a| + |i_b| + |i_c|) / 2 by such
     pulses: u = k_p (i_ref - i) + u_i, du_i/dt = k_p / t_i (i_ref - i) + (min(U, max(0, u)) - u) / t_i, and U is on
-    while u / U is above the carrier of f_c; without t_i there is no u_i. What u_i stores, t_i u_i^2 / (2 k_p), stands
-    in the balance as energy of the part. Rotor inertia is a part of its own. Modes of each leg: high, low,
+    while u / U is above the carrier of f_c; without t_i there is no u_i. The currents that it holds are above zero:
+    the torque of a brake takes U off. What u_i stores, t_i u_i^2 / (2 k_p), stands in the balance as energy of the
+    part. Rotor inertia is a part of its own. Modes of each leg: high, low,
     freewheeling high, freewheeling low, open. Source: Popenda 2019, figs 4-13. Analogue: three transformers whose
     ratios turn with the rotor.
     """
@@ -72,6 +76,7 @@ class BLDCMotor(Component):
     i_ref: Any = parameter(
         "A",
         "current to be held, over time or the rotor's speed; by default none",
+        at_least=0,
         law=True,
         default=None,
         latex="i_{ref}",
@@ -102,7 +107,7 @@ class BLDCMotor(Component):
             yield AcrossLaw(Integer(0), ("star", None), "u_star")
         if p.i_ref is not None and p.t_i is not None:
             wanted = _wanted(p)
-            wound = (Max(0, Min(_supply(p), wanted)) - wanted) / p.k_p
+            wound = (larger(0, smaller(_supply(p), wanted)) - wanted) / p.k_p
             yield AcrossStore(p.t_i / p.k_p, ("control", None), "u_i")
             yield ThroughLaw(-(_lag(p) + wound), ("control", None), "lag")
 
@@ -158,7 +163,11 @@ def _supply(p: Any) -> Expr:
 
 def _bus(p: Any) -> Expr:
     """The direct voltage of the inverter, behind the chopper where there is one."""
-    return _supply(p) if p.i_ref is None else _supply(p) * PWM(_wanted(p) / _supply(p), p.f_c)
+    if p.i_ref is None:
+        return _supply(p)
+    supply = _supply(p)
+    divisor = supply if supply.is_Symbol else larger(supply, DEAD)
+    return supply * PWM(_wanted(p) / divisor, p.f_c)
 
 
 def _lag(p: Any) -> Expr:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
-from sympy import Expr, Max, Min
+from sympy import Expr
 
 from shaftwork.components.base import Component, Port, Role, Signal, component
 from shaftwork.components.branches import ACROSS, AcrossLaw, Branch, ThroughLaw, ThroughStore, across_of, through_of
+from shaftwork.components.clips import larger, smaller
 from shaftwork.components.switching import number_of, off_time, on_time, refuse_no_time_on, while_on
 from shaftwork.core.domains import ROTATION
 from shaftwork.core.errors import ParameterError
@@ -86,4 +87,4 @@ def _limited(torque: Expr, p: Any) -> Expr:
     """A torque within the limits."""
     if p.tau_max is None:
         return torque
-    return Min(p.tau_max, Max(-p.tau_max if p.tau_min is None else p.tau_min, torque))
+    return smaller(p.tau_max, larger(-p.tau_max if p.tau_min is None else p.tau_min, torque))

@@ -12,6 +12,7 @@ from sympy.core.relational import Relational
 
 from shaftwork.components import noise, roots
 from shaftwork.components.branches import ACROSS, INTEGRAL, readings_in
+from shaftwork.components.clips import larger, smaller
 from shaftwork.components.noise import SmoothNoise
 from shaftwork.components.tables import TABLE_FUNCTIONS, Table, interpolate, interpolation_slope
 from shaftwork.core.errors import ParameterError
@@ -123,10 +124,10 @@ def PWM(duty: Any, frequency: Any) -> sympy.Expr:
     given = frequency if free and frequency.free_symbols else in_si("PWM: frequency", frequency, "Hz", above=0)
     rate = sympy.sympify(given, strict=True)
     (share,) = _finite("PWM", duty=duty)
-    inside = sympy.Max(0, sympy.Min(1, share))
+    inside = larger(0, smaller(1, share))
     # the second difference keeps the two apart beyond 0 and 1, where they would touch at each turn of the triangle
     above = sympy.cos(2 * sympy.pi * rate * t) - sympy.cos(sympy.pi * inside) + share - inside
-    return sympy.Piecewise((1, above > 0), (0, True))
+    return sympy.Heaviside(above, 0)
 
 
 def breakpoints(expression: sympy.Basic, values: Mapping[sympy.Symbol, float] | None = None) -> tuple[float, ...]:
@@ -281,10 +282,14 @@ def line(expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr] | None:
 
 
 def _finite(law: str, **arguments: Any) -> list[sympy.Expr]:
-    expressions = [sympy.sympify(_plain(law, name, value), strict=True) for name, value in arguments.items()]
-    for name, expression in zip(arguments, expressions, strict=True):
-        if expression.has(sympy.nan, sympy.oo, -sympy.oo, sympy.zoo):
-            raise ParameterError(f"{law}: {name} = {expression} is not finite. Give a number or an expression.")
+    expressions = list[sympy.Expr]()
+    for name, value in arguments.items():
+        try:
+            expressions.append(as_expression(_plain(law, name, value)))
+        except ParameterError as error:
+            raise ParameterError(f"{law}: {name} = {error}") from None
+        if expressions[-1].has(sympy.nan, sympy.oo, -sympy.oo, sympy.zoo, sympy.I):
+            raise ParameterError(f"{law}: {name} = {value} is not finite and real. Give a number or an expression.")
     return expressions
 
 

@@ -39,6 +39,7 @@ from sympy import (
 from sympy.core.relational import Relational
 
 from shaftwork.components import roots
+from shaftwork.components.clips import replaced
 from shaftwork.components.tables import InterpolationSlope
 
 STEPS = (sign, Heaviside, Relational, InterpolationSlope, floor, ceiling)
@@ -78,7 +79,7 @@ def slope(expression: Expr, symbol: Symbol) -> Expr:
     if not kinks | doubtful:
         return expression.diff(symbol)
     held = {node: Dummy(real=True) for node in kinks | doubtful}
-    smooth = expression.xreplace(held)  # from the outside in: what is inside a kink is not seen
+    smooth = replaced(expression, held)  # from the outside in: what is inside a kink is not seen
     total = smooth.diff(symbol)
     for node in (one for one in held if isinstance(one, Abs | asin | acos)):
         if (outer := smooth.diff(held[node])) != 0:
@@ -86,7 +87,7 @@ def slope(expression: Expr, symbol: Symbol) -> Expr:
     for node in doubtful:
         if (inner := slope(node.args[0], symbol)) != 0 and (outer := smooth.diff(held[node])) != 0:
             total += outer * node.fdiff(1) * inner
-    made: Expr = total.xreplace({dummy: node for node, dummy in held.items()})
+    made: Expr = replaced(total, {dummy: node for node, dummy in held.items()})
     return made.replace(_is_at_rest, _together) if made.has(Abs) else made
 
 

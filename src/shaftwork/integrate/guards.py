@@ -8,7 +8,6 @@ from typing import Protocol
 import numpy as np
 from scipy.optimize import brentq
 
-from shaftwork.core.errors import no_value
 from shaftwork.integrate.chebyshev import Polynomial, points
 from shaftwork.integrate.crossings import FIRST, LOOKS, Look, tolerance
 from shaftwork.integrate.problem import Array, DaeProblem, Explain, Guards, Problem
@@ -143,9 +142,9 @@ class GuardWatch:
             SimulationError: names the law in it.
         """
         if np.isnan(look.values).any() and self._problem.explain is not None:
-            law = self._problem.explain(look.times, look.states)
-            if law is not None:
-                raise no_value(*law)
+            error = self._problem.explain(look.times, look.states)
+            if error is not None:
+                raise error
 
     def _values(self, times: Array, states: Array) -> Array:
         assert self._guards is not None  # noqa: S101 (asked only then)

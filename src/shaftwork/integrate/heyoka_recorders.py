@@ -71,6 +71,8 @@ class SegmentRecorder:
                 stop, max_steps=self._breaks.limit(limit - taken), max_delta_t=longest, callback=watch, c_output=True
             )
             taken += steps
+            if outcome.name == "time_limit":  # heyoka counts time in two numbers, and may end a rounding beside it
+                integrator.time = stop
             if segment is not None:
                 self.segments.append(segment)
             arrived = integrator.time == self._end

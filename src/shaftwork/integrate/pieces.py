@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from shaftwork.core.errors import SimulationError, no_value
-from shaftwork.integrate.problem import Array, DaeProblem, Explain, Problem, Timed
+from shaftwork.core.errors import SimulationError
+from shaftwork.integrate.problem import Array, DaeProblem, Problem, Timed
 
 # A run has stalled when so many steps together advance by less than so many times this part of the whole time.
 STALL_STEPS, STALL_SPAN = 2000, 1e-10
@@ -20,6 +20,7 @@ LONG_STEPS, LONG_SPAN = 100_000, 1e-9
 STUCK_SPAN = 1e-7
 # Where a run has failed its further course is looked at for laws without a value, over this part of the whole time.
 AHEAD = 1e-6 * 0.5 ** np.arange(30, -1, -1)
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -167,8 +168,8 @@ def failure(
         reason: the solver's own reason.
         guard: what the solver has called.
     """
-    if (law := _law_without_value(problem, t, x, guard)) is not None:
-        return no_value(*law)
+    if (error := _without_value(problem, t, x, guard)) is not None:
+        return error
     if engine == "heyoka" and isinstance(problem, Problem) and (law := _near(problem, problem.rough, t, x)) is not None:
         return SimulationError(
             f"The heyoka engine failed at t = {law[0]:.9g} s: {law[1]} has a value there, but not all its branches and "
@@ -190,8 +191,8 @@ def failure(
     )
 
 
-def _law_without_value(problem: Timed, t: float, x: Array, guard: GuardedFunctions | None) -> tuple[float, str] | None:
-    """A law that has no value where a run has failed, or just after: the time in s, and the law in words."""
+def _without_value(problem: Timed, t: float, x: Array, guard: GuardedFunctions | None) -> SimulationError | None:
+    """The error of what has no value where a run has failed, or just after."""
     found = _near(problem, problem.explain, t, x)
     if problem.explain is None or found is not None or guard is None or guard.not_finite is None:
         return found
@@ -199,7 +200,7 @@ def _law_without_value(problem: Timed, t: float, x: Array, guard: GuardedFunctio
     return problem.explain(np.array([at]), state[None, :]) if np.isfinite(at) and np.isfinite(state).all() else None
 
 
-def _near(problem: Timed, explain: Explain | None, t: float, x: Array) -> tuple[float, str] | None:
+def _near(problem: Timed, explain: Callable[[Array, Array], T] | None, t: float, x: Array) -> T | None:
     """What explains the failure of a run where it has come to, or just after."""
     if explain is None:
         return None

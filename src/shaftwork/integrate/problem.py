@@ -15,7 +15,7 @@ from shaftwork.core.times import around
 
 Array = NDArray[np.float64]
 Made = TypeVar("Made")
-Explain = Callable[[Array, Array], tuple[float, str] | None]
+Explain = Callable[[Array, Array], SimulationError | None]
 
 
 class Fractions(NamedTuple):
@@ -201,9 +201,10 @@ class Problem:
         observed: all quantities of a linear network, or None.
         symbolic: the same system as a heyoka program with its parameters (`codegen.heyoka.BoundProgram`), a function
             that makes this where an engine asks for it, or None where there is none.
-        explain: from times (k,) and states (k, n) to the first of these times at which a law has no value, and that law
-            in words; None where all have one. It is asked for messages.
-        rough: the same of a law of which any part has no value or no slope, be it in a branch that does not hold.
+        explain: from times (k,) and states (k, n) to the error of the first of these times at which a law has no value,
+            or None where all have one.
+        rough: from the same to the first time at which any part of a law has no value or no slope, be it in a branch
+            that does not hold, and that law in words.
         max_steps: an engine gives up, with a reason, after this many steps.
         earlier_steps: of the same motion, before this part of it; they are told with the reason.
         progress: told again and again the time in s that an engine has reached, or None. What it raises ends the run.
@@ -231,7 +232,7 @@ class Problem:
     observed: Observed | None = None
     symbolic: Any = None
     explain: Explain | None = None
-    rough: Explain | None = None
+    rough: Callable[[Array, Array], tuple[float, str] | None] | None = None
     max_steps: int = 10_000_000
     earlier_steps: int = 0
     progress: Callable[[float], None] | None = None

@@ -27,7 +27,8 @@ JUMP = 1e-9
 """Part of the largest inertia beside it by which one differs on both sides of a jump; less is rounding."""
 CHANGE = "change"
 """The label of what there is beyond a constant."""
-ENDLESS = (sympy.floor, sympy.ceiling, sympy.sign, sympy.Heaviside)
+ENDLESS = (sympy.floor, sympy.ceiling)
+JUMPING = (*ENDLESS, sympy.sign, sympy.Heaviside)
 
 
 class StoreFaultError(ShaftworkError):
@@ -57,15 +58,19 @@ def changes(coefficient: Expr) -> bool:
 def beyond_constant(capacity: Expr) -> tuple[Expr, Expr, Expr]:
     """A constant capacity, the law of what there is beyond it, and the energy in that, J.
 
+    The constant is arbitrary; it is that of the angle and the time zero where this is one.
+
     Raises:
-        StoreFaultError: it jumps, so that the speed would, or it is not above zero at the angle and the time zero.
+        StoreFaultError: it jumps, so that the speed would.
     """
     constant = capacity.subs({INTEGRAL: 0, TIME: 0})
     if constant.is_number and not (constant.is_finite and constant > 0):
-        shown = constant if constant.is_finite else "not finite"
-        raise StoreFaultError(f"is {shown} at the angle and the time zero", "It must be above zero at all times.")
+        constant = sympy.Integer(1)
     if (jump := next(_jumps(capacity), None)) is not None:
-        raise StoreFaultError(f"jumps at {jump}, where the speed would", "Let it rise in a short while, as Ramp does.")
+        raise StoreFaultError(
+            f"jumps at {jump}, where the speed would",
+            "Let it rise in a short while, as Ramp does, or write it with Max, Min or Abs.",
+        )
     rest = capacity - constant
     rises = slope(capacity, INTEGRAL) * ACROSS / 2 + slope(capacity, TIME)
     return constant, rest * RATE + rises * ACROSS, rest * ACROSS**2 / 2
@@ -86,10 +91,9 @@ def _jumps(capacity: Expr) -> Iterator[str]:
     """Where a capacity jumps over time or angle, the other being zero."""
     for symbol, other, unit in ((TIME, INTEGRAL, "t = {:.6g} s"), (INTEGRAL, TIME, "the angle {:.6g}")):
         course = capacity.subs(other, 0).xreplace({symbol: TIME})
-        if any(node.has(TIME) for node in course.atoms(*ENDLESS)):
-            yield f"steps of {' and '.join(sorted({node.func.__name__ for node in course.atoms(*ENDLESS)}))}"
-        for node in sorted(course.atoms(Relational), key=str):
-            if node.has(TIME) and line(node.lhs - node.rhs) is None:  # where that is, breakpoints do not tell
+        for node in sorted(course.atoms(*JUMPING, Relational), key=str):
+            inside = node.lhs - node.rhs if isinstance(node, Relational) else node.args[0]
+            if inside.has(TIME) and (isinstance(node, ENDLESS) or line(inside) is None):  # no breakpoints tell where
                 yield f"what {str(node)[:60]} decides"
         for place in breakpoints(course):
             sides = [course.subs(TIME, math.nextafter(place, way)) for way in (-math.inf, math.inf)]

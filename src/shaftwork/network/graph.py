@@ -12,6 +12,7 @@ from sympy import Expr, Symbol
 
 from shaftwork.components.base import Component, Derived, Signal
 from shaftwork.components.branches import End, named_in
+from shaftwork.components.clips import replaced
 from shaftwork.components.laws import as_expression
 from shaftwork.components.modes import Modes
 from shaftwork.components.tables import Table
@@ -155,7 +156,7 @@ class CircuitGraph:
     def in_network_symbols(self, expression: Expr, branch: GraphBranch) -> Expr:
         """An expression of a template with the part's own parameter symbols replaced by the network's."""
         part = self.parts[branch.part]
-        return expression.xreplace({s: self.symbol_of(part, s.name) for s in branch.template.symbols})
+        return replaced(expression, {s: self.symbol_of(part, s.name) for s in branch.template.symbols})
 
 
 def signals_of(graph: CircuitGraph, part: GraphPart) -> Mapping[str, Signal]:

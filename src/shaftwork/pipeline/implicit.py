@@ -8,7 +8,7 @@ import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
-from shaftwork.core.errors import SimulationError, no_value
+from shaftwork.core.errors import SimulationError
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import DaeProblem, DenseOutput, Problem, Trajectory
 
@@ -55,8 +55,8 @@ def at_rest(problem: Problem, degree: int | None) -> Trajectory:
     t = steps if problem.t_eval is None else problem.t_eval
     if degree is None and problem.explain is not None:
         times = np.union1d(t, steps)
-        if (law := problem.explain(times, np.zeros((len(times), 0)))) is not None:
-            raise no_value(*law)
+        if (error := problem.explain(times, np.zeros((len(times), 0)))) is not None:
+            raise error
     return Trajectory(t, np.zeros((len(t), 0)), _NoStates(steps))
 
 

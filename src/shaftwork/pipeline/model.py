@@ -17,7 +17,7 @@ from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.operating import steady_state
 from shaftwork.codegen.start_values import initial_state
 from shaftwork.codegen.switching import Switching
-from shaftwork.codegen.valueless import rough, without_value
+from shaftwork.codegen.valueless import refuse_vanishing, rough, without_value
 from shaftwork.core.callbacks import Told
 from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.core.kept import Kept
@@ -157,9 +157,10 @@ class Model(CompiledModel):
 
     def _run(self, prepared: Prepared, initial: Given, demand: Demand) -> Solution:
         x0, waves = start_of(self, prepared, initial, demand.span)
-        problem = self._problem(prepared, x0, demand)
+        problem, bind = self._problem(prepared, x0, demand), lambda: prepared.bound
+        refuse_vanishing(self.form, bind, np.array([problem.t0]), lambda _: x0[None])
         trajectory, name, why = self._solve(prepared, problem, waves, demand.engine)
-        instants = self.switching.timeline(prepared.p, *demand.span)
+        refuse_vanishing(self.form, bind, trajectory.dense.steps, trajectory.dense)
         return Solution(
             name=self.name,
             t=trajectory.t,
@@ -169,7 +170,7 @@ class Model(CompiledModel):
             why=why,
             statistics=trajectory.statistics,
             dense=trajectory.dense,
-            observer=ModelObserver(self.form, lambda: prepared.bound, instants),
+            observer=ModelObserver(self.form, bind, self.switching.timeline(prepared.p, *demand.span)),
             caveat=trajectory.caveat,
         )
 
@@ -373,14 +374,13 @@ class Model(CompiledModel):
         """The linear form, where the network is linear."""
         if self.form.waves or not self.linear:
             return None
-        n, bound = len(self.states), self.bind(p)
+        n, bound, straight = len(self.states), self.bind(p), self.degree is not None
 
         def fractions() -> Fractions | None:
             found = bound.rational()
             return None if found is None else Fractions(*found)
 
         matrix = bound.jacobian(0.0, np.zeros(n)).tocsr()
-        straight = self.degree is not None
         return LinearInputs(matrix, lambda t: bound.rhs(t, np.zeros((n, *np.shape(t)))), fractions, straight)
 
     def _changes_structure(self, values: Mapping[str, float]) -> bool:

@@ -15,6 +15,7 @@ from typing import Literal
 from sympy import Add, Expr, Integer, Symbol, nan, oo, zoo
 
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, End, across_of, integral_of, through_of
+from shaftwork.components.clips import replaced
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Modes
 from shaftwork.components.pieces import parts
@@ -68,7 +69,7 @@ class Readings:
                 known[symbol] = self._integral(part, element.angle)
             else:
                 known[symbol] = self._named(part, symbol)
-        made = expression.xreplace(known)
+        made = replaced(expression, known)
         if not {zoo, oo, nan}.isdisjoint(parts((made,))):
             raise NetworkError(f"'{self.graph.name}' cannot be assembled", (_no_limit(part.name),))
         return made

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from sympy import Add, Dummy, Expr, Integer, Symbol
 
 from shaftwork.components.branches import ACROSS, INTEGRAL, RATE
+from shaftwork.components.clips import replaced
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import slope
 from shaftwork.network.controlled import Reading, readings_of
@@ -101,7 +102,7 @@ class _Solution:
             law = self.law(link)
             if link in form.inertial:
                 self.beyond[link], law = slope(law, RATE).xreplace(known), law.xreplace({RATE: Integer(0)})
-            self.through[link] = law.xreplace(known)
+            self.through[link] = replaced(law, known)
         for link in (*sources, *form.through_states, *form.dependent_across):
             self.across[link] = self.around(link)
         rates = (*self._speed_rates(), *self._torque_rates(), *(self.across[k] for k in form.integrals))
@@ -132,8 +133,8 @@ class _Solution:
 
     def _put_in_controls(self) -> None:
         """Controlled sources by what they read; until then a symbol stands for each."""
-        found = {self.across[k]: self.law(k).xreplace(self.read(k)) for k in self.form.controlled}
-        self.across = {k: across.xreplace(found) for k, across in self.across.items()} if found else self.across
+        found = {self.across[k]: replaced(self.law(k), self.read(k)) for k in self.form.controlled}
+        self.across = {k: replaced(across, found) for k, across in self.across.items()} if found else self.across
 
     def _solve_conductances(self, sources: Sequence[int]) -> None:
         form = self.form

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from shaftwork.core.errors import SimulationError, no_value
+from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.lossless.collocation import GAUSS, POWERS, STAGES, STATE_POWERS, WEIGHTS
 from shaftwork.integrate.lossless.lines import DelayProblem, DelayTrajectory, Past, past_of
 from shaftwork.integrate.lossless.panel_maps import PanelMap
@@ -244,9 +244,9 @@ class Lattice:
         finite = np.isfinite(rows).all(axis=(1, 2))
         if not finite.all():
             if problem.explain is not None:
-                law = problem.explain(self.times(run.numbers), np.zeros_like(run.starts))
-                if law is not None:
-                    raise no_value(*law)
+                error = problem.explain(self.times(run.numbers), np.zeros_like(run.starts))
+                if error is not None:
+                    raise error
             panel = int(np.argmin(finite))
             raise self.failure(panel, run.starts[panel], "a wave or a state is not finite")
         return [not fits[run.numbers % self.size == place].all() for place in range(self.size)]

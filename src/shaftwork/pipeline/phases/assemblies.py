@@ -25,7 +25,7 @@ from shaftwork.codegen.valueless import first_missing, in_words, rough, without_
 from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.pieces import pieces_degree
-from shaftwork.core.errors import CompileError
+from shaftwork.core.errors import CompileError, SimulationError, no_value
 from shaftwork.core.kept import Kept
 from shaftwork.integrate.engines import available
 from shaftwork.integrate.problem import Guards, Problem, changed
@@ -281,14 +281,14 @@ class Assembly:
 
         return rhs
 
-    def without_value(self, p: Array, modes: ModeNames, times: Array, states: Array) -> tuple[float, str] | None:
-        """The first time at which a law or a guard of the modes has no value, and which one."""
-        law, pairs = without_value(self.bound(p), times, states), self.watched(modes)
+    def without_value(self, p: Array, modes: ModeNames, times: Array, states: Array) -> SimulationError | None:
+        """The error of the first time at which a law or a guard of the modes has no value."""
+        error, pairs = without_value(self.bound(p), times, states), self.watched(modes)
         missing = first_missing(times, self.guards(p)(times, states)[:, [watched.guard for _, watched in pairs]])
-        if law is not None or missing is None:
-            return law
+        if error is not None or missing is None:
+            return error
         number, watched = pairs[missing[1]]
-        return missing[0], in_words(self.elements[number].part, watched.leave.when)
+        return no_value(missing[0], in_words(self.elements[number].part, watched.leave.when))
 
     def _rough(self, p: Array, modes: ModeNames, times: Array, states: Array) -> tuple[float, str] | None:
         """The first time at which a law or a guard has no value in some branch, and which one."""

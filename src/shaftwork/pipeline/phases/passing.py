@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from shaftwork.codegen.elements import Array
-from shaftwork.core.errors import no_value
 from shaftwork.integrate.problem import Reaction, SeriesError
 from shaftwork.pipeline.phases.assemblies import Assembly
 from shaftwork.pipeline.phases.elements import Element, ModeNames, Watched, is_same
@@ -151,9 +150,9 @@ class Passing:
         here = regime.course(t, x[: self._size].tolist())
         now, before = here[3], regime.limits(*regime.later(here, -LATE * regime.tick))
         if any(map(math.isnan, now)):
-            law = regime.assembly.without_value(regime.p, regime.modes, np.array([t]), np.array([here[1]]))
-            if law is not None:
-                raise no_value(*law)
+            error = regime.assembly.without_value(regime.p, regime.modes, np.array([t]), np.array([here[1]]))
+            if error is not None:
+                raise error
         for number, made in regime.watched:
             k = made.guard
             if k != met and min(made.side * now[k], made.side * before[k]) > CLEAR * bands[k]:

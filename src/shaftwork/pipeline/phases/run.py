@@ -18,6 +18,7 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.observer import Impact
 from shaftwork.codegen.timeline import Timeline
+from shaftwork.codegen.valueless import refuse_vanishing
 from shaftwork.core.errors import AccuracyWarning, NetworkError, ParameterError, SimulationError
 from shaftwork.core.notices import warn
 from shaftwork.integrate import choice
@@ -279,8 +280,12 @@ class Run:
 
     def _span(self, t: float, moment: Moment) -> tuple[float, Moment]:
         """One run of the engine, up to a change of equations or the next instant at which an input jumps."""
+        regime, form = moment.regime, moment.regime.assembly.model.form
+        bind = partial(regime.assembly.bound, regime.p)
+        refuse_vanishing(form, bind, np.array([t]), lambda _: moment.x[None])
         trajectory, passing = self._passed(t, moment)
         passing.close()
+        refuse_vanishing(form, bind, trajectory.dense.steps, trajectory.dense)
         self.steps += trajectory.statistics.get("steps", 0)
         assert trajectory.end is not None  # noqa: S101 (engines that follow guards say it)
         t, x = trajectory.end

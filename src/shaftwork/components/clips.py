@@ -1,0 +1,50 @@
+"""Limits in laws: Max and Min of long expressions, of which sympy is not asked which is the larger one.
+
+It compares the arguments of every Max and Min that it makes, by factoring their difference: 20 ms for a controller's
+limit, at each of the hundreds of times that an expression around it is made anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from sympy import Basic, Expr, Max, Min
+
+
+def larger(*args: Any) -> Expr:
+    """The largest of numbers and expressions."""
+    return _made(Max, args)
+
+
+def smaller(*args: Any) -> Expr:
+    """The smallest of numbers and expressions."""
+    return _made(Min, args)
+
+
+def replaced(expression: Basic, known: Mapping[Any, Any]) -> Any:
+    """The same as `expression.xreplace(known)`, at once where limits are in it."""
+    if not expression.has(Max, Min):
+        return expression.xreplace(known)
+    made: dict[Basic, Basic] = {}
+
+    def anew(node: Basic) -> Basic:
+        if node in known:
+            return known[node]
+        if not node.args:
+            return node
+        if node not in made:
+            args = [anew(one) for one in node.args]
+            if all(new is old for new, old in zip(args, node.args, strict=True)):
+                made[node] = node
+            else:
+                made[node] = _made(node.func, args) if isinstance(node, Max | Min) else node.func(*args)
+        return made[node]
+
+    return anew(expression)
+
+
+def _made(function: type[Basic], args: Any) -> Any:
+    """A limit of the arguments, compared only where all but one of them are numbers."""
+    compared = all(getattr(one, "is_number", True) for one in args)
+    return function(*args) if compared else function(*args, evaluate=False)
