@@ -1,4 +1,4 @@
-"""One evaluation of the right-hand side: model.rhs, machine code, numpy by hand, and the same in C.
+"""One evaluation of the right-hand side: model.rhs before and after model.compiled(), numpy by hand, and the same in C.
 
     python benchmarks/right_hand_side.py
 
@@ -97,7 +97,15 @@ def often(into: Any, times: int, x: Any, p: Any, rates: Any) -> None:
 def table(name: str, model: Any, hand: Callable[[Any], Any] | None) -> None:
     """Print the times of one model."""
     x, p = np.random.default_rng(0).standard_normal(len(model.states)), np.array(model.defaults)
-    compiled, other = model.compiled(), [p * (1 + 1e-9 * k) for k in range(50)]
+    other = [p * (1 + 1e-9 * k) for k in range(50)]
+    before = {
+        "rhs before": microseconds(lambda: model.rhs(0.0, x)),
+        "rhs before, other parameters": microseconds(lambda: [model.rhs(0.0, x, q) for q in other], 1) / 50,
+    }
+    if hand is not None:
+        assert np.allclose(hand(x), model.rhs(0.0, x), rtol=1e-9, atol=1e-6)
+        before["numpy by hand"] = microseconds(lambda: hand(x))
+    compiled = model.compiled()
     rates = compiled(0.0, x, p)
     often(compiled.into, 1, x, p, rates)
     rows = {
@@ -107,10 +115,9 @@ def table(name: str, model: Any, hand: Callable[[Any], Any] | None) -> None:
         "compiled": microseconds(lambda: compiled(0.0, x, p)),
         "compiled, other parameters": microseconds(lambda: [compiled(0.0, x, q) for q in other], 40) / 50,
         "rhs": microseconds(lambda: model.rhs(0.0, x)),
+        "rhs, other parameters": microseconds(lambda: [model.rhs(0.0, x, q) for q in other], 40) / 50,
+        **before,
     }
-    if hand is not None:
-        assert np.allclose(hand(x), model.rhs(0.0, x), rtol=1e-9, atol=1e-6)
-        rows["numpy by hand"] = microseconds(lambda: hand(x))
     for label, value in rows.items():
         print(f"{name} ({len(x)} states)  {label:30s} {value:8.2f} us  {value / rows['C']:6.1f} times C")
 

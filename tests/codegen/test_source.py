@@ -116,8 +116,19 @@ def test_the_text_for_sympy_gives_the_rates(name: str) -> None:
 
 @pytest.mark.parametrize("name", MODELS)
 def test_machine_code_gives_the_rates(name: str) -> None:
-    model = MODELS[name]()
-    agree(model, model.compiled())
+    agree(MODELS[name](), MODELS[name]().compiled())
+
+
+def test_the_right_hand_side_is_machine_code_once_this_is_made() -> None:
+    plain, made = (MODELS["long"]() for _ in range(2))
+    made.compiled()
+    rng = np.random.default_rng(0)
+    for _ in range(3):
+        x, p = rng.standard_normal(len(plain.states)), plain.defaults * rng.uniform(0.5, 2.0, len(plain.defaults))
+        expected = plain.rhs(0, x, p)
+        np.testing.assert_allclose(made.rhs(0, x, p), expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max())
+    with pytest.raises(sw.ParameterError, match=r"give .* numbers, one for each state"):
+        made.rhs(0.0, np.zeros(3))
 
 
 def inertia(law: Any) -> Any:
@@ -142,7 +153,7 @@ LAWS: dict[str, Any] = {
 @pytest.mark.parametrize("law", LAWS)
 def test_laws_have_one_value_in_all_languages(law: str, tmp_path: Path) -> None:
     model = inertia(LAWS[law])
-    functions = (numpy_text(model), c_text(model, tmp_path), sympy_text(model), model.compiled())
+    functions = (numpy_text(model), c_text(model, tmp_path), sympy_text(model), inertia(LAWS[law]).compiled())
     for speed in (0.05, 0.3, 0.5, 0.9):
         x = np.array([speed])
         expected = model.rhs(0.7, x)

@@ -168,7 +168,7 @@ def test_a_ramp_is_continuous() -> None:
     ("make", "says"),
     [
         (lambda: Step(math.nan), "height = nan"),
-        (lambda: Step(1, start=math.inf), "start = oo"),
+        (lambda: Step(1, start=math.inf), "start = inf"),
         (lambda: Ramp(1, 0), "duration = 0 must be greater"),
         (lambda: Ramp(1, -1.0), "duration = -1.0"),
     ],

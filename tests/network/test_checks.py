@@ -239,7 +239,7 @@ def odd(make: Callable[[Any], Iterable[Any]]) -> Component:
     [
         (lambda p: [AcrossStore(p.k / p.missing)], "missing"),
         (lambda _: [ThroughLaw(ACROSS, ("a", "nowhere"))], "'nowhere', which is no port"),
-        (lambda _: [AcrossStore(laws.t)], "is 0 at the angle and the time zero"),
+        (lambda _: [AcrossStore(laws.Step(2.0, 1.0, before=1.0))], "jumps at t = 1 s"),
         (lambda _: ["a"], "branch 1 is 'a', which is no branch"),
         (lambda _: [AcrossStore(1.0), None], "branch 2 is None, which is no branch"),
         (lambda _: [ThroughLaw("2*across")], "branch 1 (ThroughLaw) has '2*across', not a number or an expression"),

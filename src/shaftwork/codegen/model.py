@@ -67,6 +67,7 @@ class CompiledModel:
         self.arrays = ArrayProgram(form)
         self.defaults = np.array(list(self.parameters.values()), dtype=float)
         self._bound = Kept[bytes, BoundArrays](1)
+        self._machine: MachineCode | None = None
 
     @cached_property
     def states(self) -> tuple[str, ...]:
@@ -139,6 +140,8 @@ class CompiledModel:
         if np.ndim(x) == 2:
             return self._of_many(t, x, p)
         when, states, values = self._numbers(t, x, p)
+        if (machine := self._machine) is not None:
+            return machine(float(when), np.ascontiguousarray(states), np.ascontiguousarray(values))
         return (self.bind(values).rhs if self.scalar is None else self.scalar.bind(values))(when, states)
 
     def _of_many(self, t: Any, x: Any, p: Any) -> Array:
@@ -215,7 +218,8 @@ class CompiledModel:
     def compiled(self) -> MachineCode:
         """The right-hand side as machine code: a function of t in s, (n,) states and (parameters,) values.
 
-        It checks nothing: give float arrays. The first call compiles, which takes seconds.
+        It checks nothing: give float arrays. The first call compiles, which takes seconds. From then on `rhs` is made
+        by it, too, so that new parameters there cost no more than old ones.
 
         Raises:
             MissingExtraError: numba is not installed.
@@ -223,7 +227,9 @@ class CompiledModel:
         """
         if find_spec("numba") is None:
             raise MissingExtraError("numba", "fast", "model.compiled()")
-        return MachineCode(self.source("numba"))
+        if self._machine is None:
+            self._machine = MachineCode(self.source("numba"))
+        return self._machine
 
     def phase(self, name: Any) -> CompiledModel:
         """The equations of one phase of a network whose parts change their mode: `rhs`, `jacobian`, `code`, `states`.
