@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import pytest
@@ -15,6 +15,7 @@ from scipy.integrate import solve_ivp
 from sympy import Piecewise, cos, sin
 
 import shaftwork as sw
+from shaftwork.components.branches import INTEGRAL, AcrossStore, Branch
 from shaftwork.reduce import refer
 
 PHI = sympy.symbols("phi_:4", real=True)
@@ -244,6 +245,10 @@ def test_transfer_functions_have_the_slopes_of_an_inertia_that_changes() -> None
     [
         (sw.Step(2.0, 1.0, before=1.0), "jumps at t = 1 s"),
         (Piecewise((1, sw.phi < 1), (2, True)), "jumps at the angle 1"),
+        (Piecewise((2, sw.phi < 2 * sw.t), (3, True)), r"jumps at the angle 2\*t"),
+        (1 + sympy.Heaviside(sw.t - 1) * sw.phi**2, "jumps at t = 1 s"),
+        (3 + sympy.sign(sw.phi - 1) * sw.t, "jumps at the angle 1"),
+        (2 + sympy.atan(sympy.tan(sw.phi)) / 2, "jumps at what atan"),
         (2 + sympy.floor(sw.t), "jumps at what floor"),
         (2 + sw.PWM(0.3, 10.0), "jumps at what Heaviside"),
         (1 + sw.omega, "depends on its speed"),
@@ -256,6 +261,61 @@ def test_an_inertia_that_cannot_be_is_named_with_the_reason(law: sympy.Expr, sai
     net.add(sw.Spring("c", c=1.0), "a", "ground")
     with pytest.raises(sw.NetworkError, match=rf"Inertia 'arm': J {said}"):
         net.compile()
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        sw.Ramp(1.0, 1e-5, start=0.5, before=1.0),
+        1 + sympy.Abs(sw.phi - 1),
+        Piecewise((2, sw.phi < 1), (1 + sw.phi, True)),
+        Piecewise((2, sw.phi < 2 * sw.t), (2 + (sw.phi - 2 * sw.t) ** 2, True)),
+        2 + sympy.Heaviside(sw.phi - 1) * (sw.phi - 1),
+        sw.Table([0.0, 1.0, 9.0], [2.0, 3.0, 2.0])(sw.phi),
+    ],
+)
+def test_an_inertia_that_bends_keeps_its_momentum_or_its_energy(law: sympy.Expr) -> None:
+    net = sw.Network("bent")
+    net.add(sw.Inertia("arm", J=law), "a")
+    made = net.simulate(1.0, initial={"arm.omega": 2.0}, rtol=1e-10)
+    assert made.energy.residual < 1e-8
+    if not law.has(sw.phi):
+        assert made["arm.omega"][-1] == pytest.approx(1.0, rel=1e-8)
+    elif not law.has(sw.t):
+        J = float(law.subs(sw.phi, 0)), float(law.subs(sw.phi, made["arm.phi"][-1]))
+        assert J[1] * made["arm.omega"][-1] ** 2 == pytest.approx(J[0] * 4, rel=1e-8)
+
+
+@sw.component
+class Cam(sw.Component):
+    """An inertia J phi - b, for a capacity whose constant is below zero."""
+
+    J: float = sw.parameter("kg*m^2/rad", "slope", above=0)
+    b: float = sw.parameter("kg*m^2", "offset", at_least=0)
+
+    ports: ClassVar = (sw.Port("a"),)
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        yield AcrossStore(p.J * INTEGRAL - p.b)
+
+
+@pytest.mark.parametrize("engine", ["scipy", "heyoka", "sundials"])
+def test_a_capacity_in_parameters_is_that_of_the_same_law_in_numbers(engine: str) -> None:
+    pytest.importorskip("sksundae" if engine == "sundials" else engine)
+
+    def net(part: sw.Component) -> sw.Network:
+        made = sw.Network("cam")
+        made.add(part, "a")
+        made.add(sw.Spring("spring", c=3.0), "a", "b")
+        made.add(sw.Inertia("wheel", J=1.0), "b")
+        return made
+
+    start = {"cam.phi": 5.0, "cam.omega": 0.5}
+    own, plain = net(Cam("cam", J=1.0, b=2.0)), net(sw.Inertia("cam", J=sw.phi - 2))
+    one, other = (made.simulate(1.0, initial=start, engine=engine, rtol=1e-8)["cam.omega"][-1] for made in (own, plain))
+    assert one == pytest.approx(other, rel=1e-6)
+    linear = [made.compile().linearize(start).A for made in (own, plain)]
+    np.testing.assert_allclose(*linear, rtol=1e-12)
 
 
 @pytest.mark.parametrize("engine", ["scipy", "heyoka"])

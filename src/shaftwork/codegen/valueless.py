@@ -25,7 +25,7 @@ from shaftwork.reduction.form import StateForm
 LONGEST = 60
 """Characters of a law in a message."""
 WIDEST = 1 / np.finfo(float).eps
-"""So many times as large an inertia may become: beside its momentum, that of the smallest is rounding."""
+"""Largest ratio of an inertia along a motion: beyond it the smallest is lost in the rounding of the largest."""
 
 
 def without_value(bound: BoundArrays, times: Array, states: Array) -> SimulationError | None:
@@ -74,7 +74,7 @@ def vanishing(bound: BoundArrays, times: Array, states: Array) -> SimulationErro
         name = in_words(form.graph.part_of(link), law)
         with np.errstate(all="ignore"):
             beyond = of_law(bound, link, slope(law, RATE), times, states.T)
-        capacity = np.broadcast_to(bound.part.coefficients[link - 1] + beyond, times.shape)
+        capacity = np.broadcast_to(bound.part.coefficients[form.graph.constant_of(link)] + beyond, times.shape)
         if (missing := first_missing(times, capacity[:, None])) is not None:
             return no_value(missing[0], name)
         large, small = int(capacity.argmax()), int(capacity.argmin())

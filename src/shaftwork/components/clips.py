@@ -45,6 +45,6 @@ def replaced(expression: Basic, known: Mapping[Any, Any]) -> Any:
 
 
 def _made(function: type[Basic], args: Any) -> Any:
-    """A limit of the arguments, compared only where all but one of them are numbers."""
+    """A limit of the arguments, which are compared where all of them are numbers."""
     compared = all(getattr(one, "is_number", True) for one in args)
     return function(*args) if compared else function(*args, evaluate=False)

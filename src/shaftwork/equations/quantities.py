@@ -117,7 +117,7 @@ class Quantities:
         """Coefficient or law of a branch in the parameters and derived quantities of the network."""
         template = self.graph.branches[branch].template
         if template.kind is Kind.ACROSS_STORE and template.printed.has(INTEGRAL):
-            return self.printed(branch).xreplace({INTEGRAL: self.integral(branch + 1)})  # of the law behind it
+            return self.printed(branch).xreplace({INTEGRAL: self.integral(self.graph.change_of(branch))})
         return self.history(branch) if template.is_history else self.printed(branch)
 
     def printed(self, branch: int) -> Expr:

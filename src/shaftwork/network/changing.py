@@ -10,25 +10,25 @@ A spring K(s, t) lets through K s, and stores the integral of K s over s at a ti
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 import sympy
-from sympy import Expr
+from sympy import Basic, Expr, Symbol
 from sympy.core.relational import Relational
 
 from shaftwork.components.branches import ACROSS, INTEGRAL, RATE, readings_in
-from shaftwork.components.laws import breakpoints, line
 from shaftwork.components.laws import t as TIME
-from shaftwork.components.slopes import slope
+from shaftwork.components.slopes import STEPS, slope, wraps
 from shaftwork.core.errors import ShaftworkError
 
-JUMP = 1e-9
-"""Part of the largest inertia beside it by which one differs on both sides of a jump; less is rounding."""
 CHANGE = "change"
 """The label of what there is beyond a constant."""
-ENDLESS = (sympy.floor, sympy.ceiling)
-JUMPING = (*ENDLESS, sympy.sign, sympy.Heaviside)
+SAMPLES = (0.37, 1.9, 2.7)
+"""What the other variables of a capacity are where its two sides of a jump are compared."""
+BESIDE = 1e-9
+"""So far beside a boundary, in parts of its place, conditions are read that hold on one side of it."""
+SAME = 1e-9
+"""Part of a capacity by which its two sides may differ where it does not jump; less is rounding."""
 
 
 class StoreFaultError(ShaftworkError):
@@ -58,13 +58,13 @@ def changes(coefficient: Expr) -> bool:
 def beyond_constant(capacity: Expr) -> tuple[Expr, Expr, Expr]:
     """A constant capacity, the law of what there is beyond it, and the energy in that, J.
 
-    The constant is arbitrary; it is that of the angle and the time zero where this is one.
+    The constant is arbitrary: the capacity at the angle and the time zero where this is a positive number, else 1.
 
     Raises:
         StoreFaultError: it jumps, so that the speed would.
     """
     constant = capacity.subs({INTEGRAL: 0, TIME: 0})
-    if constant.is_number and not (constant.is_finite and constant > 0):
+    if not (constant.is_number and constant.is_finite and constant > 0):
         constant = sympy.Integer(1)
     if (jump := next(_jumps(capacity), None)) is not None:
         raise StoreFaultError(
@@ -88,14 +88,40 @@ def spring(stiffness: Expr) -> tuple[Expr, Expr | None]:
 
 
 def _jumps(capacity: Expr) -> Iterator[str]:
-    """Where a capacity jumps over time or angle, the other being zero."""
-    for symbol, other, unit in ((TIME, INTEGRAL, "t = {:.6g} s"), (INTEGRAL, TIME, "the angle {:.6g}")):
-        course = capacity.subs(other, 0).xreplace({symbol: TIME})
-        for node in sorted(course.atoms(*JUMPING, Relational), key=str):
-            inside = node.lhs - node.rhs if isinstance(node, Relational) else node.args[0]
-            if inside.has(TIME) and (isinstance(node, ENDLESS) or line(inside) is None):  # no breakpoints tell where
-                yield f"what {str(node)[:60]} decides"
-        for place in breakpoints(course):
-            sides = [course.subs(TIME, math.nextafter(place, way)) for way in (-math.inf, math.inf)]
-            if all(side.is_number for side in sides) and abs(sides[1] - sides[0]) > JUMP * max(map(abs, sides)):
-                yield unit.format(place)
+    """Where a capacity jumps over time or angle."""
+    steps = {node for node in sympy.preorder_traversal(capacity) if isinstance(node, STEPS) or wraps(node)}
+    for node in sorted((node for node in steps if node.has(INTEGRAL, TIME)), key=str):
+        boundary = _boundary(node)
+        if boundary is None:
+            yield f"what {str(node.xreplace({INTEGRAL: Symbol('angle')}))[:60]} decides"
+            continue
+        symbol, place = boundary
+        others = capacity.free_symbols | place.free_symbols
+        for shift in SAMPLES:
+            at = {one: shift * (1 + number) for number, one in enumerate(sorted(others - {symbol}, key=str))}
+            low, high = _sides(capacity.xreplace(at), symbol, float(place.xreplace(at)))
+            if low.is_real and high.is_real and abs(high - low) > SAME * max(abs(low), abs(high)):
+                shown = str(place) if place.free_symbols else f"{float(place):.6g}"
+                yield f"t = {shown} s" if symbol is TIME else f"the angle {shown}"
+                break
+
+
+def _boundary(node: Basic) -> tuple[Symbol, Expr] | None:
+    """The angle or the time at which a condition or a step changes; None where no straight line tells it."""
+    if not isinstance(node, Relational | sympy.sign | sympy.Heaviside):
+        return None
+    inside = node.lhs - node.rhs if isinstance(node, Relational) else node.args[0]
+    for symbol in (INTEGRAL, TIME):
+        rate = inside.diff(symbol)
+        if rate != 0 and not rate.has(INTEGRAL, TIME):
+            return symbol, (symbol - inside / rate).expand()
+    return None
+
+
+def _sides(capacity: Expr, symbol: Symbol, place: float) -> tuple[Expr, Expr]:
+    """A capacity in one variable just below and just above a boundary: its conditions read there, the rest at it."""
+    low, high = (
+        capacity.xreplace({node: node.subs(symbol, place + way) for node in capacity.atoms(*STEPS)}).subs(symbol, place)
+        for way in (-BESIDE * max(1, abs(place)), BESIDE * max(1, abs(place)))
+    )
+    return low, high

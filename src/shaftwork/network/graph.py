@@ -149,6 +149,14 @@ class CircuitGraph:
         """The part that a branch belongs to."""
         return self.parts[self.branches[branch].part]
 
+    def change_of(self, constant: int) -> int:
+        """Of an inertia or capacitor that changes, the law of what it has beyond a constant: it comes next to that."""
+        return constant + 1
+
+    def constant_of(self, change: int) -> int:
+        """The constant store before the law of what it has beyond it."""
+        return change - 1
+
     def symbol_of(self, part: GraphPart, name: str) -> Symbol:
         """The symbol of a parameter or derived quantity in the equations of the whole network."""
         return Symbol(f"{part.name}.{name}", real=True)

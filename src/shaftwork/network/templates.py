@@ -281,7 +281,7 @@ class _Resolver:
         """A store that depends on its angle or on time.
 
         Raises:
-            ShaftworkError: it is an inertia that jumps, or is not above zero at the start.
+            StoreFaultError: it is an inertia that jumps.
         """
         ends, label = branch.ends or self._default, branch.label
         if isinstance(branch, ThroughStore):
