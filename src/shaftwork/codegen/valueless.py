@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq, minimize_scalar
 from sympy import Basic, Expr
 
 from shaftwork.codegen.arrays import BoundArrays
@@ -24,6 +25,8 @@ from shaftwork.reduction.form import StateForm
 
 LONGEST = 60
 """Characters of a law in a message."""
+SAMPLES = 16
+"""Times in a step of a motion at which an inertia is looked at."""
 WIDEST = 1 / np.finfo(float).eps
 """Largest ratio of an inertia along a motion: beyond it the smallest is lost in the rounding of the largest."""
 
@@ -49,47 +52,84 @@ def without_value(bound: BoundArrays, times: Array, states: Array) -> Simulation
 
 
 def refuse_vanishing(
-    form: StateForm, bind: Callable[[], BoundArrays], times: Array, x: Callable[[Array], Array]
+    form: StateForm, bind: Callable[[], BoundArrays], steps: Array, x: Callable[[Array], Array]
 ) -> None:
     """Refuse a motion in which an inertia that changes is not above zero.
 
     Args:
         form: the equations.
         bind: makes them for their parameters.
-        times: (k,) s.
+        steps: (k,) times in s at which the steps of the motion end, or its start alone.
         x: from times to (k, n) states, or more.
 
     Raises:
         SimulationError: says when and which.
     """
-    if form.inertial and (error := vanishing(bind(), times, x(times)[:, : len(form.states)])) is not None:
-        raise error
+    for change in form.inertial:
+        bound = bind()
+
+        def course(times: Array, bound: BoundArrays = bound, change: int = change) -> Array:
+            return _capacity(bound, change, times, x(times)[:, : len(form.states)])
+
+        times = _with_lowest(course, steps)
+        if (error := _objection(bound, change, times, course(times), course)) is not None:
+            raise error
 
 
 def vanishing(bound: BoundArrays, times: Array, states: Array) -> SimulationError | None:
     """The error of the first inertia that is not above zero at times (k,) and states (k, n), or that has a pole."""
-    form = bound.program.form
-    for link in form.inertial:
-        law = form.graph.branches[link].template.law
-        name = in_words(form.graph.part_of(link), law)
-        with np.errstate(all="ignore"):
-            beyond = of_law(bound, link, slope(law, RATE), times, states.T)
-        capacity = np.broadcast_to(bound.part.coefficients[form.graph.constant_of(link)] + beyond, times.shape)
-        if (missing := first_missing(times, capacity[:, None])) is not None:
-            return no_value(missing[0], name)
-        large, small = int(capacity.argmax()), int(capacity.argmin())
-        if capacity[small] <= 0:
-            place = int(np.argmax(capacity <= 0))
-            says = f"is {capacity[place]:.6g}"
-        elif capacity[large] > WIDEST * capacity[small]:
-            place, says = large, f"is {capacity[large]:.3g}, and {capacity[small]:.3g} at t = {times[small]:.9g} s"
-        else:
-            continue
-        return SimulationError(
-            f"At t = {times[place]:.9g} s {name} {says}. "
-            "It must be above zero, and finite, at all times and angles of the motion."
-        )
+    for change in bound.program.form.inertial:
+        error = _objection(bound, change, times, _capacity(bound, change, times, states))
+        if error is not None:
+            return error
     return None
+
+
+def _capacity(bound: BoundArrays, change: int, times: Array, states: Array) -> Array:
+    """(k,) an inertia at times (k,) and states (k, n), by the law of what it has beyond a constant."""
+    graph = bound.program.form.graph
+    with np.errstate(all="ignore"):
+        beyond = of_law(bound, change, slope(graph.branches[change].template.law, RATE), times, states.T)
+    return np.broadcast_to(bound.part.coefficients[graph.constant_of(change)] + beyond, times.shape)
+
+
+def _with_lowest(course: Callable[[Array], Array], steps: Array) -> Array:
+    """Times in every step, and those between them at which an inertia is lowest and may reach zero."""
+    if steps.size < 2:
+        return steps
+    parts = np.linspace(0, 1, SAMPLES, endpoint=False)
+    times = np.append((steps[:-1, None] + np.diff(steps)[:, None] * parts).ravel(), steps[-1])
+    values = course(times)
+    before, here, after = values[:-2], values[1:-1], values[2:]
+    lowest = (here <= before) & (here <= after) & (here <= np.maximum(before, after) - here)
+    found = [
+        minimize_scalar(lambda t: course(np.array([t]))[0], bounds=(times[k], times[k + 2]), method="bounded").x
+        for k in np.flatnonzero(lowest)
+    ]
+    return np.union1d(times, found)
+
+
+def _objection(
+    bound: BoundArrays, change: int, times: Array, values: Array, course: Callable[[Array], Array] | None = None
+) -> SimulationError | None:
+    """The error of an inertia with values (k,) at times (k,); None where all are above zero and none is a pole."""
+    graph = bound.program.form.graph
+    name = in_words(graph.part_of(change), graph.branches[change].template.law)
+    if (missing := first_missing(times, values[:, None])) is not None:
+        return no_value(missing[0], name)
+    large, small = int(values.argmax()), int(values.argmin())
+    if values[small] <= 0:
+        place = int(np.argmax(values <= 0))
+        t, says = float(times[place]), f"is {values[place]:.6g}"
+        if course is not None and place > 0:
+            t, says = brentq(lambda t: course(np.array([t]))[0], times[place - 1], t), "falls to zero"
+    elif values[large] > WIDEST * values[small]:
+        t, says = times[large], f"is {values[large]:.3g}, and {values[small]:.3g} at t = {times[small]:.9g} s"
+    else:
+        return None
+    return SimulationError(
+        f"At t = {t:.9g} s {name} {says}. It must be above zero, and finite, at all times and angles of the motion."
+    )
 
 
 def of_law(bound: BoundArrays, index: int, law: Expr, t: Array, x: Array, across: Any = 0.0) -> Array:
