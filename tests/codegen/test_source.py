@@ -131,6 +131,31 @@ def test_the_right_hand_side_is_machine_code_once_this_is_made() -> None:
         made.rhs(0.0, np.zeros(3))
 
 
+@pytest.mark.parametrize(
+    "x", [np.zeros(2), np.zeros((3, 1)), np.zeros(3, dtype=int), np.zeros(3, dtype=np.float32)], ids=str
+)
+def test_machine_code_refuses_arrays_that_it_would_read_beyond_or_cut_off(x: Any) -> None:
+    net = sw.Network("two")
+    net.add(sw.Inertia("a", J=1.0), "a")
+    net.add(sw.Spring("s", c=2.0), "a", "b")
+    net.add(sw.Inertia("b", J=1.0), "b")
+    model = net.compile()
+    made, p = model.compiled(), np.array(model.defaults)
+    for arguments in ((x, p), (np.zeros(3), p[:1])):
+        with pytest.raises(sw.ParameterError, match=r"give 3 states and 3 parameters of float64"):
+            made(0.0, *arguments)
+
+
+@pytest.mark.parametrize("x", [["a"] * 3, {"a.omega": 1.0}, np.array([1j, 0, 0])], ids=repr)
+def test_states_that_are_no_real_numbers_are_refused(x: Any) -> None:
+    net = sw.Network("two")
+    net.add(sw.Inertia("a", J=1.0), "a")
+    net.add(sw.Spring("s", c=2.0), "a", "b")
+    net.add(sw.Inertia("b", J=1.0), "b")
+    with pytest.raises(sw.ParameterError, match="must be 3 real numbers, one for each state"):
+        net.compile().rhs(0.0, x)
+
+
 def inertia(law: Any) -> Any:
     net = sw.Network("one inertia")
     net.add(sw.TorqueSource("motor", tau=law), "a")

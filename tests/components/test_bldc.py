@@ -244,6 +244,17 @@ def test_a_supply_that_comes_after_whole_periods_of_the_carrier_gives_the_same_c
     assert again.energy.residual < 1e-9
 
 
+def test_a_supply_below_zero_shorts_the_motor_as_none_does() -> None:
+    def current(supply: Any) -> Any:
+        net = sw.Network("locked")
+        net.add(sw.BLDCMotor("m", **DATA | {"U": supply}), "rotor")
+        net.add(sw.SpeedSource("lock", omega=0.0), "rotor", "ground")
+        return net.simulate(0.004, initial={"m.phi": 0.3}, rtol=1e-9, t_eval=[0.002, 0.003, 0.004])["m.i_a"]
+
+    below = 40 - 20000 * sw.t
+    np.testing.assert_allclose(current(below), current(sympy.Max(0, below)), rtol=1e-7)
+
+
 def test_a_current_below_zero_is_refused_as_it_cannot_be_held() -> None:
     net = sw.Network("locked")
     net.add(sw.BLDCMotor("m", **DATA, **CONTROL | {"i_ref": -8.0}), "rotor")
@@ -298,8 +309,9 @@ def test_a_duty_that_is_no_law_is_refused_by_its_name(duty: Any) -> None:
 
 @pytest.mark.parametrize(("duty", "value"), [(-0.2, 0), (0.0, 0), (1.0, 1), (1.4, 1)])
 def test_pulses_of_no_share_and_of_all_have_neither_pulses_nor_gaps(duty: float, value: int) -> None:
-    law = sw.PWM(duty, 10.0)
+    assert sw.PWM(duty, 10.0) == value
     # at whole and half periods the triangle touches 0 and 1
+    law = sw.PWM(duty + 0 * sw.t + 1e-300 * sw.t, 10.0)
     assert {int(law.subs(sw.t, t)) for t in np.linspace(0.001, 0.098, 41)} == {value}
 
 

@@ -304,3 +304,12 @@ def test_random_networks_respond_as_their_linearised_model_does(pieces: Network,
             raise
     for H in made:
         np.testing.assert_allclose(H(2j * np.pi * F), response, rtol=0, atol=1e-10 * np.abs(response).max())
+
+
+def test_numbers_in_laws_stand_in_a_transfer_function_as_they_were_typed() -> None:
+    net = sw.Network("drive")
+    net.add(sw.TorqueSource("motor", tau=2 - 0.05 * sw.omega), "a")
+    net.add(sw.Inertia("J", J=0.3), "a")
+    transfer = net.equations().transfer_function("motor.tau", "J.omega")
+    above, below = transfer.expression.as_numer_denom()
+    assert max(abs(number) for made in (above, below) for number in made.atoms(sympy.Number)) <= 20

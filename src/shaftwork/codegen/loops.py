@@ -242,6 +242,8 @@ class LoopSolver:
         r_loop, u_loop = self._by_loops(t, x, a)
         by_state = self._slopes(t, x, a, part.C.toarray(), np.eye(size))
         r_state, u_state = self._total(np.zeros((len(a), size)), by_state, np.eye(size))
+        if not (np.isfinite(r_loop).all() and np.isfinite(r_state).all()):  # lstsq would find no values
+            return sparse.csc_array(np.full((size, size), np.nan))
         total = u_state - u_loop @ np.linalg.lstsq(r_loop, r_state, rcond=None)[0]
         return sparse.csc_array(part.A + part.B @ sparse.csr_array(total))
 

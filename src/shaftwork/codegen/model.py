@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import reprlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -168,7 +169,12 @@ class CompiledModel:
 
     @staticmethod
     def _vector(name: str, given: Any, size: int, what: str) -> Array:
-        vector = np.asarray(without_unit(name, given, f"of each {what}"), dtype=float)
+        numbers = np.asarray(without_unit(name, given, f"of each {what}"))
+        try:
+            vector = numbers.astype(float, casting="same_kind" if numbers.dtype.kind == "c" else "unsafe", copy=False)
+        except (TypeError, ValueError):
+            shown = reprlib.repr(given)
+            raise ParameterError(f"{name} = {shown} must be {size} real numbers, one for each {what}.") from None
         if vector.shape != (size,):
             raise ParameterError(f"{name} has the shape {vector.shape}: give {size} numbers, one for each {what}.")
         return vector
@@ -218,8 +224,8 @@ class CompiledModel:
     def compiled(self) -> MachineCode:
         """The right-hand side as machine code: a function of t in s, (n,) states and (parameters,) values.
 
-        It checks nothing: give float arrays. The first call compiles, which takes seconds. From then on `rhs` is made
-        by it, too, so that new parameters there cost no more than old ones.
+        Give float arrays. The first call compiles, which takes seconds. From then on `rhs` is made by it, too, so that
+        new parameters there cost no more than old ones.
 
         Raises:
             MissingExtraError: numba is not installed.
@@ -228,7 +234,7 @@ class CompiledModel:
         if find_spec("numba") is None:
             raise MissingExtraError("numba", "fast", "model.compiled()")
         if self._machine is None:
-            self._machine = MachineCode(self.source("numba"))
+            self._machine = MachineCode(self.source("numba"), len(self.states), len(self.parameters))
         return self._machine
 
     def phase(self, name: Any) -> CompiledModel:

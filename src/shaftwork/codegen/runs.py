@@ -210,19 +210,35 @@ LANGUAGES = tuple(_LANGUAGES)
 
 
 class MachineCode:
-    """A right-hand side that numba compiles when it is first called. Nothing is checked: give float arrays.
+    """A right-hand side that numba compiles when it is first called.
 
     Args:
         source: of a function rhs(t, x, p, rates).
+        states: how many there are.
+        parameters: how many there are.
     """
 
-    def __init__(self, source: str) -> None:
+    def __init__(self, source: str, states: int, parameters: int) -> None:
         names: dict[str, Any] = {}
+        self._shapes = (states,), (parameters,)
         self.into: Callable[[float, Array, Array, Array], None] = executed(source, "rhs", names, names)
-        """Writes the rates into an array, (t, x, p, rates); code of your own that numba compiles may call it, too."""
+        """Writes the rates into an array, (t, x, p, rates); code of your own that numba compiles may call it, too.
+
+        It checks nothing, and reads and writes beyond arrays that are too short: give float arrays of the right sizes.
+        """
 
     def __call__(self, t: float, x: Array, p: Array) -> Array:
-        """The rates (n,) at a time in s of states (n,), with (parameters,) values."""
+        """The rates (n,) at a time in s of states (n,), with (parameters,) values.
+
+        Raises:
+            ParameterError: x or p is no array of floats of that size.
+        """
+        if (x.shape, p.shape) != self._shapes or not (x.dtype == p.dtype == np.float64):
+            (states,), (parameters,) = self._shapes
+            raise ParameterError(
+                f"x has the shape {x.shape} of {x.dtype}, p {p.shape} of {p.dtype}: give {states} states and "
+                f"{parameters} parameters of float64. model.rhs takes lists and (n, k) states, too."
+            )
         rates = np.empty_like(x)
         self.into(t, x, p, rates)
         return rates

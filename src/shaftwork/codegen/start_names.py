@@ -77,7 +77,7 @@ class StartNames:
                 continue
             owner = name.rpartition(".")[0]
             own = (other for other in self.units if other.rpartition(".")[0] == owner)
-            near = [other for other in own if self.quantity(other) is not None] or [*self.places]
+            near = [other for other in own if other in self.places or self.quantity(other)] or [*self.places]
             raise SignalError(f"There is no speed, twist or torque '{name}' to start from. Near it: {', '.join(near)}.")
         return {
             str(name): in_si(f"the start value of '{name}'", value, self.units.get(str(name), "1"))

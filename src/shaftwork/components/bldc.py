@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 from sympy import Abs, Expr, Integer, Max, Min, Rational, asin, cos, pi, sin
 
 from shaftwork.components.base import Component, Port, Role, Signal, component
+from shaftwork.components.bounds import no_less
 from shaftwork.components.branches import (
     ACROSS,
     INTEGRAL,
@@ -55,13 +56,15 @@ class BLDCMotor(Component):
     other side until it is zero, and the phase is open until a diode conducts again. After `dead_time` a switch follows
     the one before it, at the speed of that instant. The inductance of a phase has its share of the mutual ones in it,
     L = L_mu + L_sigma. U may be a law, of pulses of a chopper before the inverter for one, 540 * PWM(0.3, 8e3): at zero
-    its legs short the motor. With i_ref a PI controller with limits holds i = (|i_a| + |i_b| + |i_c|) / 2 by such
-    pulses: u = k_p (i_ref - i) + u_i, du_i/dt = k_p / t_i (i_ref - i) + (min(U, max(0, u)) - u) / t_i, and U is on
-    while u / U is above the carrier of f_c; without t_i there is no u_i. The currents that it holds are above zero:
-    the torque of a brake takes U off. What u_i stores, t_i u_i^2 / (2 k_p), stands in the balance as energy of the
-    part. Rotor inertia is a part of its own. Modes of each leg: high, low,
-    freewheeling high, freewheeling low, open. Source: Popenda 2019, figs 4-13. Analogue: three transformers whose
-    ratios turn with the rotor.
+    and below the legs of the inverter short the motor.
+
+    With i_ref a PI controller with limits holds i = (|i_a| + |i_b| + |i_c|) / 2 by such pulses: u = k_p (i_ref - i) +
+    u_i, du_i/dt = k_p / t_i (i_ref - i) + (min(U, max(0, u)) - u) / t_i, and U is on while u / U is above the carrier
+    of f_c; without t_i there is no u_i. Below zero i_ref counts as zero: no pulses brake. What u_i stores,
+    t_i u_i^2 / (2 k_p), stands in the balance as energy of the part.
+
+    Rotor inertia is a part of its own. Modes of each leg: high, low, freewheeling high, freewheeling low, open.
+    Analogue: three transformers whose ratios turn with the rotor. Source: Popenda 2019, figs 4-13.
     """
 
     U: Any = parameter("V", "direct voltage of the inverter, also over time or the rotor's speed", at_least=0, law=True)
@@ -158,7 +161,7 @@ def _of_rotor(law: Any) -> Expr:
 
 def _supply(p: Any) -> Expr:
     """The direct voltage before the chopper."""
-    return _of_rotor(p.U)
+    return _of_rotor(no_less(p, "U", 0))
 
 
 def _bus(p: Any) -> Expr:
@@ -172,7 +175,7 @@ def _bus(p: Any) -> Expr:
 
 def _lag(p: Any) -> Expr:
     """By how much the current in the phases that conduct is less than it is to be."""
-    return _of_rotor(p.i_ref) - sum(Abs(through_of(f"i_{phase}")) for phase in PHASES) / 2
+    return _of_rotor(no_less(p, "i_ref", 0)) - sum(Abs(through_of(f"i_{phase}")) for phase in PHASES) / 2
 
 
 def _wanted(p: Any) -> Expr:

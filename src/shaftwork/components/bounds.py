@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from sympy import Expr, Max, Piecewise, Symbol
+from sympy import Expr, Piecewise, Symbol
 
+from shaftwork.components.clips import larger
 from shaftwork.components.tables import Interpolation
 
 
@@ -28,4 +29,4 @@ def no_less(p: Any, name: str, least: int) -> Expr:
 def _no_less(law: Expr, least: int) -> Expr:
     if isinstance(law, Interpolation) and min(law.ys) >= least:
         return law
-    return Max(least, law)
+    return larger(least, law)

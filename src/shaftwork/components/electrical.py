@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
-from sympy import And, Min, Not, Piecewise, false
+from sympy import And, Heaviside, Min, Not, false
 
 from shaftwork.components.base import Component, Port, Role, component
 from shaftwork.components.branches import (
@@ -116,7 +116,7 @@ class Switch(Component):
 
     def modes(self, p: Any) -> Iterator[Modes]:
         timed = p.on is not None and not p.on.free_symbols & {ACROSS, INTEGRAL}
-        law = Piecewise((1, p.on > 0), (-1, True)) if timed else p.on  # of a law that is zero for a while too
+        law = 2 * Heaviside(p.on, 0) - 1 if timed else p.on  # of a law that is zero for a while too
         begins = t - p.t_on if law is None else law if p.t_on == 0 else Min(t - p.t_on, law)
         past = false if p.t_off is None else t >= p.t_off
         on = And(begins >= 0 if p.on is None else begins > 0, Not(past))

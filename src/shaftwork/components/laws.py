@@ -125,6 +125,8 @@ def PWM(duty: Any, frequency: Any) -> sympy.Expr:
     rate = sympy.sympify(given, strict=True)
     (share,) = _finite("PWM", duty=duty)
     inside = larger(0, smaller(1, share))
+    if inside.is_number and float(inside) in (0, 1):
+        return sympy.Integer(int(inside))
     # the second difference keeps the two apart beyond 0 and 1, where they would touch at each turn of the triangle
     above = sympy.cos(2 * sympy.pi * rate * t) - sympy.cos(sympy.pi * inside) + share - inside
     return sympy.Heaviside(above, 0)

@@ -28,8 +28,8 @@ Values = Mapping[str, float]
 
 
 def exact(expression: Expr) -> Expr:
-    """Floats as the fractions that they are."""
-    return expression.xreplace({number: Rational(number) for number in expression.atoms(Float)})
+    """Floats as the fractions that they are written as, 0.05 as 1/20, which is within their rounding."""
+    return expression.xreplace({number: Rational(repr(float(number))) for number in expression.atoms(Float)})
 
 
 def fraction(number: Expr) -> Rational:
