@@ -65,7 +65,7 @@ def refuse_vanishing(
     Raises:
         SimulationError: says when and which.
     """
-    for change in form.inertial:
+    for change in form.doubtful:
         bound = bind()
 
         def course(times: Array, bound: BoundArrays = bound, change: int = change) -> Array:
@@ -78,7 +78,7 @@ def refuse_vanishing(
 
 def vanishing(bound: BoundArrays, times: Array, states: Array) -> SimulationError | None:
     """The error of the first inertia that is not above zero at times (k,) and states (k, n), or that has a pole."""
-    for change in bound.program.form.inertial:
+    for change in bound.program.form.doubtful:
         error = _objection(bound, change, times, _capacity(bound, change, times, states))
         if error is not None:
             return error
@@ -113,20 +113,20 @@ def _objection(
     bound: BoundArrays, change: int, times: Array, values: Array, course: Callable[[Array], Array] | None = None
 ) -> SimulationError | None:
     """The error of an inertia with values (k,) at times (k,); None where all are above zero and none is a pole."""
-    graph = bound.program.form.graph
-    name = in_words(graph.part_of(change), graph.branches[change].template.law)
-    if (missing := first_missing(times, values[:, None])) is not None:
-        return no_value(missing[0], name)
+    graph, missing = bound.program.form.graph, first_missing(times, values[:, None])
     large, small = int(values.argmax()), int(values.argmin())
+    if missing is None and values[small] > 0 and values[large] <= WIDEST * values[small]:
+        return None
+    name = in_words(graph.part_of(change), graph.branches[change].template.law)
+    if missing is not None:
+        return no_value(missing[0], name)
     if values[small] <= 0:
         place = int(np.argmax(values <= 0))
         t, says = float(times[place]), f"is {values[place]:.6g}"
         if course is not None and place > 0:
             t, says = brentq(lambda t: course(np.array([t]))[0], times[place - 1], t), "falls to zero"
-    elif values[large] > WIDEST * values[small]:
-        t, says = times[large], f"is {values[large]:.3g}, and {values[small]:.3g} at t = {times[small]:.9g} s"
     else:
-        return None
+        t, says = times[large], f"is {values[large]:.3g}, and {values[small]:.3g} at t = {times[small]:.9g} s"
     return SimulationError(
         f"At t = {t:.9g} s {name} {says}. It must be above zero, and finite, at all times and angles of the motion."
     )

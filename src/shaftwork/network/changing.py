@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import sympy
-from sympy import Basic, Expr, Symbol
+from sympy import AccumBounds, Basic, Expr, Symbol, oo
 from sympy.core.relational import Relational
 
 from shaftwork.components.branches import ACROSS, INTEGRAL, RATE, readings_in
@@ -74,6 +74,16 @@ def beyond_constant(capacity: Expr) -> tuple[Expr, Expr, Expr]:
     rest = capacity - constant
     rises = slope(capacity, INTEGRAL) * ACROSS / 2 + slope(capacity, TIME)
     return constant, rest * RATE + rises * ACROSS, rest * ACROSS**2 / 2
+
+
+def is_bounded(capacity: Expr) -> bool:
+    """Whether a capacity is above zero and finite at all angles and times, as far as bounds of its terms tell."""
+    anything = AccumBounds(-oo, oo)
+    try:
+        bounds = capacity.xreplace({INTEGRAL: anything, TIME: anything})
+        return bool(isinstance(bounds, AccumBounds) and bounds.min > 0 and bounds.max < oo)
+    except (TypeError, ValueError, NotImplementedError):  # a function that knows no bounds
+        return False
 
 
 def spring(stiffness: Expr) -> tuple[Expr, Expr | None]:

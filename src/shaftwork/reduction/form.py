@@ -20,6 +20,7 @@ from functools import cached_property
 
 from shaftwork.components.branches import RATE
 from shaftwork.core.domains import Domain
+from shaftwork.network.changing import is_bounded
 from shaftwork.network.controlled import Reading, readings_of
 from shaftwork.network.graph import CircuitGraph, GraphBranch
 from shaftwork.network.kinds import Kind
@@ -79,6 +80,12 @@ class StateForm:
     def inertial(self) -> tuple[int, ...]:
         """Laws of what stores have beyond a constant: they read the rate of a speed that they help to determine."""
         return tuple(k for k in self.tree.links[Kind.LAW] if RATE in self.graph.branches[k].template.reads)
+
+    @cached_property
+    def doubtful(self) -> tuple[int, ...]:
+        """Those of them whose store may vanish or have a pole somewhere."""
+        laws = {k: self.graph.branches[self.graph.constant_of(k)].template.printed for k in self.inertial}
+        return tuple(k for k, law in laws.items() if not is_bounded(law))
 
     @property
     def across_states(self) -> tuple[int, ...]:

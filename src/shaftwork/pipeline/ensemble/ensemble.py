@@ -87,7 +87,7 @@ class Ensemble:
         if model.rows is None or form.waves or form.loop_laws or not form.states:
             raise CompileError("The network is too large, holds waves, or has a nonlinear law at a massless node.")
         times = model.switching.timeline(model.defaults, *self.span, modes=False).stops
-        if form.inertial:
+        if form.doubtful:
             raise CompileError("Whether an inertia that changes stays above zero is seen in the motion of one variant.")
         if form.has_impulses or form.across_sources or times:
             raise CompileError("A source switches, jumps or has a pulse at a time of its own.")
