@@ -23,12 +23,13 @@ def leaving(
         here: the course at the moment.
         beside: rounding away from it.
         on_limit: elements and guards.
-        again: whether modes have come back: then what hardly moves yet stays as it is, and its motion will tell.
+        again: whether modes have come back: then what hardly moves yet stays as it is, and its motion will tell. The
+            step may lie beyond an instant at which a law switches.
     """
     step = regime.ahead(here[2])
     ways, beyond = (here, beside), list[tuple[float, Way]]()
     for _ in range(1 if again else 2):  # where nothing moves yet, its acceleration tells
-        ways = _further(regime, step, ways[0]), _further(regime, step, ways[1])
+        ways = _further(regime, step, ways[0], bends=not again), _further(regime, step, ways[1], bends=not again)
         moving = []
         for pair in on_limit:
             watched, k = pair[1], pair[1].guard
@@ -43,10 +44,10 @@ def leaving(
     return beyond
 
 
-def _further(regime: Regime, step: float, here: Course) -> Course:
+def _further(regime: Regime, step: float, here: Course, *, bends: bool) -> Course:
     """A step further along a straight line; where a prescribed speed bends along a parabola, as all do then (Heun)."""
     ends = regime.course(*regime.later(here, step))
-    if not regime.bends:
+    if not (bends and regime.bends):
         return ends
     t, x, rates, _ = here
     return regime.course(

@@ -147,16 +147,28 @@ class Regime:
         """Rates and guards at a time in s, behind time and states."""
         return t, x, *self.motion(t, x)
 
-    def beside(self, here: Course) -> tuple[float, list[float]]:
-        """The time and the states as far away as rounding may move them."""
+    def beside(self, here: Course, side: float = 1.0) -> tuple[float, list[float]]:
+        """The time and the states as far away as rounding may move them, to one side or to the other, -1."""
         t, x, rates, _ = here
         each, tick = zip(x, rates, self.moves, strict=True), self.tick
         # all of it to the same side: what a tick moves must not make up for the rest
-        return t + tick, [v + part * abs(v) + least + way * tick * abs(rate) for v, rate, (part, least, way, _) in each]
+        return t + side * tick, [
+            v + side * (part * abs(v) + least + way * tick * abs(rate)) for v, rate, (part, least, way, _) in each
+        ]
 
-    def bands(self, here: Course) -> list[float]:
-        """How far rounding moves each guard."""
-        return [abs(near - now) for near, now in zip(self.limits(*self.beside(here)), here[3], strict=True)]
+    def bands(self, here: Course, beside: Sequence[float] | None = None) -> list[float]:
+        """How far rounding moves each guard: on the side on which no law switches, where one is about to.
+
+        Args:
+            here: the course.
+            beside: the guards at `beside(here)`, where they are known.
+        """
+        now = here[3]
+        bands = [abs(near - guard) for near, guard in zip(beside or self.limits(*self.beside(here)), now, strict=True)]
+        if not self.assembly.model.arrays.inputs.switching:
+            return bands
+        other = self.limits(*self.beside(here, -1.0))
+        return [min(band, abs(near - guard)) for band, near, guard in zip(bands, other, now, strict=True)]
 
     def ahead(self, rates: list[float]) -> float:
         """How far in s the further course is looked at: no state moves there by more than a part of its size."""

@@ -270,7 +270,7 @@ class Settling:
         """
         regime, here = moment.regime, moment.course(t)
         beside, now = regime.course(*regime.beside(here)), here[3]
-        bands = [abs(near - guard) for near, guard in zip(beside[3], now, strict=True)]
+        bands = regime.bands(here, beside[3])
         wide = bands
         if ended.bands and ended.regime.assembly is regime.assembly:
             wide = list(map(max, bands, ended.bands))
