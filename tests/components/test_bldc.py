@@ -263,6 +263,21 @@ def test_a_current_below_zero_is_refused_as_it_cannot_be_held() -> None:
         net.compile()
 
 
+def test_what_a_controlled_motor_is_supplied_with_is_electrical_work_alone() -> None:
+    """The locked motor: the work of U is that of 2 R i^2 and of the coils, whatever the integral part has stored."""
+    net = sw.Network("locked")
+    net.add(sw.BLDCMotor("m", **DATA, **CONTROL | {"k_p": 1.0}), "rotor")
+    net.add(sw.SpeedSource("lock", omega=0.0), "rotor", "ground")
+    made = net.simulate(0.02, initial={"m.phi": 0.3}, rtol=1e-9, t_eval=np.linspace(0, 0.02, 40001))
+    i = made["m.i_a"]
+    copper = np.trapezoid(2 * DATA["R"] * i**2, made.t)
+    coils = DATA["L"] * i[-1] ** 2
+    assert made["m.u_i"][-1] ** 2 * CONTROL["t_i"] / 2 > 0.1 * (copper + coils)  # it would be seen
+    # the trapezoidal rule on 1333 points in a pulse
+    assert made.energy.supplied_by["m"] == pytest.approx(copper + coils, rel=1e-6)
+    assert made.energy.residual < 1e-9
+
+
 def test_the_mean_current_is_the_one_that_is_asked_for_once_it_has_settled() -> None:
     net = sw.Network("locked")
     net.add(sw.BLDCMotor("m", **DATA, **CONTROL), "rotor")

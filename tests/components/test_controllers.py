@@ -113,3 +113,16 @@ def test_a_reference_may_be_any_law_of_time() -> None:
 def test_limits_without_room_are_refused(limits: dict[str, float], words: str) -> None:
     with pytest.raises(sw.ParameterError, match=words):
         sw.SpeedController("c", omega_ref=1.0, k_p=1.0, **limits)
+
+
+def test_a_controller_supplies_the_work_of_its_torque_whatever_its_integral_part_has_stored() -> None:
+    net = sw.Network("axis")
+    net.add(sw.SpeedController("drive", omega_ref=10.0, k_p=0.5, t_i=0.3, tau_max=4.0), "a")
+    net.add(sw.Inertia("J", J=0.2), "a")
+    net.add(sw.Damper("d", d=0.1), "a")
+    made = net.simulate(2.0, rtol=1e-10, t_eval=np.linspace(0, 2, 20001))
+    power = made["drive.tau"] * made["J.omega"]
+    # the trapezoidal rule with steps of 1e-4 s beside time constants of 0.1 s
+    assert made.energy.supplied_by["drive"] == pytest.approx(np.trapezoid(power, made.t), rel=1e-6)
+    assert made.energy.residual < 1e-9
+    assert made["drive.tau_i"][-1] > 0.5

@@ -21,7 +21,7 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.law_slopes import input_slopes
 from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.observer import ModelObserver
-from shaftwork.codegen.recovery import History
+from shaftwork.codegen.recovery import History, branches_with_power
 from shaftwork.codegen.waves import Dense
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.slopes import slope
@@ -200,7 +200,7 @@ class _Deviations(History):
 
     def stored(self, part: GraphPart) -> Array:
         energy = np.zeros(len(self.t))
-        for index in part.branches:
+        for index in branches_with_power(self.form.graph, part):
             coefficient = self.bound.part.coefficients[index]
             match self.form.graph.branches[index].template.kind:
                 case Kind.ACROSS_STORE:

@@ -10,7 +10,7 @@ import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.recovery import History
+from shaftwork.codegen.recovery import History, branches_with_power
 from shaftwork.codegen.stores import Stores
 from shaftwork.codegen.timeline import NOTHING, Timeline
 from shaftwork.codegen.waves import Carrying, Dense, along_lines
@@ -195,7 +195,7 @@ class ModelObserver:
         return {}
 
     def _stores(self, part: GraphPart) -> bool:
-        templates = (self._graph.branches[k].template for k in part.branches)
+        templates = (self._graph.branches[k].template for k in branches_with_power(self._graph, part))
         return any(made.kind in (Kind.ACROSS_STORE, Kind.THROUGH_STORE) or made.stored != 0 for made in templates)
 
     def _gives_back(self, part: GraphPart) -> bool:

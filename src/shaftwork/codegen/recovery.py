@@ -16,7 +16,7 @@ from shaftwork.components.base import Profile, Signal
 from shaftwork.components.branches import INTEGRAL, RATE, End
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import slope
-from shaftwork.network.graph import GROUND, GraphPart
+from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart
 from shaftwork.network.kinds import Kind
 from shaftwork.network.templates import BranchTemplate
 from shaftwork.reduction.form import StateForm
@@ -122,7 +122,7 @@ class History:
     def stored(self, part: GraphPart) -> Array:
         """(k,) energy in the stores of a part, J."""
         energy = np.zeros(len(self.t))
-        for index in part.branches:
+        for index in branches_with_power(self.form.graph, part):
             coefficient = self.bound.part.coefficients[index]
             match self.form.graph.branches[index].template.kind:
                 case Kind.ACROSS_STORE:
@@ -133,7 +133,8 @@ class History:
 
     def _sprung(self, part: GraphPart) -> Iterator[tuple[int, BranchTemplate]]:
         """The branches of a part whose laws store energy."""
-        templates = ((k, self.form.graph.branches[k].template) for k in part.branches)
+        graph = self.form.graph
+        templates = ((k, graph.branches[k].template) for k in branches_with_power(graph, part))
         return ((k, template) for k, template in templates if template.stored != 0)
 
     def of_law(self, index: int, law: Expr) -> Array:
@@ -151,7 +152,7 @@ class History:
         """
         kinds = (Kind.CONDUCTANCE, Kind.LAW, Kind.THROUGH_SOURCE, Kind.ACROSS_SOURCE)
         branches = self.form.graph.branches
-        templates = ((k, branches[k].template) for k in part.branches)
+        templates = ((k, branches[k].template) for k in branches_with_power(self.form.graph, part))
         power = self._power(part, (k for k, t in templates if t.through or (t.kind in kinds and not t.line)))
         for k, template in self._sprung(part):
             in_time = self.of_law(k, slope(template.stored, TIME))
@@ -225,6 +226,12 @@ class History:
 
     def _factors(self, part: GraphPart, index: int, port: str) -> Iterator[float]:
         return _factors(part, self.form.graph.branches[index].template, port, self.bound.p)
+
+
+def branches_with_power(graph: CircuitGraph, part: GraphPart) -> tuple[int, ...]:
+    """The branches of a part without those of its controller."""
+    signals = part.component.signal_ports
+    return tuple(k for k in part.branches if signals.isdisjoint(graph.branches[k].template.ends))
 
 
 def into(part: GraphPart, port: End, through: Array, form: StateForm, p: Array) -> Array:

@@ -182,6 +182,8 @@ class Component:
 
     ports: ClassVar[tuple[Port, ...]] = (Port("a"), Port("b"))
     inner: ClassVar[tuple[Port, ...]] = ()
+    signal_ports: ClassVar[frozenset[str]] = frozenset()
+    """Names of inner ports that carry signals of a controller: what its integrator stores is no energy."""
     role: ClassVar[Role] = "store"
     declared: ClassVar[Mapping[str, Parameter]] = {}
 

@@ -60,8 +60,7 @@ class BLDCMotor(Component):
 
     With i_ref a PI controller with limits holds i = (|i_a| + |i_b| + |i_c|) / 2 by such pulses: u = k_p (i_ref - i) +
     u_i, du_i/dt = k_p / t_i (i_ref - i) + (min(U, max(0, u)) - u) / t_i, and U is on while u / U is above the carrier
-    of f_c; without t_i there is no u_i. Below zero i_ref counts as zero: no pulses brake. What u_i stores,
-    t_i u_i^2 / (2 k_p), stands in the balance as energy of the part.
+    of f_c; without t_i there is no u_i. Below zero i_ref counts as zero: no pulses brake.
 
     Rotor inertia is a part of its own. Modes of each leg: high, low, freewheeling high, freewheeling low, open.
     Analogue: three transformers whose ratios turn with the rotor. Source: Popenda 2019, figs 4-13.
@@ -90,6 +89,7 @@ class BLDCMotor(Component):
 
     role: ClassVar[Role] = "source"
     ports: ClassVar = (Port("rotor"),)
+    signal_ports: ClassVar = frozenset({"control"})
     inner: ClassVar = (
         *(Port(f"{place}_{phase}", ELECTRICAL) for phase in PHASES for place in ("leg", "winding", "emf")),
         Port("star", ELECTRICAL),

@@ -26,7 +26,7 @@ class SpeedController(Component):
     tau_i; without tau_max there are no limits. Before t_on and from t_off on there is no torque, and tau_i rests.
 
     So the controller is a damper k_p and a spring k_p / t_i to a shaft that turns at the reference speed, and tau_i is
-    the torque of that spring, whose energy tau_i^2 t_i / (2 k_p) stands in the balance as energy of the part.
+    the torque of that spring; its energy is no energy of the drive, and no balance counts it.
     Analogue: a controlled current source. Source: Åström 2006, section 3.5.
     """
 
@@ -41,6 +41,7 @@ class SpeedController(Component):
 
     role: ClassVar[Role] = "source"
     ports: ClassVar = (Port("a"),)
+    signal_ports: ClassVar = frozenset({"i"})
 
     def __post_init__(self) -> None:
         refuse_no_time_on(self)
