@@ -313,3 +313,26 @@ def test_numbers_in_laws_stand_in_a_transfer_function_as_they_were_typed() -> No
     transfer = net.equations().transfer_function("motor.tau", "J.omega")
     above, below = transfer.expression.as_numer_denom()
     assert max(abs(number) for made in (above, below) for number in made.atoms(sympy.Number)) <= 20
+
+
+def test_an_output_without_a_letter_of_its_own_is_printed_with_that_of_its_kind() -> None:
+    net = sw.Network("drive")
+    net.add(sw.TorqueSource("motor", tau=1.0), "a")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.Shaft("line", length=1.0, diameter=0.02, model=sw.OneSpring()), "a", "b")
+    net.add(sw.Inertia("J2", J=1.0), "b")
+    text = net.equations().transfer_function("motor.tau", "line.tau_a").latex()
+    assert r"\frac{\tau_{\mathrm{line},a}}{\tau_{\mathrm{motor}}}" in text
+
+
+def test_slopes_of_an_inertia_that_changes_are_taken_at_a_point_that_names_no_acceleration() -> None:
+    net = sw.Network("arm")
+    net.add(sw.TorqueSource("motor", tau=1.0), "a")
+    net.add(sw.Inertia("arm", J=2 + sympy.sin(sw.phi)), "a")
+    net.add(sw.Spring("shaft", c=9.0), "a", "b")
+    net.add(sw.Inertia("wheel", J=1.0), "b")
+    transfer = net.equations().transfer_function("motor.tau", "shaft.tau")
+    poles = transfer.numeric(at={"arm.phi": 0.5, "arm.omega": 0.0}).poles()
+    assert np.abs(poles).max() == pytest.approx(math.sqrt(9 * (1 + 1 / (2 + math.sin(0.5)))), rel=1e-12)
+    with pytest.raises(sw.ParameterError, match=r"reads arm\.omega, which is not given\. Give it, 0\.0 for rest"):
+        transfer.numeric(at={"arm.phi": 0.5})

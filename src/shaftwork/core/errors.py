@@ -72,6 +72,12 @@ class SimulationError(ShaftworkError, RuntimeError):
     """An integration failed: says when, in which state and why."""
 
 
+def in_one_line(error: Exception) -> str:
+    """What an error says in one line; of a network that cannot be assembled, its first problem."""
+    lines = str(error).splitlines() or [""]
+    return f"{lines[0]}: {error.problems[0]}" if isinstance(error, NetworkError) and error.problems else lines[0]
+
+
 def no_value(t: float, law: str) -> SimulationError:
     """The error of a law that has no real value at a time in s of a motion.
 

@@ -11,6 +11,7 @@ from sympy import Expr, Float, Integer, Rational, Symbol
 from shaftwork.components.laws import breakpoints
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ParameterError, no_quantity
+from shaftwork.equations.quantities import is_rate
 from shaftwork.equations.slopes import VARIED, Slope
 from shaftwork.network.graph import GROUND, CircuitGraph
 from shaftwork.network.kinds import Kind
@@ -66,8 +67,10 @@ class Numbers:
             known = {**self._time, **self.known}
             for symbol in sorted(read, key=str):
                 value = self._point.value(symbol)
-                if value is None and not self._at_rest:
-                    raise ParameterError(f"at: the law of '{slope.part}' reads {symbol}, which is not given.")
+                if value is None and not (self._at_rest or is_rate(symbol)):
+                    raise ParameterError(
+                        f"at: the law of '{slope.part}' reads {symbol}, which is not given. Give it, 0.0 for rest."
+                    )
                 known[symbol] = Integer(0) if value is None else value
             found = slope.value.xreplace(known).evalf(DIGITS)
             if not (found.is_number and found.is_real and found.is_finite) or _jumps(slope, known, float(found)):

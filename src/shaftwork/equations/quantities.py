@@ -38,6 +38,11 @@ def rate_of(symbol: Symbol) -> Symbol:
     return Symbol(f"der({symbol.name})", real=True)
 
 
+def is_rate(symbol: Symbol) -> bool:
+    """Whether a symbol stands for a derivative by time."""
+    return str(symbol.name).startswith("der(")
+
+
 def refuse_controlled(graph: CircuitGraph) -> None:
     """Refuse laws that read others of their part, and couplings that lose power, where positions are all that there is.
 

@@ -21,6 +21,8 @@ if TYPE_CHECKING:  # the record prints itself through this module
 
 REAL = Symbol("s", real=True)
 """Stands for s in print, where all letters are real."""
+GREEK = {"tau": r"\tau", "omega": r"\omega", "phi": r"\varphi", "psi": r"\psi"}
+"""The letters of quantities whose names are those of Greek ones."""
 
 
 def in_latex(made: TransferFunction) -> str:
@@ -47,7 +49,11 @@ def _lines(made: TransferFunction) -> Iterator[Line]:
 
 
 def _named(name: str, names: Mapping[str, str]) -> str:
-    return names.get(name, rf"\mathrm{{{escaped(name)}}}")
+    """The letter of a quantity, "line.tau_a" as tau with the name of its part, where no equation has one for it."""
+    part, _, quantity = name.rpartition(".")
+    stem, _, end = quantity.partition("_")
+    index = rf"\mathrm{{{escaped(part)}}}{f',{escaped(end)}' if end else ''}"
+    return names.get(name, rf"{GREEK.get(stem, stem)}_{{{index}}}")
 
 
 def _letters(slopes: Mapping[Symbol, Slope], taken: set[str]) -> dict[str, str]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from shaftwork.components.shaft_models import ShaftModel, Wave
-from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError
+from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError, in_one_line
 from shaftwork.core.files import replaced
 from shaftwork.integrate.engines import ENGINES, available
 from shaftwork.pipeline.model import Model
@@ -185,7 +185,7 @@ def _row(case: Case, model: ShaftModel, engines: Sequence[str], truth: Motion) -
             warnings.simplefilter("always")
             compiled = case.network(model).compile()
     except ShaftworkError as error:
-        return [Cell(*label, engine, "", "refused", why=_first_line(error)) for engine in engines]
+        return [Cell(*label, engine, "", "refused", why=in_one_line(error)) for engine in engines]
     warned = "; ".join(str(warning.message) for warning in said)
     return [_cell(case, label, compiled, engine, truth, own, warned) for engine in engines]
 
@@ -203,11 +203,11 @@ def _cell(
             balanced = engine == "auto" and not case.periods and len(compiled.states) <= MOST_BALANCED
             energy = run.energy_residual if balanced else np.nan
     except SimulationError as error:
-        why = _first_line(error)
+        why = in_one_line(error)
         verdict: Verdict = "too long" if re.search(r"steps (were|are) not enough", why) else "failed"
         return Cell(*label, engine, "", verdict, cpu=time.process_time() - began, why=why)
     except ShaftworkError as error:
-        return Cell(*label, engine, "", "refused", why=_first_line(error))
+        return Cell(*label, engine, "", "refused", why=in_one_line(error))
     why = "; ".join(filter(None, [warned, *(str(warning.message) for warning in said)]))
     measured, expected, deviation = distances(found, truth, own)
     verdict = judge(measured, deviation, energy, truth.error, warned=bool(why))
@@ -253,11 +253,6 @@ def judge(error: float, deviation: float, energy: float, uncertainty: float, *, 
     if warned:
         return "warned"
     return "unknown" if sound and np.isnan(deviation) else "wrong"
-
-
-def _first_line(error: Exception) -> str:
-    lines = str(error).splitlines()
-    return " ".join(line.strip() for line in lines[:2])
 
 
 def _text(model: ShaftModel) -> str:

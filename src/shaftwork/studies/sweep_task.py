@@ -15,10 +15,10 @@ from shaftwork.components.base import Component
 from shaftwork.core.errors import (
     AccuracyWarning,
     CompileError,
-    NetworkError,
     NetworkWarning,
     ParameterError,
     ShaftworkError,
+    in_one_line,
     no_quantity,
 )
 from shaftwork.core.notices import muted
@@ -189,7 +189,7 @@ class Worker:
             try:
                 changed.__post_init__()
             except ParameterError as error:
-                return _first_line(error)
+                return in_one_line(error)
         return ""
 
     def _alone(self, variant: int) -> tuple[Array, str]:
@@ -201,13 +201,13 @@ class Worker:
                 options["initial"] = steady_start(self._model, options["initial"] or {}, parameters)
             solution = self._model.simulate(task.t_end, parameters=parameters, **options)
         except ShaftworkError as error:
-            return nothing, _first_line(error)
+            return nothing, in_one_line(error)
         values = []
         for name, reader in task.measures.items():
             try:
                 value = reader.of(solution, task.sn) if isinstance(reader, Measure) else float(reader(solution))
             except Exception as error:  # noqa: BLE001 (of the user's own function: a reason, not the end of the sweep)
-                return nothing, f"measure '{name}': {type(error).__name__}: {_first_line(error)}"
+                return nothing, f"measure '{name}': {type(error).__name__}: {in_one_line(error)}"
             if not np.isfinite(value):
                 return nothing, f"measure '{name}' is {value}"
             values.append(value)
@@ -228,9 +228,3 @@ def _checked(part: Component) -> set[str]:
     with muted(NetworkWarning, AccuracyWarning):  # what is odd about it was said when it was made
         told.__post_init__()
     return read - {"__post_init__"}
-
-
-def _first_line(error: Exception) -> str:
-    """What an error says in one line; of a network that cannot be assembled, its first problem."""
-    lines = str(error).splitlines() or [""]
-    return f"{lines[0]}: {error.problems[0]}" if isinstance(error, NetworkError) and error.problems else lines[0]

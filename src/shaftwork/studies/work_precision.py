@@ -18,7 +18,7 @@ import numpy as np
 
 from shaftwork.components.shaft_models import ShaftModel
 from shaftwork.components.shafts import Shaft
-from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError
+from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError, in_one_line
 from shaftwork.core.files import replaced
 from shaftwork.core.parameters import in_si, whole
 from shaftwork.pipeline.model import Model
@@ -336,8 +336,7 @@ def _trial(net: Network, shaft: str, model: ShaftModel, asked: Trial, t_end: flo
         while not times or (len(times) < CALLS and sum(times) < 1.0):
             times.append(_timed(compiled, shaft, asked, t_end, t)[1])
     except ShaftworkError as error:
-        why = str(error).splitlines()[0]
-        return dataclasses.replace(asked, setup=time.thread_time() - began, why=why)
+        return dataclasses.replace(asked, setup=time.thread_time() - began, why=in_one_line(error))
     found, cpu = quantities(solution, varied, shaft), median(times)
     errors = {name: float(np.abs(found[name] - known.values[name]).max()) / _size(known, name) for name in QUANTITIES}
     extra = None
