@@ -27,8 +27,8 @@ from scipy.integrate import solve_ivp
 
 import shaftwork as sw
 from shaftwork.scenes.shaft_chain import LOAD_INERTIA, MOTOR_INERTIA, RATED_TORQUE
-from shaftwork.shafts.exact_motion import Torque, motion
-from shaftwork.shafts.line import Line, Section
+from shaftwork.shafts.exact_motion import JunctionTorque, motion
+from shaftwork.shafts.line import Section, SectionLine
 
 Array = NDArray[np.float64]
 
@@ -55,8 +55,8 @@ class Ends:
 
 def exact(t: Array) -> Ends:
     """By characteristics."""
-    line = Line((SECTION,), (MOTOR_INERTIA, LOAD_INERTIA), (0.0, 0.0))
-    found = motion(line, [Torque(0, lambda t: np.full_like(t, RATED_TORQUE))], T_END)
+    line = SectionLine((SECTION,), (MOTOR_INERTIA, LOAD_INERTIA), (0.0, 0.0))
+    found = motion(line, [JunctionTorque(0, lambda t: np.full_like(t, RATED_TORQUE))], T_END)
     torques = np.stack([found.torque_in(0, t, "left"), found.torque_in(0, t, "right")], axis=1)
     return Ends(torques, np.stack([found.junction_speed(0, t), found.junction_speed(1, t)], axis=1))
 

@@ -1,4 +1,4 @@
-"""What goes over into other equations: its derivatives are those of what `Stores` computes in numbers."""
+"""What goes over into other equations: its derivatives are those of what `StateTransfer` computes in numbers."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from sympy import Symbol
 
-from shaftwork.codegen.stores import Stores
-from shaftwork.codegen.takeover import Takeover
+from shaftwork.codegen.state_transfer import StateTransfer
+from shaftwork.codegen.state_transfer_jacobian import StateTransferJacobian
 from tests.properties.examples import Array, compiled, share_of_examples
 from tests.strategies import Network, networks
 
@@ -33,8 +33,8 @@ def test_derivatives_of_stores_and_states_equal_central_differences(pieces: Netw
     if model.rows is None:
         return
     names = list(model.parameters)[:6]
-    takeover = Takeover(model.form, model.rows, [Symbol(name, real=True) for name in names])
-    stores, dice = Stores(model.form), np.random.default_rng(len(model.states))
+    takeover = StateTransferJacobian(model.form, model.rows, [Symbol(name, real=True) for name in names])
+    stores, dice = StateTransfer(model.form), np.random.default_rng(len(model.states))
     x, dx = dice.normal(size=len(model.states)), dice.normal(size=(len(model.states), len(names)))
     held, dheld = (dice.normal(size=(len(takeover.names), *shape)) for shape in ((), (len(names),)))
     still = np.zeros(len(names))

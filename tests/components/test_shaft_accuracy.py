@@ -7,7 +7,7 @@ import pytest
 
 import shaftwork as sw
 from shaftwork.shafts.exact_modes import natural_frequencies
-from shaftwork.shafts.line import Line, Section
+from shaftwork.shafts.line import Section, SectionLine
 from tests.components.test_shafts import INERTIA, STEEL, STIFFNESS, TRUE, train
 
 
@@ -26,7 +26,7 @@ def frequencies(model: object, load: float = 0.11) -> np.ndarray:
 def exact_frequencies(load: float = 0.11, motor: float = 0.025, count: int = 4) -> np.ndarray:
     """The lowest of the lossless shaft in Hz, by the transcendental equation, without the rigid motion."""
     return natural_frequencies(
-        Line((Section.of_geometry(1.0, 0.02, density=7900.0, shear_modulus=77.5e9),), (motor, load)), count + 1
+        SectionLine((Section.of_geometry(1.0, 0.02, density=7900.0, shear_modulus=77.5e9),), (motor, load)), count + 1
     )[1:]
 
 

@@ -15,7 +15,7 @@ from shaftwork.integrate.lossless import commensurate
 from shaftwork.integrate.lossless import engine as delay
 from shaftwork.integrate.lossless.collocation import POINTS
 from shaftwork.integrate.lossless.lines import DelayProblem, Lines, Past
-from shaftwork.integrate.lossless.panels import History
+from shaftwork.integrate.lossless.panels import WaveHistory
 
 # The steel shaft of Popenda (8)-(23): 1 m long, 20 mm thick.
 DENSITY, MODULUS = 7900.0, 77.5e9
@@ -490,7 +490,7 @@ def test_what_arrives_over_two_panels_is_what_left_in_each() -> None:
     starts, lengths = np.array([-1.0, -0.4]), np.array([0.6, 0.4])
     left = starts[:, None] + lengths[:, None] * (1 + POINTS) / 2
     past = Past(starts, lengths, np.array([[wave(times), 2 * wave(times)] for times in left]))
-    history = History(Lines.of(np.array([1.0])), past, 1e-12)
+    history = WaveHistory(Lines.of(np.array([1.0])), past, 1e-12)
     arrived, cut = history.arriving(0.0, 1.0, np.full(2, 1e-9))
     expected = wave(-1.0 + (1 + POINTS) / 2)
     np.testing.assert_allclose(arrived, [-2 * expected, -expected], atol=1e-13)

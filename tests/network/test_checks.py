@@ -14,7 +14,7 @@ import shaftwork as sw
 from shaftwork.components import electrical, laws, machines, rotation, sources, translation
 from shaftwork.components.base import Component, Port, component
 from shaftwork.components.branches import ACROSS, AcrossLaw, AcrossStore, Branch, IdealCoupling, ThroughLaw
-from shaftwork.core.errors import Problem
+from shaftwork.core.errors import Diagnostic
 from shaftwork.core.parameters import parameter
 from shaftwork.network.checks import connection_problems, declaration_problems, examine
 from shaftwork.network.grammar import FUNCTIONS
@@ -33,13 +33,13 @@ def netlist(*further: tuple[Component, tuple[Any, ...]]) -> Netlist:
     return Netlist("train", (*TRAIN, *(Placed(part, nodes) for part, nodes in further)))
 
 
-def typed(part: Component, *nodes: Any) -> Problem:
+def typed(part: Component, *nodes: Any) -> Diagnostic:
     """The only problem that a part brings to the train as it is typed."""
     (problem,) = declaration_problems(netlist((part, nodes)))
     return problem
 
 
-def joined(*further: tuple[Component, tuple[str, ...]]) -> tuple[Problem, ...]:
+def joined(*further: tuple[Component, tuple[str, ...]]) -> tuple[Diagnostic, ...]:
     """The problems of connection of the train with further parts."""
     return connection_problems(build_graph(netlist(*further)))
 

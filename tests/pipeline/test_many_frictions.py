@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 import shaftwork as sw
 from shaftwork.pipeline.arguments import Demand
-from shaftwork.pipeline.phases.run import Run
+from shaftwork.pipeline.phases.run import HybridRun
 from shaftwork.pipeline.phases.solution import solution
 from tests.properties.examples import share_of_examples
 
@@ -58,7 +58,7 @@ KINDS = st.lists(st.sampled_from(["friction", "load", "brake", "clutch"]), min_s
 
 def by_combinations(model: Any, t_end: float) -> sw.Solution:
     """The motion in equations of its own for each combination."""
-    run = Run(
+    run = HybridRun(
         model.phases, {}, Demand((0.0, t_end), 1e-10, None, np.linspace(0.0, t_end, 11), "auto", 10**6, None), own=True
     )
     run.march(None)

@@ -16,10 +16,10 @@ import sympy
 
 import shaftwork as sw
 from shaftwork.integrate.problem import SeriesError
-from shaftwork.pipeline.phases.moments import Moment
-from shaftwork.pipeline.phases.passing import Passing
-from shaftwork.pipeline.phases.run import Run
-from shaftwork.pipeline.phases.settling import Settling
+from shaftwork.pipeline.phases.event_iteration import EventIteration
+from shaftwork.pipeline.phases.hybrid_state import HybridState
+from shaftwork.pipeline.phases.in_place_events import InPlaceEvents
+from shaftwork.pipeline.phases.run import HybridRun
 
 ENGINES = ("heyoka", "scipy", "sundials")
 
@@ -282,10 +282,10 @@ def test_auto_goes_on_with_scipy_where_a_law_in_the_midst_of_contacts_has_no_tay
 
 
 def test_an_end_of_a_mode_that_the_series_have_hidden_is_told() -> None:
-    settling = Settling(model().phases, {}, (0.0, 10.0))
+    settling = EventIteration(model().phases, {}, (0.0, 10.0))
     regime = settling.regime(("open", "forward", "released"))
     size, bands = len(regime.assembly.model.states), [1e-12] * len(regime.sides)
-    passing = Passing(settling, Moment(regime, np.zeros(size), bands), 0.0, lambda _t, _made: None)
+    passing = InPlaceEvents(settling, HybridState(regime, np.zeros(size), bands), 0.0, lambda _t, _made: None)
     twist = regime.assembly.model.states.index("gap.phi")
     within = np.ones(size)
     within[twist] = 0.0
@@ -297,10 +297,10 @@ def test_an_end_of_a_mode_that_the_series_have_hidden_is_told() -> None:
 
 
 def test_the_rates_of_many_instants_are_those_of_each() -> None:
-    settling = Settling(model().phases, {}, (0.0, 10.0))
+    settling = EventIteration(model().phases, {}, (0.0, 10.0))
     regime = settling.regime(("forward", "forward", "released"))
     x = np.random.default_rng(0).normal(size=(5, len(regime.assembly.model.states)))
-    moment = Moment(regime, x[0], [0.0] * len(regime.sides))
+    moment = HybridState(regime, x[0], [0.0] * len(regime.sides))
     problem = regime.assembly.problem(
         moment, (0.0, 10.0), regime.assembly.model.switching.timeline(regime.p, 0.0, 10.0)
     )
@@ -312,10 +312,10 @@ def test_the_rates_of_many_instants_are_those_of_each() -> None:
 
 def test_a_wheel_slips_in_the_way_it_is_pulled_where_the_rounding_of_a_moment_is_not_known() -> None:
     net = wheel(sw.TorqueSource("pull", tau=3.0), sw.CoulombLoad("load", tau=2.0))
-    settling = Settling(net.compile().phases, {}, (0.0, 10.0))
+    settling = EventIteration(net.compile().phases, {}, (0.0, 10.0))
     regime = settling.regime(("stuck",))
     met = next(made.guard for _, made in regime.watched if made.leave.to == "forward")
-    moment = Moment(regime, np.zeros(len(regime.assembly.model.states)))
+    moment = HybridState(regime, np.zeros(len(regime.assembly.model.states)))
     moment, changes = settling.settle(0.0, 0.0, moment, met)
     assert [(change.before, change.after) for change in changes] == [("stuck", "forward")]
     assert moment.regime.modes == ("forward",)
@@ -409,7 +409,7 @@ def test_a_motion_is_freed_with_its_last_holder(engine: str) -> None:
         assert [ref() for ref in held] == [None, None]
         gc.set_debug(gc.DEBUG_SAVEALL)
         gc.collect()
-        assert [one for one in gc.garbage if isinstance(one, Run | Passing)] == []
+        assert [one for one in gc.garbage if isinstance(one, HybridRun | InPlaceEvents)] == []
     finally:
         gc.set_debug(0)
         gc.garbage.clear()

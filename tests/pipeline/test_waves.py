@@ -9,8 +9,8 @@ import pytest
 import sympy
 
 import shaftwork as sw
-from shaftwork.shafts.exact_motion import Torque, motion
-from shaftwork.shafts.line import Line, Section
+from shaftwork.shafts.exact_motion import JunctionTorque, motion
+from shaftwork.shafts.line import Section, SectionLine
 
 STEEL = {"density": 7900.0, "shear_modulus": 77.5e9}
 SECTION = Section.of_geometry(1.0, 0.02, **STEEL)
@@ -40,7 +40,7 @@ def pulse(at_the_end: sw.Component | None) -> sw.Solution:
 def test_waves_are_the_exact_solution(load: float) -> None:
     """Against characteristics with Radau collocation, which shares no code with the engine."""
     sol = train(sw.Wave(), load).simulate(0.2, t_eval=401)
-    truth = motion(Line((SECTION,), (0.025, load)), [Torque(0, 12.7)], 0.2)
+    truth = motion(SectionLine((SECTION,), (0.025, load)), [JunctionTorque(0, 12.7)], 0.2)
     assert sol.engine == "wave"
     for side, name in (("left", "line.tau_a"), ("right", "line.tau_b")):
         expected = truth.torque_in(0, sol.t, side)
@@ -88,7 +88,7 @@ def test_a_nonlinear_motor_drives_waves() -> None:
         slip = 1 - omega / omega_0
         return 2 * 30.0 * slip * 0.2 / (slip**2 + 0.2**2)
 
-    truth = motion(Line((SECTION,), (0.025, 0.11)), [Torque(0, kloss, of_speed=True)], 0.1)
+    truth = motion(SectionLine((SECTION,), (0.025, 0.11)), [JunctionTorque(0, kloss, of_speed=True)], 0.1)
     expected = truth.torque_in(0, sol.t, "right")
     assert np.abs(sol["line.tau_b"] - expected).max() < 1e-7 * np.abs(expected).max()
 
@@ -164,7 +164,7 @@ def test_another_diameter_needs_no_new_model() -> None:
     model = train(sw.Wave()).compile()
     thick = model.simulate(0.02, parameters={"line.diameter": 0.03}, t_eval=21)
     section = Section.of_geometry(1.0, 0.03, **STEEL)
-    truth = motion(Line((section,), (0.025, 0.11)), [Torque(0, 12.7)], 0.02)
+    truth = motion(SectionLine((section,), (0.025, 0.11)), [JunctionTorque(0, 12.7)], 0.02)
     expected = truth.torque_in(0, thick.t, "left")
     assert np.abs(thick["line.tau_a"] - expected).max() < 1e-8 * np.abs(expected).max()
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import shaftwork as sw
 from shaftwork.codegen.observer import ModelObserver
-from shaftwork.codegen.stores import Stores
+from shaftwork.codegen.state_transfer import StateTransfer
 from tests.properties.examples import compiled, network_of, share_of_examples
 from tests.strategies import Network, networks
 from tests.trains import Train, trains
@@ -80,7 +80,7 @@ def slopes(model: sw.Model, names: Iterable[str]) -> Any:
 def assert_all_else_rests(model: sw.Model, sol: sw.Solution, initial: Mapping[str, float]) -> None:
     """Every store that moves has a value of its own, or can have no other one beside the values that are given."""
     rest = model.simulate(SHORT, t_eval=[0.0, SHORT], engine="scipy")
-    stores = Stores(model.form)
+    stores = StateTransfer(model.form)
     unit = np.vstack([np.zeros(len(model.states)), np.eye(len(model.states))])
     rows = stores.of(model.bind, np.zeros(len(unit)), unit)
     rows = (rows[1:] - rows[0]).T

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import shaftwork as sw
-from shaftwork.reduce.swings import Row, singular_values
+from shaftwork.reduce.tridiagonal_modes import TridiagonalChain, singular_values
 from tests.properties.examples import share_of_examples
 from tests.reduce.test_simplify import chain, groups_of
 
@@ -46,7 +46,7 @@ def test_every_rate_of_a_chain_has_all_digits(
     """Inertias over twelve decades, stiffness over fifteen. Each of 20 roundings on the way is 1.1e-16."""
     count = len(inertias)
     springs, supports = stiffnesses[: count - 1], [bearing * (k == place % count) for k in range(count)]
-    row = Row(np.array(inertias), np.array(springs), np.array(supports))
+    row = TridiagonalChain(np.array(inertias), np.array(springs), np.array(supports))
     true = rates(inertias, springs, supports)
     assert row.rates() == pytest.approx([float(rate) for rate in true], rel=4e-15)
     assert row.rates(1) == pytest.approx([float(true[0])], rel=4e-15)
@@ -59,7 +59,7 @@ def test_every_rate_of_a_chain_has_all_digits(
 @given(wide, stiffness)
 def test_the_lowest_shape_and_its_torques_fulfil_the_equations(inertias: list[float], stiffnesses: list[float]) -> None:
     """The torque of each spring is what moves all before it; from speeds it would be a difference of equal ones."""
-    row = Row(np.array(inertias), np.array(stiffnesses[: len(inertias) - 1]), np.zeros(len(inertias)))
+    row = TridiagonalChain(np.array(inertias), np.array(stiffnesses[: len(inertias) - 1]), np.zeros(len(inertias)))
     (rate,) = row.rates(1)
     shape, torques = row.swing(rate)
     moved = np.cumsum(rate**2 * row.inertias * shape)[:-1]

@@ -12,7 +12,7 @@ from shaftwork.components import bldc, electrical, induction_machine, loads, mac
 from shaftwork.components.base import REGISTRY
 from shaftwork.components.laws import Ramp, Step, omega, phi, t
 from shaftwork.components.tables import Table
-from shaftwork.core.errors import ParameterError, Problem
+from shaftwork.core.errors import Diagnostic, ParameterError
 from shaftwork.network.netlist import Netlist, Placed
 from shaftwork.reduction.diagnosis import diagnose
 from tests.malformations import malformed_networks
@@ -31,12 +31,12 @@ TRAIN = (
 MOTOR = {"tau_k": 9.6, "s_k": 0.25, "n_sync": 3000.0}
 
 
-def problems(*further: Placed) -> tuple[Problem, ...]:
+def problems(*further: Placed) -> tuple[Diagnostic, ...]:
     """What is said about a sound train of two inertias with further parts."""
     return diagnose(Netlist("train", (*TRAIN, *further)))[2]
 
 
-def only(*further: Placed) -> Problem:
+def only(*further: Placed) -> Diagnostic:
     (problem,) = problems(*further)
     return problem
 

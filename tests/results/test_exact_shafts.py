@@ -15,7 +15,7 @@ from shaftwork.results import exact_modes
 from shaftwork.shafts.exact_modes import modes as line_modes
 from shaftwork.shafts.exact_modes import natural_frequencies
 from shaftwork.shafts.exact_response import frequency_response
-from shaftwork.shafts.line import Line, Section
+from shaftwork.shafts.line import Section, SectionLine
 from tests.properties.examples import share_of_examples
 
 STEEL = {"density": 7900.0, "shear_modulus": 77.5e9}
@@ -106,7 +106,7 @@ def test_the_reference_shaft_has_its_printed_frequencies_whatever_its_model(
     modes = _train(model, (0.025, J)).modes(exact=True)
     assert len(modes) == exact_modes.MODES
     np.testing.assert_allclose(modes.frequencies[1:4], printed, atol=5.1e-9)
-    line = Line((Section.of_geometry(1.0, 0.02),), (0.025, J))
+    line = SectionLine((Section.of_geometry(1.0, 0.02),), (0.025, J))
     np.testing.assert_allclose(modes.frequencies, natural_frequencies(line, count=10), rtol=1e-14)
     assert not modes.damping.any()
     assert modes.names[0] == "rigid body of Je, line, Jm"
@@ -117,7 +117,7 @@ def test_the_reference_shaft_has_its_printed_frequencies_whatever_its_model(
 @pytest.mark.parametrize("J", [(1e-9, 1e3), (1e-4, 1e-9), (1e6, 1e-2), (1e6, 1e3)])
 def test_no_mode_is_lost_at_extreme_ratios(length: float, J: tuple[float, float]) -> None:
     modes = _train(sw.Lumped(4), J, length=length).modes(count=12, exact=True)
-    wanted = natural_frequencies(Line((Section.of_geometry(length, 0.02),), J), count=12)
+    wanted = natural_frequencies(SectionLine((Section.of_geometry(length, 0.02),), J), count=12)
     np.testing.assert_allclose(modes.frequencies, wanted, rtol=1e-13)
 
 
@@ -132,7 +132,7 @@ def test_a_stepped_shaft_with_discs_has_the_shapes_of_its_line() -> None:
         if J:
             net.add(sw.Inertia(f"J{k}", J=J), f"n{k}")
     modes = net.modes(exact=True, f_max=9000.0)
-    line = Line(tuple(Section.of_geometry(*section) for section in sections), discs)
+    line = SectionLine(tuple(Section.of_geometry(*section) for section in sections), discs)
     wanted = line_modes(line, f_max=9000.0)
     np.testing.assert_allclose(modes.frequencies, wanted.frequencies, rtol=1e-13)
     start = 0.0
@@ -148,7 +148,7 @@ def test_a_stepped_shaft_with_discs_has_the_shapes_of_its_line() -> None:
 def test_the_damped_shaft_responds_as_its_transfer_matrix() -> None:
     f = np.geomspace(0.1, 2e4, 300)
     net = _train(sw.Lumped(10), **LOSSY)
-    line = Line((Section.of_geometry(1.0, 0.02, **LOSSY),), (0.025, 0.11))
+    line = SectionLine((Section.of_geometry(1.0, 0.02, **LOSSY),), (0.025, 0.11))
     wanted = frequency_response(line, f, 0)
     for name, values in (("line.omega_b", wanted.speeds([1.0])), ("line.tau_b", wanted.torques([1.0], "left"))):
         found = net.frequency_response("motor.tau", name, f, exact=True)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shaftwork.results.quadrature import MOST, Panels, integrate
+from shaftwork.results.quadrature import MOST, LobattoPanels, integrate
 
 STEPS = np.array([0.0, 1.0, 3.0])
 
@@ -13,7 +13,7 @@ STEPS = np.array([0.0, 1.0, 3.0])
 @pytest.mark.slow
 @given(st.floats(0.0, 3.0))
 def test_a_jump_and_a_kink_within_a_step_are_integrated_to_1e_10(place: float) -> None:
-    def integrand(panels: Panels) -> np.ndarray:
+    def integrand(panels: LobattoPanels) -> np.ndarray:
         after = panels.times - place
         return np.array([after > 0, np.maximum(after, 0.0)], dtype=float)
 

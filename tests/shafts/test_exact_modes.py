@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.shafts.exact_modes import Modes, modes, modes_below, natural_frequencies
-from shaftwork.shafts.line import Array, End, Line, Section
+from shaftwork.shafts.exact_modes import LineModes, modes, modes_below, natural_frequencies
+from shaftwork.shafts.line import Array, End, Section, SectionLine
 
 SHAFT = Section.of_geometry(1.0, 0.02)
 STEPPED = tuple(Section.of_geometry(0.1 + 0.2 * i, 0.02 + 0.03 * (i % 2)) for i in range(4))
 # Sections of equal delay whose impedances alternate: they have stop bands, and fewer modes than their length promises.
 STOPPING = tuple(Section(1.0, 1.0 if index % 2 else 1e-3, 1.0 if index % 2 else 1e-3) for index in range(9))
 # Sections 1e12 times as stiff as others and discs from 1e-9 to 1e9 kg m2, massless junctions among them.
-EXTREME = Line(
+EXTREME = SectionLine(
     tuple(Section(1.0, 1e-4, stiffness) for stiffness in (1e3, 1e15, 1e9, 1e3, 1e15)),
     (1e-9, 0.1, 1e9, 0.0, 1e-9, 1e3),
 )
@@ -25,7 +25,7 @@ ROUNDING = 2e-14
 ENDS: tuple[tuple[End, End], ...] = tuple(itertools.product(("free", "clamped"), repeat=2))
 
 
-def high_precision_count(line: Line, frequency: mpmath.mpf) -> int:
+def high_precision_count(line: SectionLine, frequency: mpmath.mpf) -> int:
     """Modes below a frequency by Wittrick and Williams: clamped modes and negative pivots, with 60 digits."""
     omega = 2 * mpmath.pi * frequency
     diagonal = [-mpmath.mpf(disc) * omega for disc in line.discs]
@@ -45,7 +45,7 @@ def high_precision_count(line: Line, frequency: mpmath.mpf) -> int:
     return clamped_modes + negative
 
 
-def modal_inertias(shapes: Modes) -> Array:
+def modal_inertias(shapes: LineModes) -> Array:
     """Integrals of J' phi_i phi_k and the sums over the discs, by Gauss quadrature."""
     line = shapes.line
     nodes, weights = np.polynomial.legendre.leggauss(60)
@@ -70,7 +70,7 @@ def modal_inertias(shapes: Modes) -> Array:
 )
 def test_a_bare_shaft_has_whole_or_half_multiples_of_v_over_2_L(ends: tuple[End, End], half_waves: Array) -> None:
     expected = half_waves / (2 * SHAFT.delay)
-    assert natural_frequencies(Line((SHAFT,), (0.0, 0.0), ends=ends), 6) == pytest.approx(expected, rel=1e-14)
+    assert natural_frequencies(SectionLine((SHAFT,), (0.0, 0.0), ends=ends), 6) == pytest.approx(expected, rel=1e-14)
 
 
 @pytest.mark.parametrize("ends", ENDS)
@@ -78,9 +78,9 @@ def test_a_bare_shaft_has_whole_or_half_multiples_of_v_over_2_L(ends: tuple[End,
 def test_a_shaft_cut_into_parts_keeps_its_modes_though_they_have_nodes_at_the_cuts(
     ends: tuple[End, End], parts: int
 ) -> None:
-    whole = modes(Line((SHAFT,), (0.02, 0.03), ends=ends), 8)
+    whole = modes(SectionLine((SHAFT,), (0.02, 0.03), ends=ends), 8)
     discs = (0.02, *[0.0] * (parts - 1), 0.03)
-    cut = modes(Line((Section.of_geometry(1 / parts, 0.02),) * parts, discs, ends=ends), 8)
+    cut = modes(SectionLine((Section.of_geometry(1 / parts, 0.02),) * parts, discs, ends=ends), 8)
     assert cut.frequencies == pytest.approx(whole.frequencies, rel=ROUNDING)
     stations = np.linspace(0.0, 1.0, 13)
     # Shapes of bare modes have size Jshaft^-0.5, about 130; they take on some ten roundings.
@@ -89,14 +89,14 @@ def test_a_shaft_cut_into_parts_keeps_its_modes_though_they_have_nodes_at_the_cu
 
 def test_two_discs_on_a_light_shaft_swing_like_two_masses_on_a_spring() -> None:
     # The shaft's inertia of 1e-18 of the discs' is below the rounding.
-    line = Line((Section(0.5, 1e-19, 300.0),), (0.1, 0.4))
+    line = SectionLine((Section(0.5, 1e-19, 300.0),), (0.1, 0.4))
     expected = math.sqrt(300.0 / 0.5 * (1 / 0.1 + 1 / 0.4)) / (2 * math.pi)
     assert natural_frequencies(line, 2)[1] == pytest.approx(expected, rel=ROUNDING)
 
 
 @pytest.mark.parametrize("discs", [(0.025, 0.11), (0.025, 0.025), (1e-9, 1e3), (5.0, 1e-6)])
 def test_a_shaft_with_two_discs_obeys_the_tangent_equation(discs: tuple[float, float]) -> None:
-    line = Line((SHAFT,), discs)
+    line = SectionLine((SHAFT,), discs)
     found = natural_frequencies(line, 6)[1:]
     with mpmath.workdps(40):
         delay = mpmath.sqrt(mpmath.mpf(SHAFT.inertia) / SHAFT.stiffness)
@@ -121,7 +121,7 @@ def test_a_shaft_with_two_discs_obeys_the_tangent_equation(discs: tuple[float, f
 )
 def test_the_shaft_of_popenda_has_its_known_frequencies(disc: float, expected: tuple[float, ...]) -> None:
     # The numbers are printed with ten digits or more.
-    assert natural_frequencies(Line((SHAFT,), (0.025, disc)), 4) == pytest.approx(expected, rel=1e-9)
+    assert natural_frequencies(SectionLine((SHAFT,), (0.025, disc)), 4) == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.parametrize("ends", ENDS)
@@ -133,7 +133,7 @@ def test_the_shaft_of_popenda_has_its_known_frequencies(disc: float, expected: t
 def test_each_frequency_lies_where_the_count_in_60_digits_steps_up(
     sections: tuple[Section, ...], discs: tuple[float, ...], count: int, ends: tuple[End, End]
 ) -> None:
-    line = Line(sections, discs, ends=ends)
+    line = SectionLine(sections, discs, ends=ends)
     found = natural_frequencies(line, count)
     assert found.size == count
     rigid = int(ends == ("free", "free"))
@@ -146,7 +146,7 @@ def test_each_frequency_lies_where_the_count_in_60_digits_steps_up(
 
 @pytest.mark.parametrize("ends", ENDS)
 def test_all_modes_up_to_a_frequency_are_as_many_as_wittrick_and_williams_count(ends: tuple[End, End]) -> None:
-    line = Line(STEPPED, (0.1, 0.0, 2.0, 1e-3, 0.05), ends=ends)
+    line = SectionLine(STEPPED, (0.1, 0.0, 2.0, 1e-3, 0.05), ends=ends)
     for limit in (1.0, 5e3, 1e5):
         with mpmath.workdps(60):
             expected = high_precision_count(line, mpmath.mpf(limit))
@@ -156,7 +156,7 @@ def test_all_modes_up_to_a_frequency_are_as_many_as_wittrick_and_williams_count(
 
 def test_pairs_of_almost_equal_frequencies_are_both_found() -> None:
     # Two equal shafts on both sides of a disc that hardly moves: each mode comes twice, 1e-9 or less apart.
-    line = Line((SHAFT, SHAFT), (0.0, 1e6, 0.0))
+    line = SectionLine((SHAFT, SHAFT), (0.0, 1e6, 0.0))
     found = natural_frequencies(line, 41)[1:].reshape(20, 2)
     quarter_waves = (np.arange(20) + 0.5) / (2 * SHAFT.delay)
     assert found[:, 0] == pytest.approx(quarter_waves, rel=ROUNDING)
@@ -168,7 +168,7 @@ def test_pairs_of_almost_equal_frequencies_are_both_found() -> None:
 def test_modes_are_orthogonal_and_of_unit_inertia(
     sections: tuple[Section, ...], discs: tuple[float, ...], ends: tuple[End, End]
 ) -> None:
-    shapes = modes(Line(sections, discs, ends=ends), 8)
+    shapes = modes(SectionLine(sections, discs, ends=ends), 8)
     # Sums of a few hundred products of numbers near 1.
     assert np.abs(modal_inertias(shapes) - np.eye(8)).max() < 1e-13
 
@@ -185,7 +185,7 @@ def test_modes_of_random_lines_of_extreme_ratios_are_where_60_digits_put_them(se
     parts = draw.integers(1, 7)
     sections = tuple(Section(*10 ** draw.uniform([-4, -4, -4], [4, 4, 12])) for _ in range(parts))
     discs = tuple(float(disc) for disc in 10 ** draw.uniform(-9, 9, parts + 1) * (draw.random(parts + 1) > 0.3))
-    line = Line(sections, discs, ends=ENDS[draw.integers(4)])
+    line = SectionLine(sections, discs, ends=ENDS[draw.integers(4)])
     shapes = modes(line, 10)
     with mpmath.workdps(60):
         for number, frequency in enumerate(shapes.frequencies):
@@ -199,7 +199,7 @@ def test_modes_of_random_lines_of_extreme_ratios_are_where_60_digits_put_them(se
 
 
 def test_shapes_obey_the_law_of_the_shaft_and_of_its_discs() -> None:
-    line = Line(STEPPED, (0.1, 0.0, 2.0, 1e-3, 0.05))
+    line = SectionLine(STEPPED, (0.1, 0.0, 2.0, 1e-3, 0.05))
     shapes = modes(line, 8)
     omega = 2 * math.pi * shapes.frequencies
     stations, h = np.array([0.05, 0.2, 0.3, 0.7]), 1e-4
@@ -217,7 +217,7 @@ def test_a_shape_concentrated_in_the_middle_is_the_same_from_both_ends() -> None
     # Discs with one light one among them: its mode falls by a factor of about 50 from disc to disc.
     discs = [1.0] * 21
     discs[8] = 0.02
-    line = Line((Section(0.1, 1e-6, 100.0),) * 20, tuple(discs))
+    line = SectionLine((Section(0.1, 1e-6, 100.0),) * 20, tuple(discs))
     shapes, mirrored = modes(line, 21), modes(line.mirrored(), 21)
     ours = shapes.angles(line.junctions)[20]
     theirs = mirrored.angles(line.junctions)[20][::-1]
@@ -231,11 +231,11 @@ def test_a_shape_concentrated_in_the_middle_is_the_same_from_both_ends() -> None
 @pytest.mark.parametrize("arguments", [{}, {"count": 0}, {"count": 3, "f_max": 10.0}, {"f_max": math.inf}])
 def test_modes_are_asked_for_by_number_or_by_frequency(arguments: dict[str, float]) -> None:
     with pytest.raises(ParameterError, match="either the count of the modes"):
-        natural_frequencies(Line((SHAFT,), (0.0, 0.0)), **arguments)  # type: ignore[arg-type]
+        natural_frequencies(SectionLine((SHAFT,), (0.0, 0.0)), **arguments)  # type: ignore[arg-type]
 
 
 def test_a_line_with_losses_has_no_real_modes() -> None:
-    damped = Line((Section(1.0, 1.0, 1.0, damping=0.1),), (0.0, 0.0))
+    damped = SectionLine((Section(1.0, 1.0, 1.0, damping=0.1),), (0.0, 0.0))
     for ask in (natural_frequencies, modes):
         with pytest.raises(ParameterError, match="without_losses"):
             ask(damped, 3)

@@ -11,13 +11,13 @@ from scipy.linalg import eigh_tridiagonal
 
 from shaftwork.core.errors import ParameterError, SimulationError
 from shaftwork.shafts.exact_modes import modes
-from shaftwork.shafts.exact_motion import Motion, Torque, common_step, motion
+from shaftwork.shafts.exact_motion import JunctionTorque, LineMotion, common_step, motion
 from shaftwork.shafts.exact_response import laplace_response
-from shaftwork.shafts.line import Array, End, Line, Section
+from shaftwork.shafts.line import Array, End, Section, SectionLine
 
 SHAFT = Section.of_geometry(1.0, 0.02)
-POPENDA = Line((SHAFT,), (0.025, 0.11))
-STEPPED = Line(
+POPENDA = SectionLine((SHAFT,), (0.025, 0.11))
+STEPPED = SectionLine(
     (Section.of_geometry(0.5, 0.03), Section.of_geometry(1.0, 0.02), Section.of_geometry(0.75, 0.04, 0.01)),
     (0.025, 0.0, 1e-3, 0.11),
 )
@@ -46,7 +46,7 @@ def modal_speeds(omega: Array, shape_products: Array, t: Array) -> Array:
     return np.asarray(shape_products @ (steady - swinging) / 2)
 
 
-def wave_energy(of: Motion) -> Array:
+def wave_energy(of: LineMotion) -> Array:
     """Energy in J at the end of each common step: of the discs, and of the waves on their way in each section."""
     q = of.rightward.shape[-1]
     squares = of.rightward**2 + of.leftward**2
@@ -63,7 +63,7 @@ def wave_energy(of: Motion) -> Array:
     return total
 
 
-def largest_difference(one: Motion, other: Motion, t: Array) -> float:
+def largest_difference(one: LineMotion, other: LineMotion, t: Array) -> float:
     """Difference of speeds and torques of two motions at the junctions, relative to the largest of each."""
     worst = 0.0
     for section in range(len(one.line.sections)):
@@ -79,7 +79,7 @@ def largest_difference(one: Motion, other: Motion, t: Array) -> float:
 
 
 def test_a_step_on_a_bare_shaft_climbs_the_stairs_of_d_alembert() -> None:
-    of = motion(Line((SHAFT,), (0.0, 0.0)), [Torque(0, STEP)], 20 * SHAFT.delay)
+    of = motion(SectionLine((SHAFT,), (0.0, 0.0)), [JunctionTorque(0, STEP)], 20 * SHAFT.delay)
     t = (np.arange(19) + 0.5) * SHAFT.delay
     step = STEP / SHAFT.impedance
     arrivals = np.floor(t / SHAFT.delay)
@@ -90,8 +90,8 @@ def test_a_step_on_a_bare_shaft_climbs_the_stairs_of_d_alembert() -> None:
 
 @pytest.mark.parametrize(("end", "reflected"), [("free", 1.0), ("clamped", -1.0)])
 def test_a_free_end_returns_the_speed_and_a_clamped_end_turns_its_sign(end: End, reflected: float) -> None:
-    line = Line((SHAFT,), (0.0, 0.0), dampers=(SHAFT.impedance, 0.0), ends=("free", end))
-    of = motion(line, [Torque(0, pulse, (PULSE,))], PULSE + 2 * SHAFT.delay)
+    line = SectionLine((SHAFT,), (0.0, 0.0), dampers=(SHAFT.impedance, 0.0), ends=("free", end))
+    of = motion(line, [JunctionTorque(0, pulse, (PULSE,))], PULSE + 2 * SHAFT.delay)
     t = np.linspace(0.0, PULSE, 100)
     sent = pulse(t) / (2 * SHAFT.impedance)
     back = reflected * pulse(t - 1.5 * SHAFT.delay) * (t > 1.5 * SHAFT.delay) / (2 * SHAFT.impedance)
@@ -100,8 +100,8 @@ def test_a_free_end_returns_the_speed_and_a_clamped_end_turns_its_sign(end: End,
 
 
 def test_an_end_with_a_damper_of_the_shafts_impedance_returns_nothing() -> None:
-    line = Line((SHAFT,), (0.0, 0.0), dampers=(0.0, SHAFT.impedance))
-    of = motion(line, [Torque(0, pulse, (PULSE,))], 2 * PULSE)
+    line = SectionLine((SHAFT,), (0.0, 0.0), dampers=(0.0, SHAFT.impedance))
+    of = motion(line, [JunctionTorque(0, pulse, (PULSE,))], 2 * PULSE)
     t = np.linspace(0.0, PULSE, 100)
     assert of.speed(0.5, t + SHAFT.delay / 2) == pytest.approx(pulse(t) / SHAFT.impedance, abs=ROUNDING)
     # u - a_in at the matched end: the rounding of one subtraction.
@@ -110,14 +110,14 @@ def test_an_end_with_a_damper_of_the_shafts_impedance_returns_nothing() -> None:
 
 def test_a_light_disc_answers_a_step_with_its_exponential_front() -> None:
     disc = 1e-8  # its time constant is 1e-4 of the delay
-    of = motion(Line((SHAFT,), (disc, 0.0)), [Torque(0, STEP)], 2 * SHAFT.delay)
+    of = motion(SectionLine((SHAFT,), (disc, 0.0)), [JunctionTorque(0, STEP)], 2 * SHAFT.delay)
     t = np.concatenate([np.geomspace(1e-11, 1e-6, 50), np.linspace(1e-6, 1.999 * SHAFT.delay, 50)])
     expected = -np.expm1(-t * SHAFT.impedance / disc) * STEP / SHAFT.impedance
     assert of.junction_speed(0, t) == pytest.approx(expected, abs=ROUNDING * STEP / SHAFT.impedance)
 
 
 def test_the_modes_of_the_shaft_add_up_to_its_motion() -> None:
-    of = motion(POPENDA, [Torque(0, bow)], 0.05)
+    of = motion(POPENDA, [JunctionTorque(0, bow)], 0.05)
     shapes = modes(POPENDA, 3000)
     t = np.linspace(0.0, 0.05, 40)
     angles = shapes.angles(POPENDA.junctions)
@@ -130,8 +130,8 @@ def test_the_modes_of_the_shaft_add_up_to_its_motion() -> None:
 
 @pytest.mark.parametrize("disc", [0.11, 0.025])
 def test_the_modes_of_the_shaft_of_popenda_add_up_to_its_motion_under_a_step(disc: float) -> None:
-    line = Line((SHAFT,), (0.025, disc))
-    of = motion(line, [Torque(0, STEP)], 0.2)
+    line = SectionLine((SHAFT,), (0.025, disc))
+    of = motion(line, [JunctionTorque(0, STEP)], 0.2)
     shapes = modes(line, 5000)
     omega, angles = 2 * math.pi * shapes.frequencies, shapes.angles(line.junctions)
     t = np.linspace(0.0, 0.2, 101)
@@ -144,7 +144,7 @@ def test_the_modes_of_the_shaft_of_popenda_add_up_to_its_motion_under_a_step(dis
 
 @pytest.mark.parametrize(("station", "side"), [(0.0, "right"), (0.7, "right"), (1.5, "left"), (1.5, "right")])
 def test_a_stepped_line_moves_as_its_inverted_laplace_response(station: float, side: str) -> None:
-    of = motion(STEPPED, [Torque(0, pulse, (PULSE,))], 0.02)
+    of = motion(STEPPED, [JunctionTorque(0, pulse, (PULSE,))], 0.02)
     t = np.array([0.0013, 0.0044, 0.011, 0.0199])
     period, shift, terms = 0.04, 25 / 0.04, 1 << 16
     omega = 2 * math.pi / period * np.arange(terms)
@@ -163,7 +163,7 @@ def test_a_stepped_line_moves_as_its_inverted_laplace_response(station: float, s
     assert of.torque(station, t, side=side) == pytest.approx(through, abs=2e-9)  # type: ignore[arg-type]
 
 
-def chain_speeds(line: Line, cells: int, t: Array) -> Array:
+def chain_speeds(line: SectionLine, cells: int, t: Array) -> Array:
     """Speeds of the ends under `bow` of a chain of equal cells, the inertia of the outer two halved."""
     section = line.sections[0]
     step = section.length / cells
@@ -177,8 +177,8 @@ def chain_speeds(line: Line, cells: int, t: Array) -> Array:
 
 
 def test_a_fine_lumped_chain_comes_nearer_with_the_square_of_its_cells() -> None:
-    line = Line((SHAFT,), (1e-4, 2e-4))
-    of = motion(line, [Torque(0, bow)], 0.005)
+    line = SectionLine((SHAFT,), (1e-4, 2e-4))
+    of = motion(line, [JunctionTorque(0, bow)], 0.005)
     t = np.linspace(0.0, 0.005, 60)
     exact = np.array([of.junction_speed(0, t), of.junction_speed(1, t)])
     errors = np.array([np.abs(chain_speeds(line, cells, t) - exact).max() for cells in (40, 80, 160, 320)])
@@ -187,9 +187,11 @@ def test_a_fine_lumped_chain_comes_nearer_with_the_square_of_its_cells() -> None
     assert errors[-1] < 1e-4 * np.abs(exact).max()
 
 
-@pytest.mark.parametrize("line", [POPENDA, STEPPED, Line((SHAFT,), (0.025, 1e-7)), Line((SHAFT,), (0.0, 0.0))])
-def test_the_energy_is_the_work_of_the_torque_and_stays_when_it_ends(line: Line) -> None:
-    of = motion(line, [Torque(0, pulse, (PULSE,))], 0.1)
+@pytest.mark.parametrize(
+    "line", [POPENDA, STEPPED, SectionLine((SHAFT,), (0.025, 1e-7)), SectionLine((SHAFT,), (0.0, 0.0))]
+)
+def test_the_energy_is_the_work_of_the_torque_and_stays_when_it_ends(line: SectionLine) -> None:
+    of = motion(line, [JunctionTorque(0, pulse, (PULSE,))], 0.1)
     energy = wave_energy(of)
     nodes, weights = np.polynomial.legendre.leggauss(24)
     work = 0.0
@@ -202,14 +204,14 @@ def test_the_energy_is_the_work_of_the_torque_and_stays_when_it_ends(line: Line)
 
 @pytest.mark.slow
 def test_energy_does_not_drift_in_ten_thousand_delays() -> None:
-    of = motion(POPENDA, [Torque(0, pulse, (PULSE,))], 1e4 * SHAFT.delay)
+    of = motion(POPENDA, [JunctionTorque(0, pulse, (PULSE,))], 1e4 * SHAFT.delay)
     energy = wave_energy(of)
     # One rounding for each reflection, of random sign.
     assert energy[-1] == pytest.approx(energy[100], rel=ROUNDING)
 
 
 def test_the_angular_momentum_is_the_impulse_of_the_torques() -> None:
-    of = motion(STEPPED, [Torque(0, STEP), Torque(3, -4.0, ()), Torque(2, 1.0)], 0.03)
+    of = motion(STEPPED, [JunctionTorque(0, STEP), JunctionTorque(3, -4.0, ()), JunctionTorque(2, 1.0)], 0.03)
     t = 0.0293
     nodes, weights = np.polynomial.legendre.leggauss(12)
     momentum = sum(disc * of.junction_speed(j, np.array(t)) for j, disc in enumerate(STEPPED.discs))
@@ -226,8 +228,8 @@ def test_the_angular_momentum_is_the_impulse_of_the_torques() -> None:
 
 @pytest.mark.parametrize("disc", [0.11, 0.025])
 def test_the_step_on_the_shaft_of_popenda_does_not_depend_on_the_order(disc: float) -> None:
-    line = Line((SHAFT,), (0.025, disc))
-    of, finer = (motion(line, [Torque(0, STEP)], 0.2, order=order) for order in (16, 24))
+    line = SectionLine((SHAFT,), (0.025, disc))
+    of, finer = (motion(line, [JunctionTorque(0, STEP)], 0.2, order=order) for order in (16, 24))
     t = np.linspace(0.0, 0.2, 2001)
     difference = largest_difference(of, finer, t)
     assert of.error < ROUNDING
@@ -245,10 +247,12 @@ def test_the_estimated_error_of_random_lines_bounds_the_difference_from_a_higher
         impedance, inertia = 10 ** draw.uniform([-2, -3], [2, 1])
         sections.append(Section(multiple * 1e-3 * impedance / inertia, inertia, impedance**2 / inertia))
     discs = 10 ** draw.uniform(-6, 3, parts + 1) * (draw.random(parts + 1) > 0.3)
-    line = Line(tuple(sections), tuple(discs.tolist()), ends=("free", "clamped" if draw.random() < 0.5 else "free"))
+    line = SectionLine(
+        tuple(sections), tuple(discs.tolist()), ends=("free", "clamped" if draw.random() < 0.5 else "free")
+    )
     start = draw.uniform(0, 0.02)
-    late = Torque(parts - 1, lambda t: np.where(t < start, 0.0, np.cos(200 * (t - start))), (start,))
-    of, finer = (motion(line, [Torque(0, 1.0), late], 0.05, order=order) for order in (16, 25))
+    late = JunctionTorque(parts - 1, lambda t: np.where(t < start, 0.0, np.cos(200 * (t - start))), (start,))
+    of, finer = (motion(line, [JunctionTorque(0, 1.0), late], 0.05, order=order) for order in (16, 25))
     t = draw.uniform(0, 0.05, 200)
     scale = max(float(np.abs(part).max()) for part in (of.junction_speeds, of.rightward, of.leftward))
     difference = 0.0
@@ -263,38 +267,38 @@ def test_the_estimated_error_of_random_lines_bounds_the_difference_from_a_higher
 
 def test_a_shaft_in_parts_moves_like_the_whole_shaft() -> None:
     parts = tuple(Section.of_geometry(length, 0.02) for length in (0.2, 0.3, 0.5))
-    whole = motion(POPENDA, [Torque(0, STEP, (0.011,))], 0.03)
-    cut = motion(Line(parts, (0.025, 0.0, 0.0, 0.11)), [Torque(0, STEP, (0.011,))], 0.03)
+    whole = motion(POPENDA, [JunctionTorque(0, STEP, (0.011,))], 0.03)
+    cut = motion(SectionLine(parts, (0.025, 0.0, 0.0, 0.11)), [JunctionTorque(0, STEP, (0.011,))], 0.03)
     assert cut.step == pytest.approx(SHAFT.delay / 10, rel=1e-14)
     t = np.linspace(0.0, 0.03, 500)
     for station in (0.0, 0.35, 1.0):
-        for ask in (Motion.speed, Motion.torque):
+        for ask in (LineMotion.speed, LineMotion.torque):
             expected = ask(whole, station, t)
             assert ask(cut, station, t) == pytest.approx(expected, abs=ROUNDING * np.abs(expected).max())
 
 
 def test_panels_end_at_breakpoints_and_at_all_their_echoes() -> None:
-    late = Torque(1, lambda t: np.where(t < 0.0123, 0.0, np.sqrt(t)), (0.0123,))
-    of = motion(POPENDA, [Torque(0, STEP), late], 0.03)
+    late = JunctionTorque(1, lambda t: np.where(t < 0.0123, 0.0, np.sqrt(t)), (0.0123,))
+    of = motion(POPENDA, [JunctionTorque(0, STEP), late], 0.03)
     for echo in range(20):
         assert np.abs(of.edges - (0.0123 + echo * SHAFT.delay)).min() < 1e-16
     assert of.error < ROUNDING
-    finer = motion(POPENDA, [Torque(0, STEP), late], 0.03, order=24)
+    finer = motion(POPENDA, [JunctionTorque(0, STEP), late], 0.03, order=24)
     assert largest_difference(of, finer, np.linspace(0.0, 0.03, 700)) < ROUNDING
 
 
 def test_breakpoints_a_whole_number_of_delays_apart_share_their_panels() -> None:
     breakpoints = tuple(0.001 + number * SHAFT.delay for number in range(5))
-    one, five = (motion(POPENDA, [Torque(0, STEP, given)], 0.03) for given in (breakpoints[:1], breakpoints))
+    one, five = (motion(POPENDA, [JunctionTorque(0, STEP, given)], 0.03) for given in (breakpoints[:1], breakpoints))
     assert five.edges.tolist() == one.edges.tolist()
 
 
-@pytest.mark.parametrize("line", [POPENDA, Line((SHAFT,), (0.0, 0.11))])
-def test_a_jump_that_is_not_given_is_found_by_halving_panels(line: Line) -> None:
+@pytest.mark.parametrize("line", [POPENDA, SectionLine((SHAFT,), (0.0, 0.11))])
+def test_a_jump_that_is_not_given_is_found_by_halving_panels(line: SectionLine) -> None:
     def law(t: Array) -> Array:
         return np.where(t < 0.0123, 0.0, 1.0)
 
-    given, found = (motion(line, [Torque(0, law, at)], 0.03) for at in ((0.0123,), ()))
+    given, found = (motion(line, [JunctionTorque(0, law, at)], 0.03) for at in ((0.0123,), ()))
     assert found.edges.size > 2 * given.edges.size
     # No time of comparison is within a rounding of an echo of the jump.
     assert largest_difference(given, found, np.linspace(0.0123, 0.03, 97)[1:]) < ROUNDING
@@ -339,7 +343,7 @@ def reference_by_steps(discs: tuple[float, float], law: Callable[[Array, Array],
 def test_a_motor_with_kloss_curve_starts_as_in_the_method_of_steps() -> None:
     discs = (1e-4, 3e-4)
     expected = np.array(reference_by_steps(discs, kloss, 8))
-    of = motion(Line((SHAFT,), discs), [Torque(0, kloss, of_speed=True)], 8 * SHAFT.delay)
+    of = motion(SectionLine((SHAFT,), discs), [JunctionTorque(0, kloss, of_speed=True)], 8 * SHAFT.delay)
     t = np.arange(9) * SHAFT.delay
     # DOP853 interpolates the waves with order 7: (delay / 20)^8 of fronts that take a delay.
     scale = np.abs(expected).max()
@@ -350,26 +354,26 @@ def test_a_motor_with_kloss_curve_starts_as_in_the_method_of_steps() -> None:
 
 @pytest.mark.parametrize("disc", [0.02, 0.0])
 def test_a_linear_law_of_the_speed_is_a_damper(disc: float) -> None:
-    lines = [Line((SHAFT,), (disc, 0.11), dampers=(damper, 0.0)) for damper in (0.0, 0.3)]
-    law = Torque(0, lambda _, speed: -0.3 * speed, of_speed=True)
-    with_law = motion(lines[0], [Torque(0, STEP), law], 0.02)
-    with_damper = motion(lines[1], [Torque(0, STEP)], 0.02)
+    lines = [SectionLine((SHAFT,), (disc, 0.11), dampers=(damper, 0.0)) for damper in (0.0, 0.3)]
+    law = JunctionTorque(0, lambda _, speed: -0.3 * speed, of_speed=True)
+    with_law = motion(lines[0], [JunctionTorque(0, STEP), law], 0.02)
+    with_damper = motion(lines[1], [JunctionTorque(0, STEP)], 0.02)
     assert largest_difference(with_damper, with_law, np.linspace(0.0, 0.02, 333)) < ROUNDING
 
 
 @pytest.mark.slow
 def test_a_law_that_jumps_with_the_speed_is_refused() -> None:
-    friction = Torque(0, lambda _, speed: -0.3 * np.sign(speed), of_speed=True)
-    drive = Torque(1, lambda t: np.sin(2000 * t))
+    friction = JunctionTorque(0, lambda _, speed: -0.3 * np.sign(speed), of_speed=True)
+    drive = JunctionTorque(1, lambda t: np.sin(2000 * t))
     with pytest.raises(SimulationError, match="make torques smooth in the speed"):
-        motion(Line((SHAFT,), (0.0, 1e-4)), [friction, drive], 0.02)
+        motion(SectionLine((SHAFT,), (0.0, 1e-4)), [friction, drive], 0.02)
 
 
 def test_a_turning_shaft_without_torque_turns_on_and_a_clamp_stops_it() -> None:
     t = np.linspace(0.0, 0.01, 50)
     free = motion(STEPPED, [], 0.01, initial_speed=5.0)
     assert free.junction_speed(1, t) == pytest.approx(np.full(50, 5.0), rel=ROUNDING)
-    held = motion(Line((SHAFT,), (0.0, 0.0), ends=("clamped", "free")), [], 0.01, initial_speed=5.0)
+    held = motion(SectionLine((SHAFT,), (0.0, 0.0), ends=("clamped", "free")), [], 0.01, initial_speed=5.0)
     # The front of the stop runs to the free end and back.
     assert held.torque_in(0, np.array([0.5, 1.5, 2.5]) * SHAFT.delay, "left") == pytest.approx(
         SHAFT.impedance * 5.0 * np.array([-1, -1, 1]), rel=ROUNDING
@@ -379,20 +383,24 @@ def test_a_turning_shaft_without_torque_turns_on_and_a_clamp_stops_it() -> None:
 @pytest.mark.parametrize(
     ("line", "torques", "text"),
     [
-        (Line((SHAFT, Section.of_geometry(math.sqrt(2), 0.02)), (0.0,) * 3), [], "not multiples of one common step"),
-        (Line((Section(1.0, 1.0, 1.0, damping=0.1),), (0.0, 0.0)), [], "without damping and friction"),
-        (Line((SHAFT,), (0.0, 0.0), ends=("clamped", "free")), [Torque(0, 1.0)], "junction is clamped"),
-        (POPENDA, [Torque(2, 1.0)], "no junction 2"),
+        (
+            SectionLine((SHAFT, Section.of_geometry(math.sqrt(2), 0.02)), (0.0,) * 3),
+            [],
+            "not multiples of one common step",
+        ),
+        (SectionLine((Section(1.0, 1.0, 1.0, damping=0.1),), (0.0, 0.0)), [], "without damping and friction"),
+        (SectionLine((SHAFT,), (0.0, 0.0), ends=("clamped", "free")), [JunctionTorque(0, 1.0)], "junction is clamped"),
+        (POPENDA, [JunctionTorque(2, 1.0)], "no junction 2"),
     ],
 )
-def test_what_characteristics_cannot_do_is_refused(line: Line, torques: list[Torque], text: str) -> None:
+def test_what_characteristics_cannot_do_is_refused(line: SectionLine, torques: list[JunctionTorque], text: str) -> None:
     with pytest.raises(ParameterError, match=text):
         motion(line, torques, 0.01)
 
 
 def test_a_torque_that_is_not_finite_and_a_time_after_the_end_are_refused() -> None:
     with pytest.raises(SimulationError, match="junction 0 is not finite"):
-        motion(POPENDA, [Torque(0, math.nan)], 0.01)
+        motion(POPENDA, [JunctionTorque(0, math.nan)], 0.01)
     with pytest.raises(ParameterError, match="known up to"):
         motion(POPENDA, [], 0.01).junction_speed(0, np.array([0.011]))
     with pytest.raises(ParameterError, match="t_end above 0"):

@@ -10,7 +10,7 @@ from scipy.linalg import solve_banded
 from shaftwork.core.errors import ParameterError
 from shaftwork.shafts.exact_modes import modes
 from shaftwork.shafts.exact_response import Complex, Drive, frequency_response, laplace_response
-from shaftwork.shafts.line import Array, Line, Section
+from shaftwork.shafts.line import Array, Section, SectionLine
 
 SHAFT = Section.of_geometry(1.0, 0.02)
 DAMPED = (
@@ -18,12 +18,12 @@ DAMPED = (
     Section.of_geometry(0.4, 0.05, 0.03, damping=0.3),
     Section.of_geometry(2.0, 0.03, friction=0.02),
 )
-LINE = Line(DAMPED, (0.025, 0.0, 0.3, 0.11), dampers=(0.01, 0.0, 0.2, 0.0))
+LINE = SectionLine(DAMPED, (0.025, 0.0, 0.3, 0.11), dampers=(0.01, 0.0, 0.2, 0.0))
 # Tens of operations for each section, none of which cancels.
 ROUNDING = 1e-13
 
 
-def high_precision_speeds(line: Line, s: complex, junction: int) -> list[mpmath.mpc]:
+def high_precision_speeds(line: SectionLine, s: complex, junction: int) -> list[mpmath.mpc]:
     """Speeds of all junctions for a unit torque, from the dense admittance matrix in 80 digits."""
     size, s = len(line.discs), mpmath.mpc(s)
     admittance = mpmath.matrix(size, size)
@@ -50,7 +50,7 @@ def high_precision_speeds(line: Line, s: complex, junction: int) -> list[mpmath.
 @pytest.mark.parametrize("s", [1e-3j, 2j, 1.0 + 300j, -20 + 5e3j, 3e4j, 500.0])
 @pytest.mark.parametrize("ends", [("free", "free"), ("free", "clamped")])
 def test_speeds_of_a_damped_line_agree_with_80_digits(junction: int, s: complex, ends: tuple[str, str]) -> None:
-    line = Line(LINE.sections, LINE.discs, LINE.dampers, ends)  # type: ignore[arg-type]
+    line = SectionLine(LINE.sections, LINE.discs, LINE.dampers, ends)  # type: ignore[arg-type]
     found = laplace_response(line, np.array([s]), junction).speeds(line.junctions)[0]
     with mpmath.workdps(80):
         expected = [complex(value) for value in high_precision_speeds(line, s, junction)]
@@ -59,7 +59,7 @@ def test_speeds_of_a_damped_line_agree_with_80_digits(junction: int, s: complex,
 
 
 def test_stiff_and_soft_sections_beside_each_other_lose_no_digits_at_low_frequency() -> None:
-    line = Line(tuple(Section(1.0, 1e-4, k, friction=1e-6) for k in (1e3, 1e15, 1e6)), (1e-9, 0.1, 1e3, 1e-3))
+    line = SectionLine(tuple(Section(1.0, 1e-4, k, friction=1e-6) for k in (1e3, 1e15, 1e6)), (1e-9, 0.1, 1e3, 1e-3))
     s = np.array([1e-6j, 1e-2j, 1.0j])
     found = laplace_response(line, s, 0).speeds(line.junctions)
     for row, point in zip(found, s, strict=True):
@@ -77,7 +77,7 @@ def test_speeds_of_random_lines_of_extreme_ratios_agree_with_200_digits(seed: in
         for _ in range(parts)
     )
     discs, dampers = (10 ** draw.uniform(-9, 9, (2, parts + 1)) * (draw.random((2, parts + 1)) > 0.3)).tolist()
-    line = Line(sections, tuple(discs), tuple(dampers), ("free", "clamped" if draw.random() < 0.5 else "free"))
+    line = SectionLine(sections, tuple(discs), tuple(dampers), ("free", "clamped" if draw.random() < 0.5 else "free"))
     s = complex(*10 ** draw.uniform(-6, [2, 3]) * [draw.random() > 0.5, 1])
     exponents = [
         abs(np.sqrt((s * part.inertia + part.friction) * s / (part.stiffness + s * part.damping))) * part.length
@@ -93,7 +93,7 @@ def test_speeds_of_random_lines_of_extreme_ratios_agree_with_200_digits(seed: in
 
 
 def test_a_bare_shaft_has_the_cotangent_of_its_delay_as_mobility() -> None:
-    line, f = Line((SHAFT,), (0.0, 0.0)), np.array([1.0, 400.0, 1e3, 2.2e4])
+    line, f = SectionLine((SHAFT,), (0.0, 0.0)), np.array([1.0, 400.0, 1e3, 2.2e4])
     theta = 2 * math.pi * f * SHAFT.delay
     response = frequency_response(line, f, 0)
     # cot(theta) with theta up to 44 takes on theta roundings.
@@ -106,7 +106,7 @@ def test_a_bare_shaft_has_the_cotangent_of_its_delay_as_mobility() -> None:
 
 
 def test_at_low_frequency_the_line_is_one_inertia() -> None:
-    line, f = Line(tuple(SHAFT for _ in range(3)), (0.025, 0.0, 1e-3, 0.11)), np.array([1e-6])
+    line, f = SectionLine(tuple(SHAFT for _ in range(3)), (0.025, 0.0, 1e-3, 0.11)), np.array([1e-6])
     response = frequency_response(line, f, 1).speeds(np.array([0.0, 1.5, 3.0]))
     # (f / f_1)^2 is below 1e-13.
     assert response == pytest.approx(np.full((1, 3), 1 / (2j * math.pi * f[0] * line.inertia)), rel=1e-12)
@@ -122,7 +122,7 @@ def test_at_rest_the_line_is_its_friction() -> None:
 
 @pytest.mark.parametrize("f", [1e5, 1e8, 1e12])
 def test_high_frequencies_die_out_in_damped_sections_without_overflow(f: float) -> None:
-    line = Line((DAMPED[0],) * 50, (0.0,) * 51)
+    line = SectionLine((DAMPED[0],) * 50, (0.0,) * 51)
     response = frequency_response(line, np.array([f]), 0)
     s = 2j * math.pi * f
     # A wave that never returns sees the characteristic impedance alone.
@@ -178,7 +178,7 @@ def test_the_power_that_goes_in_is_the_power_that_is_lost() -> None:
 
 
 def test_a_shaft_with_a_damper_of_its_impedance_at_its_end_answers_like_an_endless_one() -> None:
-    line = Line((SHAFT, SHAFT), (0.0,) * 3, dampers=(0.0, 0.0, SHAFT.impedance))
+    line = SectionLine((SHAFT, SHAFT), (0.0,) * 3, dampers=(0.0, 0.0, SHAFT.impedance))
     f = np.array([1.0, 777.0, 5e4])
     response = frequency_response(line, f, 0)
     assert response.speeds(np.array([0.0]))[:, 0] == pytest.approx(np.full(3, 1 / SHAFT.impedance), rel=ROUNDING)
@@ -188,7 +188,7 @@ def test_a_shaft_with_a_damper_of_its_impedance_at_its_end_answers_like_an_endle
 
 
 def test_the_poles_are_the_natural_frequencies_and_the_residues_the_shapes() -> None:
-    line = Line(tuple(SHAFT for _ in range(2)), (0.025, 0.01, 0.11))
+    line = SectionLine(tuple(SHAFT for _ in range(2)), (0.025, 0.01, 0.11))
     shapes = modes(line, 6)
     omega = 2 * math.pi * shapes.frequencies[1:]
     distance = 1e-9 * omega
@@ -200,17 +200,17 @@ def test_the_poles_are_the_natural_frequencies_and_the_residues_the_shapes() -> 
 
 
 def test_a_pole_a_clamped_junction_and_an_unknown_drive_are_refused() -> None:
-    line = Line((SHAFT,), (0.025, 0.11), ends=("free", "free"))
+    line = SectionLine((SHAFT,), (0.025, 0.11), ends=("free", "free"))
     with pytest.raises(ParameterError, match=r"infinite at s = 0\+0j 1/s"):
         frequency_response(line, np.array([0.0, 1.0]), 0)
-    clamped = Line((SHAFT,), (0.025, 0.0), ends=("free", "clamped"))
+    clamped = SectionLine((SHAFT,), (0.025, 0.0), ends=("free", "clamped"))
     with pytest.raises(ParameterError, match="Junction 1 is clamped"):
         frequency_response(clamped, np.array([1.0]), 1)
     with pytest.raises(ParameterError, match="not by 'angle'"):
         frequency_response(clamped, np.array([1.0]), 0, drive="angle")  # type: ignore[arg-type]
 
 
-def lumped_speeds(line: Line, s: complex, cells: int) -> Complex:
+def lumped_speeds(line: SectionLine, s: complex, cells: int) -> Complex:
     """Speeds of the ends of a one-section line under a unit torque at the left end, of a chain with half cells."""
     section = line.sections[0]
     step = section.length / cells
@@ -229,7 +229,7 @@ def lumped_speeds(line: Line, s: complex, cells: int) -> Complex:
 
 
 def test_a_fine_lumped_chain_comes_nearer_with_the_square_of_its_cells() -> None:
-    line, f = Line((DAMPED[0],), (1e-4, 2e-4), dampers=(0.02, 0.0)), 900.0
+    line, f = SectionLine((DAMPED[0],), (1e-4, 2e-4), dampers=(0.02, 0.0)), 900.0
     exact = frequency_response(line, np.array([f]), 0).speeds(line.junctions)[0]
     errors: Array = np.array(
         [np.abs(lumped_speeds(line, 2j * math.pi * f, cells) - exact).max() for cells in (40, 80, 160, 320)]

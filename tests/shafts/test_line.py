@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.shafts.line import Line, Section
+from shaftwork.shafts.line import Section, SectionLine
 
 SHAFT = Section.of_geometry(1.0, 0.02)
 
@@ -39,7 +39,7 @@ def test_delay_and_impedance_are_those_of_the_material() -> None:
 
 
 def test_a_station_at_a_junction_belongs_to_the_side_that_is_asked_for() -> None:
-    line = Line((SHAFT, SHAFT), (0.0, 0.0, 0.0))
+    line = SectionLine((SHAFT, SHAFT), (0.0, 0.0, 0.0))
     assert line.locate(1.0, "left") == (0, 1.0)
     assert line.locate(1.0, "right") == (1, 0.0)
     assert line.locate(0.0, "left") == (0, 0.0)
@@ -47,7 +47,7 @@ def test_a_station_at_a_junction_belongs_to_the_side_that_is_asked_for() -> None
 
 
 def test_a_station_that_misses_a_junction_by_a_rounding_is_the_junction() -> None:
-    line = Line((Section.of_geometry(0.1, 0.02), Section.of_geometry(0.2, 0.02)), (0.0, 0.0, 0.0))
+    line = SectionLine((Section.of_geometry(0.1, 0.02), Section.of_geometry(0.2, 0.02)), (0.0, 0.0, 0.0))
     assert line.locate(0.3 - 2**-54, "right") == line.locate(0.1 + 0.2, "right")
     assert line.locate(math.nextafter(0.1, 0.0)) == (1, 0.0)
 
@@ -59,12 +59,12 @@ def test_a_station_that_misses_a_junction_by_a_rounding_is_the_junction() -> Non
         (lambda: Section(1.0, 1.0, math.inf), "stiffness of a section.*finite"),
         (lambda: Section(1.0, 1.0, 1.0, damping=-1.0), "damping of a section.*at least 0"),
         (lambda: Section.of_geometry(1.0, 0.02, 0.02), "inner_diameter.*less than its diameter"),
-        (lambda: Line((), (0.0,)), "at least one section"),
-        (lambda: Line((SHAFT,), (0.0,)), "1 sections has 2 junctions.*1 discs are given"),
-        (lambda: Line((SHAFT,), (0.0, -1.0)), "disc of a line.*at least 0"),
-        (lambda: Line((SHAFT,), (0.0, 0.0), ends=("free", "pinned")), "'free' and 'clamped'"),  # type: ignore[arg-type]
-        (lambda: Line((SHAFT,), (0.0, 0.0)).locate(1.1), "station 1.1 m is outside"),
-        (lambda: Line((SHAFT,), (0.0, 0.0)).junction(2), "junctions 0 to 1"),
+        (lambda: SectionLine((), (0.0,)), "at least one section"),
+        (lambda: SectionLine((SHAFT,), (0.0,)), "1 sections has 2 junctions.*1 discs are given"),
+        (lambda: SectionLine((SHAFT,), (0.0, -1.0)), "disc of a line.*at least 0"),
+        (lambda: SectionLine((SHAFT,), (0.0, 0.0), ends=("free", "pinned")), "'free' and 'clamped'"),  # type: ignore[arg-type]
+        (lambda: SectionLine((SHAFT,), (0.0, 0.0)).locate(1.1), "station 1.1 m is outside"),
+        (lambda: SectionLine((SHAFT,), (0.0, 0.0)).junction(2), "junctions 0 to 1"),
     ],
 )
 def test_what_is_no_line_is_refused_with_the_reason(wrong: Any, text: str) -> None:

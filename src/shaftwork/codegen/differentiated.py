@@ -11,14 +11,14 @@ from sympy import Expr, Symbol
 
 from shaftwork.codegen.derivatives import SlopeMatrix, Values
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.takeover import Takeover
+from shaftwork.codegen.state_transfer_jacobian import StateTransferJacobian
 from shaftwork.components.laws import switches, switches_of
 from shaftwork.components.laws import t as TIME
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.rows import Rows
 
 
-class Shown:
+class ValueWithSlopes:
     """An expression with its slopes.
 
     Args:
@@ -57,7 +57,7 @@ class Differentiated:
         integrands: Sequence[Expr],
     ) -> None:
         self._form, self._rows, self._parameters = form, rows, tuple(parameters)
-        self._shown: dict[Expr, Shown] = {}
+        self._shown: dict[Expr, ValueWithSlopes] = {}
         self.quantities = quantities
         self._expressions = rates = (*rows.rates, *integrands)
         self._rates = Values(rows, rates)
@@ -78,16 +78,16 @@ class Differentiated:
         """Slopes of the rates by states (k, N, n) and by parameters (k, N, m)."""
         return self._by_states.along(times, states, p), self._by_parameters.along(times, states, p)
 
-    def shown(self, expression: Expr) -> Shown:
+    def shown(self, expression: Expr) -> ValueWithSlopes:
         """An expression with its slopes; made once."""
         if expression not in self._shown:
-            self._shown[expression] = Shown(self._rows, expression, self._parameters)
+            self._shown[expression] = ValueWithSlopes(self._rows, expression, self._parameters)
         return self._shown[expression]
 
     @cached_property
-    def takeover(self) -> Takeover:
+    def takeover(self) -> StateTransferJacobian:
         """What is stored, and how the states take it up."""
-        return Takeover(self._form, self._rows, self._parameters)
+        return StateTransferJacobian(self._form, self._rows, self._parameters)
 
     @property
     def _read(self) -> tuple[Expr, ...]:

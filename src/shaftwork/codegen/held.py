@@ -24,7 +24,7 @@ from shaftwork.codegen.arrays import ArrayProgram, BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.matrices import LinearPart
 from shaftwork.codegen.products import Factor
-from shaftwork.codegen.stores import Stores
+from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.held_rows import HeldRows
 
@@ -188,7 +188,7 @@ class HeldArrays(BoundArrays):
         return self._moving.jacobian(t, x)
 
 
-class HeldStores(Stores):
+class HeldStores(StateTransfer):
     """What is stored where inertias are held together, and each is a state all the same."""
 
     def states(self, bound: BoundArrays, t: float, held: Mapping[str, float]) -> Array:

@@ -26,7 +26,7 @@ Function = Callable[..., Any]
 
 
 @dataclass(frozen=True, eq=False)
-class _Group:
+class _TemplateInputs:
     """The inputs of one template: where they stand in u, their across variables in y, their integrals in x.
 
     What they read of other branches, (reads, k), stands in y too. The slopes are by time, across, integral and reads.
@@ -93,7 +93,7 @@ class Inputs:
         self.rates = np.array([output[made] for made in form.readings if made.kind == "rate"], dtype=np.intp)
         self._last: tuple[Array, tuple[tuple[Any, ...], ...]] = np.empty(0), ()
 
-    def _group(self, made: TemplateGroup, place: Any, output: Any, integral: Any) -> _Group:
+    def _group(self, made: TemplateGroup, place: Any, output: Any, integral: Any) -> _TemplateInputs:
         is_wave = made.template.is_history
         law = INTEGRAL if is_wave else made.template.law  # both are read from x
         symbols, reads = _arguments(made.template), made.template.reads
@@ -105,7 +105,7 @@ class Inputs:
             return None if real == 0 else vectorised(symbols, real)
 
         moves = made.template.kind is Kind.LAW
-        return _Group(
+        return _TemplateInputs(
             made,
             np.array([place[branch] for branch in members], dtype=np.intp),
             np.array([output[branch] for branch in members] if moves else [], dtype=np.intp),
@@ -231,7 +231,9 @@ class Inputs:
                     return int(place)
         return None
 
-    def _evaluate(self, pick: Callable[[_Group], Function | None], t: Any, y: Array, x: Array, p: Array) -> Array:
+    def _evaluate(
+        self, pick: Callable[[_TemplateInputs], Function | None], t: Any, y: Array, x: Array, p: Array
+    ) -> Array:
         result = np.zeros((self.size, *np.shape(x)[1:]))
         t = np.float64(t)  # of Python's floats the cube root of -1 is complex, and 1 / 0 an exception
         with np.errstate(all="ignore"):  # a law that has no value is NaN here; the engines say when and where
@@ -250,7 +252,7 @@ def is_linear(law: Expr, reads: Sequence[Symbol]) -> bool:
     return not (any(slope(law, read).has(*reads, TIME) for read in reads) or jumps(law, *reads))
 
 
-def _read(group: _Group, y: Array, x: Array, parameters: tuple[Any, ...]) -> tuple[Any, ...]:
+def _read(group: _TemplateInputs, y: Array, x: Array, parameters: tuple[Any, ...]) -> tuple[Any, ...]:
     """What the laws of a group read: across variables, integrals, what is of other branches, parameters."""
     across = y[group.outputs] if group.outputs.size else 0.0
     known = group.integrals.size and group.integrals[-1] < len(x)  # not the waves, where none are given

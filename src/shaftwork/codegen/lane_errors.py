@@ -24,7 +24,7 @@ TINY = 1e-30
 
 
 @dataclass(frozen=True, eq=False)
-class Start:
+class LaneStart:
     """Where a step starts, as heyoka's expressions.
 
     Args:
@@ -50,7 +50,7 @@ class Start:
 
 
 def step_error(
-    start: Start, integrals: Sequence[tuple[Any, Any, int]], blind: Sequence[Any], stages: Sequence[Sequence[Any]]
+    start: LaneStart, integrals: Sequence[tuple[Any, Any, int]], blind: Sequence[Any], stages: Sequence[Sequence[Any]]
 ) -> Any:
     """The error of a step in units of the tolerance.
 

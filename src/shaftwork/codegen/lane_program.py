@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from sympy import Expr, Symbol
 
 from shaftwork.codegen.fixed import Fixed
+from shaftwork.codegen.hermite import JET
 from shaftwork.codegen.heyoka import HeyokaProgram
 from shaftwork.codegen.heyoka_expressions import Translator
-from shaftwork.codegen.quintics import JET
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError
 from shaftwork.reduction.rows import Rows

@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DOP853
 
-from shaftwork.codegen.lane_errors import TINY, Start, step_error, weighted
+from shaftwork.codegen.hermite import BEYOND, JET, apart, inner
+from shaftwork.codegen.lane_errors import TINY, LaneStart, step_error, weighted
 from shaftwork.codegen.lane_program import FREE_TIME, KEPT, LaneFunction, LaneProgram, at
-from shaftwork.codegen.quintics import BEYOND, JET, apart, inner
 
 Array = NDArray[np.float64]
 
@@ -151,7 +151,7 @@ class LaneStep:
         stages = _stages(program.variables, [*program.rates, *integrands, *blind], time, size)
         new = [_moved(x, size, DOP853.B, slopes) for x, slopes in zip(old, stages, strict=False)]
         begun = [(x, *of) for x, of in zip(integrals, self._integrals, strict=True)]
-        error = step_error(Start(program, time, size, sizes), begun, blind, stages) / tolerance
+        error = step_error(LaneStart(program, time, size, sizes), begun, blind, stages) / tolerance
         factor = SAFETY / heyoka.sqrt(heyoka.sqrt(heyoka.sqrt(error + TINY)))  # the error is of order 8
         factor = _higher(_lower(factor, heyoka.expression(MOST_FACTOR)), heyoka.expression(LEAST_FACTOR))
         good = heyoka.lte(error, 1.0)

@@ -21,8 +21,8 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.law_slopes import input_slopes
 from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.observer import ModelObserver
-from shaftwork.codegen.recovery import History, branches_with_power
-from shaftwork.codegen.waves import Dense
+from shaftwork.codegen.recovery import BranchHistory, branches_with_power
+from shaftwork.codegen.waves import DenseWaves
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.slopes import slope
 from shaftwork.core.errors import SimulationError
@@ -170,9 +170,9 @@ class Linearization:
         return read
 
     @cached_property
-    def _nominal(self) -> History:
+    def _nominal(self) -> BranchHistory:
         t, x = self._point
-        return History(self._bound, np.array([t]), x[None, :])
+        return BranchHistory(self._bound, np.array([t]), x[None, :])
 
 
 def _in_a_row(part: GraphPart, stores: set[int]) -> list[tuple[int, float]]:
@@ -187,10 +187,10 @@ def _in_a_row(part: GraphPart, stores: set[int]) -> list[tuple[int, float]]:
     return [(nodes[0], 1.0), *zip(nodes[1:], (steps / steps.mean()).tolist(), strict=True)]
 
 
-class _Deviations(History):
+class _Deviations(BranchHistory):
     """All branch quantities of a small motion about a point."""
 
-    def __init__(self, bound: BoundArrays, x: Any, given: tuple[Any, Any, Any], nominal: History) -> None:
+    def __init__(self, bound: BoundArrays, x: Any, given: tuple[Any, Any, Any], nominal: BranchHistory) -> None:
         super().__init__(bound, np.zeros(x.shape[1]), x.T)
         self._given, self._nominal = given, nominal
 
@@ -223,12 +223,12 @@ class _Deviations(History):
 class _Reader(ModelObserver):
     """Reads small motions by name, one at a time."""
 
-    motion: History
+    motion: BranchHistory
 
-    def history(self, t: Array, x: Array) -> History:  # noqa: ARG002 (they are those of the motion)
+    def history(self, t: Array, x: Array) -> BranchHistory:  # noqa: ARG002 (they are those of the motion)
         return self.motion
 
-    def signal(self, name: str, t: Array, x: Array, dense: Dense | None = None) -> Array:
+    def signal(self, name: str, t: Array, x: Array, dense: DenseWaves | None = None) -> Array:
         """(k,) a quantity by its name in `units`; the energy of a part is that in its stores, lines apart."""
         owner, _, quantity = name.rpartition(".")
         if quantity == "energy" and name not in self.quantities.signals:

@@ -13,8 +13,8 @@ from scipy import sparse
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.products import Factor
-from shaftwork.codegen.recovery import History
-from shaftwork.codegen.stores import Stores
+from shaftwork.codegen.recovery import BranchHistory
+from shaftwork.codegen.state_transfer import StateTransfer
 
 LARGEST_BLOCK = 2_000_000
 """Values, branches by columns, that are made at once."""
@@ -22,11 +22,11 @@ ROUNDING = 1e-12
 """A part of the largest value that is rounding."""
 GOLDEN = (5**0.5 - 1) / 2
 
-Read = Callable[[History], Array]
+Read = Callable[[BranchHistory], Array]
 
 
 @dataclass(frozen=True)
-class Quantity:
+class LinearQuantity:
     """A quantity that is linear in states, inputs and rates.
 
     Args:
@@ -41,7 +41,7 @@ class Quantity:
 
 
 @dataclass(frozen=True)
-class Row:
+class LinearRow:
     """How a quantity follows from the states.
 
     Args:
@@ -55,7 +55,7 @@ class Row:
     moved: bool
 
 
-class _Columns(History):
+class _Columns(BranchHistory):
     """Branch quantities where states, inputs and rates are given, each column for itself.
 
     Args:
@@ -116,7 +116,7 @@ class ReadingMatrices:
             )
             yield _Columns(bound, x, u, rate, slopes)
 
-    def __call__(self, history: History) -> Array:
+    def __call__(self, history: BranchHistory) -> Array:
         """(quantities, k) the quantities along a history."""
         by_state, by_input, by_rate, by_slope = self._matrices
         read = by_state @ history.x[: self._sizes[0]] + by_input @ history.values[1]
@@ -136,8 +136,8 @@ class GivenSpeeds:
         others: three columns: what sources prescribe; any numbers for laws, and for accelerations.
     """
 
-    states: History
-    others: History
+    states: BranchHistory
+    others: BranchHistory
 
     def of(self, read: Read, rest: Any = 0.0) -> Array:
         """Speeds: as they are where they follow from start values and sources alone, else at rest.
@@ -161,7 +161,7 @@ class GivenSpeeds:
         return ~_is_nothing(read(self.states), self.states)[..., 2]
 
 
-def _is_nothing(speeds: Array, history: History) -> Any:
+def _is_nothing(speeds: Array, history: BranchHistory) -> Any:
     """Whether speeds are rounding beside the largest one of their column."""
     return np.abs(speeds) <= ROUNDING * np.abs(history.across).max(axis=0, initial=0.0)
 
@@ -182,9 +182,9 @@ class LinearReadings:
     def __init__(self, bound: BoundArrays, t: float) -> None:
         self._bound = bound
         self._size = len(bound.program.form.states)
-        self._prescribed = Stores(bound.program.form).sources(bound, t)
+        self._prescribed = StateTransfer(bound.program.form).sources(bound, t)
 
-    def rows(self, quantities: Sequence[Quantity]) -> list[Row]:
+    def rows(self, quantities: Sequence[LinearQuantity]) -> list[LinearRow]:
         """How each quantity follows from the states."""
         if not quantities:
             return []
@@ -194,9 +194,9 @@ class LinearReadings:
         largest = {True: np.abs(others.across), False: np.abs(others.through)}
         sizes = np.array([largest[q.is_across].max(axis=0, initial=0.0) for q in quantities])
         moved: Any = (np.abs(values) - ROUNDING * sizes)[:, 1:].max(axis=1) > 0
-        return [Row(by_state[k], float(values[k, 0]), bool(moved[k])) for k in range(len(quantities))]
+        return [LinearRow(by_state[k], float(values[k, 0]), bool(moved[k])) for k in range(len(quantities))]
 
-    def states_behind(self, quantities: Sequence[Quantity]) -> list[int]:
+    def states_behind(self, quantities: Sequence[LinearQuantity]) -> list[int]:
         """The states on which quantities depend, by way of rates as well."""
         if not quantities:
             return []
@@ -204,7 +204,7 @@ class LinearReadings:
         size = np.abs(values).max(axis=1, keepdims=True, initial=0.0)
         return [int(k) for k in np.flatnonzero((np.abs(values) > ROUNDING * size).any(axis=0))]
 
-    def given_speeds(self, x: Array, rest: Array, is_given: Any, prescribed: Sequence[Quantity]) -> GivenSpeeds:
+    def given_speeds(self, x: Array, rest: Array, is_given: Any, prescribed: Sequence[LinearQuantity]) -> GivenSpeeds:
         """Which speeds start values give.
 
         Args:
@@ -219,7 +219,7 @@ class LinearReadings:
         u[:, 2] = self._are_behind(prescribed) * _any_numbers(self._prescribed.size)
         return GivenSpeeds(_Columns(self._bound, states, u, zero, np.zeros_like(u)), self._others())
 
-    def _are_behind(self, quantities: Sequence[Quantity]) -> Any:
+    def _are_behind(self, quantities: Sequence[LinearQuantity]) -> Any:
         """(m,) which of the inputs are sources of time that have a part in quantities."""
         sources = np.flatnonzero(self._bound.program.inputs.of_time)
         behind = np.zeros(self._prescribed.size, dtype=bool)
@@ -229,7 +229,7 @@ class LinearReadings:
             behind[sources] = (values != 0).any(axis=0)
         return behind
 
-    def _values(self, quantities: Sequence[Quantity], columns: _Columns) -> Array:
+    def _values(self, quantities: Sequence[LinearQuantity], columns: _Columns) -> Array:
         return np.array([quantity.read(columns) for quantity in quantities])
 
     def _by_states(self, *, moving: bool) -> list[_Columns]:

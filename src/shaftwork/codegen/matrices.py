@@ -114,7 +114,7 @@ class MatrixAssembly:
 
     def _assembled(self, F: Any, Q: Any, k: Array, potentials: Any) -> LinearPart:
         form = self.form
-        blocks = _Blocks(form, F, Q, len(self.inputs))
+        blocks = _MatrixBlocks(form, F, Q, len(self.inputs))
         solve_conductances = self._inverse_of_conductances(blocks, k)
         link_g = blocks.diagonal(k[blocks.R])
         # across variables of the tree conductances from states and inputs
@@ -162,12 +162,12 @@ class MatrixAssembly:
             coefficients=k,
         )
 
-    def _inverse_of_conductances(self, blocks: _Blocks, k: Array) -> Any:
+    def _inverse_of_conductances(self, blocks: _MatrixBlocks, k: Array) -> Any:
         links = blocks.diagonal(k[blocks.R])
         matrix = blocks.diagonal(k[blocks.G]) + blocks.Q("G", "R") @ links @ blocks.F("G", "R").T
         return self._inverse(blocks, matrix, blocks.G, "conductance")
 
-    def _inverse(self, blocks: _Blocks, matrix: Any, branches: NDArray[np.intp], what: str) -> Any:
+    def _inverse(self, blocks: _MatrixBlocks, matrix: Any, branches: NDArray[np.intp], what: str) -> Any:
         """The inverse, block by block of connected unknowns; diagonal where nothing is coupled."""
         if blocks.rational:
             return inverse_of_fractions(matrix)
@@ -204,7 +204,7 @@ class MatrixAssembly:
         )
 
 
-class _Blocks:
+class _MatrixBlocks:
     """The blocks of F and Q by group, and the rows that pick states and inputs."""
 
     def __init__(self, form: StateForm, loops: Any, cutsets: Any, inputs: int) -> None:

@@ -10,10 +10,10 @@ import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.recovery import History, branches_with_power
-from shaftwork.codegen.stores import Stores
+from shaftwork.codegen.recovery import BranchHistory, branches_with_power
+from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.codegen.timeline import NOTHING, Timeline
-from shaftwork.codegen.waves import Carrying, Dense, along_lines
+from shaftwork.codegen.waves import DenseWaves, WaveReadings, along_lines
 from shaftwork.components.base import Component, Profile
 from shaftwork.core.errors import SignalError
 from shaftwork.network.graph import CircuitGraph, GraphPart
@@ -62,7 +62,7 @@ class ModelObserver:
         self._form, self._bind, self._instants = form, bind, instants
         self.quantities = Names(form) if quantities is None else quantities
         self._graph: CircuitGraph = form.graph
-        self._last: tuple[Array, Array, History] | None = None
+        self._last: tuple[Array, Array, BranchHistory] | None = None
 
     @property
     def units(self) -> Mapping[str, str]:
@@ -78,22 +78,22 @@ class ModelObserver:
         """The moving nodes that a torque or speed is of, by its name in `units`; none for other quantities."""
         return self.quantities.nodes_of(name)
 
-    def history(self, t: Array, x: Array) -> History:
+    def history(self, t: Array, x: Array) -> BranchHistory:
         """All branch quantities along a trajectory; the last one asked for is kept."""
         if self._last is None or self._last[0] is not t or self._last[1] is not x:
-            self._last = t, x, History(self._bind(), self._instants.one_sided(t), x)
+            self._last = t, x, BranchHistory(self._bind(), self._instants.one_sided(t), x)
         return self._last[2]
 
-    def _read(self, t: Array, x: Array, read: Callable[[History], Array]) -> Array:
+    def _read(self, t: Array, x: Array, read: Callable[[BranchHistory], Array]) -> Array:
         """What is read of a trajectory; of a large one in blocks of times, since all branches take much memory."""
         rows = max(1, LARGEST_HISTORY // max(1, len(self._graph.branches)))
         if len(t) <= rows:
             return read(self.history(t, x))
         times, bound = self._instants.one_sided(t), self._bind()
         blocks = (slice(first, first + rows) for first in range(0, len(t), rows))
-        return np.concatenate([read(History(bound, times[block], x[block])) for block in blocks])
+        return np.concatenate([read(BranchHistory(bound, times[block], x[block])) for block in blocks])
 
-    def signal(self, name: str, t: Array, x: Array, dense: Dense | None = None) -> Array:
+    def signal(self, name: str, t: Array, x: Array, dense: DenseWaves | None = None) -> Array:
         """(k,) a quantity by its name in `units`; the energy of waves is read from the motion behind the states.
 
         Raises:
@@ -118,7 +118,7 @@ class ModelObserver:
         """For each line the part that it belongs to."""
         return tuple(self._graph.part_of(end) for end in self._form.waves[::2])
 
-    def _in_waves(self, t: Array, dense: Dense | None) -> dict[str, Array]:
+    def _in_waves(self, t: Array, dense: DenseWaves | None) -> dict[str, Array]:
         """Energy (k,) on its way in the lines of each part that has lines.
 
         Raises:
@@ -147,14 +147,14 @@ class ModelObserver:
             for name, (part, made) in self._profiles.items()
         }
 
-    def profile(self, name: str, t: Array, x: Array, dense: Dense) -> Array:
+    def profile(self, name: str, t: Array, x: Array, dense: DenseWaves) -> Array:
         """(k, places) a quantity along a part by its name in `profiles`."""
         part, profile = self._profiles[name]
         if profile.lines:
             return along_lines(self._bind(), part, profile, t, _carrying(dense))
         return self._read(t, x, lambda history: history.profile(part, profile))
 
-    def impacts(self, dense: Dense) -> tuple[Impact, ...]:
+    def impacts(self, dense: DenseWaves) -> tuple[Impact, ...]:
         """Instants at which sources jump that are rigidly joined to what stores energy.
 
         Law: what a source gives is the impulse through it times the mean of its speeds, as of a jump that is a steep
@@ -162,8 +162,8 @@ class ModelObserver:
         """
         return tuple(self._jumps(dense)) if self._form.has_impulses else ()
 
-    def _jumps(self, dense: Dense) -> Iterator[Impact]:
-        bound, stores = self._bind(), Stores(self._form)
+    def _jumps(self, dense: DenseWaves) -> Iterator[Impact]:
+        bound, stores = self._bind(), StateTransfer(self._form)
         for time in self._instants.times:
             sides = np.array(self._instants.sides(time))
             if sides[0] == sides[1]:
@@ -174,16 +174,16 @@ class ModelObserver:
             if given := stores.given(bound, (sources[0] + sources[1]) / 2, held):
                 yield Impact(time, "", given, {})
 
-    def stored(self, t: Array, x: Array, dense: Dense) -> dict[str, Array]:
+    def stored(self, t: Array, x: Array, dense: DenseWaves) -> dict[str, Array]:
         """Stored energy by part; of sources those that have stores of their own, such as windings."""
-        history = History(self._bind(), self._instants.one_sided(t), x)
+        history = BranchHistory(self._bind(), self._instants.one_sided(t), x)
         parts = (part for part in self._graph.parts if part.component.role != "source" or self._stores(part))
         stored = {part.name: history.stored(part) for part in parts}
         return stored | {name: stored[name] + held for name, held in self._in_waves(t, dense).items()}
 
     def held(self, t: float, x: Array) -> dict[str, float]:
         """All that is stored at a time in s with the states (n,), by name."""
-        stores = Stores(self._form)
+        stores = StateTransfer(self._form)
         return stores.at_once(self._bind, self.read_at(t), x)
 
     def read_at(self, t: float) -> float:
@@ -203,7 +203,7 @@ class ModelObserver:
 
     def powers(self, t: Array, x: Array) -> tuple[dict[str, Array], dict[str, Array]]:
         """Lost and supplied power by part; of weights, and of sources with resistors or dampers of their own, both."""
-        history = History(self._bind(), self._instants.one_sided(t), x)
+        history = BranchHistory(self._bind(), self._instants.one_sided(t), x)
         parts = self._graph.parts
         sources = [part for part in parts if part.component.role == "source"]
         lost = {part.name: history.lost(part) for part in parts if part not in sources}
@@ -232,12 +232,12 @@ class ModelObserver:
         return made.changed(**{key: float(p[places[key]]) for key in made.declared if key in places})
 
 
-def _carrying(dense: Dense | None) -> Carrying:
+def _carrying(dense: DenseWaves | None) -> WaveReadings:
     """The motion, which knows the waves on their way.
 
     Raises:
         SignalError: there is none.
     """
-    if not isinstance(dense, Carrying):
+    if not isinstance(dense, WaveReadings):
         raise SignalError("A wave is on its way, and one instant does not tell it. Read it of a motion.")
     return dense

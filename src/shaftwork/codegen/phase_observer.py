@@ -11,9 +11,9 @@ import numpy as np
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array, Index
 from shaftwork.codegen.observer import Impact, ModelObserver
-from shaftwork.codegen.stores import Stores
+from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.codegen.timeline import Timeline
-from shaftwork.codegen.waves import Dense
+from shaftwork.codegen.waves import DenseWaves
 from shaftwork.components.base import Component
 
 
@@ -36,7 +36,7 @@ class Stretch:
 
     start: float
     key: Any
-    stores: Stores
+    stores: StateTransfer
     bind: Callable[[], BoundArrays]
     observer: ModelObserver
     instants: Timeline
@@ -114,7 +114,7 @@ class PhaseObserver:
     ) -> None:
         self._names, self._make, self._find_impacts = names, stretches, impacts
 
-    def impacts(self, _dense: Dense) -> tuple[Impact, ...]:
+    def impacts(self, _dense: DenseWaves) -> tuple[Impact, ...]:
         """Instants at which energy may be given or lost at once."""
         return self._find_impacts()
 
@@ -145,21 +145,21 @@ class PhaseObserver:
         """Every quantity that can be read along a part."""
         return self._first.profiles
 
-    def signal(self, name: str, t: Array, x: Array, dense: Dense | None = None) -> Array:
+    def signal(self, name: str, t: Array, x: Array, dense: DenseWaves | None = None) -> Array:
         """(k,) a quantity by its name in `units`."""
         made = np.empty(len(t))
         for observer, places, times, states in self._pieces(t, x):
             made[places] = observer.signal(name, times, states, dense)
         return made
 
-    def profile(self, name: str, t: Array, x: Array, dense: Dense) -> Array:
+    def profile(self, name: str, t: Array, x: Array, dense: DenseWaves) -> Array:
         """(k, places) a quantity along a part by its name in `profiles`."""
         made = np.empty((len(t), len(self.profiles[name][1])))
         for observer, places, times, states in self._pieces(t, x):
             made[places] = observer.profile(name, times, states, dense)
         return made
 
-    def stored(self, t: Array, x: Array, dense: Dense) -> dict[str, Array]:
+    def stored(self, t: Array, x: Array, dense: DenseWaves) -> dict[str, Array]:
         """Stored energy by part."""
         made: dict[str, Array] = {}
         for observer, places, times, states in self._pieces(t, x):

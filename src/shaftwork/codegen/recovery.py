@@ -20,10 +20,10 @@ from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart
 from shaftwork.network.kinds import Kind
 from shaftwork.network.templates import BranchTemplate
 from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.readings import Quantity
+from shaftwork.reduction.observables import Observable
 
 
-class History:
+class BranchHistory:
     """All branch quantities at given times.
 
     Args:
@@ -108,7 +108,7 @@ class History:
         mask[list(self.form.tree.loops)] = False
         return mask
 
-    def quantity(self, wanted: Quantity) -> Array:
+    def quantity(self, wanted: Observable) -> Array:
         """(k,) what a guard reads."""
         match wanted.kind:
             case "across":

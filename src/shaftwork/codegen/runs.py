@@ -29,7 +29,7 @@ SHORTEST = 4
 
 
 @dataclass(frozen=True)
-class Run:
+class Stencil:
     """Equal rows one after the other.
 
     Args:
@@ -48,22 +48,22 @@ def near(distance: int) -> Symbol:
     return Symbol(f"x[i{distance:+d}]", real=True)
 
 
-def runs_of(rows: Rows) -> tuple[Run, ...]:
+def runs_of(rows: Rows) -> tuple[Stencil, ...]:
     """The rows of all states, equal ones together."""
     place = {symbol: k for k, symbol in enumerate(rows.states)}
-    found: list[Run] = []
+    found: list[Stencil] = []
     for i, rate in enumerate(rows.rates):
         read = {symbol: near(place[symbol] - i) for symbol in rate.free_symbols if symbol in place}
         made = rate.xreplace(read)
         if found and found[-1].rate == made:
-            found[-1] = Run(found[-1].first, found[-1].count + 1, made)
+            found[-1] = Stencil(found[-1].first, found[-1].count + 1, made)
         else:
-            found.append(Run(i, 1, made))
+            found.append(Stencil(i, 1, made))
     return tuple(one for run in found for one in ([run] if run.count >= SHORTEST else _apart(run)))
 
 
-def _apart(run: Run) -> Iterator[Run]:
-    yield from (Run(run.first + k, 1, run.rate) for k in range(run.count))
+def _apart(run: Stencil) -> Iterator[Stencil]:
+    yield from (Stencil(run.first + k, 1, run.rate) for k in range(run.count))
 
 
 class _C(RealNumbers, C99CodePrinter):  # type: ignore[misc]
@@ -124,20 +124,20 @@ class _Language:
     single: str
     loop: tuple[str, ...]
     foot: tuple[str, ...]
-    state: Callable[[Run, int], str]
+    state: Callable[[Stencil, int], str]
     view: str = ""
 
 
-def _indexed(run: Run, distance: int) -> str:
+def _indexed(run: Stencil, distance: int) -> str:
     return f"x[{run.first + distance}]" if run.count == 1 else f"x[i{f'{distance:+d}' if distance else ''}]"
 
 
-def _viewed(run: Run, distance: int) -> str:
+def _viewed(run: Stencil, distance: int) -> str:
     first = run.first + distance
     return f"x[{first}]" if run.count == 1 else f"x{first}[i]"
 
 
-def _sliced(run: Run, distance: int) -> str:
+def _sliced(run: Stencil, distance: int) -> str:
     first = run.first + distance
     return f"x[{first}]" if run.count == 1 else f"x[{first}:{first + run.count}]"
 
@@ -256,11 +256,11 @@ class RunProgram:
         self._rows, self._title = rows, title
 
     @cached_property
-    def _runs(self) -> tuple[tuple[Run, ...], dict[Symbol, Expr]]:
+    def _runs(self) -> tuple[tuple[Stencil, ...], dict[Symbol, Expr]]:
         """The runs in terms of what parameters alone tell, and that by symbols."""
         constants = _Constants(self._rows.parameters)
         found = ((run, constants.taken_out(_by_coefficient(run))) for run in runs_of(self._rows))
-        runs = tuple(Run(run.first, run.count, rate) for run, rate in found)
+        runs = tuple(Stencil(run.first, run.count, rate) for run, rate in found)
         return runs, constants.symbols
 
     def source(self, language: str) -> str:
@@ -342,7 +342,7 @@ def _read(rate: Expr) -> list[tuple[Symbol, int]]:
     return sorted(((symbol, int(name[3:-1])) for symbol, name in found), key=lambda pair: pair[1])
 
 
-def _by_coefficient(run: Run) -> Expr:
+def _by_coefficient(run: Stencil) -> Expr:
     """A rate that is linear in the states with what has the same coefficient together; others as they are."""
     states = [symbol for symbol, _ in _read(run.rate)]
     slopes = {symbol: run.rate.diff(symbol) for symbol in states}

@@ -11,9 +11,9 @@ from scipy import sparse
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.linear_readings import LinearReadings, Quantity
+from shaftwork.codegen.linear_readings import LinearQuantity, LinearReadings
 from shaftwork.codegen.observer import ModelObserver
-from shaftwork.codegen.recovery import History
+from shaftwork.codegen.recovery import BranchHistory
 from shaftwork.codegen.wound_shafts import wound_shafts
 from shaftwork.core.errors import SignalError
 from shaftwork.core.hints import hint
@@ -84,22 +84,22 @@ class StartNames:
             for name, value in given.items()
         }
 
-    def quantity(self, name: str) -> Quantity | None:
+    def quantity(self, name: str) -> LinearQuantity | None:
         """A quantity by its name; None for one that is no sum of states."""
         if name in self.tied:
             index = self.tied[name]
             is_across = index in self._form.dependent_across
-            return Quantity(name, is_across, lambda h: (h.across if is_across else h.through)[index])
+            return LinearQuantity(name, is_across, lambda h: (h.across if is_across else h.through)[index])
         quantities = self._observer.quantities
         if name in quantities.signals:
             part, signal = quantities.signals[name]
-            return Quantity(name, signal.kind == "across", lambda h: h.signal(part, signal))
+            return LinearQuantity(name, signal.kind == "across", lambda h: h.signal(part, signal))
         if name in quantities.nodes:
             number = quantities.nodes[name]
-            return Quantity(name, is_across=True, read=lambda h: np.asarray(h.potentials[number]))
+            return LinearQuantity(name, is_across=True, read=lambda h: np.asarray(h.potentials[number]))
         if name in self._along:
             part, profile = self._along[name], self._along[name].component.profiles()[name.rpartition(".")[2]]
-            return Quantity(name, is_across=False, read=lambda h: h.profile(part, profile)[:, 0])
+            return LinearQuantity(name, is_across=False, read=lambda h: h.profile(part, profile)[:, 0])
         return None
 
     def along(self, name: str) -> str | None:
@@ -151,7 +151,9 @@ class StartNames:
             return stored
         wanted = [quantity] if quantity is not None else []
         if part is not None and not is_across:
-            wanted = [Quantity("", is_across=True, read=partial(_potential, node)) for node in part.nodes.values()]
+            wanted = [
+                LinearQuantity("", is_across=True, read=partial(_potential, node)) for node in part.nodes.values()
+            ]
         return self._states_together(self.readings.states_behind(wanted) or range(len(self.places)))
 
     def _stored(self, part: GraphPart, *, is_across: bool) -> list[str]:
@@ -183,7 +185,7 @@ class StartNames:
         return [name for name, place in self.places.items() if found[place]]
 
 
-def _potential(node: int, history: History) -> Array:
+def _potential(node: int, history: BranchHistory) -> Array:
     return np.asarray(history.potentials[node])
 
 

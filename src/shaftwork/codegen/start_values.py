@@ -12,9 +12,9 @@ from scipy import linalg
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.linear_readings import GivenSpeeds, Quantity, Row
+from shaftwork.codegen.linear_readings import GivenSpeeds, LinearQuantity, LinearRow
 from shaftwork.codegen.operating import energy_weights
-from shaftwork.codegen.recovery import History
+from shaftwork.codegen.recovery import BranchHistory
 from shaftwork.codegen.start_names import StartNames
 from shaftwork.codegen.wound_shafts import EndSpeeds, speeds_inside
 from shaftwork.core.errors import ParameterError
@@ -110,7 +110,7 @@ class Start:
         first, last = len(form.across_states), len(form.across_states) + len(form.through_states)
         self._of_kind = {True: numbers < first, False: (numbers >= first) & (numbers < last)}
         self._x, self._fixed = self._rest.copy(), np.zeros(numbers.size, dtype=bool)
-        self._prescribed: list[Quantity] = []
+        self._prescribed: list[LinearQuantity] = []
         direct = {self._names.places[name]: v for name, v in self._values.items() if name in self._names.places}
         self._x[list(direct)], self._fixed[list(direct)] = list(direct.values()), True
 
@@ -163,13 +163,13 @@ class Start:
             size = max(abs(values[name]), np.abs(self._x[list(shaft.states)]).max())
             self._refuse_other(name, float(along[np.abs(along - values[name]).argmax()]), size)
 
-    def _linear(self, name: str) -> Quantity:
+    def _linear(self, name: str) -> LinearQuantity:
         quantity = self._names.quantity(name)
         if quantity is None:
             raise self._refused(name, "is no sum of speeds or of torques")
         return quantity
 
-    def _meet(self, demands: Sequence[tuple[Quantity, Row]], *, is_across: bool) -> None:
+    def _meet(self, demands: Sequence[tuple[LinearQuantity, LinearRow]], *, is_across: bool) -> None:
         """Change the speeds, or the torques, so that quantities have their values and everything else is at rest."""
         of_kind, x = self._of_kind[is_across], self._x
         free = of_kind & ~self._fixed
@@ -186,7 +186,7 @@ class Start:
             if not abs(reached[k] - values[k]) <= self._drift(quantity):
                 self._refuse_other(quantity.name, float(reached[k]), size)
 
-    def _constant(self, quantity: Quantity, row: Row) -> float:
+    def _constant(self, quantity: LinearQuantity, row: LinearRow) -> float:
         """What the states do not add to a quantity.
 
         Raises:
@@ -205,10 +205,10 @@ class Start:
             raise self._refused(name, "follows from speeds")
         return row.prescribed
 
-    def _drift(self, quantity: Quantity) -> float:
+    def _drift(self, quantity: LinearQuantity) -> float:
         """How far sources move a quantity within a time that is none beside any motion."""
         times = np.array([self._t, self._t + AT_ONCE])
-        return float(np.ptp(quantity.read(History(self._bound, times, np.array([self._x, self._x])))))
+        return float(np.ptp(quantity.read(BranchHistory(self._bound, times, np.array([self._x, self._x])))))
 
     def _changes(self, rows: Array, gaps: Array, movable: Any, *, is_across: bool) -> Array:
         """(k,) changes of the movable states with which rows close their gaps and all that can be at rest is.

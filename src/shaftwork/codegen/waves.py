@@ -16,7 +16,7 @@ from shaftwork.network.graph import GraphPart
 from shaftwork.network.templates import BranchTemplate
 
 
-class Dense(Protocol):
+class DenseWaves(Protocol):
     """States, and histories behind them, at any time."""
 
     @property
@@ -30,7 +30,7 @@ class Dense(Protocol):
 
 
 @runtime_checkable
-class Carrying(Protocol):
+class WaveReadings(Protocol):
     """What a motion of a network with lines can tell besides."""
 
     def held(self, times: Array) -> Array:
@@ -94,7 +94,7 @@ def _line(template: BranchTemplate) -> Callable[..., Sequence[float]]:
     return scalar(template.symbols, template.line or ())
 
 
-def along_lines(bound: BoundArrays, part: GraphPart, profile: Profile, t: Array, dense: Carrying) -> Array:
+def along_lines(bound: BoundArrays, part: GraphPart, profile: Profile, t: Array, dense: WaveReadings) -> Array:
     """(k, places) torque or speed along a part that is made of lines.
 
     Law: tau = (f - g) / 2, omega = (f + g) / (2 Z), with f and g the waves that have left the two ends and come by.

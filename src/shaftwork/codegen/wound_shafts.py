@@ -11,7 +11,7 @@ import numpy as np
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.linear_readings import GivenSpeeds
-from shaftwork.codegen.recovery import History
+from shaftwork.codegen.recovery import BranchHistory
 from shaftwork.components.base import Profile
 from shaftwork.network.graph import GraphPart
 from shaftwork.network.kinds import Kind
@@ -43,7 +43,7 @@ class WoundShaft:
 
         What is read at the very ends counts inertia there, so it is not read; a store there has the damper of the next.
         """
-        columns = History(bound, np.array([t]), x[None, :]).profile(self.part, self.profile)[0]
+        columns = BranchHistory(bound, np.array([t]), x[None, :]).profile(self.part, self.profile)[0]
         inside, states = columns[1:-1], list(self.states)
         if len(inside) == len(states):
             return np.asarray(inside)
@@ -84,7 +84,7 @@ class EndSpeeds:
         return float(self._speeds[first]), float(self._speeds[last])
 
 
-def _potentials(history: History) -> Array:
+def _potentials(history: BranchHistory) -> Array:
     return history.potentials
 
 

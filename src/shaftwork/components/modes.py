@@ -184,7 +184,7 @@ class Modes:
 
 
 @dataclass(frozen=True)
-class Choice:
+class ModeChoice:
     """What is chosen for an element when branches are made: a form, and a number or None for a parameter.
 
     Args:

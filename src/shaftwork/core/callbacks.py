@@ -16,7 +16,7 @@ class _Carried(BaseException):
         self.error = error
 
 
-class Told:
+class Callback:
     """A user's function that is told of a run, for engines to call.
 
     Args:

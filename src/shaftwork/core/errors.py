@@ -11,7 +11,7 @@ Severity = Literal["error", "warning", "note"]
 
 
 @dataclass(frozen=True)
-class Problem:
+class Diagnostic:
     """One thing that is wrong with, or worth saying about, a network.
 
     Args:
@@ -45,7 +45,7 @@ class ParameterError(ShaftworkError, ValueError):
 class NetworkError(ShaftworkError, ValueError):
     """A network cannot be assembled; `problems` holds every reason found, not only the first."""
 
-    def __init__(self, title: str, problems: tuple[Problem, ...]) -> None:
+    def __init__(self, title: str, problems: tuple[Diagnostic, ...]) -> None:
         self.problems = problems
         count = "1 problem" if len(problems) == 1 else f"{len(problems)} problems"
         lines = [f"{title}: {count}", *(f"  {number}. {problem}" for number, problem in enumerate(problems, 1))]

@@ -14,7 +14,7 @@ from sympy import Add, Expr, Integer, Mul
 
 from shaftwork.components.branches import ACROSS, HISTORY, INTEGRAL
 from shaftwork.components.laws import t as TIME
-from shaftwork.equations.quantities import Flow, Quantities, rate_of
+from shaftwork.equations.quantities import Quantities, ThroughQuantity, rate_of
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm
@@ -23,7 +23,7 @@ from shaftwork.reduction.gains import Number, simplified
 Terms = tuple[Expr, ...]
 
 
-class Group(NamedTuple):
+class FactoredTerms(NamedTuple):
     """A common factor and the terms that it multiplies."""
 
     factor: Expr
@@ -34,12 +34,12 @@ class Sides(NamedTuple):
     """Left side and right side of a row."""
 
     left: Expr
-    groups: tuple[Group, ...]
+    groups: tuple[FactoredTerms, ...]
 
 
 def sides(left: Expr, terms: Iterable[Expr]) -> Sides:
     """A row without a common factor."""
-    return Sides(tidy(left), (Group(Integer(1), rising_first(terms)),))
+    return Sides(tidy(left), (FactoredTerms(Integer(1), rising_first(terms)),))
 
 
 def rising_first(terms: Iterable[Expr]) -> Terms:
@@ -95,9 +95,9 @@ class Assembly:
         return made.plus, made.minus
 
     @cached_property
-    def at_node(self) -> tuple[tuple[Flow | int, ...], ...]:
+    def at_node(self) -> tuple[tuple[ThroughQuantity | int, ...], ...]:
         """For each node the flows, across stores and couplings that touch it, in the order of the parts."""
-        found: list[dict[Flow | int, None]] = [{} for _ in self.form.graph.nodes]
+        found: list[dict[ThroughQuantity | int, None]] = [{} for _ in self.form.graph.nodes]
         for branch in self.form.graph.branches:
             item = self.quantities.flow_of.get(branch.index, branch.index)
             touched = [node for _, plus, minus in branch.terms for node in (plus, minus)]
@@ -111,7 +111,7 @@ class Assembly:
         own: list[Expr] = []
         terms: list[Expr] = []
         for item in self.at_node[node]:
-            if isinstance(item, Flow):
+            if isinstance(item, ThroughQuantity):
                 terms.append((1 if item.minus == node else -1) * item.sign * self.quantities.through(item))
             elif self.ends(item) == (node, GROUND):
                 own.append(self.quantities.law(item))
@@ -197,7 +197,7 @@ class Assembly:
         left = [term for term in terms if not term.could_extract_minus_sign()]
         return sides(Add(*left), (-term for term in terms if term.could_extract_minus_sign()))
 
-    def law_of_flow(self, flow: Flow, across: Expr | None = None) -> Sides:
+    def law_of_flow(self, flow: ThroughQuantity, across: Expr | None = None) -> Sides:
         """A flow's through variable by the laws of its branches."""
         terms = (flow.sign * self.through_law(branch, across) for branch in flow.branches)
         return sides(self.quantities.through(flow), terms)
@@ -262,7 +262,7 @@ class Assembly:
 
     def out_of(self, tree: int, left_out: Kind | None = None) -> Terms:
         """Through variables that drive a tree branch: minus those of the links in its cutset."""
-        terms: dict[Flow | int, Terms] = {}
+        terms: dict[ThroughQuantity | int, Terms] = {}
         for link, gain in self.cutsets.get(tree, ()):
             if self.kind(link) is left_out:
                 continue

@@ -14,11 +14,11 @@ from sympy import Add, Expr, Float, Integer, Symbol, preorder_traversal
 
 from shaftwork.core.domains import ELECTRICAL, ROTATION, TRANSLATION
 from shaftwork.core.errors import CompileError
-from shaftwork.equations.assembly import Group, Sides, sides, tidy
+from shaftwork.equations.assembly import FactoredTerms, Sides, sides, tidy
 from shaftwork.equations.notation import INDEX_CLOSES, INDEX_OPENS
 from shaftwork.equations.notations import in_letters
 from shaftwork.equations.printing import LINE_WIDTH, Line, Writer, with_rates
-from shaftwork.equations.quantities import Flow, rate_of
+from shaftwork.equations.quantities import ThroughQuantity, rate_of
 from shaftwork.equations.second_order import SecondOrder
 from shaftwork.equations.spelling import in_text
 from shaftwork.equations.sums import MEANING, WEIGHTS, Sums, sums_of
@@ -195,7 +195,7 @@ class Blocks:
         return tuple(made for made in self.sums if {nodes[made.part.nodes[end]] for end in ("a", "b")} <= set(free))
 
     def _motion(self, form: SecondOrder, row: int) -> Line:
-        left = self.writer.pieces((Group(Integer(1), tuple(map(tidy, form.terms(row)))),))
+        left = self.writer.pieces((FactoredTerms(Integer(1), tuple(map(tidy, form.terms(row)))),))
         force = form.forces[row]
         right = self.writer.pieces(sides(Integer(0), force.args if force.is_Add else (force,)).groups) or ("0",)
         return Line("", (*left, f"= {right[0]}", *right[1:]), relation="")
@@ -268,7 +268,7 @@ class Blocks:
         letters = self.equations.assembly.quantities.across(self.equations.assembly.ends(source)).free_symbols
         return any(not letters.isdisjoint(row.expression.free_symbols) for row in rows)
 
-    def law(self, flow: Flow, known: Mapping[Expr, Expr]) -> Iterator[Line]:
+    def law(self, flow: ThroughQuantity, known: Mapping[Expr, Expr]) -> Iterator[Line]:
         """A flow's law, and the letters in it; nothing where the law is a parameter alone."""
         symbol = self.equations.assembly.quantities.through(flow)
         shared, terms = self._split[flow]
@@ -278,7 +278,7 @@ class Blocks:
                 yield self.writer.line(_in_order(letter, expression.xreplace(known)))
 
     @cached_property
-    def _split(self) -> dict[Flow, tuple[tuple[tuple[Symbol, Expr], ...], tuple[Expr, ...]]]:
+    def _split(self) -> dict[ThroughQuantity, tuple[tuple[tuple[Symbol, Expr], ...], tuple[Expr, ...]]]:
         """For each flow the letters in its law and the terms that contain them."""
         assembly = self.equations.assembly
         made = {}

@@ -27,7 +27,7 @@ from shaftwork.equations.assembly import sides, terms_of
 from shaftwork.equations.notation import Letter, without_marks
 from shaftwork.equations.notations import in_letters, inverses_of
 from shaftwork.equations.printing import Line, Writer, with_rates
-from shaftwork.equations.quantities import Flow
+from shaftwork.equations.quantities import ThroughQuantity
 from shaftwork.network.graph import GROUND, GraphPart
 
 if TYPE_CHECKING:  # the records make these
@@ -113,9 +113,11 @@ class Field:
                 ends = (("a", -1, Integer(0)), ("b", 1, other.symbol("length")))
                 yield from (sign * other.torque.subs(X, x) for end, sign, x in ends if other.part.nodes[end] == node)
         for item in assembly.at_node[node]:
-            if isinstance(graph.part_of(item.branches[0] if isinstance(item, Flow) else item).component, Shaft):
+            if isinstance(
+                graph.part_of(item.branches[0] if isinstance(item, ThroughQuantity) else item).component, Shaft
+            ):
                 continue
-            if isinstance(item, Flow):
+            if isinstance(item, ThroughQuantity):
                 yield (1 if item.minus == node else -1) * item.sign * assembly.quantities.through(item)
             else:
                 yield from (-gain * assembly.stored(item) for gain in assembly.incidence(item, node))

@@ -8,7 +8,7 @@ from functools import cached_property, partial
 from sympy import Add, Expr, Symbol
 
 from shaftwork.equations.assembly import Assembly, Sides, sides
-from shaftwork.equations.quantities import Flow, rate_of
+from shaftwork.equations.quantities import ThroughQuantity, rate_of
 from shaftwork.equations.records import Equations
 from shaftwork.equations.rows import (
     CouplingEquation,
@@ -18,7 +18,7 @@ from shaftwork.equations.rows import (
     NodeEquation,
     StateEquation,
 )
-from shaftwork.equations.solution import SolvedForm, System
+from shaftwork.equations.solution import EliminationSystem, SolvedForm
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm, branch_name
@@ -32,7 +32,7 @@ def kirchhoff(form: StateForm) -> Equations:
 
     Source: Popenda 2019, (1)-(4).
     """
-    writer = _Writer(form)
+    writer = _KirchhoffWriter(form)
     return Equations(
         form,
         writer.assembly,
@@ -46,7 +46,7 @@ def kirchhoff(form: StateForm) -> Equations:
     )
 
 
-class _Writer:
+class _KirchhoffWriter:
     """Makes the records; all sympy work is put off by partial application."""
 
     def __init__(self, form: StateForm) -> None:
@@ -69,7 +69,7 @@ class _Writer:
     def nodes(self) -> Iterator[NodeEquation]:
         for number, name in enumerate(self.graph.nodes):
             items = self.assembly.at_node[number]
-            branches = [k for item in items for k in (item.branches if isinstance(item, Flow) else (item,))]
+            branches = [k for item in items for k in (item.branches if isinstance(item, ThroughQuantity) else (item,))]
             parts, kept, _ = self.origin(branches)
             make, taken = partial(self.assembly.balance, number), partial(self._taken, number, kept)
             yield NodeEquation(parts, kept, (name,), make, name, taken)
@@ -115,10 +115,10 @@ class _Writer:
                 row, coupled = partial(_row, system, branch), partial(_coupled, system, branch)
                 yield StateEquation(*origin, row, *named, partial(_solved, system, branch), coupled)
 
-    def _speeds(self) -> System:
+    def _speeds(self) -> EliminationSystem:
         return self.solution.speeds
 
-    def _torques(self) -> System:
+    def _torques(self) -> EliminationSystem:
         return self.solution.torques
 
     def _integral_row(self, branch: int) -> Sides:
@@ -230,15 +230,15 @@ def _always() -> bool:
     return True
 
 
-def _row(system: Callable[[], System], branch: int) -> Sides:
+def _row(system: Callable[[], EliminationSystem], branch: int) -> Sides:
     return system().row(branch)
 
 
-def _solved(system: Callable[[], System], branch: int) -> bool:
+def _solved(system: Callable[[], EliminationSystem], branch: int) -> bool:
     return system().solved(branch)
 
 
-def _coupled(system: Callable[[], System], branch: int) -> Sides:
+def _coupled(system: Callable[[], EliminationSystem], branch: int) -> Sides:
     return system().coupled(branch)
 
 

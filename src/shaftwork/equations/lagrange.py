@@ -17,7 +17,7 @@ from sympy import Add, Expr, Integer, Rational, Symbol, cancel, expand
 
 from shaftwork.components.branches import ACROSS, HISTORY, INTEGRAL
 from shaftwork.components.laws import t as TIME
-from shaftwork.equations.assembly import Group, Sides, rising_first, sides, terms_of, tidy
+from shaftwork.equations.assembly import FactoredTerms, Sides, rising_first, sides, terms_of, tidy
 from shaftwork.equations.coordinates import Coordinates, coordinates, is_prescribed
 from shaftwork.equations.motion import Motion
 from shaftwork.equations.quantities import rate_of
@@ -49,9 +49,9 @@ class Square(NamedTuple):
         """The whole term."""
         return Rational(1, 2) * self.coefficient * self.along**2
 
-    def pull(self, symbol: Symbol) -> Group:
+    def pull(self, symbol: Symbol) -> FactoredTerms:
         """Minus the term differentiated: a torque."""
-        return Group(tidy(-self.coefficient * self.along.diff(symbol)), rising_first(terms_of(self.along)))
+        return FactoredTerms(tidy(-self.coefficient * self.along.diff(symbol)), rising_first(terms_of(self.along)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,10 +183,10 @@ class Lagrangian:
 
 def lagrangian(equations: Equations) -> Lagrangian:
     """Lagrange's equations of the network that Kirchhoff's are given of; of these only the network is read."""
-    return _Writer(equations).made()
+    return _LagrangeWriter(equations).made()
 
 
-class Torque(NamedTuple):
+class GeneralisedTorque(NamedTuple):
     """What a branch takes from nodes, and the position on which that does work.
 
     Args:
@@ -200,7 +200,7 @@ class Torque(NamedTuple):
     along: Expr
 
 
-class _Writer:
+class _LagrangeWriter:
     def __init__(self, equations: Equations) -> None:
         self.equations, self.quantities = equations, equations.assembly.quantities
         self.graph = self.quantities.graph
@@ -209,7 +209,7 @@ class _Writer:
         self.inertias: list[Square] = []
         self.springs: list[Square] = []
         self.dampers: list[Square] = []
-        self.torques: list[Torque] = []
+        self.torques: list[GeneralisedTorque] = []
         self.constraints: list[Constraint] = []
         self.laws: dict[Symbol, Expr] = {}
 
@@ -257,12 +257,14 @@ class _Writer:
             case Kind.ACROSS_SOURCE if not is_prescribed(branch):
                 reaction, sign = self._reaction(branch.index), self.quantities.flow_of[branch.index].sign
                 self._constrain(branch, reaction, self.motion.speed(branch), self.motion.of(law))
-                self.torques.append(Torque(branch.index, sign * reaction, self.motion.twist(branch)))
+                self.torques.append(GeneralisedTorque(branch.index, sign * reaction, self.motion.twist(branch)))
             case Kind.COUPLING if branch.template.through:
                 reaction = self._reaction(branch.index)
                 speeds = self.coordinates.rate(self.motion.summed(branch, branch.terms))
                 self._constrain(branch, reaction, speeds, Integer(0))
-                self.torques.append(Torque(branch.index, reaction, self.motion.summed(branch, branch.balances)))
+                self.torques.append(
+                    GeneralisedTorque(branch.index, reaction, self.motion.summed(branch, branch.balances))
+                )
 
     def _enter_law(self, branch: GraphBranch, law: Expr) -> None:
         """What is linear in the twist is an energy; what is left a torque, by its symbol where it has one."""
@@ -282,7 +284,7 @@ class _Writer:
             if symbol != flow.sign * size:
                 self.laws[symbol] = flow.sign * size
             size = flow.sign * symbol
-        self.torques.append(Torque(branch.index, size, twist))
+        self.torques.append(GeneralisedTorque(branch.index, size, twist))
 
     def _history(self, branch: GraphBranch) -> Expr:
         """What arrives at an end of a line: what left the other end a delay ago."""
@@ -315,7 +317,7 @@ class _Writer:
             origin = (tuple(parts), tuple(branches), tuple(moved[symbol]))
             yield MotionEquation(*origin, make, self.graph.nodes[node], symbol, force, moved[symbol])
 
-    def _sides(self, velocity: Symbol, inertias: list[Square], pulls: list[Group], force: Expr) -> Sides:
+    def _sides(self, velocity: Symbol, inertias: list[Square], pulls: list[FactoredTerms], force: Expr) -> Sides:
         """The rate of the momentum dT/dq', sorted by accelerations; what is prescribed of it counts as a torque."""
         coefficients: dict[Symbol, list[Expr]] = {}
         right = [*terms_of(force)]
@@ -344,7 +346,7 @@ def _moved(at: Coordinates) -> dict[Symbol, dict[str, Expr]]:
     return moved
 
 
-S = TypeVar("S", Square, Torque)
+S = TypeVar("S", Square, GeneralisedTorque)
 
 
 def _by_symbol(found: Iterable[S], symbols: Iterable[Symbol]) -> dict[Symbol, list[S]]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from sympy import Integer
 
-from shaftwork.equations.assembly import Group, Sides, sides, terms_of
+from shaftwork.equations.assembly import FactoredTerms, Sides, sides, terms_of
 from shaftwork.equations.blocks import Block, Blocks
 from shaftwork.equations.nomenclature import nomenclature, unit
 from shaftwork.equations.printing import Line
@@ -64,10 +64,12 @@ def _names(lagrangian: Lagrangian) -> set[str]:
 
 
 def _blocks(lagrangian: Lagrangian, *, values: bool) -> tuple[Block, ...]:
-    return tuple(block for block in _Blocks(lagrangian, Blocks(lagrangian.kirchhoff, values)).made() if block.lines)
+    return tuple(
+        block for block in _LagrangeBlocks(lagrangian, Blocks(lagrangian.kirchhoff, values)).made() if block.lines
+    )
 
 
-class _Blocks:
+class _LagrangeBlocks:
     def __init__(self, lagrangian: Lagrangian, blocks: Blocks) -> None:
         self.lagrangian, self.blocks, self.writer = lagrangian, blocks, blocks.writer
         self.graph = blocks.equations.form.graph
@@ -121,7 +123,7 @@ class _Blocks:
         """A sum of squares, those of a shaft with weights in one."""
         parts = [summed.part for summed in self._sums]
         terms = [square.energy for square in squares if self.graph.part_of(square.branch) not in parts]
-        pieces = [*self.writer.pieces((Group(Integer(1), tuple(terms)),))]
+        pieces = [*self.writer.pieces((FactoredTerms(Integer(1), tuple(terms)),))]
         pieces += [f"+ {piece}" for summed in self._sums for piece in of(summed)]
         if pieces:
             yield Line(letter, (pieces[0].removeprefix("+ "), *pieces[1:]))

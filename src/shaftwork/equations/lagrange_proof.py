@@ -35,7 +35,7 @@ CLOSE = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class LagrangeComparison:
     """Equations of Kirchhoff's beside what Lagrange's say.
 
     Args:
@@ -68,7 +68,7 @@ class Proof:
 
     name: str
     phase: str
-    rows: tuple[Comparison, ...]
+    rows: tuple[LagrangeComparison, ...]
     reactions: tuple[Symbol, ...]
     left: int
     given: Mapping[Symbol, Expr]
@@ -95,7 +95,7 @@ class Proof:
         return "\n".join(lines)
 
 
-def _sum_of(row: Comparison) -> str:
+def _sum_of(row: LagrangeComparison) -> str:
     """The balances that make an equation of motion, by the names of their nodes."""
     named = zip((node for made in row.kirchhoff for node in made.nodes), row.factors, strict=True)
     return " + ".join(node if factor == 1 else f"{_bracketed(factor)} * {node}" for node, factor in named)
@@ -120,7 +120,7 @@ class _Comparisons:
         self.decided = tuple(Symbol(name, real=True) for name in self.kirchhoff.form.tree.frozen)
         self.given = self._given() if self.decided else {}
 
-    def rows(self) -> Iterator[Comparison]:
+    def rows(self) -> Iterator[LagrangeComparison]:
         """All comparisons: equations of motion, loops, couplings, laws."""
         balances = {row.node: row for row in self.kirchhoff.nodes}
         for equation in self.lagrangian.equations:
@@ -128,13 +128,13 @@ class _Comparisons:
             nodes = tuple(balances[node] for node in moved)
             works = (factor * self.known(balances[node].expression) for node, factor in moved.items())
             difference = self.zero(Add(*works) - equation.expression)
-            yield Comparison("motion", equation.coordinate.name, nodes, tuple(moved.values()), difference)
+            yield LagrangeComparison("motion", equation.coordinate.name, nodes, tuple(moved.values()), difference)
         for kind, row, residual in self.kinematic:
-            yield Comparison(kind, ", ".join(row.parts), (row,), (Integer(1),), self.zero(residual))
+            yield LagrangeComparison(kind, ", ".join(row.parts), (row,), (Integer(1),), self.zero(residual))
         for row in self.kirchhoff.laws:
             left = self.known(row.left.xreplace(dict(self.lagrangian.laws)))
             difference = self.zero(self.known(row.right) - left - self._imposed(row))
-            yield Comparison("law", ", ".join(row.parts), (row,), (Integer(1),), difference)
+            yield LagrangeComparison("law", ", ".join(row.parts), (row,), (Integer(1),), difference)
 
     def known(self, expression: Expr) -> Expr:
         """An expression of Kirchhoff's equations in coordinates and rates."""

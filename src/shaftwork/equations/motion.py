@@ -10,7 +10,7 @@ from sympy import Add, Expr, Symbol
 
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.equations.coordinates import Coordinates, is_prescribed
-from shaftwork.equations.quantities import Flow, Quantities, rate_of
+from shaftwork.equations.quantities import Quantities, ThroughQuantity, rate_of
 from shaftwork.network.graph import CircuitGraph, GraphBranch
 from shaftwork.network.kinds import Kind
 
@@ -66,7 +66,7 @@ class Motion:
                 return law * self.speed(branch)
         return self.by_law(branch, law)
 
-    def of_flows(self, flows: Iterable[Flow]) -> dict[Symbol, Expr]:
+    def of_flows(self, flows: Iterable[ThroughQuantity]) -> dict[Symbol, Expr]:
         """What parts let through by their laws; what prescribes a speed lets through whatever it takes."""
         made: dict[Symbol, Expr] = {}
         for flow in flows:

@@ -11,7 +11,7 @@ from sympy import Expr, Float, Heaviside, Integer, Piecewise, Pow, Symbol, true
 from sympy.printing.latex import LatexPrinter
 
 from shaftwork.components.laws import t as TIME
-from shaftwork.equations.assembly import Group, Sides, rising_first
+from shaftwork.equations.assembly import FactoredTerms, Sides, rising_first
 from shaftwork.equations.quantities import rate_of
 from shaftwork.equations.widths import printed_width
 
@@ -160,15 +160,15 @@ class Writer:
         """A row of the equations."""
         pieces = self.pieces(sides.groups)
         terms = sorted(sides.left.args, key=self._rank) if sides.left.is_Add else [sides.left]
-        left = " ".join(self.pieces((Group(Integer(1), tuple(terms)),)))
+        left = " ".join(self.pieces((FactoredTerms(Integer(1), tuple(terms)),)))
         return Line(left, pieces or ("0",), remark)
 
-    def pieces(self, groups: Iterable[Group]) -> tuple[str, ...]:
+    def pieces(self, groups: Iterable[FactoredTerms]) -> tuple[str, ...]:
         """The terms of all groups, each with its sign, the first without a plus."""
         made = [piece for group in groups for piece in self._group(group)]
         return (made[0].removeprefix("+ "), *made[1:]) if made else ()
 
-    def _group(self, group: Group) -> list[str]:
+    def _group(self, group: FactoredTerms) -> list[str]:
         """The pieces of a group, each with its sign."""
         factor, terms = group
         if len(terms) < 2:

@@ -59,7 +59,7 @@ def refuse_controlled(graph: CircuitGraph) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class Flow:
+class ThroughQuantity:
     """What a part lets through between two nodes: its parallel branches together, under one symbol.
 
     Args:
@@ -105,12 +105,12 @@ class Quantities:
     graph: CircuitGraph
 
     @cached_property
-    def flows(self) -> tuple[Flow, ...]:
+    def flows(self) -> tuple[ThroughQuantity, ...]:
         """Every flow of every part, in the order of the parts."""
         return tuple(flow for number in range(len(self.graph.parts)) for flow in self._flows_of(number))
 
     @cached_property
-    def flow_of(self) -> dict[int, Flow]:
+    def flow_of(self) -> dict[int, ThroughQuantity]:
         """The flow that a branch belongs to; across stores and couplings belong to none."""
         return {branch: flow for flow in self.flows for branch in flow.branches}
 
@@ -201,7 +201,7 @@ class Quantities:
             name += f"_{self._label(made)}" if sum(kind is Kind.ACROSS_SOURCE for kind in siblings) > 1 else ""
         return Symbol(name, real=True)
 
-    def through(self, flow: Flow) -> Symbol:
+    def through(self, flow: ThroughQuantity) -> Symbol:
         """The through variable of a flow: a state, where it is a lone store; a parameter, where that is all its law."""
         first = self.graph.branches[flow.branches[0]]
         if len(flow.branches) == 1:
@@ -310,7 +310,7 @@ class Quantities:
         name = f"{owner}.{quantity.name}{ending}"
         return Symbol(f"{quantity.name}{ending}({owner})" if name in self.graph.parameters else name, real=True)
 
-    def _flows_of(self, number: int) -> Iterator[Flow]:
+    def _flows_of(self, number: int) -> Iterator[ThroughQuantity]:
         part = self.graph.parts[number]
         together: dict[tuple[int, int, bool], list[int]] = {}
         for index in part.branches:
@@ -328,7 +328,7 @@ class Quantities:
             made = label.removeprefix(f"{self.domain((plus, minus)).through.name}_") if alike else brief
             if alike and len(branches) > 1:  # the label is that of the store, which is only a part of it
                 made = f"total_{brief}"
-            yield Flow(number, tuple(branches), plus, minus, self._sign(part, branches), made)
+            yield ThroughQuantity(number, tuple(branches), plus, minus, self._sign(part, branches), made)
 
     def _sign(self, part: GraphPart, branches: list[int]) -> int:
         """The sign of the signal of the same name, so that both mean the same torque."""

@@ -9,7 +9,7 @@ from typing import Literal
 
 from sympy import Add, Eq, Expr, Symbol
 
-from shaftwork.equations.assembly import Group, Sides
+from shaftwork.equations.assembly import FactoredTerms, Sides
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class Row:
         return self.sides.left
 
     @property
-    def groups(self) -> tuple[Group, ...]:
+    def groups(self) -> tuple[FactoredTerms, ...]:
         """The right side as groups of terms under a common factor."""
         return self.sides.groups
 

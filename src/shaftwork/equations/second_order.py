@@ -88,7 +88,7 @@ def second_order(graph: CircuitGraph) -> SecondOrder:
             f"{', '.join(electrical[:6])}{', ...' if len(electrical) > 6 else ''}.{INSTEAD}"
         )
     refuse_controlled(graph)
-    return _Writer(graph).made()
+    return _SecondOrderWriter(graph).made()
 
 
 class _Positions:
@@ -127,7 +127,7 @@ class _Positions:
         self.solved.update({node: self.reduce(row) for node, row in self.solved.items() if pivot in row})
 
 
-class _Writer:
+class _SecondOrderWriter:
     def __init__(self, graph: CircuitGraph) -> None:
         self.graph, self.quantities = graph, Quantities(graph)
         self.positions = _Positions(graph)

@@ -36,7 +36,7 @@ class Slope(NamedTuple):
     jumps: Expr | None
 
 
-class Slopes:
+class LawSlopes:
     """The slopes of the laws of a network.
 
     Args:

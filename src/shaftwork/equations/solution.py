@@ -14,7 +14,7 @@ from sympy import Add, Expr, Integer, count_ops, together
 
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import slope
-from shaftwork.equations.assembly import Assembly, Group, Sides, Terms, rising_first, sides
+from shaftwork.equations.assembly import Assembly, FactoredTerms, Sides, Terms, rising_first, sides
 from shaftwork.equations.quantities import rate_of
 from shaftwork.network.kinds import Kind
 from shaftwork.reduction.blocks import LARGEST_BLOCK, solve_blocks
@@ -23,7 +23,7 @@ Matrix = Mapping[tuple[int, int], Expr]
 
 
 @dataclass(frozen=True, eq=False)
-class System:
+class EliminationSystem:
     """Linear equations for some unknowns.
 
     Args:
@@ -84,7 +84,7 @@ class SolvedForm:
     assembly: Assembly
 
     @cached_property
-    def speeds(self) -> System:
+    def speeds(self) -> EliminationSystem:
         """d(across)/dt of the tree's stores: referred inertias times accelerations."""
         form = self.assembly.form
         matrix = self._congruence(form.across_states, form.dependent_across)
@@ -96,10 +96,10 @@ class SolvedForm:
         def symbol(tree: int) -> Expr:
             return rate_of(self.assembly.quantities.across(self.assembly.ends(tree)))
 
-        return System(form.across_states, matrix, right, symbol)
+        return EliminationSystem(form.across_states, matrix, right, symbol)
 
     @cached_property
-    def torques(self) -> System:
+    def torques(self) -> EliminationSystem:
         """d(through)/dt of the links' stores: compliances times torque rates."""
         assembly, form = self.assembly, self.assembly.form
         matrix: dict[tuple[int, int], Expr] = {
@@ -120,10 +120,10 @@ class SolvedForm:
         def symbol(link: int) -> Expr:
             return rate_of(assembly.quantities.store(link))
 
-        return System(form.through_states, matrix, right, symbol)
+        return EliminationSystem(form.through_states, matrix, right, symbol)
 
     @cached_property
-    def algebraic(self) -> System:
+    def algebraic(self) -> EliminationSystem:
         """Across variables of conductances between nodes without a store."""
         assembly, form = self.assembly, self.assembly.form
         matrix = self._congruence(form.tree_conductances, form.link_conductances)
@@ -139,7 +139,7 @@ class SolvedForm:
         def symbol(tree: int) -> Expr:
             return assembly.quantities.across(assembly.ends(tree))
 
-        return System(form.tree_conductances, matrix, right, symbol)
+        return EliminationSystem(form.tree_conductances, matrix, right, symbol)
 
     def _congruence(self, unknowns: tuple[int, ...], links: tuple[int, ...]) -> Matrix:
         """Coefficients of tree branches plus those of links referred to them."""
@@ -177,18 +177,18 @@ class SolvedForm:
         return tuple(term for term in terms if term != 0)
 
 
-def _grouped(factor: Expr, terms: Terms) -> Iterator[Group]:
+def _grouped(factor: Expr, terms: Terms) -> Iterator[FactoredTerms]:
     """A factor of terms as groups: a sum whose own factor cancels a part of the other one stands beside the bracket."""
-    beside: list[Group] = []
+    beside: list[FactoredTerms] = []
     within: list[Expr] = []
     for term in terms:
         sums = [part for part in term.args if part.is_Add] if term.is_Mul else []
         own = factor * term / sums[0] if len(sums) == 1 else factor
         if len(sums) == 1 and not factor.free_symbols <= own.free_symbols:
-            beside.append(Group(own, rising_first(sums[0].args)))
+            beside.append(FactoredTerms(own, rising_first(sums[0].args)))
         else:
             within.append(term)
-    yield Group(factor, rising_first(within))
+    yield FactoredTerms(factor, rising_first(within))
     yield from beside
 
 

@@ -11,16 +11,16 @@ from sympy import Add, Dummy, Expr, ImmutableMatrix, Integer, Symbol, cancel
 
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError, SignalError, no_quantity
-from shaftwork.equations.slopes import Slope, Slopes
+from shaftwork.equations.slopes import LawSlopes, Slope
 from shaftwork.equations.tableau import refuse_waves
 from shaftwork.network.graph import GraphBranch
 from shaftwork.network.kinds import Kind
 from shaftwork.reduction.blocks import BlockTooLargeError
-from shaftwork.reduction.expressed import Expressed
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.inputs import places_of, source_inputs, with_inputs
 from shaftwork.reduction.names import Names
 from shaftwork.reduction.rows import explicit_rows
+from shaftwork.reduction.symbolic_observables import SymbolicObservables
 
 if TYPE_CHECKING:  # the records make matrices through this module
     from shaftwork.equations.records import Equations
@@ -73,7 +73,7 @@ def state_space(
     """
     refuse_waves(equations.form)
     named = source_inputs(equations.form.graph) if inputs is None else _listed(inputs)
-    slopes = Slopes(equations.assembly.quantities)
+    slopes = LawSlopes(equations.assembly.quantities)
     places = places_of(equations.form.graph, named)
     form, branches = with_inputs(_near(equations, slopes), places)
     values = [(Dummy(real=True), Dummy(real=True)) for _ in places]
@@ -90,7 +90,7 @@ def state_space(
             "solves any, or compile().linearize() for numbers."
         ) from None
     wanted = tuple(state.name for state in form.states) if outputs is None else _listed(outputs)
-    read = Expressed(form, rows)
+    read = SymbolicObservables(form, rows)
     groups = rows.states, [value for value, _ in values], [rate for _, rate in values]
     A, B, B1 = (_slopes(rows.rates, group) for group in groups)
     C, D, D1 = (_slopes([_quantity(form, read, name) for name in wanted], group) for group in groups)
@@ -103,7 +103,7 @@ def _listed(names: str | Sequence[str]) -> tuple[str, ...]:
     return (names,) if isinstance(names, str) else tuple(names)
 
 
-def _near(equations: Equations, slopes: Slopes) -> StateForm:
+def _near(equations: Equations, slopes: LawSlopes) -> StateForm:
     """The form with laws by their slopes, in letters of the network, and sources at zero."""
     quantities, laws = equations.assembly.quantities, dict[int, Expr]()
     for branch in equations.form.graph.branches:
@@ -130,7 +130,7 @@ def _with_laws(form: StateForm, laws: Mapping[int, Expr]) -> StateForm:
     return dataclasses.replace(form, graph=dataclasses.replace(form.graph, branches=tuple(branches)))
 
 
-def _quantity(form: StateForm, read: Expressed, name: str) -> Expr:
+def _quantity(form: StateForm, read: SymbolicObservables, name: str) -> Expr:
     """A quantity in states, inputs and their rates.
 
     Raises:

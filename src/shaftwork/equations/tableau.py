@@ -19,7 +19,7 @@ from shaftwork.components.base import Signal
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.core.errors import CompileError
 from shaftwork.equations.assembly import Assembly
-from shaftwork.equations.slopes import Slopes
+from shaftwork.equations.slopes import LawSlopes
 from shaftwork.network.controlled import Reading, readings_of
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
 from shaftwork.network.kinds import Kind
@@ -66,7 +66,7 @@ class Tableau:
     """
 
     assembly: Assembly
-    slopes: Slopes
+    slopes: LawSlopes
 
     @property
     def _graph(self) -> CircuitGraph:

@@ -20,7 +20,7 @@ from sympy import Add, Expr, Float, Integer, Poly, Rational, Symbol, lcm, prime,
 from shaftwork.core.errors import CompileError, ParameterError, SignalError, no_quantity
 from shaftwork.equations.determinants import MOST_TERMS, TooManyTermsError, determinant
 from shaftwork.equations.point_values import DIGITS, Numbers, Values, exact, fraction
-from shaftwork.equations.slopes import Slope, Slopes
+from shaftwork.equations.slopes import LawSlopes, Slope
 from shaftwork.equations.tableau import S, Sum, Tableau, Unknown, refuse_waves
 from shaftwork.reduction.inputs import Place, places_of
 from shaftwork.reduction.names import Names
@@ -186,7 +186,7 @@ def transfer_function(
     if not values and (at is not None or t is not None):
         raise ParameterError("at and t put numbers in. Take values=True, or numeric(at=...) of what this makes.")
     (place,) = places_of(equations.form.graph, names[:1])
-    slopes = Slopes(equations.assembly.quantities)
+    slopes = LawSlopes(equations.assembly.quantities)
     tableau = Tableau(equations.assembly, slopes)
     read, direct = _output(equations, tableau, place, names[1])
     rows = tableau.rows(read)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from sympy import Add, Expr, Integer, Symbol, default_sort_key
 
-from shaftwork.equations.assembly import Group
+from shaftwork.equations.assembly import FactoredTerms
 from shaftwork.equations.blocks import Blocks
 from shaftwork.equations.notation import without_marks
 from shaftwork.equations.printing import LINE_WIDTH, Line, Writer, aligned
@@ -68,19 +68,19 @@ def _letters(slopes: Mapping[Symbol, Slope], taken: set[str]) -> dict[str, str]:
     return found
 
 
-def _powers(polynomial: Expr) -> list[Group]:
+def _powers(polynomial: Expr) -> list[FactoredTerms]:
     """The terms of a polynomial in s, the highest power first."""
     powers: dict[int, list[Expr]] = {}
     for term in sorted(Add.make_args(polynomial.expand()), key=default_sort_key):  # else each process has its order
         coefficient, power = term.as_independent(S)
         powers.setdefault(int(power.as_base_exp()[1]) if power != 1 else 0, []).append(coefficient)
-    return [Group(REAL**power, tuple(terms)) for power, terms in sorted(powers.items(), reverse=True)]
+    return [FactoredTerms(REAL**power, tuple(terms)) for power, terms in sorted(powers.items(), reverse=True)]
 
 
 def _derivative(slope: Slope, writer: Writer) -> tuple[str, ...]:
     """How a torque changes with what its law reads, or the slope in full where the torque is no quantity by itself."""
     sign, letter = slope.of.as_coeff_Mul()
     if not (letter.is_Symbol and slope.by.is_Symbol):
-        return writer.pieces([Group(Integer(1), Add.make_args(slope.value))])
+        return writer.pieces([FactoredTerms(Integer(1), Add.make_args(slope.value))])
     minus = "-" if sign < 0 else ""
     return (rf"{minus}\frac{{\partial {writer.latex(letter)}}}{{\partial {writer.latex(slope.by)}}}",)

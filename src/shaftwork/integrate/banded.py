@@ -16,12 +16,12 @@ import numpy as np
 from shaftwork.core.errors import ParameterError
 from shaftwork.integrate.banded_matrix import ShiftedMatrix
 from shaftwork.integrate.banded_method import ShiftedCollocation, shifted_collocation
-from shaftwork.integrate.banded_stages import LinearStages, NewtonStages, Stages, StepStart, shifted
+from shaftwork.integrate.banded_stages import BandedStages, LinearStages, NewtonStages, StepStart, shifted
 from shaftwork.integrate.crossings import Crossings
 from shaftwork.integrate.engines import ENGINES
 from shaftwork.integrate.pieces import (
     Pace,
-    Piece,
+    SmoothInterval,
     both_sides,
     check_finite,
     failure,
@@ -40,7 +40,7 @@ UNDAMPED = 1e-12
 
 
 @dataclass(frozen=True)
-class _Step:
+class _BandedStep:
     """What makes a step again.
 
     Args:
@@ -72,7 +72,7 @@ def solve(problem: Problem) -> Trajectory:
 
     Source: Hairer and Wanner, Solving Ordinary Differential Equations II, 1996, chapter IV.
     """
-    run = _Run(problem)
+    run = _BandedMarch(problem)
     with np.errstate(all="ignore"):
         for number, piece in enumerate(run.pieces):
             run.march(number, piece)
@@ -107,7 +107,7 @@ def is_undamped(problem: Problem) -> bool:
 class _Arc:
     """The polynomial of one step."""
 
-    def __init__(self, run: _Run, start: StepStart, length: float, modes: Array) -> None:
+    def __init__(self, run: _BandedMarch, start: StepStart, length: float, modes: Array) -> None:
         method = self._method = run.method
         self._stages, self._start, self._length, self._modes = run.stages, start, length, modes
         # The slope that the system has at the start, where the polynomial need not meet it, less the polynomial's own.
@@ -161,14 +161,14 @@ class _Outputs:
             self.x[first:last] = arc.at(self._times[first:last])
 
 
-class _Run:
+class _BandedMarch:
     """The march over the pieces, and what dense output needs of it."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem, self.pieces = problem, pieces(problem)
         self.method, self.stages = _stages(problem)
         self.outputs = _Outputs(problem)
-        self.steps: list[_Step] = []
+        self.steps: list[_BandedStep] = []
         self.ends: list[Array] = []
         self.rejected = 0
         self._rtol, self._pace = max(problem.rtol, ENGINES["banded"].finest), Pace(problem)
@@ -177,7 +177,7 @@ class _Run:
         """The tolerance (n,) of each state."""
         return np.maximum(self.problem.atol + self._rtol * np.abs(x), np.finfo(float).tiny)
 
-    def march(self, number: int, piece: Piece) -> None:
+    def march(self, number: int, piece: SmoothInterval) -> None:
         """Step through one piece."""
         before = self.ends[-1] if self.ends else np.asarray(self.problem.x0, dtype=float)
         start, step = self._open(piece, piece.start, start_of_piece(self.problem, piece, before))
@@ -197,7 +197,7 @@ class _Run:
                 continue
             if factor > WORTH:
                 step = max(step, factor * length)
-            self.steps.append(_Step(number, start.t, length, start.x, start.rate if self.stages.noisy else None))
+            self.steps.append(_BandedStep(number, start.t, length, start.x, start.rate if self.stages.noisy else None))
             self.outputs.fill(start.t, end, arc)
             self._finish(end, arc.end, rests=crossings.rests)
             if cut is not None and end < piece.end:
@@ -221,7 +221,7 @@ class _Run:
             return None
         return None if modes is None else _Arc(self, start, length, modes)
 
-    def _open(self, piece: Piece, t: float, x: Array) -> tuple[StepStart, float]:
+    def _open(self, piece: SmoothInterval, t: float, x: Array) -> tuple[StepStart, float]:
         """Start anew: from where, and the length of the first step in s."""
         self.outputs.start(t, x)
         self.stages.open(piece)
@@ -254,7 +254,7 @@ class _Run:
 class _BandedDense:
     """The motion at any time, from steps that are made again: their polynomials would fill the memory."""
 
-    def __init__(self, run: _Run) -> None:
+    def __init__(self, run: _BandedMarch) -> None:
         self._run = run
         self._starts = np.array([step.t for step in run.steps])
 
@@ -291,7 +291,7 @@ class _BandedDense:
         return arc
 
 
-def _stages(problem: Problem) -> tuple[ShiftedCollocation, Stages]:
+def _stages(problem: Problem) -> tuple[ShiftedCollocation, BandedStages]:
     """The method that suits a problem, and what solves its stage equations."""
     if problem.straight is not None:
         method = shifted_collocation("gauss" if is_undamped(problem) else "radau", STAGES)

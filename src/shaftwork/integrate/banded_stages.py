@@ -11,7 +11,7 @@ from scipy import sparse
 
 from shaftwork.integrate.banded_matrix import ShiftedMatrix, Solver
 from shaftwork.integrate.banded_method import ShiftedCollocation
-from shaftwork.integrate.pieces import GuardedFunctions, Piece
+from shaftwork.integrate.pieces import GuardedFunctions, SmoothInterval
 from shaftwork.integrate.problem import Array, LinearInputs, Problem
 
 MOST_ITERATIONS = 10
@@ -40,7 +40,7 @@ class StepStart:
     scale: Array
 
 
-class Stages(Protocol):
+class BandedStages(Protocol):
     """Solves the stage equations of one step after another."""
 
     @property
@@ -51,7 +51,7 @@ class Stages(Protocol):
     def noisy(self) -> bool:
         """Whether `rate` multiplies what is left of an iteration by the fastest decay; Radau's own slope does not."""
 
-    def open(self, piece: Piece) -> None:
+    def open(self, piece: SmoothInterval) -> None:
         """Begin a piece."""
 
     def rate(self, t: float, x: Array) -> Array:
@@ -116,7 +116,7 @@ class _Factors:
         return np.asarray(self._solvers[0](right).real)
 
 
-class LinearStages(Stages):
+class LinearStages(BandedStages):
     """The stages of x' = A x + u(t), u a straight line in each piece: one solution for each pole.
 
     Args:
@@ -141,7 +141,7 @@ class LinearStages(Stages):
     def noisy(self) -> bool:
         return False
 
-    def open(self, piece: Piece) -> None:
+    def open(self, piece: SmoothInterval) -> None:
         length = piece.high - piece.low  # inside the piece, clear of what jumps at its ends
         early, late = (np.asarray(self._forcing(piece.low + part * length)) for part in (0.25, 0.75))
         slope = (late - early) / (0.5 * length)
@@ -166,7 +166,7 @@ class LinearStages(Stages):
         return reason
 
 
-class NewtonStages(Stages):
+class NewtonStages(BandedStages):
     """The stages of x' = f(t, x) by simplified Newton iterations; Jacobian and factors are kept while they serve.
 
     Args:
@@ -194,7 +194,7 @@ class NewtonStages(Stages):
     def noisy(self) -> bool:
         return True
 
-    def open(self, piece: Piece) -> None:
+    def open(self, piece: SmoothInterval) -> None:
         self._guard = GuardedFunctions(self._problem, piece)
         self._wanted, self._last = True, None
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from shaftwork.integrate.pieces import Piece
+from shaftwork.integrate.pieces import SmoothInterval
 from shaftwork.integrate.problem import Array, DaeProblem, Problem
 
 Dense = Callable[[Array], Array]
@@ -51,7 +51,7 @@ class Crossings:
         piece: the piece.
     """
 
-    def __init__(self, problem: Problem | DaeProblem, piece: Piece) -> None:
+    def __init__(self, problem: Problem | DaeProblem, piece: SmoothInterval) -> None:
         self._problem, self._piece = problem, piece
         self._clearance = CLEARANCE * float(np.spacing(max(abs(problem.t0), abs(problem.t_end))))
         self._start, self._attempts = np.nan, 0

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from shaftwork.integrate.modal import Complex, Modes, phi
+from shaftwork.integrate.modal import Complex, Eigensystem, phi
 from shaftwork.integrate.problem import Array
 
 # Degree of a panel's polynomials, the part of an input that they may leave out, and that which rounding may take.
@@ -37,7 +37,7 @@ class Driven:
         inputs: (panels, modes, degree + 1) coefficients of the powers of the share of a panel.
     """
 
-    modes: Modes
+    modes: Eigensystem
     length: float
     starts: Complex
     inputs: Complex
@@ -95,7 +95,7 @@ def polynomials(forcing: Callable[[Array], Array], length: float, fewest: int, m
     return None
 
 
-def driven(modes: Modes, values: Array, start: Array, length: float) -> Driven:
+def driven(modes: Eigensystem, values: Array, start: Array, length: float) -> Driven:
     """The motion from a start state under inputs.
 
     Args:

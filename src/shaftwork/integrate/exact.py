@@ -14,7 +14,7 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.integrate.driven import FEWEST, MOST_VALUES, driven, polynomials
 from shaftwork.integrate.linear_system import LinearSystem, are_even, propagator_of, system_of
 from shaftwork.integrate.observation import difference, doubt
-from shaftwork.integrate.pieces import Piece, both_sides, failure, pieces, piecewise, start_of_piece
+from shaftwork.integrate.pieces import SmoothInterval, both_sides, failure, pieces, piecewise, start_of_piece
 from shaftwork.integrate.precise import Nearby, PrecisePiece, PreciseSystem, precise_piece, precise_system, seconds
 from shaftwork.integrate.problem import Array, LinearInputs, Problem, Trajectory
 from shaftwork.integrate.straight import straight_line
@@ -96,7 +96,7 @@ def _moved_by_rounding(problem: Problem, linear: LinearInputs, trajectory: Traje
     return difference(problem, trajectory, _propagated(problem, system, _in_floats(problem, system)))
 
 
-def _nearby(problem: Problem, system: LinearSystem, piece: Piece) -> Nearby:
+def _nearby(problem: Problem, system: LinearSystem, piece: SmoothInterval) -> Nearby:
     """The motion in floats from the node before each time: over so short a time they lose little."""
     level, slope = straight_line(problem, system.forcing, piece)
     modes, scale = system.modes, system.scale
@@ -125,11 +125,11 @@ def _lost(problem: Problem, system: LinearSystem, trajectory: Trajectory) -> Arr
 
 
 def _propagated(
-    problem: Problem, system: LinearSystem, span_of: Callable[[Piece, Array], _Span | PrecisePiece]
+    problem: Problem, system: LinearSystem, span_of: Callable[[SmoothInterval, Array], _ExactInterval | PrecisePiece]
 ) -> Trajectory:
     """The motion from piece to piece."""
     x = np.asarray(problem.x0, dtype=float)
-    spans: list[_Span | PrecisePiece] = []
+    spans: list[_ExactInterval | PrecisePiece] = []
     for piece in pieces(problem):
         start = start_of_piece(problem, piece, x)
         with np.errstate(over="ignore", invalid="ignore"):
@@ -147,7 +147,7 @@ def _propagated(
     else:
         t = np.asarray(problem.t_eval, dtype=float)
         states = dense(t)
-    steps = sum(span.times.size - 1 for span in spans if isinstance(span, _Span))
+    steps = sum(span.times.size - 1 for span in spans if isinstance(span, _ExactInterval))
     return Trajectory(t, states, dense, {"steps": steps})
 
 
@@ -176,12 +176,12 @@ def drivable(problem: Problem) -> bool:
     return _inputs(problem, linear) is not None
 
 
-def _inputs(problem: Problem, linear: LinearInputs) -> dict[Piece, Array] | None:
+def _inputs(problem: Problem, linear: LinearInputs) -> dict[SmoothInterval, Array] | None:
     """Values of the inputs of every piece of a run that resolve them, or None where in one piece none do."""
     spans, duration = pieces(problem), problem.t_end - problem.t0
 
-    def resolved() -> dict[Piece, Array] | None:
-        values, left = dict[Piece, Array](), MOST_VALUES
+    def resolved() -> dict[SmoothInterval, Array] | None:
+        values, left = dict[SmoothInterval, Array](), MOST_VALUES
         for piece in spans:
             length = piece.end - piece.start
             nodes = polynomials(partial(_inside, linear, piece), length, math.ceil(FEWEST * length / duration), left)
@@ -193,7 +193,7 @@ def _inputs(problem: Problem, linear: LinearInputs) -> dict[Piece, Array] | None
     return linear.kept("inputs", resolved, spans)
 
 
-def _inside(linear: LinearInputs, piece: Piece, elapsed: Array) -> Array:
+def _inside(linear: LinearInputs, piece: SmoothInterval, elapsed: Array) -> Array:
     """The inputs (n, k) at times (k,) after the start of a piece, on its side of jumps."""
     return linear.forcing(np.clip(piece.start + elapsed, piece.low, piece.high))
 
@@ -224,7 +224,7 @@ def _size(problem: Problem) -> tuple[int, int]:
 
 
 @dataclass(frozen=True)
-class _Span:
+class _ExactInterval:
     """One piece, propagated.
 
     Args:
@@ -248,7 +248,7 @@ class _ExactDense:
         size: number of states n.
     """
 
-    def __init__(self, spans: Sequence[_Span | PrecisePiece], starts: Array, rate: float, size: int) -> None:
+    def __init__(self, spans: Sequence[_ExactInterval | PrecisePiece], starts: Array, rate: float, size: int) -> None:
         self._spans, self._starts, self._rate, self._size = spans, starts, rate, size
 
     @cached_property
@@ -265,7 +265,7 @@ class _ExactDense:
         return piecewise(self._starts, [span.at for span in self._spans], self._size, times)
 
 
-def _in_floats(problem: Problem, system: LinearSystem) -> Callable[[Piece, Array], _Span]:
+def _in_floats(problem: Problem, system: LinearSystem) -> Callable[[SmoothInterval, Array], _ExactInterval]:
     """The motion in a piece from its first state (n,): in modes, or by exponentials where these are of no use."""
     dense_form = problem.straight is None or prefers_dense(problem, problem.straight)
     modes = system.modes if dense_form else None
@@ -274,7 +274,7 @@ def _in_floats(problem: Problem, system: LinearSystem) -> Callable[[Piece, Array
     linear = problem.linear
     inputs = None if linear is None or linear.straight else _inputs(problem, linear)
 
-    def span(piece: Piece, x: Array) -> _Span:
+    def span(piece: SmoothInterval, x: Array) -> _ExactInterval:
         start, scale = x / system.scale, system.scale
         motion: Callable[[Array], Array]  # of times after the start of the piece
         if inputs is None:
@@ -289,12 +289,18 @@ def _in_floats(problem: Problem, system: LinearSystem) -> Callable[[Piece, Array
             return states
 
         nodes = _nodes(problem, piece, fewest=0 if inputs is None else OWN_INTERVALS)  # a blow may lie between outputs
-        return _Span(nodes, at(np.array([piece.end]))[0], at)
+        return _ExactInterval(nodes, at(np.array([piece.end]))[0], at)
 
     return span
 
 
-def _by_exponentials(problem: Problem, system: LinearSystem, dense_form: bool, piece: Piece, x: Array) -> _Span:  # noqa: FBT001
+def _by_exponentials(
+    problem: Problem,
+    system: LinearSystem,
+    dense_form: bool,  # noqa: FBT001
+    piece: SmoothInterval,
+    x: Array,
+) -> _ExactInterval:
     """The motion in a piece from node to node; times between start from the node before them."""
     times, (level, slope) = _nodes(problem, piece), straight_line(problem, system.forcing, piece)
     propagator = propagator_of(system, level, slope, dense_form=dense_form)
@@ -304,10 +310,10 @@ def _by_exponentials(problem: Problem, system: LinearSystem, dense_form: bool, p
         step = (times[first + count] - times[first]) / count
         block = propagator.march(states[first], times[first] - piece.start, step, count)
         states[first + 1 : first + 1 + count] = block
-    return _Span(times, states[-1], lambda asked: propagator.between(times, states, asked))
+    return _ExactInterval(times, states[-1], lambda asked: propagator.between(times, states, asked))
 
 
-def _nodes(problem: Problem, piece: Piece, *, fewest: int = 0) -> Array:
+def _nodes(problem: Problem, piece: SmoothInterval, *, fewest: int = 0) -> Array:
     """The output times in a piece and its ends; the engine's own grid where there are none, or fewer in the run."""
     outputs = np.empty(0) if problem.t_eval is None else np.asarray(problem.t_eval, dtype=float)
     if problem.t_eval is None or outputs.size < fewest:

@@ -9,7 +9,7 @@ import numpy as np
 
 from shaftwork.integrate.breaks import Breaks
 from shaftwork.integrate.problem import Array, Problem
-from shaftwork.integrate.switches import Watch
+from shaftwork.integrate.switches import SwitchWatch
 
 # What heyoka's outcomes are called here where a guard ended the run.
 GUARD = "guard"
@@ -32,7 +32,7 @@ class GridRecorder:
         """Rows of output that are filled."""
         return min(self._filled, len(self._rows))
 
-    def __call__(self, integrator: Any, watch: Watch | None, limit: int, longest: float) -> tuple[Any, str, int]:
+    def __call__(self, integrator: Any, watch: SwitchWatch | None, limit: int, longest: float) -> tuple[Any, str, int]:
         taken = 0
         while True:
             pending, now = self._grid[self._filled : self._filled + self._chunk], integrator.time
@@ -63,7 +63,7 @@ class SegmentRecorder:
         self._end, self._stops = end, stops
         self.segments: list[Any] = []
 
-    def __call__(self, integrator: Any, watch: Watch | None, limit: int, longest: float) -> tuple[Any, str, int]:
+    def __call__(self, integrator: Any, watch: SwitchWatch | None, limit: int, longest: float) -> tuple[Any, str, int]:
         taken = 0
         while True:
             stop = min((stop for stop in self._stops if stop > integrator.time), default=self._end)
@@ -82,7 +82,7 @@ class SegmentRecorder:
                 return outcome, _outcome(outcome, watch, arrived=arrived), taken
 
 
-def _outcome(outcome: Any, watch: Watch | None, *, arrived: bool) -> str:
+def _outcome(outcome: Any, watch: SwitchWatch | None, *, arrived: bool) -> str:
     """Name of heyoka's outcome; a watch that stops the very last step has stopped the run only if it has a reason.
 
     A run that has come to a stop on its way with its last step has met the limit of its steps, not its end.

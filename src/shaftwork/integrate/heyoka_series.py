@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from shaftwork.integrate.pieces import Piece
+from shaftwork.integrate.pieces import SmoothInterval
 from shaftwork.integrate.problem import Array, Problem
 
 DEFECT = 1e-8
@@ -15,7 +15,13 @@ Rates = Callable[[float, Array], Array]
 
 
 def satisfied(
-    problem: Problem, rhs: Rates, piece: Piece, terms: Array, start: float, elapsed: float, sizes: Array | float
+    problem: Problem,
+    rhs: Rates,
+    piece: SmoothInterval,
+    terms: Array,
+    start: float,
+    elapsed: float,
+    sizes: Array | float,
 ) -> bool:
     """Whether a series (n, orders) from a start in s satisfies equations after some time; `sizes` are of states."""
     orders = np.arange(terms.shape[1])

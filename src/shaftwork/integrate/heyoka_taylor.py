@@ -17,8 +17,8 @@ from shaftwork.integrate.engines import ENGINES
 from shaftwork.integrate.heyoka_recorders import GUARD, GridRecorder, SegmentRecorder
 from shaftwork.integrate.heyoka_series import Rates, satisfied
 from shaftwork.integrate.pieces import (
-    Piece,
     PiecewiseDense,
+    SmoothInterval,
     both_sides,
     failure,
     pieces,
@@ -27,7 +27,7 @@ from shaftwork.integrate.pieces import (
     used_up,
 )
 from shaftwork.integrate.problem import Array, Problem, SeriesError, StickingError, Trajectory
-from shaftwork.integrate.switches import SOMEWHERE, Watch, keeps_sides, settle
+from shaftwork.integrate.switches import SOMEWHERE, SwitchWatch, keeps_sides, settle
 
 # The cost grows only with the logarithm of the tolerance, and a loose one loses events.
 LOOSEST_TOLERANCE = 1e-10
@@ -43,7 +43,7 @@ INSIDE = (0.5, 0.9)
 
 # From (integrator, step callback, step limit, longest step) to (outcome, its name, steps taken); called again after an
 # interruption. It returns to Python after some steps each, which changes them by rounding alone.
-Advance = Callable[[Any, Watch | None, int, float], tuple[Any, str, int]]
+Advance = Callable[[Any, SwitchWatch | None, int, float], tuple[Any, str, int]]
 # Output times that heyoka is given at once where a guard is likely to be met before the last of them.
 CHUNK = 32
 # Two runs of one problem end at times that differ by less of its span.
@@ -75,7 +75,7 @@ def solve(problem: Problem) -> Trajectory:
         )
     if problem.t_eval is not None and not problem.program.program.singular:
         return _on_grid(problem, np.asarray(problem.t_eval, dtype=float))
-    dense = _Replay(problem)
+    dense = _TaylorReplay(problem)
     t, x = both_sides(problem, *dense.step_ends)
     end = float(t[-1]), x[-1]
     if problem.t_eval is not None:
@@ -96,7 +96,7 @@ NEAR = 1e-12
 """Part of its size by which a guard at the instant of a switch may be below its limit and be met by rounding."""
 
 
-class _Run:
+class _TaylorRun:
     """One run over a problem, by an integrator that is lent for it."""
 
     def __init__(self, problem: Problem, lent: Any) -> None:
@@ -115,7 +115,7 @@ class _Run:
         self.reactions: list[tuple[float, Callable[[], Rates]]] = []
         """Times in s of guards past which it went on, and what makes the equations that hold from there on."""
 
-    def piece(self, piece: Piece, advance: Advance) -> None:
+    def piece(self, piece: SmoothInterval, advance: Advance) -> None:
         """Bring the run to the end of a piece; `advance` records what it passes."""
         integrator, self._begun = self.integrator, None
         integrator.time = piece.start
@@ -177,7 +177,7 @@ class _Run:
             size = max(self._sizes[number], offset / ROUNDING)
             self._sides[number], self._offsets[number] = side / size, offset / size
 
-    def _guard_met(self, raw: Any, outcome: str, watch: Watch | None) -> int | None:
+    def _guard_met(self, raw: Any, outcome: str, watch: SwitchWatch | None) -> int | None:
         """The guard at which the run has stopped, by its own event or at that of a switch at the very same instant."""
         if outcome == GUARD:
             met: int | None = self.program.guard_met(raw)
@@ -216,7 +216,7 @@ class _Run:
         self.program.weigh(self.integrator)
         return True
 
-    def _first_step(self, piece: Piece) -> float:
+    def _first_step(self, piece: SmoothInterval) -> float:
         """Longest first step in s, infinite where heyoka's own choice is good.
 
         heyoka takes its step from the last two terms of the series. Where a motion starts as a polynomial, as that of
@@ -239,11 +239,11 @@ class _Run:
             longest = SHORTER * step
         return longest
 
-    def _satisfied(self, piece: Piece, start: float, elapsed: float) -> bool:
+    def _satisfied(self, piece: SmoothInterval, start: float, elapsed: float) -> bool:
         """Whether the series of the last step satisfies the equations at a time inside it."""
         return satisfied(self.problem, self.problem.rhs, piece, self.integrator.tc, start, elapsed, 0.0)
 
-    def verify(self, piece: Piece, segments: Sequence[Any]) -> None:
+    def verify(self, piece: SmoothInterval, segments: Sequence[Any]) -> None:
         """Refuse series that have passed a root or a pole of a law, and gone on otherwise than the law.
 
         Raises:
@@ -264,7 +264,7 @@ class _Run:
                         made = failure(self.problem, "heyoka", start, terms[:, 0], reason)
                         raise SeriesError(str(made), reason)
 
-    def _watch(self, piece: Piece) -> Watch | None:
+    def _watch(self, piece: SmoothInterval) -> SwitchWatch | None:
         """Set the signs of the switches; what has to look after them, where the motion may change them."""
         program = self.program
         if not program.switches:
@@ -278,9 +278,9 @@ class _Run:
             return None
         integrator = self.integrator
         size = np.abs(program.switch_values(integrator.time, integrator.state, integrator.pars))
-        return Watch(program, piece.start, self.problem.t_end - self.problem.t0, size)
+        return SwitchWatch(program, piece.start, self.problem.t_end - self.problem.t0, size)
 
-    def _failure(self, piece: Piece, outcome: str, watch: Watch | None) -> SimulationError:
+    def _failure(self, piece: SmoothInterval, outcome: str, watch: SwitchWatch | None) -> SimulationError:
         time, state = self._last_good(piece, watch)
         made = failure(self.problem, "heyoka", time, state, self._reason(outcome, watch))
         if watch is not None and watch.reason is not None:
@@ -288,7 +288,7 @@ class _Run:
         found = f"after t = {time:.9g} s a law, or one of its derivatives, is not finite, as a root's at zero"
         return SeriesError(str(made), found) if outcome == "err_nf_state" else made
 
-    def _last_good(self, piece: Piece, watch: Watch | None) -> tuple[float, Array]:
+    def _last_good(self, piece: SmoothInterval, watch: SwitchWatch | None) -> tuple[float, Array]:
         """Time and state at the end of the last good step of a run that has failed in a piece."""
         integrator = self.integrator
         if watch is not None:
@@ -300,7 +300,7 @@ class _Run:
             good = integrator.time, integrator.state.copy()
         return good
 
-    def _reason(self, outcome: str, watch: Watch | None) -> str:
+    def _reason(self, outcome: str, watch: SwitchWatch | None) -> str:
         if outcome == "step_limit":
             used = self.steps >= self.problem.max_steps
             return used_up(self.problem) if used else "its steps are shorter than the spacing of numbers at this time"
@@ -313,10 +313,10 @@ class _Run:
 
 def _on_grid(problem: Problem, times: Array) -> Trajectory:
     with problem.program.program.lent(_tolerance(problem)) as lent:
-        return _filled(_Run(problem, lent), times)
+        return _filled(_TaylorRun(problem, lent), times)
 
 
-def _filled(run: _Run, times: Array) -> Trajectory:
+def _filled(run: _TaylorRun, times: Array) -> Trajectory:
     problem, stops = run.problem, list[float]()
     states = np.empty((times.size, run.state.size))
     done, chunk = 0, times.size + 1 if problem.guards is None else CHUNK
@@ -331,11 +331,11 @@ def _filled(run: _Run, times: Array) -> Trajectory:
         done = stop
     # the integrator's own time may be a rounding away from where it was sent
     end = None if problem.guards is None else (problem.t_end if run.met is None else run.integrator.time, run.state)
-    dense = _Replay(problem, stops, run.integrator.time)
+    dense = _TaylorReplay(problem, stops, run.integrator.time)
     return Trajectory(times[:done], states[:done], dense, {"steps": run.steps}, met=run.met, end=end)
 
 
-class _Replay:
+class _TaylorReplay:
     """Dense output that runs the problem when it is first asked, in the steps of the run before, if there was one.
 
     Args:
@@ -351,7 +351,7 @@ class _Replay:
     def _made(self) -> tuple[tuple[tuple[Any, ...], ...], int | None]:
         problem, recorders = self._problem, list[SegmentRecorder]()
         with problem.program.program.lent(_tolerance(problem)) as lent:
-            run = _Run(problem, lent)
+            run = _TaylorRun(problem, lent)
             for piece in pieces(problem):
                 recorders.append(SegmentRecorder(problem, piece.end, [s for s in self._stops if s < piece.end]))
                 run.piece(piece, recorders[-1])

@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from scipy.sparse.linalg import expm_multiply
 
 from shaftwork.core.interruption import interruptible
-from shaftwork.integrate.modal import Modes, find_modes
+from shaftwork.integrate.modal import Eigensystem, find_modes
 from shaftwork.integrate.problem import Array, LinearInputs
 from shaftwork.integrate.stiffness import balance, norm, scale_by
 
@@ -36,7 +36,7 @@ class LinearSystem:
         return 1.0 if self.modes is None else self.modes.condition
 
     @cached_property
-    def modes(self) -> Modes | None:
+    def modes(self) -> Eigensystem | None:
         """The modes, or None where they are too badly conditioned."""
         matrix = self.matrix.toarray()
         return interruptible(find_modes, matrix) if len(matrix) >= LONG_WAIT else find_modes(matrix)

@@ -22,7 +22,7 @@ SKEW = 1e-12
 
 
 @dataclass(frozen=True)
-class Modes:
+class Eigensystem:
     """Eigenvalues and eigenvectors of a real matrix that is well conditioned for them.
 
     Of each conjugate pair one is kept, with its vector doubled: the motion is the real part of what it gives.
@@ -54,7 +54,7 @@ class Modes:
         return np.ascontiguousarray((motion @ self.vectors.T).real)
 
 
-def find_modes(matrix: Any) -> Modes | None:
+def find_modes(matrix: Any) -> Eigensystem | None:
     """The modes of a dense (n, n) matrix, or None where they are too badly conditioned to be of use."""
     lossless = _lossless_halves(matrix)
     if lossless is not None:
@@ -66,7 +66,7 @@ def find_modes(matrix: Any) -> Modes | None:
     inverse = np.linalg.inv(vectors).astype(complex)
     kept = values.imag >= 0
     weights = np.where(values.imag > 0, 2.0, 1.0)[kept]
-    return Modes(values[kept].astype(complex), vectors[:, kept] * weights, inverse[kept], condition)
+    return Eigensystem(values[kept].astype(complex), vectors[:, kept] * weights, inverse[kept], condition)
 
 
 def _lossless_halves(matrix: Array) -> tuple[Array, NDArray[np.bool_]] | None:
@@ -94,7 +94,7 @@ def _lossless_halves(matrix: Array) -> tuple[Array, NDArray[np.bool_]] | None:
     return scale, speeds
 
 
-def _lossless_modes(matrix: Array, scale: Array, speeds: NDArray[np.bool_]) -> Modes:
+def _lossless_modes(matrix: Array, scale: Array, speeds: NDArray[np.bool_]) -> Eigensystem:
     """Of v' = -B^T u, u' = B v, by B = U S V^T: the frequencies are S, real to the last bit, so no energy is lost.
 
     An eigenvalue of a general decomposition has a real part of some roundings, which in time adds up.
@@ -113,7 +113,7 @@ def _lossless_modes(matrix: Array, scale: Array, speeds: NDArray[np.bool_]) -> M
     values[:rank] = 1j * sizes[:rank]
     weights = np.where(values.imag > 0, 2.0, 1.0)
     vectors = rows.conj().T * weights * scale[:, None]
-    return Modes(values, vectors.astype(complex), (rows / scale).astype(complex))
+    return Eigensystem(values, vectors.astype(complex), (rows / scale).astype(complex))
 
 
 def phi(z: Complex, exponential: Complex, count: int) -> Complex:

@@ -24,7 +24,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class Piece:
+class SmoothInterval:
     """A span of time in which the right-hand side is smooth.
 
     Args:
@@ -48,7 +48,7 @@ class Piece:
 class GuardedFunctions:
     """Right-hand side and Jacobian of one piece: never evaluated outside it; remembers where one was not finite."""
 
-    def __init__(self, problem: Problem, piece: Piece) -> None:
+    def __init__(self, problem: Problem, piece: SmoothInterval) -> None:
         self._problem = problem
         self._jacobian: Callable[[float, Array], Any] = problem.jacobian or _no_jacobian
         self._low, self._high = piece.low, piece.high
@@ -87,17 +87,17 @@ class GuardedFunctions:
         return f"{reason.rstrip('.')}; the derivative of {name!r} was {derivative[bad[0]]} at t = {t:.9g} s"
 
 
-def pieces(problem: Timed) -> tuple[Piece, ...]:
+def pieces(problem: Timed) -> tuple[SmoothInterval, ...]:
     """The pieces between the start, the breakpoints and the end of a problem, in order."""
     ends = (problem.t0, *problem.breakpoints, problem.t_end)
     sides = [problem.sides(end) for end in ends]
     return tuple(
-        Piece(start, end, after, before)
+        SmoothInterval(start, end, after, before)
         for (start, (_, after)), (end, (before, _)) in pairwise(zip(ends, sides, strict=True))
     )
 
 
-def start_of_piece(problem: Timed, piece: Piece, x: Array) -> Array:
+def start_of_piece(problem: Timed, piece: SmoothInterval, x: Array) -> Array:
     """State (n,) with which a piece starts, from the state at the end of the piece before (or the start state)."""
     if problem.jump is None or piece.start == problem.t0:
         return x

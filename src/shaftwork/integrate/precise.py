@@ -14,7 +14,7 @@ from numpy.polynomial import chebyshev
 from shaftwork.integrate.chebyshev import Polynomial, points
 from shaftwork.integrate.fixed_point import FixedPoint, Integers
 from shaftwork.integrate.linear_system import are_even
-from shaftwork.integrate.pieces import Piece, PiecewiseDense, pieces
+from shaftwork.integrate.pieces import PiecewiseDense, SmoothInterval, pieces
 from shaftwork.integrate.problem import Array, Fractions, LinearInputs, Problem
 from shaftwork.integrate.stiffness import balance, scale_by
 from shaftwork.integrate.straight import straight_line
@@ -81,7 +81,7 @@ class PrecisePiece:
     """
 
     system: PreciseSystem
-    piece: Piece
+    piece: SmoothInterval
     start: Integers
     exponent: int
     nearby: Nearby
@@ -178,7 +178,9 @@ def precise_system(problem: Problem, linear: LinearInputs) -> PreciseSystem | No
     return linear.kept("precise", lambda: PreciseSystem(linear, fractions, length, active), (length, active))
 
 
-def precise_piece(problem: Problem, system: PreciseSystem, piece: Piece, x: Array, nearby: Nearby) -> PrecisePiece:
+def precise_piece(
+    problem: Problem, system: PreciseSystem, piece: SmoothInterval, x: Array, nearby: Nearby
+) -> PrecisePiece:
     """The motion in a piece from a state x (n,)."""
     level, slope = straight_line(problem, system.fractions.inputs, piece)
     values = np.concatenate([x, level[system.active], slope[system.active]])

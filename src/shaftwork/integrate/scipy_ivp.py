@@ -17,8 +17,8 @@ from shaftwork.integrate.guards import LEAST, SHORTER, GuardWatch
 from shaftwork.integrate.pieces import (
     GuardedFunctions,
     Pace,
-    Piece,
     PiecewiseDense,
+    SmoothInterval,
     both_sides,
     failure,
     pieces,
@@ -46,7 +46,7 @@ INSIDE, BRIEF = 1.0, 100
 
 
 @dataclass(frozen=True)
-class _Run:
+class _SolvedInterval:
     """One piece, solved: step ends (s,), states there (s, n), dense output, counts, and the guard that ended it."""
 
     times: Array
@@ -94,10 +94,10 @@ def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
     return Trajectory(t, states, dense, _sums(runs), met=runs[-1].met, end=(float(steps[-1]), runs[-1].states[-1]))
 
 
-def _march(problem: Problem, method: Method, longest: float = np.inf) -> list[_Run]:
+def _march(problem: Problem, method: Method, longest: float = np.inf) -> list[_SolvedInterval]:
     """All pieces, one after another."""
     x, pace, taken = np.asarray(problem.x0, dtype=float), Pace(problem), 0
-    runs: list[_Run] = []
+    runs: list[_SolvedInterval] = []
     with np.errstate(all="ignore"):
         for piece in pieces(problem):
             start = start_of_piece(problem, piece, x)
@@ -109,7 +109,7 @@ def _march(problem: Problem, method: Method, longest: float = np.inf) -> list[_R
     return runs
 
 
-def _on_edge(problem: Problem, runs: list[_Run]) -> bool:
+def _on_edge(problem: Problem, runs: list[_SolvedInterval]) -> bool:
     """Whether a step is so long that it may be stability which bounds it.
 
     The decay is looked at once for many brief phases in the same modes, and anew for a long one.
@@ -125,18 +125,18 @@ def _on_edge(problem: Problem, runs: list[_Run]) -> bool:
     return bool(longest * found["decay"] > INSIDE)
 
 
-def _samples(runs: list[_Run]) -> tuple[Array, Array]:
+def _samples(runs: list[_SolvedInterval]) -> tuple[Array, Array]:
     """Times and states at the starts of all steps: there no input is in the midst of a jump."""
     return np.concatenate([run.times[:-1] for run in runs]), np.concatenate([run.states[:-1] for run in runs])
 
 
-def _sums(runs: list[_Run]) -> dict[str, int]:
+def _sums(runs: list[_SolvedInterval]) -> dict[str, int]:
     return {name: sum(run.counts[name] for run in runs) for name in runs[0].counts}
 
 
 def _piece(
-    problem: Problem, piece: Piece, x: Array, method: Method, max_steps: int, pace: Pace, longest: float
-) -> _Run:
+    problem: Problem, piece: SmoothInterval, x: Array, method: Method, max_steps: int, pace: Pace, longest: float
+) -> _SolvedInterval:
     guard, crossings = GuardedFunctions(problem, piece), Crossings(problem, piece)
     watch = GuardWatch(problem, piece.low, piece.high)
     times, states = [piece.start], [x]
@@ -180,7 +180,7 @@ def _piece(
     calls, jacobians = retired.tolist()
     counts = {"steps": len(interpolants), "rhs": calls, "jacobians": jacobians}
     met = watch.met if times[-1] < piece.end else None
-    return _Run(np.array(times), np.array(states), _rows(solution), counts, met)
+    return _SolvedInterval(np.array(times), np.array(states), _rows(solution), counts, met)
 
 
 def _advance(problem: Problem, solver: Any, method: Method, guard: GuardedFunctions, t: float, x: Array) -> None:
@@ -204,7 +204,9 @@ def _rows(dense: Callable[[Array], Array]) -> Callable[[Array], Array]:
     return lambda times: np.asarray(dense(times)).T
 
 
-def _solver(problem: Problem, piece: Piece, x: Array, method: Method, guard: GuardedFunctions, longest: float) -> Any:
+def _solver(
+    problem: Problem, piece: SmoothInterval, x: Array, method: Method, guard: GuardedFunctions, longest: float
+) -> Any:
     options: dict[str, Any] = {"rtol": max(problem.rtol, FINEST), "atol": problem.atol, "max_step": longest}
     if method != "DOP853" and problem.jacobian is not None:
         options["jac"] = guard.jacobian

@@ -7,14 +7,14 @@ from collections.abc import Callable
 import numpy as np
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.integrate.pieces import Piece
+from shaftwork.integrate.pieces import SmoothInterval
 from shaftwork.integrate.problem import Array, Problem
 
 # A forcing may differ from a straight line by this part of its size before it is refused.
 STRAIGHT = 1e-7
 
 
-def straight_line(problem: Problem, forcing: Callable[[float], Array], piece: Piece) -> tuple[Array, Array]:
+def straight_line(problem: Problem, forcing: Callable[[float], Array], piece: SmoothInterval) -> tuple[Array, Array]:
     """Level at the start of a piece and slope of u, from values strictly inside the piece.
 
     Raises:

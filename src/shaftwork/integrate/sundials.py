@@ -21,8 +21,8 @@ from shaftwork.integrate.guards import CLEARANCE, LEAST, SHORTER, GuardWatch, sh
 from shaftwork.integrate.pieces import (
     GuardedFunctions,
     Pace,
-    Piece,
     PiecewiseDense,
+    SmoothInterval,
     both_sides,
     check_finite,
     failure,
@@ -96,7 +96,7 @@ class _Inside:
         return self._made(times)
 
 
-Opener = Callable[[Piece, Array], _Opened]
+Opener = Callable[[SmoothInterval, Array], _Opened]
 Opening = Callable[[float], Opener]
 """From the part of its tolerance with which a problem is solved."""
 
@@ -148,7 +148,7 @@ def _require(purpose: str) -> None:
         raise MissingExtraError("scikit-sundae", "stiff", purpose)
 
 
-def _open_cvode(problem: Problem, piece: Piece, x: Array, method: Method, pattern: Pattern) -> _Opened:
+def _open_cvode(problem: Problem, piece: SmoothInterval, x: Array, method: Method, pattern: Pattern) -> _Opened:
     from sksundae.cvode import CVODE
 
     guard = GuardedFunctions(problem, piece)
@@ -179,7 +179,7 @@ def _first_change(problem: Problem, x: Array, rates: Array) -> float:
         return float(np.min((problem.atol + 0.1 * np.abs(x)) / np.abs(rates), initial=np.inf))
 
 
-def _linear_solver(guard: GuardedFunctions, piece: Piece, x: Array, pattern: Pattern) -> dict[str, Any]:
+def _linear_solver(guard: GuardedFunctions, piece: SmoothInterval, x: Array, pattern: Pattern) -> dict[str, Any]:
     if x.size <= LARGEST_DENSE:
 
         def fill_dense(t: float, y: Array, _: Array, full: Array) -> None:
@@ -195,7 +195,7 @@ def _linear_solver(guard: GuardedFunctions, piece: Piece, x: Array, pattern: Pat
     return {"linsolver": "sparse", "sparsity": order, "jacfn": fill_sparse}
 
 
-def _open_ida(problem: DaeProblem, piece: Piece, x: Array) -> _Opened:
+def _open_ida(problem: DaeProblem, piece: SmoothInterval, x: Array) -> _Opened:
     from sksundae.ida import IDA
 
     def residual(t: float, y: Array, derivative: Array, found: Array) -> None:
@@ -219,7 +219,7 @@ def _open_ida(problem: DaeProblem, piece: Piece, x: Array) -> _Opened:
 
 
 @dataclass(frozen=True)
-class _Step:
+class _CvodeStep:
     """One step: its ends in s, the state (n,) at its end, the states (k, n) at the times asked for inside it."""
 
     start: float
@@ -230,7 +230,7 @@ class _Step:
 
 Ask = Callable[[float, float], Array]
 """The times (k,) wanted in a step, from its start and end in s."""
-Marched = tuple[list[tuple[Array, list[_Step]]], int | None]
+Marched = tuple[list[tuple[Array, list[_CvodeStep]]], int | None]
 """All steps of each piece, behind the piece's start state, and the guard that ended the run."""
 
 
@@ -256,7 +256,7 @@ def _march(problem: Problem | DaeProblem, opening: Opening, ask: Ask) -> Marched
 
 def _attempt(problem: Problem | DaeProblem, open_solver: Opener, ask: Ask) -> Marched:
     x = np.asarray(problem.x0, dtype=float)
-    found: list[tuple[Array, list[_Step]]] = []
+    found: list[tuple[Array, list[_CvodeStep]]] = []
     left, pace = problem.max_steps, Pace(problem)
     for piece in pieces(problem):
         opened, crossings = open_solver(piece, start_of_piece(problem, piece, x)), Crossings(problem, piece)
@@ -287,7 +287,7 @@ def _attempt(problem: Problem | DaeProblem, open_solver: Opener, ask: Ask) -> Ma
             states = np.repeat(x[None, :], asked.size, axis=0)
             if within.size:
                 states[: within.size] = inside(within)
-            found[-1][1].append(_Step(t, end, x, states))
+            found[-1][1].append(_CvodeStep(t, end, x, states))
             t, left = end, left - 1
             if stops and t < piece.end:
                 return found, watch.met
@@ -300,7 +300,7 @@ def _attempt(problem: Problem | DaeProblem, open_solver: Opener, ask: Ask) -> Ma
 
 
 def _step(
-    problem: Problem | DaeProblem, piece: Piece, opened: _Opened, t: float, x: Array, longest: float
+    problem: Problem | DaeProblem, piece: SmoothInterval, opened: _Opened, t: float, x: Array, longest: float
 ) -> tuple[float, Array]:
     """End in s and state (n,) there of the next step from a time and state, which is `longest` s long at most."""
     stop = min(piece.end, t + longest)
@@ -317,7 +317,7 @@ def _step(
 
 
 def _trajectory(problem: Problem | DaeProblem, opening: Opening, degree: int) -> Trajectory:
-    dense = _Replay(problem, opening, degree)
+    dense = _CvodeReplay(problem, opening, degree)
     if problem.t_eval is None:
         t, states = both_sides(problem, *dense.step_ends)
         end = float(t[-1]), states[-1]
@@ -344,7 +344,7 @@ def _trajectory(problem: Problem | DaeProblem, opening: Opening, degree: int) ->
     return Trajectory(times[: len(states)], states, dense, {"steps": steps}, met=met, end=(last.end, last.state))
 
 
-class _Replay:
+class _CvodeReplay:
     """Dense output that runs the problem again when it is first asked, and keeps each step's own polynomial."""
 
     def __init__(self, problem: Problem | DaeProblem, opening: Opening, degree: int) -> None:
@@ -359,7 +359,7 @@ class _Replay:
         return _march(self._problem, self._opening, lambda start, end: start + (end - start) * self._shares)
 
     @property
-    def _found(self) -> list[tuple[Array, list[_Step]]]:
+    def _found(self) -> list[tuple[Array, list[_CvodeStep]]]:
         return self._marched[0]
 
     @property
@@ -394,6 +394,6 @@ class _Replay:
         return self._dense(times)
 
 
-def _step_ends(found: list[tuple[Array, list[_Step]]]) -> tuple[list[Array], list[Array]]:
+def _step_ends(found: list[tuple[Array, list[_CvodeStep]]]) -> tuple[list[Array], list[Array]]:
     times = [np.array([steps[0].start, *(step.end for step in steps)]) for _, steps in found]
     return times, [np.vstack([start, *(step.state for step in steps)]) for start, steps in found]

@@ -126,7 +126,7 @@ def keeps_sides(program: Any, integrator: Any, parameters: Array, start: float) 
     return bool((signs[:, None] * values >= -WRONG_SIDE * np.abs(values).max(axis=1)[:, None]).all())
 
 
-class Watch:
+class SwitchWatch:
     """Step callback of a run with switches: stops it when a switch is not on the side that its sign says.
 
     Args:

@@ -18,7 +18,7 @@ from sympy import Integer
 from shaftwork.components.base import Component
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.core.domains import Domain
-from shaftwork.core.errors import Problem, ShaftworkError
+from shaftwork.core.errors import Diagnostic, ShaftworkError
 from shaftwork.network.graph import GROUND, CircuitGraph, resolve, signals_of
 from shaftwork.network.kinds import Kind
 from shaftwork.network.law_faults import Fault, instead_of, law_faults
@@ -34,12 +34,12 @@ Train = tuple[int, ...]
 """Numbers of the parts that hang together."""
 
 
-def declaration_problems(netlist: Netlist) -> tuple[Problem, ...]:
+def declaration_problems(netlist: Netlist) -> tuple[Diagnostic, ...]:
     """What is wrong with names, nodes, parameters and laws as they were typed: the problems of `examine`."""
     return examine(netlist)[1]
 
 
-def examine(netlist: Netlist) -> tuple[Netlist, tuple[Problem, ...]]:
+def examine(netlist: Netlist) -> tuple[Netlist, tuple[Diagnostic, ...]]:
     """Check every part by itself and against the names and nodes before it.
 
     Args:
@@ -62,7 +62,7 @@ class _Examination:
 
     def __init__(self, netlist: Netlist) -> None:
         self._parts = {placed.part.name for placed in netlist.placed if isinstance(placed.part.name, str)}
-        self.problems: list[Problem] = []
+        self.problems: list[Diagnostic] = []
         self.kept: list[Placed] = []
         self._named: dict[str, str] = {}
         self._domains: dict[str, tuple[Domain, str]] = {}
@@ -75,7 +75,7 @@ class _Examination:
             message = f"{message.removesuffix('.')} ({placed.origin.of(parameter)})."
         parts = (str(placed.part.name),) if placed else ()
         nodes = tuple(node for node in placed.nodes if isinstance(node, str) and node) if placed else ()
-        self.problems.append(Problem(kind, message, hint, parts, tuple(dict.fromkeys(nodes))))
+        self.problems.append(Diagnostic(kind, message, hint, parts, tuple(dict.fromkeys(nodes))))
 
     def take(self, placed: Placed) -> None:
         """Check one part and keep it if the rest can be examined with it."""
@@ -133,7 +133,7 @@ class _Examination:
             self._dotted[node] = None
             hint = f"A dot marks the nodes inside a part: write '{node.replace('.', '_')}'."
             message = f"{title(part)} stands at node '{node}', which has a dot in its name{self._unclear(node)}."
-            self.problems.append(Problem("dotted node name", message, hint, (part.name,), (node,)))
+            self.problems.append(Diagnostic("dotted node name", message, hint, (part.name,), (node,)))
         return fits
 
     def _check_count(self, placed: Placed) -> None:
@@ -214,7 +214,7 @@ class _Examination:
         return odd or self._faults.of(part, values)[0]
 
 
-def connection_problems(graph: CircuitGraph) -> tuple[Problem, ...]:
+def connection_problems(graph: CircuitGraph) -> tuple[Diagnostic, ...]:
     """Parts, ends and whole trains that are not joined to the rest, and nodes whose speed has the name of another."""
     ends = _ends(graph)
     spelling = Spelling(graph.nodes)
@@ -228,7 +228,7 @@ def connection_problems(graph: CircuitGraph) -> tuple[Problem, ...]:
     return (*problems, *_nearly_reference(graph), *_shared_names(graph))
 
 
-def resting_trains(graph: CircuitGraph) -> tuple[Problem, ...]:
+def resting_trains(graph: CircuitGraph) -> tuple[Diagnostic, ...]:
     """The trains beside a driven one in which nothing moves unless it is given a start value."""
     _, main, others = _split(graph, _ends(graph))
     spelling = Spelling(graph.nodes)
@@ -279,10 +279,10 @@ def _port_nodes(graph: CircuitGraph, numbers: Train) -> tuple[int, ...]:
     return tuple(dict.fromkeys(node for node in nodes if node != GROUND))
 
 
-def _floating_part(graph: CircuitGraph, number: int, spelling: Spelling) -> Problem:
+def _floating_part(graph: CircuitGraph, number: int, spelling: Spelling) -> Diagnostic:
     part = graph.parts[number]
     nodes = tuple(graph.nodes[node] for node in _port_nodes(graph, (number,)))
-    return Problem(
+    return Diagnostic(
         "floating part",
         f"{title(part.component)} at {at_nodes(nodes)} shares no node with any other part.",
         f"Join it to the train{spelling.suggestion(nodes)}, or remove it.",
@@ -291,9 +291,9 @@ def _floating_part(graph: CircuitGraph, number: int, spelling: Spelling) -> Prob
     )
 
 
-def _loose_end(graph: CircuitGraph, number: int, port: str, node: int, spelling: Spelling) -> Problem:
+def _loose_end(graph: CircuitGraph, number: int, port: str, node: int, spelling: Spelling) -> Diagnostic:
     part, name = graph.parts[number], graph.nodes[node]
-    return Problem(
+    return Diagnostic(
         "loose end",
         f"node '{name}': only {title(part.component)} ends there, with its port {port}, so it can carry no load.",
         f"Join another part to '{name}'{spelling.suggestion((name,))}, or remove '{part.name}'.",
@@ -302,7 +302,7 @@ def _loose_end(graph: CircuitGraph, number: int, port: str, node: int, spelling:
     )
 
 
-def _shared_names(graph: CircuitGraph) -> Iterator[Problem]:
+def _shared_names(graph: CircuitGraph) -> Iterator[Diagnostic]:
     """Nodes with the name of a part whose speed is another: sol["wheel.omega"] is that of the part."""
     parts = {part.name: part for part in graph.parts}
     for number, (node, domain) in enumerate(zip(graph.nodes, graph.domains, strict=True)):
@@ -312,7 +312,7 @@ def _shared_names(graph: CircuitGraph) -> Iterator[Problem]:
         if (read.kind, ends, read.sign) == ("across", (number, GROUND), 1):
             continue
         quantity, at = f"{node}.{domain.across.name}", tuple(graph.node_name(end) for end in ends if end != GROUND)
-        yield Problem(
+        yield Diagnostic(
             "shared name",
             f"{title(part.component)} and node '{node}' have the same name: '{quantity}' is read and set at "
             f"{at_nodes(at)}, where the part is, and that of node '{node}' cannot be read.",
@@ -323,11 +323,11 @@ def _shared_names(graph: CircuitGraph) -> Iterator[Problem]:
         )
 
 
-def _nearly_reference(graph: CircuitGraph) -> Iterator[Problem]:
+def _nearly_reference(graph: CircuitGraph) -> Iterator[Diagnostic]:
     """Nodes that are written like the frame, and are not."""
     for node in graph.nodes:
         if node.strip().lower() == REFERENCE:
-            yield Problem(
+            yield Diagnostic(
                 "nearly ground",
                 f"node '{node}' is a node of its own: the frame is '{REFERENCE}', in small letters.",
                 f"Write '{REFERENCE}', or give the node another name.",
@@ -337,11 +337,11 @@ def _nearly_reference(graph: CircuitGraph) -> Iterator[Problem]:
             )
 
 
-def _separate_train(graph: CircuitGraph, train: Train, main: Train, spelling: Spelling) -> Problem:
+def _separate_train(graph: CircuitGraph, train: Train, main: Train, spelling: Spelling) -> Diagnostic:
     names = tuple(graph.parts[number].name for number in train)
     nodes = tuple(graph.nodes[node] for node in _port_nodes(graph, train))
     others = listed(tuple(graph.parts[number].name for number in main), most=3)
-    return Problem(
+    return Diagnostic(
         "separate train",
         f"{listed(names)} at {at_nodes(nodes)} share{'s' * (len(names) == 1)} no node with {others}"
         + (", and nothing drives that train." if _rests(graph, train, main) else "."),

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 
 from sympy import Symbol
 
-from shaftwork.components.modes import Choice, Modes
+from shaftwork.components.modes import ModeChoice, Modes
 from shaftwork.network.graph import CircuitGraph, GraphPart, resolve
 from shaftwork.network.netlist import Placed
 from shaftwork.network.sharing import Shared
@@ -31,13 +31,13 @@ def _of_part(part: GraphPart, templates: Shared[Template]) -> Iterator[str]:
     return (name for name in part.component.declared if name in read)
 
 
-def _forms(elements: tuple[Modes, ...]) -> Iterator[tuple[Choice, ...]]:
+def _forms(elements: tuple[Modes, ...]) -> Iterator[tuple[ModeChoice, ...]]:
     """What may be chosen: each form of each element beside the first ones of the others."""
-    firsts = tuple(Choice(element.options[0].form) for element in elements)
+    firsts = tuple(ModeChoice(element.options[0].form) for element in elements)
     yield firsts
     for place, element in enumerate(elements):
         for form in dict.fromkeys(form for mode in element.options for form in mode.forms):
-            yield (*firsts[:place], Choice(form), *firsts[place + 1 :])
+            yield (*firsts[:place], ModeChoice(form), *firsts[place + 1 :])
 
 
 def _symbols(templates: Iterable[Template]) -> Iterator[Symbol]:

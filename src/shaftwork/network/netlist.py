@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
 from shaftwork.components.base import Component
-from shaftwork.components.modes import Choice
+from shaftwork.components.modes import ModeChoice
 from shaftwork.core.errors import ParameterError
 
 REFERENCE = "ground"
@@ -44,7 +44,7 @@ class Placed:
 
     part: Component
     nodes: tuple[str, ...]
-    choices: tuple[Choice, ...] = ()
+    choices: tuple[ModeChoice, ...] = ()
     origin: Origin | None = field(default=None, compare=False, repr=False)
 
 
@@ -116,7 +116,7 @@ class Netlist:
 
         return replace(self, placed=tuple(changed(item) for item in self.placed))
 
-    def with_choices(self, choices: Mapping[str, tuple[Choice, ...]]) -> Netlist:
+    def with_choices(self, choices: Mapping[str, tuple[ModeChoice, ...]]) -> Netlist:
         """The same parts with what is chosen for those that have modes, by name of the part."""
         placed = (replace(item, choices=choices.get(item.part.name, item.choices)) for item in self.placed)
         return replace(self, placed=tuple(placed))

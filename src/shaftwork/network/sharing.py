@@ -7,10 +7,10 @@ from collections.abc import Callable, Mapping
 from typing import Any, Generic, TypeVar
 
 from shaftwork.components.base import Component
-from shaftwork.components.modes import Choice
+from shaftwork.components.modes import ModeChoice
 
 T = TypeVar("T")
-Work = Callable[[Component, Mapping[str, Any], tuple[Choice, ...]], T]
+Work = Callable[[Component, Mapping[str, Any], tuple[ModeChoice, ...]], T]
 
 
 class Shared(Generic[T]):
@@ -28,7 +28,7 @@ class Shared(Generic[T]):
         self._results: dict[Any, list[tuple[Mapping[str, Any], T]]] = {}
 
     def of(
-        self, part: Component, values: Mapping[str, Any], choices: tuple[Choice, ...] = ()
+        self, part: Component, values: Mapping[str, Any], choices: tuple[ModeChoice, ...] = ()
     ) -> tuple[T, Mapping[str, Any]]:
         """The result for a part, and what was read of such a part besides; arguments as of `work`."""
         pattern = tuple((float, bool(value)) if isinstance(value, float) else value for value in values.values())

@@ -36,7 +36,7 @@ from shaftwork.components.branches import (
     through_of,
 )
 from shaftwork.components.laws import t as TIME
-from shaftwork.components.modes import Choice, Modes, has_mode, mode_symbol
+from shaftwork.components.modes import ModeChoice, Modes, has_mode, mode_symbol
 from shaftwork.core.domains import DOMAINS
 from shaftwork.core.errors import ShaftworkError
 from shaftwork.network.changing import CHANGE, beyond_constant, changes, spring
@@ -129,7 +129,7 @@ def substitution(part: Component) -> dict[Any, Any]:
     return names
 
 
-def make_template(part: Component, values: Mapping[str, Any], choices: tuple[Choice, ...] = ()) -> Template:
+def make_template(part: Component, values: Mapping[str, Any], choices: tuple[ModeChoice, ...] = ()) -> Template:
     """The branches of a part whose parameter values are floats or, for laws, expressions.
 
     Args:
@@ -155,9 +155,9 @@ def make_template(part: Component, values: Mapping[str, Any], choices: tuple[Cho
     return Template(branches, tuple(known.values()), _occurring(derived, resolver.printed), modes)
 
 
-def _choose(p: Any, modes: tuple[Modes, ...], choices: tuple[Choice, ...]) -> dict[Symbol, str]:
+def _choose(p: Any, modes: tuple[Modes, ...], choices: tuple[ModeChoice, ...]) -> dict[Symbol, str]:
     """Put the chosen forms and numbers of modes into `p`; symbol and name of the numbers that stay parameters."""
-    firsts = tuple(Choice(element.options[0].form, element.options[0].value) for element in modes)
+    firsts = tuple(ModeChoice(element.options[0].form, element.options[0].value) for element in modes)
     free: dict[Symbol, str] = {}
     for element, choice in zip(modes, choices or firsts, strict=True):
         setattr(p, element.form, choice.form)

@@ -12,9 +12,9 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.linear import Linearization
 from shaftwork.codegen.observer import ModelObserver
-from shaftwork.codegen.recovery import History
+from shaftwork.codegen.recovery import BranchHistory
 from shaftwork.codegen.start_values import initial_state
-from shaftwork.components.modes import Choice
+from shaftwork.components.modes import ModeChoice
 from shaftwork.components.shaft_models import MOST_SPECTRAL, OneSpring, Rigid, Spectral, Wave
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import AccuracyWarning, NetworkWarning, ParameterError
@@ -35,7 +35,7 @@ from shaftwork.pipeline.analysis import (
     titled,
 )
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.phases.elements import ModeNames
+from shaftwork.pipeline.phases.mode_machines import ModeNames
 from shaftwork.pipeline.phases.model import PhasedModel
 from shaftwork.results.exact import ExactModel, ExactSlopes
 from shaftwork.results.exact_lines import ExactLines
@@ -160,7 +160,7 @@ class ExactNetwork:
         """
         values, names = self._read(time, x), input_names(self._own, inputs)
         slopes = ExactSlopes(
-            open=self._opened(values, time, names, History(self._own.bind(), np.array([time]), x[None, :])),
+            open=self._opened(values, time, names, BranchHistory(self._own.bind(), np.array([time]), x[None, :])),
             lines=self.lines,
             meshed=Linearization(self._own, self._own.vector(), x, time, ()),
             profiles=ModelObserver(self._model.form, self._model.bind).profiles,
@@ -182,7 +182,7 @@ class ExactNetwork:
         }
 
     def _opened(
-        self, values: Mapping[str, float], time: float, inputs: tuple[str, ...], point: History
+        self, values: Mapping[str, float], time: float, inputs: tuple[str, ...], point: BranchHistory
     ) -> Linearization:
         """The open network at the point, its algebraic loops solved as they are there."""
         graph = self._open.form.graph
@@ -267,7 +267,7 @@ class ExactPhases:
 
     def _in(self, modes: ModeNames) -> Model:
         """The network in one phase."""
-        phases, chosen = self._model.phases, dict[str, tuple[Choice, ...]]()
+        phases, chosen = self._model.phases, dict[str, tuple[ModeChoice, ...]]()
         netlist = phases.assembly(modes).model.netlist
         forms = {item.part.name: iter(item.choices) for item in netlist.placed}
         for element, name in zip(phases.elements, modes, strict=True):

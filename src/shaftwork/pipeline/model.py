@@ -18,7 +18,7 @@ from shaftwork.codegen.operating import steady_state
 from shaftwork.codegen.start_values import initial_state
 from shaftwork.codegen.switching import Switching
 from shaftwork.codegen.valueless import refuse_vanishing, rough, without_value
-from shaftwork.core.callbacks import Told
+from shaftwork.core.callbacks import Callback
 from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.core.kept import Kept
 from shaftwork.core.notices import PulsationWarning, muted
@@ -142,7 +142,7 @@ class Model(CompiledModel):
             return self._variant(values).simulate(t_end, **options)
         span = time_span(t_start, t_end)
         asked = relative_tolerance(rtol), atol, output_times(t_eval, *span), engine, step_limit(max_steps)
-        told = Told(progress)
+        told = Callback(progress)
         demand = Demand(span, *asked, told if progress else None)
         made = dict(zip(self.parameters, self.defaults.tolist(), strict=True)) | values
         if initial is None or (isinstance(initial, Mapping) and not isinstance(initial, Ending)):

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self
 
-from shaftwork.core.errors import NetworkError, NetworkWarning, ParameterError, Problem
+from shaftwork.core.errors import Diagnostic, NetworkError, NetworkWarning, ParameterError
 from shaftwork.core.notices import warn
 from shaftwork.equations.kirchhoff import kirchhoff
 from shaftwork.equations.records import Equations, NamedPhase
@@ -53,7 +53,7 @@ class Network(NetworkBuilder):
         2.0
     """
 
-    def check(self) -> tuple[Problem, ...]:
+    def check(self) -> tuple[Diagnostic, ...]:
         """Everything that is wrong with the network or worth saying about it. Never raises."""
         return diagnose(self.netlist())[2]
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.recovery import History
+from shaftwork.codegen.recovery import BranchHistory
 from shaftwork.integrate.problem import LinearInputs, Observed
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind
@@ -60,7 +60,7 @@ def observed(prepared: Prepared) -> Observed:
     pairs = [branches for branches in beside.values() if len(branches) > 1]
 
     def values(times: Array, states: Array) -> Array:
-        history = History(prepared.bound, times, states)
+        history = BranchHistory(prepared.bound, times, states)
         left = history.through[tree] - prepared.bound.part.coefficients[tree][:, None] * history.across[tree]
         sums = [history.through[pair].sum(axis=0, keepdims=True) for pair in pairs]
         return np.concatenate([history.potentials[places], history.through, *sums, left]).T

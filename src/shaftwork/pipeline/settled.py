@@ -24,8 +24,8 @@ from shaftwork.network.wording import listed
 
 if TYPE_CHECKING:
     from shaftwork.network.graph import CircuitGraph, GraphBranch
-    from shaftwork.pipeline.phases.elements import Element
-    from shaftwork.pipeline.phases.moments import Regime
+    from shaftwork.pipeline.phases.hybrid_state import Regime
+    from shaftwork.pipeline.phases.mode_machines import ModeMachine
 
 SAME = 1e-6
 """Levels of a law that differ by less than this fraction are one."""
@@ -115,7 +115,7 @@ def warn_of_earlier_levels(bound: BoundArrays, x: Array, when: float, switching:
         )
 
 
-def warn_of_held_torques(regime: Regime, elements: Sequence[Element], x: Array, when: float) -> None:
+def warn_of_held_torques(regime: Regime, elements: Sequence[ModeMachine], x: Array, when: float) -> None:
     """Warn where what sticks can hold other torques as well: a spring between two of them, or from one to the frame.
 
     The states are disturbed, and of that is read what is left for ever: it tells equilibria side by side.

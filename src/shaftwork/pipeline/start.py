@@ -10,8 +10,8 @@ import numpy as np
 
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.start_values import initial_state, with_others
-from shaftwork.codegen.stores import Stores
-from shaftwork.core.errors import NetworkWarning, Problem
+from shaftwork.codegen.state_transfer import StateTransfer
+from shaftwork.core.errors import Diagnostic, NetworkWarning
 from shaftwork.core.notices import warn
 from shaftwork.network.checks import resting_trains
 from shaftwork.network.graph import CircuitGraph
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from shaftwork.pipeline.prepared import Prepared
     from shaftwork.pipeline.waves import CarriedWaves, WaveStart
 
-_RESTING: WeakKeyDictionary[CircuitGraph, tuple[Problem, ...]] = WeakKeyDictionary()
+_RESTING: WeakKeyDictionary[CircuitGraph, tuple[Diagnostic, ...]] = WeakKeyDictionary()
 """What `resting_trains` gives: it takes as long as a short run."""
 
 
@@ -101,7 +101,7 @@ def _taken_up(prepared: Prepared, ending: Ending, after: float, *, changes: bool
         after: time at which inputs are read from now on, s.
         changes: whether a parameter is another one: what is rigidly joined may then have to change its speeds at once.
     """
-    form, bound, stores = prepared.form, prepared.bound, Stores(prepared.form)
+    form, bound, stores = prepared.form, prepared.bound, StateTransfer(prepared.form)
     if changes:
         ending.refuse_lacking(stores.names)
         x = stores.states(bound, ending.read, ending)

@@ -11,9 +11,9 @@ import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.recovery import History
+from shaftwork.codegen.recovery import BranchHistory
 from shaftwork.codegen.start_values import Start, at_rest
-from shaftwork.codegen.stores import Stores
+from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.codegen.waves import WaveSystem
 from shaftwork.codegen.wound_shafts import EndSpeeds
 from shaftwork.components.base import Component
@@ -173,7 +173,7 @@ def start_of_waves(
     form, graph = bound.program.form, twin.program.form.graph
     start = Start(twin, _all_along(form, given), t0)
     times, x = np.array([just_after(t0)]), start.states[None, :]
-    stores = Stores(twin.program.form)
+    stores = StateTransfer(twin.program.form)
     stored = dict(zip(stores.names, stores.of(lambda: twin, times, x)[0], strict=True))
     states = np.array([stored[state.name] for state in form.states])
     inertias = [stores.branches[state.name] for state in form.states if state.kind == "across"]
@@ -181,7 +181,7 @@ def start_of_waves(
         lambda history: history.across[inertias], at_rest(bound, t0)[: len(inertias)]
     )
     springs = [b for b in graph.branches if b.template.kind is Kind.THROUGH_STORE and _is_wave(form, b.part)]
-    ends, through = EndSpeeds(start.given_speeds), History(twin, times, x).through
+    ends, through = EndSpeeds(start.given_speeds), BranchHistory(twin, times, x).through
     speeds = [speed for spring in springs for speed in ends.of(spring.plus, spring.minus)]
     return states, WaveStart(np.array(speeds), np.array([through[spring.index, 0] for spring in springs]))
 

@@ -13,9 +13,9 @@ from shaftwork.components.contacts import Backlash
 from shaftwork.components.rotation import Damper, Inertia, Spring
 from shaftwork.components.sources import SpeedSource
 from shaftwork.core.domains import ROTATION
-from shaftwork.core.errors import NetworkError, Problem
+from shaftwork.core.errors import Diagnostic, NetworkError
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
-from shaftwork.reduce.swings import Array, Row
+from shaftwork.reduce.tridiagonal_modes import Array, TridiagonalChain
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class Chain:
         return np.append(np.zeros(len(free) - len(rates)), rates) / (2 * np.pi)
 
     @cached_property
-    def row(self) -> tuple[tuple[int, ...], Row]:
+    def row(self) -> tuple[tuple[int, ...], TridiagonalChain]:
         """Places of the stations whose speed is not prescribed, and how they swing: the others are a frame to them."""
         free = tuple(k for k, held in enumerate(self.prescribed) if not held)
         c = np.array([0.0, *(link.c for link in self.links), 0.0])
@@ -104,7 +104,7 @@ class Chain:
         supports += np.where(held[:-2], c[:-1], 0.0) + np.where(held[2:], c[1:], 0.0)
         inertias = np.array([station.inertia for station in self.stations])
         between = [c[a + 1] if b == a + 1 else 0.0 for a, b in pairwise(free)]
-        return free, Row(inertias[list(free)], np.array(between), supports[list(free)])
+        return free, TridiagonalChain(inertias[list(free)], np.array(between), supports[list(free)])
 
     def swing(self, rate: float) -> tuple[Array, Array]:
         """(n,) shape at one of its rates, with a modal inertia of 1 kg m^2, and (n - 1,) torques in the links.
@@ -150,7 +150,7 @@ def read_chain(netlist: Netlist, keep: str) -> Chain:
     Raises:
         NetworkError: it is no chain of inertias and springs; names every part and node that is in the way.
     """
-    problems: list[Problem] = []
+    problems: list[Diagnostic] = []
     stations: dict[str, Station] = {}
     links: dict[tuple[str, str], list[Placed]] = {}
     circuits: list[Placed] = []
@@ -191,7 +191,7 @@ def _with(station: Station, item: Placed) -> Station:
     return replace(station, riders=(*station.riders, item), support=station.support + support)
 
 
-def _objections(items: Sequence[Placed], keep: str) -> Iterator[Problem]:
+def _objections(items: Sequence[Placed], keep: str) -> Iterator[Diagnostic]:
     """Gaps that no chain of springs describes."""
     beside = [item.part.name for item in items if not isinstance(item.part, Damper)]
     for item in items:
@@ -199,14 +199,14 @@ def _objections(items: Sequence[Placed], keep: str) -> Iterator[Problem]:
         if not isinstance(part, Backlash):
             continue
         if part.c is None:
-            yield Problem(
+            yield Diagnostic(
                 "rigid gap",
                 f"Backlash '{part.name}' has rigid flanks, which have no stiffness to swing by.",
                 "Give it a stiffness c.",
                 (part.name,),
             )
         elif len(beside) > 1 and keep not in beside:
-            yield Problem(
+            yield Diagnostic(
                 "gap beside a spring",
                 f"Backlash '{part.name}' lies beside {', '.join(name for name in beside if name != part.name)}: in "
                 "series with others they are no one gap.",
@@ -215,22 +215,22 @@ def _objections(items: Sequence[Placed], keep: str) -> Iterator[Problem]:
             )
 
 
-def _not_in_a_chain(item: Placed) -> Problem:
+def _not_in_a_chain(item: Placed) -> Diagnostic:
     kind, name = type(item.part).__name__, item.part.name
     hint = "net.expanded() writes a long shaft out part by part." if kind == "Shaft" else "Put springs in its place."
-    return Problem("no part of a chain", f"{kind} '{name}' joins {', '.join(item.nodes)}.", hint, (name,))
+    return Diagnostic("no part of a chain", f"{kind} '{name}' joins {', '.join(item.nodes)}.", hint, (name,))
 
 
-def _not_a_row(stations: dict[str, Station], links: dict[tuple[str, str], list[Placed]]) -> Iterator[Problem]:
+def _not_a_row(stations: dict[str, Station], links: dict[tuple[str, str], list[Placed]]) -> Iterator[Diagnostic]:
     """Where a chain branches, closes or falls apart, and links without a spring."""
     for (a, b), items in links.items():
         if not any(float(getattr(item.part, "c", None) or 0.0) for item in items):
             names = tuple(item.part.name for item in items)
-            yield Problem("no spring", f"Between '{a}' and '{b}' there is no spring.", "Give it one.", names, (a, b))
+            yield Diagnostic("no spring", f"Between '{a}' and '{b}' there is no spring.", "Give it one.", names, (a, b))
     for node in stations:
         beside = [pair for pair in links if node in pair]
         if len(beside) > 2:
-            yield Problem(
+            yield Diagnostic(
                 "branching", f"At node '{node}' {len(beside)} shafts meet.", "Simplify one branch.", (), (node,)
             )
     if not stations:
@@ -240,10 +240,12 @@ def _not_a_row(stations: dict[str, Station], links: dict[tuple[str, str], list[P
             "one of the train, and TorqueSource('none', tau=0.0) there: seen from it, masses are inertias of the same "
             "numbers, and forces torques."
         )
-        yield Problem("no row", f"{what}.", hint)
+        yield Diagnostic("no row", f"{what}.", hint)
     elif len(links) != len(stations) - 1:
         what = f"{len(stations)} nodes are joined by {len(links)} shafts"
-        yield Problem("no row", f"{what}; a chain has one shaft less than nodes.", "Open the loop, or join the parts.")
+        yield Diagnostic(
+            "no row", f"{what}; a chain has one shaft less than nodes.", "Open the loop, or join the parts."
+        )
 
 
 def _in_a_row(stations: dict[str, Station], links: dict[tuple[str, str], list[Placed]]) -> Chain:
@@ -262,7 +264,7 @@ def _in_a_row(stations: dict[str, Station], links: dict[tuple[str, str], list[Pl
 def _condensed(chain: Chain, keep: str, title: str) -> Chain:
     """Springs that meet at a node without inertia, where nothing sits, are one."""
     stations, links = list(chain.stations), list(chain.links)
-    problems: list[Problem] = []
+    problems: list[Diagnostic] = []
     for station in chain.stations:
         if station.inertia or station.prescribed_by:
             continue
@@ -271,7 +273,7 @@ def _condensed(chain: Chain, keep: str, title: str) -> Chain:
         if station.riders or len(beside) < 2 or any(link.has(keep) for link in beside):
             where = f"Node '{station.node}' has no inertia"
             problems.append(
-                Problem(
+                Diagnostic(
                     "massless node",
                     f"{where}, and is the end of the kept shaft or of the chain, or parts sit there.",
                     "Give it the inertia of what it stands for.",

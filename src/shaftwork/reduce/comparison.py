@@ -11,7 +11,7 @@ import numpy as np
 
 from shaftwork.core.errors import ParameterError
 from shaftwork.pipeline.network import Network
-from shaftwork.reduce.swings import Array
+from shaftwork.reduce.tridiagonal_modes import Array
 from shaftwork.results.solution import Solution
 
 SHOWN = 3

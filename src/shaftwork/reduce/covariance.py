@@ -13,7 +13,7 @@ from sympy import Expr, Float, Symbol
 from shaftwork.components.base import Component
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, End, named_in, readings_in
 from shaftwork.components.laws import t
-from shaftwork.components.modes import Choice, Mode, Modes
+from shaftwork.components.modes import Mode, ModeChoice, Modes
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.network.graph import resolve
 from shaftwork.network.kinds import Kind
@@ -37,14 +37,14 @@ def does_the_same(part: Component, referred: Component, scale: Scale) -> bool:
         referred: as it is at the reference shaft.
         scale: of its speeds and powers to those of the reference shaft.
     """
-    old, new = _View.of(part), _View.of(referred)
+    old, new = _PartView.of(part), _PartView.of(referred)
     if len(old.modes) != len(new.modes):
         return False
     forms = [dict.fromkeys(form for mode in element.options for form in mode.forms) for element in old.modes]
     try:
         guards = all(_Guards(old, new, scale, *pair).agree() for pair in zip(old.modes, new.modes, strict=True))
         return guards and all(
-            _agree(old.chosen(tuple(map(Choice, chosen))), new.chosen(tuple(map(Choice, chosen))), scale)
+            _agree(old.chosen(tuple(map(ModeChoice, chosen))), new.chosen(tuple(map(ModeChoice, chosen))), scale)
             for chosen in product(*forms)
         )
     except (TypeError, ValueError, ArithmeticError):
@@ -52,18 +52,18 @@ def does_the_same(part: Component, referred: Component, scale: Scale) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class _View:
+class _PartView:
     """A part with the values of its parameters, and its branches in one combination of forms."""
 
     part: Component
     template: Template
 
     @classmethod
-    def of(cls, part: Component, choices: tuple[Choice, ...] = ()) -> _View:
+    def of(cls, part: Component, choices: tuple[ModeChoice, ...] = ()) -> _PartView:
         nodes = tuple("ground" for _ in part.ports)
         return cls(part, make_template(part, resolve(Placed(part, nodes))[0].values, choices))
 
-    def chosen(self, choices: tuple[Choice, ...]) -> _View:
+    def chosen(self, choices: tuple[ModeChoice, ...]) -> _PartView:
         return self.of(self.part, choices) if choices else self
 
     @property
@@ -97,7 +97,7 @@ class _View:
         ends = [end for end in branch.ends if end is not None]
         return self.scale_at(ends[0], scale) if ends else scale
 
-    def ends_beside(self, other: _View, branch: BranchTemplate) -> tuple[End | None, ...]:
+    def ends_beside(self, other: _PartView, branch: BranchTemplate) -> tuple[End | None, ...]:
         """The ends of a branch; an optional port that the other part does not have is left at the frame."""
         kept = {port.name for port in other.part.ports}
         frame = [port.name for port in self.part.ports if port.optional and port.name not in kept]
@@ -127,14 +127,14 @@ def _samples(symbols: Sequence[Symbol], modes: Sequence[Modes]) -> Iterator[dict
             yield {symbol: abs(value) if symbol == t else value for symbol, value in chosen.items()}
 
 
-def _agree(old: _View, new: _View, scale: Scale) -> bool:
+def _agree(old: _PartView, new: _PartView, scale: Scale) -> bool:
     pairs = tuple(zip(old.template.branches, new.template.branches, strict=True))
     return all(
         a.kind is b.kind and a.ends == new.ends_beside(old, b) and _same_branch(old, new, a, b, scale) for a, b in pairs
     )
 
 
-def _same_branch(old: _View, new: _View, before: BranchTemplate, after: BranchTemplate, scale: Scale) -> bool:
+def _same_branch(old: _PartView, new: _PartView, before: BranchTemplate, after: BranchTemplate, scale: Scale) -> bool:
     if before.terms:
         return _proportional(old, new, before, after, scale)
     own = old.scale_of(before, scale)
@@ -158,7 +158,7 @@ def _modes_in(law: Expr) -> tuple[Symbol, ...]:
     return tuple(sorted(found, key=lambda symbol: str(symbol.name)))
 
 
-def _turned(view: _View, symbol: Symbol, own: Scale, scale: Scale) -> float:
+def _turned(view: _PartView, symbol: Symbol, own: Scale, scale: Scale) -> float:
     """By what an argument of a law at the reference shaft is multiplied to be that of the part as it was."""
     if symbol in (ACROSS, INTEGRAL):
         return own.ratio
@@ -169,7 +169,7 @@ def _turned(view: _View, symbol: Symbol, own: Scale, scale: Scale) -> float:
     return -1.0 if symbol != t and own.ratio < 0 else 1.0  # slipping forward is slipping backward
 
 
-def _proportional(old: _View, new: _View, before: BranchTemplate, after: BranchTemplate, scale: Scale) -> bool:
+def _proportional(old: _PartView, new: _PartView, before: BranchTemplate, after: BranchTemplate, scale: Scale) -> bool:
     """Whether a coupling asks for the same speeds, and shares the same torques."""
     ends = [(plus if plus is not None else minus) for _, plus, minus in before.terms]
     scales = [old.scale_at(end, scale) for end in ends]
@@ -192,8 +192,8 @@ def _close(one: float, other: float) -> bool:
 class _Guards:
     """The guards of an element of a part, before and after."""
 
-    old: _View
-    new: _View
+    old: _PartView
+    new: _PartView
     scale: Scale
     before: Modes
     after: Modes

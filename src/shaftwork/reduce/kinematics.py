@@ -10,7 +10,7 @@ from sympy import Expr, Float, S
 
 from shaftwork.components.lossy_gear import LossyGear
 from shaftwork.core.domains import ELECTRICAL
-from shaftwork.core.errors import Problem
+from shaftwork.core.errors import Diagnostic
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
 from shaftwork.network.kinds import Kind
 from shaftwork.network.wording import listed
@@ -37,7 +37,7 @@ class Term:
 
 
 @dataclass(frozen=True)
-class Row:
+class SpeedConstraint:
     """Sum of factor * speed over nodes is zero: what a rigid part demands."""
 
     part: str
@@ -58,7 +58,7 @@ class Kinematics:
     rigid: Clusters
     shafts: Clusters
     absorbed: tuple[int, ...]
-    problems: tuple[Problem, ...]
+    problems: tuple[Diagnostic, ...]
 
 
 def kinematics(graph: CircuitGraph, drives: Mapping[str, str]) -> Kinematics:
@@ -73,13 +73,13 @@ def kinematics(graph: CircuitGraph, drives: Mapping[str, str]) -> Kinematics:
     parts = [graph.parts[place] for place in absorbed]
     rows = [_row(graph, graph.branches[index]) for part in parts for index in part.branches]
     held = _joined(Clusters(moving), rows, [])
-    problems: list[Problem] = []
+    problems: list[Diagnostic] = []
     for number, row in enumerate(rows):
         part = next(part for part in parts if part.name == row.part)
         if isinstance(part.component, LossyGear):
             lossy = _with_loss(graph, part, row, drives.get(part.name), held)
-            problems += [lossy] if isinstance(lossy, Problem) else []
-            rows[number] = row if isinstance(lossy, Problem) else lossy
+            problems += [lossy] if isinstance(lossy, Diagnostic) else []
+            rows[number] = row if isinstance(lossy, Diagnostic) else lossy
     if not problems:
         rigid, shafts = _joined(Clusters(moving), rows, problems), _joined(Clusters(moving), rows, [])
         for place, part in enumerate(graph.parts):
@@ -97,7 +97,7 @@ def _is_rigid(graph: CircuitGraph, part: GraphPart) -> bool:
     return rigid and (not part.modes or isinstance(part.component, LossyGear))
 
 
-def _row(graph: CircuitGraph, branch: GraphBranch) -> Row:
+def _row(graph: CircuitGraph, branch: GraphBranch) -> SpeedConstraint:
     """The speeds of a coupling, each node once."""
     factors: dict[int, Expr] = {}
     for coefficient, plus, minus in branch.terms:
@@ -106,19 +106,21 @@ def _row(graph: CircuitGraph, branch: GraphBranch) -> Row:
             factors[node] = factors.get(node, 0) + factor
     values = {symbol: Float(graph.parameters[symbol.name]) for law in factors.values() for symbol in law.free_symbols}
     terms = (Term(node, float(law.xreplace(values)), law) for node, law in factors.items() if node != GROUND)
-    return Row(graph.part_of(branch.index).name, tuple(term for term in terms if term.factor))
+    return SpeedConstraint(graph.part_of(branch.index).name, tuple(term for term in terms if term.factor))
 
 
-def _with_loss(graph: CircuitGraph, gear: GraphPart, row: Row, side: str | None, still: Clusters) -> Row | Problem:
+def _with_loss(
+    graph: CircuitGraph, gear: GraphPart, row: SpeedConstraint, side: str | None, still: Clusters
+) -> SpeedConstraint | Diagnostic:
     """The row of a lossy gear with what its driving side loses."""
     found = side or _driving_side(graph, gear, still)
-    if isinstance(found, Problem):
+    if isinstance(found, Diagnostic):
         return found
     back = found == "b" and getattr(gear.component, "efficiency_back", None) is not None
     name = "efficiency_back" if back else "efficiency"
     share = float(gear.component.declared[name].magnitude(getattr(gear.component, name))[0])
     if share <= 0:
-        return Problem(
+        return Diagnostic(
             "self-locking gear",
             f"LossyGear '{gear.name}' cannot be driven from its side b: {name} = {share:g}.",
             f"Where a drives, say so: drives={{'{gear.name}': 'a'}}.",
@@ -126,10 +128,10 @@ def _with_loss(graph: CircuitGraph, gear: GraphPart, row: Row, side: str | None,
         )
     driving, law = gear.nodes[found], graph.symbol_of(gear, name)
     terms = (replace(term, power=share, power_law=law) if term.node == driving else term for term in row.terms)
-    return Row(row.part, tuple(terms))
+    return SpeedConstraint(row.part, tuple(terms))
 
 
-def _driving_side(graph: CircuitGraph, gear: GraphPart, still: Clusters) -> str | Problem:
+def _driving_side(graph: CircuitGraph, gear: GraphPart, still: Clusters) -> str | Diagnostic:
     """The side of a lossy gear on which every motor and source is."""
     found: dict[str, list[str]] = {}
     for port in ("a", "b"):
@@ -142,7 +144,7 @@ def _driving_side(graph: CircuitGraph, gear: GraphPart, still: Clusters) -> str 
         why = f"it lies in a loop: {listed(round_it)} drives it from both of its sides"
     elif found["a"]:
         why = f"sources are on both sides ({listed(found['a'])}; {listed(found['b'])})"
-    return Problem(
+    return Diagnostic(
         "direction of power",
         f"LossyGear '{gear.name}' loses its share on the way of the power, and {why}.",
         f"Say which side drives: drives={{'{gear.name}': 'a'}}.",
@@ -170,7 +172,7 @@ def _beyond(graph: CircuitGraph, gear: GraphPart, start: int, still: Clusters) -
     return found
 
 
-def _joined(clusters: Clusters, rows: Sequence[Row], problems: list[Problem]) -> Clusters:
+def _joined(clusters: Clusters, rows: Sequence[SpeedConstraint], problems: list[Diagnostic]) -> Clusters:
     """Join nodes by rows of two, again and again, since rows of three become rows of two as others are joined."""
     waiting = list(rows)
     while True:
@@ -181,7 +183,7 @@ def _joined(clusters: Clusters, rows: Sequence[Row], problems: list[Problem]) ->
         waiting = left
 
 
-def _settled(clusters: Clusters, row: Row, problems: list[Problem]) -> bool:
+def _settled(clusters: Clusters, row: SpeedConstraint, problems: list[Diagnostic]) -> bool:
     """Whether a row is used up: it held a group at rest, joined two, or said what was known."""
     groups: dict[int, list[tuple[Term, Scale]]] = {}
     for term in row.terms:
@@ -230,8 +232,8 @@ def _turns(group: Sequence[tuple[Term, Scale]]) -> bool:
     return abs(sum(parts)) <= AGREE * sum(map(abs, parts))
 
 
-def _two_ratios(row: Row) -> Problem:
-    return Problem(
+def _two_ratios(row: SpeedConstraint) -> Diagnostic:
+    return Diagnostic(
         "two ratios",
         f"'{row.part}' closes a loop of gears round which ratios or losses differ, so that its shafts have two ratios.",
         "Make the ratios round the loop agree, or take the part out.",
@@ -239,8 +241,8 @@ def _two_ratios(row: Row) -> Problem:
     )
 
 
-def _differential(clusters: Clusters, row: Row) -> Problem:
-    return Problem(
+def _differential(clusters: Clusters, row: SpeedConstraint) -> Diagnostic:
+    return Diagnostic(
         "differential",
         f"'{row.part}' has no fixed member: {sum(term.node in clusters for term in row.terms)} of its shafts turn, and "
         "none of them has a ratio to another one alone.",
@@ -249,7 +251,7 @@ def _differential(clusters: Clusters, row: Row) -> Problem:
     )
 
 
-def _along(graph: CircuitGraph, part: GraphPart, shafts: Clusters) -> Iterator[Problem]:
+def _along(graph: CircuitGraph, part: GraphPart, shafts: Clusters) -> Iterator[Diagnostic]:
     """A spring, a gap or any part that stays joins nodes of one ratio."""
     nodes = [node for node in part.nodes.values() if node in shafts]
     for node in nodes[1:]:
@@ -258,7 +260,7 @@ def _along(graph: CircuitGraph, part: GraphPart, shafts: Clusters) -> Iterator[P
             shafts.join(nodes[0], node, Scale())
         elif not own.agrees(other):
             here, there = graph.node_name(nodes[0]), graph.node_name(node)
-            yield Problem(
+            yield Diagnostic(
                 "two ratios",
                 f"'{part.name}' closes a loop: by the way round it, {_difference(own, other, here, there)}.",
                 "No one ratio refers a shaft that its own gears twist; take the part out, or leave the train as it is.",

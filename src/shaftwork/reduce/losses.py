@@ -8,7 +8,7 @@ from itertools import zip_longest
 
 from shaftwork.equations.nomenclature import table as longtable
 from shaftwork.equations.printing import printed_number
-from shaftwork.reduce.swings import Array
+from shaftwork.reduce.tridiagonal_modes import Array
 
 
 @dataclass(frozen=True)

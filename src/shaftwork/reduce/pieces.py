@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shaftwork.reduce.chain import Chain
-from shaftwork.reduce.swings import Array, Row, carried
+from shaftwork.reduce.tridiagonal_modes import Array, TridiagonalChain, carried
 
 NOTHING = 1e-12
 """A share of a speed or of an inertia that is only rounding."""
@@ -31,7 +31,7 @@ class Carried:
 
 
 @dataclass(frozen=True, eq=False)
-class Mode(Carried):
+class FixedBoundaryMode(Carried):
     """How a piece of a chain swings while its boundaries are held: an inertia on a spring that they carry.
 
     Args:
@@ -47,7 +47,7 @@ class Mode(Carried):
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class Substructure:
     """The stations between boundaries, or beyond the outer ones.
 
     Args:
@@ -62,10 +62,10 @@ class Piece:
     joint: tuple[float, float]
     support: Array
     between: tuple[int, ...]
-    modes: tuple[Mode, ...]
+    modes: tuple[FixedBoundaryMode, ...]
 
 
-def piece_of(chain: Chain, count: int, number: int, inner: range) -> Piece:
+def piece_of(chain: Chain, count: int, number: int, inner: range) -> Substructure:
     """The stations before the boundary of this number, of so many, and behind the one before it.
 
     Law: C is the deflection of the stations under the boundaries while nothing swings; the force that it takes to hold
@@ -75,8 +75,8 @@ def piece_of(chain: Chain, count: int, number: int, inner: range) -> Piece:
     between = tuple(k for k in (number - 1, number) if 0 <= k < count)
     still = np.zeros((len(chain.stations), count))
     if not inner:
-        return Piece(still, (0.0, 0.0), np.zeros((count, 2)), between, ())
-    held = _Held.of(chain, inner)
+        return Substructure(still, (0.0, 0.0), np.zeros((count, 2)), between, ())
+    held = _FixedBoundaries.of(chain, inner)
     given = np.zeros((len(inner) + 2, count))
     for k, place, follow in zip((number - 1, number), (0, -1), (held.from_first, held.from_last), strict=True):
         if k in between:
@@ -90,11 +90,11 @@ def piece_of(chain: Chain, count: int, number: int, inner: range) -> Piece:
     beside = [chain.stations[k].inertia for k in (inner.start - 1, inner.stop) if 0 <= k < len(chain.stations)]
     faint = math.sqrt(NOTHING * min(size for size in (*beside, *held.inertias.tolist()) if size))
     modes = tuple(_modes(held, still, between, np.array(inner), number, faint))
-    return Piece(still, (stiffness, damping), support, between, modes)
+    return Substructure(still, (stiffness, damping), support, between, modes)
 
 
 @dataclass(frozen=True, eq=False)
-class _Held:
+class _FixedBoundaries:
     """Stations while the boundaries beside them rest.
 
     Args:
@@ -113,7 +113,7 @@ class _Held:
     d: Array
 
     @classmethod
-    def of(cls, chain: Chain, inner: range) -> _Held:
+    def of(cls, chain: Chain, inner: range) -> _FixedBoundaries:
         stations = [chain.stations[k] for k in inner]
         inertias, supports = np.array([(station.inertia, station.support) for station in stations]).T
         bearings = np.array([sum(spring.d for spring in station.bearings) for station in stations])
@@ -121,9 +121,9 @@ class _Held:
         return cls(inertias, supports, bearings, *springs[inner.start : inner.stop + 1].T)
 
     @property
-    def row(self) -> Row:
+    def row(self) -> TridiagonalChain:
         """How they swing."""
-        return Row(self.inertias, self.c[1:-1], _first(_last(self.supports, self.c[-1]), self.c[0]))
+        return TridiagonalChain(self.inertias, self.c[1:-1], _first(_last(self.supports, self.c[-1]), self.c[0]))
 
     def from_first(self) -> Array:
         """(m,) how they follow the boundary before them."""
@@ -148,8 +148,8 @@ def _last(values: Array, more: float) -> Array:
 
 
 def _modes(
-    held: _Held, still: Array, between: tuple[int, ...], inner: Array, number: int, faint: float
-) -> Iterator[Mode]:
+    held: _FixedBoundaries, still: Array, between: tuple[int, ...], inner: Array, number: int, faint: float
+) -> Iterator[FixedBoundaryMode]:
     """The modes of stations while the boundaries beside them rest.
 
     Law: L = Phi^T J C, which is the force on each boundary, c Phi of the station beside it, over omega^2. Below a faint
@@ -166,7 +166,7 @@ def _modes(
         shares = np.zeros(len(still))
         shares[inner] = size * shape
         lost = float(held.lost(np.pad(shape, 1)[:, None])[0, 0])
-        yield Mode(size**2, base, between, size**2 * rate**2, size**2 * lost, shares)
+        yield FixedBoundaryMode(size**2, base, between, size**2 * rate**2, size**2 * lost, shares)
 
 
 def _scaled(participation: Array) -> tuple[float, Array]:

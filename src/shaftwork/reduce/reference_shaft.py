@@ -8,7 +8,7 @@ from functools import partial
 
 from shaftwork.components.lossy_gear import LossyGear
 from shaftwork.core.domains import ELECTRICAL
-from shaftwork.core.errors import NetworkError, ParameterError, Problem, SignalError
+from shaftwork.core.errors import Diagnostic, NetworkError, ParameterError, SignalError
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
 from shaftwork.pipeline.network import Network, network_of
@@ -100,7 +100,7 @@ def refer(net: Network, to: str, *, drives: Mapping[str, str] | None = None) -> 
         raise NetworkError(title, found.problems)
     if node not in found.shafts:
         raise ParameterError(f"Node '{to}' of '{net.name}' is held at rest: nothing can be referred to it.")
-    view = _View(graph, netlist, found, node)
+    view = _NodeView(graph, netlist, found, node)
     parts, problems = view.parts()
     if problems:
         raise NetworkError(title, problems)
@@ -139,7 +139,7 @@ def _checked_sides(graph: CircuitGraph, drives: Mapping[str, str]) -> Mapping[st
 
 
 @dataclass(frozen=True, eq=False)
-class _View:
+class _NodeView:
     """A network from one of its nodes."""
 
     graph: CircuitGraph
@@ -147,10 +147,10 @@ class _View:
     found: Kinematics
     to: int
 
-    def parts(self) -> tuple[list[ReferredPart], tuple[Problem, ...]]:
+    def parts(self) -> tuple[list[ReferredPart], tuple[Diagnostic, ...]]:
         """The parts at the reference shaft, and those that have no place there."""
         made: list[ReferredPart] = []
-        problems: list[Problem] = []
+        problems: list[Diagnostic] = []
         for place, (item, part) in enumerate(zip(self.netlist.placed, self.graph.parts, strict=True)):
             if place in self.found.absorbed:
                 continue
@@ -161,7 +161,7 @@ class _View:
                 problems.append(seen)
         return made, tuple(problems)
 
-    def _part(self, item: Placed, part: GraphPart) -> ReferredPart | Problem | None:
+    def _part(self, item: Placed, part: GraphPart) -> ReferredPart | Diagnostic | None:
         """A part at the reference shaft; None where it cannot move."""
         nodes = [number for number in part.nodes.values() if number != GROUND]
         moving = [number for number in nodes if number in self.found.shafts]
@@ -173,7 +173,7 @@ class _View:
             return None
         name, kind = part.name, type(item.part).__name__
         if self.found.shafts[moving[0]][0] != self.found.shafts[self.to][0]:
-            return Problem(
+            return Diagnostic(
                 "other train",
                 f"{kind} '{name}' is not joined to '{self.graph.node_name(self.to)}' by any shaft.",
                 "Refer each train in a network of its own.",
@@ -183,7 +183,9 @@ class _View:
         if isinstance(seen, ReferredPart):
             return seen
         hint = f"Refer to its own shaft, to='{self.graph.node_name(moving[0])}', or put a simpler part in its place."
-        return Problem("no such part there", f"{kind} '{name}' cannot be referred: {seen.rstrip('.')}.", hint, (name,))
+        return Diagnostic(
+            "no such part there", f"{kind} '{name}' cannot be referred: {seen.rstrip('.')}.", hint, (name,)
+        )
 
     def _place(self, node: int) -> str:
         """Where a node is in the referred network: rigid shafts are one node."""

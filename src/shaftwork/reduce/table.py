@@ -13,7 +13,7 @@ from sympy import Add, Expr, Integer, Symbol, latex
 from shaftwork.components.laws import omega, phi, s, v
 from shaftwork.components.tables import Table
 from shaftwork.core.errors import SignalError
-from shaftwork.equations.assembly import Group
+from shaftwork.equations.assembly import FactoredTerms
 from shaftwork.equations.nomenclature import column, unit
 from shaftwork.equations.nomenclature import table as longtable
 from shaftwork.equations.notation import without_marks
@@ -179,7 +179,7 @@ def _pieces(law: Expr, names: Mapping[str, str]) -> tuple[str, ...]:
     if isinstance(law, Table):
         points = [f"({printed_number(x)},\\, {printed_number(y)})\\," for x, y in zip(law.xs, law.ys, strict=True)]
         return (*points[:POINTS], *([r"\dots"] if len(points) > POINTS else []))
-    return Writer(names, (), (), {}).pieces((Group(Integer(1), Add.make_args(law)),))
+    return Writer(names, (), (), {}).pieces((FactoredTerms(Integer(1), Add.make_args(law)),))
 
 
 def _broken(text: str, width: int) -> str:

@@ -14,8 +14,8 @@ from shaftwork.network.netlist import REFERENCE
 from shaftwork.pipeline.network import Network
 from shaftwork.reduce.chain import Chain, Link, series
 from shaftwork.reduce.groups import add_circuits, add_link, add_riders
-from shaftwork.reduce.pieces import NOTHING, Carried, Mode, Piece, common, piece_of
-from shaftwork.reduce.swings import Array, singular_values
+from shaftwork.reduce.pieces import NOTHING, Carried, FixedBoundaryMode, Substructure, common, piece_of
+from shaftwork.reduce.tridiagonal_modes import Array, singular_values
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class ModalChain:
     joints: tuple[Link, ...]
     support: Array
     carried: tuple[Carried, ...]
-    modes: tuple[Mode, ...]
+    modes: tuple[FixedBoundaryMode, ...]
     still: Array
 
     def speeds(self) -> Array:
@@ -142,7 +142,7 @@ def truncated(chain: Chain, unknowns: int, kept: int) -> ModalChain:
     return ModalChain(chain, kept, boundaries, ends, joints, support, tuple(carried), tuple(modes), still)
 
 
-def _joint(links: Sequence[Link], piece: Piece) -> Link:
+def _joint(links: Sequence[Link], piece: Substructure) -> Link:
     """The links between two boundaries as one."""
     if len(links) == 1:
         return links[0]

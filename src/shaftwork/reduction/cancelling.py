@@ -11,7 +11,7 @@ import networkx as nx
 import numpy as np
 import sympy
 
-from shaftwork.core.errors import Problem
+from shaftwork.core.errors import Diagnostic
 from shaftwork.network.graph import CircuitGraph, GraphBranch
 from shaftwork.network.wording import at_nodes, listed
 from shaftwork.reduction.form import StateForm
@@ -23,7 +23,7 @@ SINGULAR = 1e-13
 """Reciprocal condition below which coupled values cancel; the same as in the assembly of the matrices."""
 
 
-def numeric_problems(form: StateForm) -> tuple[Problem, ...]:
+def numeric_problems(form: StateForm) -> tuple[Diagnostic, ...]:
     """Values that cancel each other or lie outside what a computer can represent, although the structure is sound."""
     graph, loops, cutsets = form.graph, form.tree.loops, form.tree.cutsets
     rows = (*loops.items(), *(cutsets.items() if cutsets is not loops else ()))
@@ -35,7 +35,7 @@ def numeric_problems(form: StateForm) -> tuple[Problem, ...]:
     return (*found, *jamming(form, graph.parameters))
 
 
-def jamming(form: StateForm, parameters: Mapping[str, float]) -> Iterator[Problem]:
+def jamming(form: StateForm, parameters: Mapping[str, float]) -> Iterator[Diagnostic]:
     """A coupling that brakes by more than the inertia (or damping, or compliance) in its way can answer: it jams.
 
     Args:
@@ -108,24 +108,24 @@ def _matrix(numbers: Sequence[Sequence[Number]], parameters: Mapping[str, float]
     return np.array(made, dtype=float).reshape(len(numbers), -1 if made and made[0] else columns)
 
 
-def _jammed(view: View, lossy: Sequence[int]) -> Problem:
+def _jammed(view: View, lossy: Sequence[int]) -> Diagnostic:
     words = view.words(lossy[0])
     message = (
         f"{view.titles(lossy)} would brake by more than the {words.store} before it can answer: "
         f"no rates of {words.across} satisfy its law, it jams."
     )
     hint = f"Give the side that brakes more {words.store}, or let the coupling lose less."
-    return Problem("jammed coupling", message, hint, view.parts(lossy), view.ends(lossy))
+    return Diagnostic("jammed coupling", message, hint, view.parts(lossy), view.ends(lossy))
 
 
-def extreme_ratios(graph: CircuitGraph, branches: Iterable[int]) -> Problem:
+def extreme_ratios(graph: CircuitGraph, branches: Iterable[int]) -> Diagnostic:
     """That ratios multiply to a number that is not finite or not above zero."""
     names = tuple(dict.fromkeys(graph.part_of(branch).name for branch in branches if graph.branches[branch].terms))
     message = f"the ratios of {listed(names)} multiply to a number that is no longer finite or no longer above zero."
-    return Problem("extreme ratios", message, "Check their units and powers of ten.", names)
+    return Diagnostic("extreme ratios", message, "Check their units and powers of ten.", names)
 
 
-def _cancelling(form: StateForm, own: Sequence[int], beside: Sequence[int]) -> Iterator[Problem]:
+def _cancelling(form: StateForm, own: Sequence[int], beside: Sequence[int]) -> Iterator[Diagnostic]:
     """Coupled conductances (or inertias) of which a negative one cancels others, block by block."""
     values = _coefficients(form.graph, (*own, *beside), form.graph.parameters)
     if all(value > 0 for value in values.values()):
@@ -160,7 +160,7 @@ def _is_singular(block: Any) -> bool:
     return not (np.isfinite(scaled).all() and 1 / np.linalg.cond(scaled) > SINGULAR)
 
 
-def _cancelling_block(view: View, branches: Sequence[int]) -> Problem:
+def _cancelling_block(view: View, branches: Sequence[int]) -> Diagnostic:
     moved = (node for branch in branches for node in view.moved.get(branch, ()))
     nodes, words = view.nodes(moved) or view.ends(branches), view.words(branches[0])
     message = (
@@ -168,4 +168,4 @@ def _cancelling_block(view: View, branches: Sequence[int]) -> Problem:
         f"so that no {words.across} follows from a {words.through} there."
     )
     hint = f"Change one of the values, or give a node {words.remedy}."
-    return Problem("cancelling values", message, hint, view.parts(branches), nodes)
+    return Diagnostic("cancelling values", message, hint, view.parts(branches), nodes)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from shaftwork.core.errors import Problem
+from shaftwork.core.errors import Diagnostic
 from shaftwork.network.graph import GraphPart
 from shaftwork.network.wording import at_nodes, listed
 from shaftwork.reduction.view import View
 
 
-def changing_problems(view: View, jumping: Sequence[Problem]) -> Iterator[Problem]:
+def changing_problems(view: View, jumping: Sequence[Diagnostic]) -> Iterator[Diagnostic]:
     """Impulses that would need the inertia of their instant, and travelling waves.
 
     Args:
@@ -31,7 +31,7 @@ def changing_problems(view: View, jumping: Sequence[Problem]) -> Iterator[Proble
     ):
         if others:
             message = f"{begin} but {listed(others)} {what}."
-            yield Problem("changing inertia", message, hint, (*view.parts(changing), *others), view.ends(changing))
+            yield Diagnostic("changing inertia", message, hint, (*view.parts(changing), *others), view.ends(changing))
 
 
 def _strikes(part: GraphPart) -> bool:

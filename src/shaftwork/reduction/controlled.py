@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from shaftwork.components.branches import ACROSS
-from shaftwork.core.errors import Problem
+from shaftwork.core.errors import Diagnostic
 from shaftwork.network.controlled import Reading, readings_of
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind
@@ -54,7 +54,7 @@ def _deciding(view: View, trees: Iterable[int]) -> tuple[int, ...]:
     return tuple(sorted(found))
 
 
-def controlled_problems(view: View) -> Iterator[Problem]:
+def controlled_problems(view: View) -> Iterator[Diagnostic]:
     """Controlled sources that read what is not known, or that jolt a store."""
     laws = (*view.tree.tree[Kind.LAW], *view.tree.links[Kind.LAW], *view.form.controlled)
     reading = [law for law in sorted(laws) if view.graph.branches[law].template.reads]
@@ -69,7 +69,7 @@ def controlled_problems(view: View) -> Iterator[Problem]:
         yield from _beside_a_store(view, law)
 
 
-def _unknown(view: View, law: int, reading: Reading) -> Iterator[Problem]:
+def _unknown(view: View, law: int, reading: Reading) -> Iterator[Diagnostic]:
     trees, words = _tree_branches(view, reading), view.words(law)
     name = title(view.graph.part_of(law).component)
     nodes = view.nodes((reading.of,)) if reading.kind == "across" else view.ends((reading.of,))
@@ -78,7 +78,7 @@ def _unknown(view: View, law: int, reading: Reading) -> Iterator[Problem]:
     if series := [tree for tree in trees if view.kind(tree) is Kind.THROUGH_STORE]:
         kept = view.words(series[0])
         message = f"{what}, where only {kept.spring}s meet: it follows from how fast their {kept.through} changes."
-        yield Problem(
+        yield Diagnostic(
             "controlled source", message, f"Let it read a {kept.through}, or put a {kept.loss} there.", parts, nodes
         )
     if law in view.form.controlled:
@@ -90,7 +90,7 @@ def _unknown(view: View, law: int, reading: Reading) -> Iterator[Problem]:
                 f"{there.store}: what it reads depends on {view.titles(moving)} at the same instant."
             )
             hint = f"Give the node some {there.store}, so that its {there.across} is a state."
-            yield Problem("controlled source", message, hint, view.parts((law, *moving)), nodes)
+            yield Diagnostic("controlled source", message, hint, view.parts((law, *moving)), nodes)
 
 
 def _words_of(view: View, reading: Reading) -> Words:
@@ -98,7 +98,7 @@ def _words_of(view: View, reading: Reading) -> Words:
     return words_of(view.graph.domains[reading.of]) if reading.kind == "across" else view.words(reading.of)
 
 
-def _beside_a_store(view: View, law: int) -> Iterator[Problem]:
+def _beside_a_store(view: View, law: int) -> Iterator[Diagnostic]:
     """A store whose through variable would be the rate of what a law reads."""
     stores = [link for link in view.tree.links[Kind.ACROSS_STORE] if law in view.tree.loops[link]]
     if stores:
@@ -108,4 +108,4 @@ def _beside_a_store(view: View, law: int) -> Iterator[Problem]:
             f"the {words.through} would be the rate of that."
         )
         hint = f"Put a {words.loss} or {words.spring} between the two."
-        yield Problem("controlled source", message, hint, view.parts((law, *stores)), view.ends(stores))
+        yield Diagnostic("controlled source", message, hint, view.parts((law, *stores)), view.ends(stores))

@@ -12,7 +12,7 @@ import sympy
 
 from shaftwork.components.laws import breakpoints, t
 from shaftwork.components.tables import InterpolationSlope
-from shaftwork.core.errors import Problem
+from shaftwork.core.errors import Diagnostic
 from shaftwork.network.checks import LEFT_OUT, connection_problems, examine
 from shaftwork.network.graph import CircuitGraph, build_graph
 from shaftwork.network.kinds import Kind
@@ -39,7 +39,7 @@ _OF_VALUES = (
 """Kinds that depend on values: not said of parts whose values are replaced."""
 
 
-def diagnose(netlist: Netlist) -> tuple[CircuitGraph | None, StateForm | None, tuple[Problem, ...]]:
+def diagnose(netlist: Netlist) -> tuple[CircuitGraph | None, StateForm | None, tuple[Diagnostic, ...]]:
     """Run all checks in order and collect what they say.
 
     Args:
@@ -63,7 +63,7 @@ def diagnose(netlist: Netlist) -> tuple[CircuitGraph | None, StateForm | None, t
     return (None, None, problems) if typed else (graph, form, problems)
 
 
-def _causes(typed: Sequence[Problem], found: Sequence[Problem]) -> Iterator[Problem]:
+def _causes(typed: Sequence[Diagnostic], found: Sequence[Diagnostic]) -> Iterator[Diagnostic]:
     """The problems without those that follow from others: from a part left out, a value replaced, a missing end."""
     replaced = {part for problem in typed if problem.kind not in LEFT_OUT for part in problem.parts}
     covered = {node for problem in typed if problem.kind in LEFT_OUT for node in problem.nodes}
@@ -77,7 +77,7 @@ def _causes(typed: Sequence[Problem], found: Sequence[Problem]) -> Iterator[Prob
             yield problem
 
 
-def structural_problems(form: StateForm) -> tuple[Problem, ...]:
+def structural_problems(form: StateForm) -> tuple[Diagnostic, ...]:
     """What the normal tree says: errors, then warnings, then notes, whatever the values are."""
     view = _Structure(form)
     jumping = tuple(view.jumping())
@@ -100,7 +100,7 @@ def structural_problems(form: StateForm) -> tuple[Problem, ...]:
 class _Structure(View):
     """What the state form says, problem by problem."""
 
-    def prescribed_twice(self) -> Iterator[Problem]:
+    def prescribed_twice(self) -> Iterator[Diagnostic]:
         """Sources of speed or voltage that others in their loop contradict."""
         for source in self.tree.links[Kind.ACROSS_SOURCE]:
             loop = self.tree.loops[source]
@@ -117,9 +117,9 @@ class _Structure(View):
                 kind = f"blocked {words.across} source"
                 message = f"{name} prescribes the {words.across} of {where}, which is held at zero{through}."
                 hint = f"Remove the source or what holds the node, or {between}."
-            yield Problem(kind, message, hint, self.parts([source, *others, *rigid]), self.ends([source, *others]))
+            yield Diagnostic(kind, message, hint, self.parts([source, *others, *rigid]), self.ends([source, *others]))
 
-    def massless(self) -> Iterator[Problem]:
+    def massless(self) -> Iterator[Diagnostic]:
         """Sources of torque or current that nothing answers."""
         for source in (*self.tree.tree[Kind.THROUGH_SOURCE], *filter(self.is_controlled, self.tree.tree[Kind.LAW])):
             words, sources = self.words(source), [source, *self.cutsets[source]]
@@ -129,9 +129,9 @@ class _Structure(View):
                 f"no {words.spring}: nothing answers the {words.through} of {self.titles(sources)}."
             )
             hint = f"Give {'one of them' if len(nodes) > 1 else 'it'} {words.remedy}{self.spelling.suggestion(nodes)}."
-            yield Problem("massless node", message, hint, self.parts(sources), nodes)
+            yield Diagnostic("massless node", message, hint, self.parts(sources), nodes)
 
-    def implicit(self) -> Iterator[Problem]:
+    def implicit(self) -> Iterator[Diagnostic]:
         """Laws whose torque decides, alone or through dampers, the speed that they depend on."""
         for law in sorted((*self.tree.tree[Kind.LAW], *self.tree.links[Kind.LAW])):
             if law not in self.tree.loops and self.is_controlled(law):
@@ -148,9 +148,9 @@ class _Structure(View):
                 f"{words.across} that it depends on determine each other, a nonlinear equation at every instant."
             )
             hint = f"Give the node some {words.store}, however small{self.spelling.suggestion(nodes)}."
-            yield Problem("algebraic loop", message, hint, self.parts([law, *losses]), nodes)
+            yield Diagnostic("algebraic loop", message, hint, self.parts([law, *losses]), nodes)
 
-    def wound(self) -> Iterator[Problem]:
+    def wound(self) -> Iterator[Diagnostic]:
         """Springs that a friction without inertia behind it would wind up at once when it begins to slip."""
         for spring in self.tree.tree[Kind.THROUGH_STORE]:
             laws = [branch for branch in self.cutsets.get(spring, ()) if self._holds(branch)]
@@ -164,14 +164,14 @@ class _Structure(View):
                 f"of {self.titles(laws)} at every instant, and jump where its mode changes."
             )
             hint = f"Give the node some {words.store}, however small{self.spelling.suggestion(nodes)}."
-            yield Problem("massless node", message, hint, self.parts([spring, *laws]), nodes)
+            yield Diagnostic("massless node", message, hint, self.parts([spring, *laws]), nodes)
 
     def _holds(self, law: int) -> bool:
         """Whether the part of a law holds in another mode, up to a torque: a friction, a brake."""
         modes = (mode for modes in self.graph.part_of(law).modes for mode in modes.options)
         return self.kind(law) in (Kind.LAW, Kind.THROUGH_SOURCE) and any(mode.gives_way for mode in modes)
 
-    def undetermined(self) -> Iterator[Problem]:
+    def undetermined(self) -> Iterator[Diagnostic]:
         """Nodes whose speed or voltage nothing fixes, group by group."""
         free = {node for node, row in enumerate(self.tree.potentials) if row is None}
         if not free:
@@ -190,7 +190,7 @@ class _Structure(View):
             at = sorted({number for node in members for number in parts[node]})
             yield self._undetermined_group(members, at)
 
-    def _undetermined_group(self, members: Sequence[int], at: Sequence[int]) -> Problem:
+    def _undetermined_group(self, members: Sequence[int], at: Sequence[int]) -> Diagnostic:
         parts, nodes = [self.graph.parts[number] for number in at], self.nodes(members)
         domain = self.graph.domains[members[0]]
         words, names = words_of(domain), tuple(part.name for part in parts)
@@ -204,7 +204,7 @@ class _Structure(View):
                     f"{'join' if len(opens) > 1 else 'joins'} it to ground at times only, a Resistor of 1e6 ohm from "
                     "there to ground instead."
                 )
-            return Problem("undetermined speed", message, hint, names, nodes)
+            return Diagnostic("undetermined speed", message, hint, names, nodes)
         zeros = tuple(zero for zero in self.graph.zeros if zero.rsplit(".", 1)[0] in names)
         left_out = f" ({listed(zeros)} {'are' if len(zeros) > 1 else 'is'} zero and left out)" if zeros else ""
         message = (
@@ -212,9 +212,9 @@ class _Structure(View):
             f"{words.store}, a {words.loss} to the frame or a prescribed {words.across}{left_out}."
         )
         hint = f"Give {'one of the nodes' if many else 'the node'} {words.remedy}, or a Ground."
-        return Problem("undetermined speed", message, hint, names, nodes)
+        return Diagnostic("undetermined speed", message, hint, names, nodes)
 
-    def locked(self) -> Iterator[Problem]:
+    def locked(self) -> Iterator[Diagnostic]:
         """Loops of couplings whose ratios agree at standstill only."""
         routes: nx.Graph[int] = nx.Graph()
         for closing, nodes in self.tree.locked:
@@ -231,7 +231,7 @@ class _Structure(View):
                 f"while {at_nodes(where)} {'stand' if len(where) > 1 else 'stands'} still, locked."
             )
             hint = "Make the ratios around the loop agree, or put a spring into one of its shafts."
-            yield Problem("locked gear loop", message, hint, self.parts(loop), where, "warning")
+            yield Diagnostic("locked gear loop", message, hint, self.parts(loop), where, "warning")
 
     def _moves(self, node: int) -> bool:
         return any(self.kind(branch) is not Kind.COUPLING for branch in self.tree.potentials[node] or ())
@@ -250,7 +250,7 @@ class _Structure(View):
         names = self.titles(branch.index for branch in others)
         return f" with {a} = {math.prod(ratios):.10g} {b} by {names}, but {direct:.10g} {b} by {self.titles([closing])}"
 
-    def jumping(self) -> Iterator[Problem]:
+    def jumping(self) -> Iterator[Diagnostic]:
         """Prescribed speeds that jump although an inertia is joined to them rigidly."""
         joined: dict[int, list[int]] = {}
         for store in self.tree.links[Kind.ACROSS_STORE]:
@@ -266,9 +266,9 @@ class _Structure(View):
                 )
                 hint = "The impulse is computed exactly; use a Ramp if the change takes time in the machine."
                 parts = self.parts([source, *stores])
-                yield Problem("jumping source", message, hint, parts, self.ends([source]), "warning")
+                yield Diagnostic("jumping source", message, hint, parts, self.ends([source]), "warning")
 
-    def unbalanced(self) -> Iterator[Problem]:
+    def unbalanced(self) -> Iterator[Diagnostic]:
         """Couplings that lose power and let no torque through from where everything that could balance it is."""
         branches, words = self.tree.unbalanced, self.words(self.tree.unbalanced[0])
         lossy = [branch.index for branch in self.graph.branches if branch.template.through]
@@ -277,9 +277,9 @@ class _Structure(View):
             f"{self.titles(branches)}, so that nothing balances the {words.through} on the other side."
         )
         hint = f"Give the other side {words.remedy}."
-        yield Problem("unbalanced coupling", message, hint, self.parts([*branches, *lossy]), self.ends(lossy))
+        yield Diagnostic("unbalanced coupling", message, hint, self.parts([*branches, *lossy]), self.ends(lossy))
 
-    def redundant(self) -> Iterator[Problem]:
+    def redundant(self) -> Iterator[Diagnostic]:
         """Couplings that repeat what others say."""
         for branch in self.tree.redundant:
             others = [other for other in self.tree.loops[branch] if self.kind(other) is Kind.COUPLING]
@@ -287,9 +287,9 @@ class _Structure(View):
             message = f"{self.titles([branch])} asks for nothing that is not held by {by}."
             hint = "This is allowed; how rigid ways share the load is open, and this part is taken to carry none."
             parts = self.parts([branch, *others])
-            yield Problem("redundant coupling", message, hint, parts, self.ends([branch]), "note")
+            yield Diagnostic("redundant coupling", message, hint, parts, self.ends([branch]), "note")
 
-    def fixed_ratios(self) -> Iterator[Problem]:
+    def fixed_ratios(self) -> Iterator[Diagnostic]:
         """Ratios whose values decide the structure of the equations."""
         found = self.tree.frozen
         names = tuple(name for name in self.graph.parameters if name in found)
@@ -297,7 +297,7 @@ class _Structure(View):
             parts = tuple(dict.fromkeys(name.rsplit(".", 1)[0] for name in names))
             message = f"the values of {listed(names)} match in a closed loop and decide which equations there are."
             hint = "Another value needs a new assembly: build the network with it and compile again."
-            yield Problem("fixed ratios", message, hint, parts, (), "note")
+            yield Diagnostic("fixed ratios", message, hint, parts, (), "note")
 
 
 def _jumps(law: sympy.Expr) -> tuple[float, ...]:

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from sympy import Float, Symbol
 
 from shaftwork.components.branches import THROUGH
-from shaftwork.core.errors import Problem
+from shaftwork.core.errors import Diagnostic
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart
 from shaftwork.network.kinds import Kind
 from shaftwork.network.wording import at_nodes, title
@@ -23,7 +23,7 @@ _SLIPPING_OR_STUCK = 3
 """Modes of what rubs at all times: forward, backward, stuck; a brake has more."""
 
 
-def notes_of(graph: CircuitGraph) -> Iterator[Problem]:
+def notes_of(graph: CircuitGraph) -> Iterator[Diagnostic]:
     """What is worth saying about parts by their values."""
     for part in graph.parts:
         at = tuple(node for node in part.nodes.values() if node != GROUND)
@@ -31,7 +31,7 @@ def notes_of(graph: CircuitGraph) -> Iterator[Problem]:
         for note in part.component.notes():
             load = "" if note.torque is None else _against(graph, at[0], note.torque)
             message = f"{title(part.component)} at {at_nodes(nodes)} {note.message}{load}."
-            yield Problem(note.kind, message, note.hint, (part.name,), nodes, "note")
+            yield Diagnostic(note.kind, message, note.hint, (part.name,), nodes, "note")
 
 
 def _against(graph: CircuitGraph, start: int, torque: float) -> str:

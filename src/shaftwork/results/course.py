@@ -15,7 +15,7 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from shaftwork.results.observer import Array, blocks
-from shaftwork.results.quadrature import NODES, SHARE, Panels
+from shaftwork.results.quadrature import NODES, SHARE, LobattoPanels
 
 Read = Callable[[Array], Array]
 """From ascending times (k,) to the values of a quantity there."""
@@ -64,7 +64,7 @@ class Course:
     """
 
     read: Read
-    panels: Panels
+    panels: LobattoPanels
     values: Array
     end: float
 
@@ -114,9 +114,9 @@ def course(read: Read, steps: Array, *, even: bool = False) -> Course:
         even: whether they are to be as good everywhere.
     """
     edges = np.unique(steps)
-    panels = Panels(edges[:-1], edges[1:])
+    panels = LobattoPanels(edges[:-1], edges[1:])
     shortest = SHORTEST * np.spacing(np.abs(edges).max())
-    settled: list[tuple[Panels, Array]] = []
+    settled: list[tuple[LobattoPanels, Array]] = []
     end_value = float(read(edges[-1:])[0])
     low, high, count = end_value, end_value, 0
     while True:
@@ -136,7 +136,7 @@ def course(read: Read, steps: Array, *, even: bool = False) -> Course:
     start, end = (np.concatenate([getattr(part, side) for part, _ in settled]) for side in ("start", "end"))
     order = np.argsort(start, kind="stable")
     return Course(
-        read, Panels(start[order], end[order]), np.concatenate([part for _, part in settled])[order], end_value
+        read, LobattoPanels(start[order], end[order]), np.concatenate([part for _, part in settled])[order], end_value
     )
 
 
@@ -145,7 +145,7 @@ def _missed(values: Array) -> Array:
     return np.asarray(SAFETY * np.abs(values @ _TAILS.T).sum(axis=1))
 
 
-def _noise(read: Read, panels: Panels) -> Array:
+def _noise(read: Read, panels: LobattoPanels) -> Array:
     """(p,) how far rounding moves what is read in panels."""
     if not len(panels.start):
         return np.empty(0)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from shaftwork.results.observer import Array, Dense, Observer, blocks
+from shaftwork.results.observer import Array, DenseStates, Observer, blocks
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
 """Gauss points in one panel, from -1 to 1, and their weights."""
@@ -64,7 +64,7 @@ class EnergyBalance:
         return float(self.t[place]), float(self.t[place + 1])
 
 
-def energy_balance(observer: Observer, dense: Dense, steps: Array) -> EnergyBalance:
+def energy_balance(observer: Observer, dense: DenseStates, steps: Array) -> EnergyBalance:
     """Integrate the powers over every step with Gauss' formula, on panels halved until their work no longer changes.
 
     The run is read in blocks of steps, so that the memory that it takes does not grow with the number of steps.
@@ -115,7 +115,7 @@ def _impulses(
     return impulses, list(lost.items()), given
 
 
-def _stored_on_both_sides(observer: Observer, dense: Dense, steps: Array) -> tuple[Array, Array]:
+def _stored_on_both_sides(observer: Observer, dense: DenseStates, steps: Array) -> tuple[Array, Array]:
     """Stored energy just before and at every time of `steps`; they differ where an input's jump is an impulse."""
     before, after = np.empty(len(steps)), np.empty(len(steps))
     # a time that is listed twice is read before what jumps there, and then after it: both belong to one block
@@ -130,7 +130,7 @@ def _stored_on_both_sides(observer: Observer, dense: Dense, steps: Array) -> tup
     return before, after
 
 
-def _width(observer: Observer, dense: Dense, steps: Array) -> int:
+def _width(observer: Observer, dense: DenseStates, steps: Array) -> int:
     """Numbers that are read at one time: states, and powers lost and supplied."""
     return int(dense(steps[:1]).shape[1]) + 2 * len(observer.wiring)
 
@@ -144,7 +144,7 @@ class _Work:
         steps: (s,) times.
     """
 
-    def __init__(self, observer: Observer, dense: Dense, steps: Array) -> None:
+    def __init__(self, observer: Observer, dense: DenseStates, steps: Array) -> None:
         self._observer, self._dense = observer, dense
         self._rows = _width(observer, dense, steps) * len(NODES)
         self._by_step = np.zeros((2, len(steps) - 1))

@@ -49,7 +49,7 @@ class Extreme(float):
     __str__ = float.__repr__
 
 
-class Row(NamedTuple):
+class ExtremesRow(NamedTuple):
     """What a table says of a quantity; along a part, of all its places."""
 
     least: Extreme
@@ -70,7 +70,7 @@ class Extremes(Mapping[str, tuple[Extreme, Extreme]]):
 
     def __init__(self, solution: Solution) -> None:
         self._solution = solution
-        self._rows: dict[str, Row] = {}
+        self._rows: dict[str, ExtremesRow] = {}
 
     def __getitem__(self, name: str) -> tuple[Extreme, Extreme]:
         row = self.row(name)
@@ -85,7 +85,7 @@ class Extremes(Mapping[str, tuple[Extreme, Extreme]]):
     def __contains__(self, name: object) -> bool:
         return name in self._solution.observer.units or name in self._solution.observer.profiles
 
-    def row(self, name: str) -> Row:
+    def row(self, name: str) -> ExtremesRow:
         """Extremes, mean over time and value at the end; along a part those of the worst places.
 
         Raises:
@@ -95,7 +95,7 @@ class Extremes(Mapping[str, tuple[Extreme, Extreme]]):
             self._rows[name] = self._searched(name)
         return self._rows[name]
 
-    def _searched(self, name: str) -> Row:
+    def _searched(self, name: str) -> ExtremesRow:
         solution = self._solution
         if name not in self:
             solution[name]  # refuses the name and says which there are
@@ -108,10 +108,10 @@ class Extremes(Mapping[str, tuple[Extreme, Extreme]]):
             lowest, highest = quantity.extremes()
             found = min((lowest, *infinite), key=itemgetter(1)), max((highest, *infinite), key=itemgetter(1))
             low, high = (Extreme(value + 0.0, t, name, unit, place) for t, value in found)
-            rows.append(Row(low, high, quantity.mean, quantity.end))
+            rows.append(ExtremesRow(low, high, quantity.mean, quantity.end))
         least, most = (min(row.least for row in rows), max(row.most for row in rows))
         worst = int(np.argmax([abs(row.mean) for row in rows]))
-        return Row(least, most, rows[worst].mean, max((row.end for row in rows), key=abs))
+        return ExtremesRow(least, most, rows[worst].mean, max((row.end for row in rows), key=abs))
 
     def table(self, names: Sequence[str]) -> str:
         """A line for each quantity: unit, minimum and maximum with their times, mean over time, value at the end.

@@ -16,7 +16,7 @@ from shaftwork.core.errors import MissingExtraError, ParameterError, SignalError
 from shaftwork.core.parameters import numbers_in_si
 from shaftwork.core.screen import in_lines
 from shaftwork.results.observer import Array
-from shaftwork.results.slopes import Complex, Motions, Slopes
+from shaftwork.results.slopes import Complex, DeviationEquations, Motions
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -124,7 +124,7 @@ def frequencies(f: Any) -> Array:
     return given
 
 
-class System(Protocol):
+class DrivenSystem(Protocol):
     """The states of a network under one input that swings as exp(s t)."""
 
     def nearness(self, s: complex) -> float:
@@ -136,7 +136,7 @@ class System(Protocol):
         ...
 
 
-def frequency_response(title: str, slopes: Slopes, names: tuple[str, str], f: Any) -> FrequencyResponse:
+def frequency_response(title: str, slopes: DeviationEquations, names: tuple[str, str], f: Any) -> FrequencyResponse:
     """The response of one quantity to one input.
 
     Law: (s I - A) x = (B + s B1) v with s = 2 pi i f, and the output from x, v and s v, by which the derivatives that
@@ -156,7 +156,7 @@ def frequency_response(title: str, slopes: Slopes, names: tuple[str, str], f: An
 
 
 def response(
-    title: str, slopes: Motions, system: Callable[[int], System], names: tuple[str, str], f: Any
+    title: str, slopes: Motions, system: Callable[[int], DrivenSystem], names: tuple[str, str], f: Any
 ) -> FrequencyResponse:
     """The response of one quantity to one input, from a system that gives the states.
 
@@ -198,7 +198,7 @@ def unknown_output(title: str, slopes: Motions, name: Any) -> SignalError:
     return SignalError(f"No quantity {reprlib.repr(name)} in '{title}'. {what}: {', '.join(listed)}.")
 
 
-def _values(system: System, states: int, s: Complex, read: Callable[[Complex, Complex], Complex]) -> Complex:
+def _values(system: DrivenSystem, states: int, s: Complex, read: Callable[[Complex, Complex], Complex]) -> Complex:
     """The response at complex frequencies s, chunk by chunk; where a pole is hit, by its limit."""
     values, hit = np.empty(len(s), dtype=complex), np.zeros(len(s), dtype=bool)
     chunk = max(1, ENTRIES // max(1, 4 * states))
@@ -211,7 +211,7 @@ def _values(system: System, states: int, s: Complex, read: Callable[[Complex, Co
     return values
 
 
-def _limit(system: System, s: complex, read: Callable[[Complex, Complex], Complex]) -> complex:
+def _limit(system: DrivenSystem, s: complex, read: Callable[[Complex, Complex], Complex]) -> complex:
     """The response at a natural frequency: infinite, or finite where input or output does not take part in the mode.
 
     A pole turns its sign there, so the difference of both sides grows towards it, and without one it vanishes.
@@ -227,7 +227,7 @@ def _limit(system: System, s: complex, read: Callable[[Complex, Complex], Comple
 class _Matrices:
     """(s I - A) x = (B + s B1) v for one input, in states of equal units."""
 
-    def __init__(self, slopes: Slopes, number: int) -> None:
+    def __init__(self, slopes: DeviationEquations, number: int) -> None:
         self._weights = slopes.weights
         scale = sparse.diags_array(slopes.weights)
         self._matrix = sparse.csc_array(scale @ slopes.A @ sparse.diags_array(1 / slopes.weights))

@@ -15,7 +15,7 @@ from shaftwork.core.screen import counted
 from shaftwork.results.frequency import FrequencyResponse, frequency_response, unknown_output
 from shaftwork.results.modes import Modes, find_modes
 from shaftwork.results.observer import Array
-from shaftwork.results.slopes import Slopes
+from shaftwork.results.slopes import DeviationEquations
 
 LARGEST_DENSE = 1000
 """States up to which A and C are numpy arrays; beyond they are sparse."""
@@ -50,7 +50,7 @@ class LinearModel:
     outputs: tuple[str, ...]
     point: Mapping[str, float]
     t: float
-    slopes: Slopes
+    slopes: DeviationEquations
     phase: str = ""
 
     @property
@@ -152,7 +152,7 @@ class LinearModel:
 
 
 def linear_model(
-    title: str, slopes: Slopes, outputs: tuple[str, ...] | None, x: Array, t: float, phase: str = ""
+    title: str, slopes: DeviationEquations, outputs: tuple[str, ...] | None, x: Array, t: float, phase: str = ""
 ) -> LinearModel:
     """The record of a network near a point.
 

@@ -11,7 +11,7 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.results.course import Read
 from shaftwork.results.fatigue import SNLine
 from shaftwork.results.observer import Array
-from shaftwork.results.quadrature import Panels, integrate
+from shaftwork.results.quadrature import LobattoPanels, integrate
 from shaftwork.results.solution import Solution
 
 KINDS: Mapping[str, str] = {
@@ -88,7 +88,7 @@ def _worst(values: Array) -> float:
 
 
 def _mean(read: Read, steps: Array, power: int) -> float:
-    def integrand(panels: Panels) -> Array:
+    def integrand(panels: LobattoPanels) -> Array:
         times = panels.times
         return (read(times.ravel()) ** power).reshape(1, *times.shape)
 

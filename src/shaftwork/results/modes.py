@@ -15,7 +15,7 @@ from shaftwork.core.parameters import in_si, whole
 from shaftwork.core.screen import counted, in_lines
 from shaftwork.results.eigenvalues import eigenmodes
 from shaftwork.results.observer import Array
-from shaftwork.results.slopes import Complex, Motions, Slopes
+from shaftwork.results.slopes import Complex, DeviationEquations, Motions
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -129,7 +129,7 @@ class _Shapes(Mapping[str, Complex]):
         return len({**self._slopes.units, **self._slopes.profiles})
 
 
-def find_modes(title: str, slopes: Slopes, count: int | None = None, f_max: float | None = None) -> Modes:
+def find_modes(title: str, slopes: DeviationEquations, count: int | None = None, f_max: float | None = None) -> Modes:
     """The modes of a network near a point.
 
     Law: the eigenvalues and eigenvectors of A.
@@ -195,7 +195,7 @@ def modes_of(title: str, slopes: Motions, rates: Complex, vectors: Complex) -> M
     return Modes(title, _names(slopes, rates, vectors), rates, vectors, slopes)
 
 
-def _that_act(slopes: Slopes) -> tuple[Any, Any]:
+def _that_act(slopes: DeviationEquations) -> tuple[Any, Any]:
     """The states that have modes, and the rest: angles that are only recorded follow from the others."""
     read = np.asarray(abs(slopes.A).sum(axis=0)).ravel() > 0
     read[: len(read) - slopes.angles] = True

@@ -28,7 +28,7 @@ class Observer(Protocol):
         """Every quantity that can be read, "part.quantity" or "node.quantity", and its unit."""
         ...
 
-    def signal(self, name: str, t: Array, x: Array, dense: Dense) -> Array:
+    def signal(self, name: str, t: Array, x: Array, dense: DenseStates) -> Array:
         """(k,) a quantity at times t (k,) with states x (k, n), with the motion behind them."""
         ...
 
@@ -37,18 +37,18 @@ class Observer(Protocol):
         """Every quantity that can be read along a part, "part.quantity": its unit and the places in m."""
         ...
 
-    def profile(self, name: str, t: Array, x: Array, dense: Dense) -> Array:
+    def profile(self, name: str, t: Array, x: Array, dense: DenseStates) -> Array:
         """(k, places) a quantity along a part at times t (k,) with states x (k, n), with the motion behind them."""
         ...
 
-    def impacts(self, dense: Dense) -> Sequence[tuple[float, str, Mapping[str, float], Mapping[str, float]]]:
+    def impacts(self, dense: DenseStates) -> Sequence[tuple[float, str, Mapping[str, float], Mapping[str, float]]]:
         """Times in s at which energy may be given or lost at once.
 
         Of each the part that is hit, if any, what sources give then and what others lose of it, in J by part.
         """
         ...
 
-    def stored(self, t: Array, x: Array, dense: Dense) -> dict[str, Array]:
+    def stored(self, t: Array, x: Array, dense: DenseStates) -> dict[str, Array]:
         """By part, stored energy in J at times t (k,) with states x (k, n), with the motion behind them.
 
         Of a time that is listed twice in a row the first is before whatever jumps there.
@@ -85,7 +85,7 @@ class Observer(Protocol):
         ...
 
 
-class Dense(Protocol):
+class DenseStates(Protocol):
     """The states between the output times."""
 
     @property

@@ -34,7 +34,7 @@ _SLOPES = np.stack(
 
 
 @dataclass(frozen=True, eq=False)
-class Panels:
+class LobattoPanels:
     """Parts of a span of time, each with the nodes of Lobatto's rule.
 
     Args:
@@ -57,16 +57,16 @@ class Panels:
         made[:, -1] = np.nextafter(self.end, self.start)
         return made
 
-    def parted(self) -> Panels:
+    def parted(self) -> LobattoPanels:
         """Two panels for each."""
         middle = self.start + SHARE * self.length
         start, end = np.stack([self.start, middle], axis=1), np.stack([middle, self.end], axis=1)
-        return Panels(start.ravel(), end.ravel())
+        return LobattoPanels(start.ravel(), end.ravel())
 
-    def split(self, times: Array) -> Panels:
+    def split(self, times: Array) -> LobattoPanels:
         """Panels that also end at times (k,) inside the span, which they fill without gaps."""
         start = np.unique(np.append(self.start, times))
-        return Panels(start, np.append(start[1:], self.end[-1]))
+        return LobattoPanels(start, np.append(start[1:], self.end[-1]))
 
     def integrals(self, values: Array) -> Array:
         """(..., p) integrals over each panel of values (..., p, 8) at the nodes."""
@@ -76,12 +76,12 @@ class Panels:
         """(p, 8) derivatives by time of the polynomials through values (p, 8)."""
         return np.asarray(values @ _SLOPES.T * 2 / self.length[:, None])
 
-    def taken(self, which: NDArray[Any]) -> Panels:
+    def taken(self, which: NDArray[Any]) -> LobattoPanels:
         """Some of them, marked or numbered."""
-        return Panels(self.start[which], self.end[which])
+        return LobattoPanels(self.start[which], self.end[which])
 
 
-def integrate(integrand: Callable[[Panels], Array], steps: Array) -> tuple[Array, Panels]:
+def integrate(integrand: Callable[[LobattoPanels], Array], steps: Array) -> tuple[Array, LobattoPanels]:
     """Integrals of several quantities over a run, and the panels in which all of them are smooth.
 
     A kink or a jump within a step is closed in by parting; the ends of steps are ends of panels.
@@ -92,10 +92,10 @@ def integrate(integrand: Callable[[Panels], Array], steps: Array) -> tuple[Array
     """
     least = max(1, LEAST // len(steps))
     edges = np.append((steps[:-1, None] + np.diff(steps)[:, None] * np.arange(least) / least).ravel(), steps[-1])
-    panels = Panels(edges[:-1], edges[1:])
+    panels = LobattoPanels(edges[:-1], edges[1:])
     shortest = ROUNDINGS * np.spacing(np.abs(steps).max())
     whole, first, count, before = panels.integrals(integrand(panels)), len(panels.start), 0, (np.inf, 0)
-    total, size, settled = np.zeros(len(whole)), np.zeros(len(whole)), list[Panels]()
+    total, size, settled = np.zeros(len(whole)), np.zeros(len(whole)), list[LobattoPanels]()
     while len(panels.start):
         parts = panels.parted()
         values = integrand(parts)
@@ -114,4 +114,4 @@ def integrate(integrand: Callable[[Panels], Array], steps: Array) -> tuple[Array
         panels, whole, before = parts.taken(~kept), fine[:, ~kept], (rough, open_)
     start, end = (np.concatenate([getattr(made, name) for made in settled]) for name in ("start", "end"))
     order = np.argsort(start, kind="stable")
-    return total, Panels(start[order], end[order])
+    return total, LobattoPanels(start[order], end[order])

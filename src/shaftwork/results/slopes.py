@@ -63,7 +63,7 @@ class Motions(Protocol):
         ...
 
 
-class Slopes(Motions, Protocol):
+class DeviationEquations(Motions, Protocol):
     """x' = A x + B v + B1 v' in deviations of the states x and the inputs v from a point."""
 
     A: Any
@@ -80,7 +80,7 @@ class Slopes(Motions, Protocol):
         ...
 
 
-class OpenSlopes(Slopes, Protocol):
+class OpenSlopes(DeviationEquations, Protocol):
     """A network whose lines are taken out: what arrives at their ends, h, follows the inputs in v.
 
     The speeds of the ends, the two of each line in a row, are C x + D v.

@@ -20,7 +20,7 @@ from shaftwork.results.extremes import Extreme, Extremes
 from shaftwork.results.fatigue import Damage, SNLine
 from shaftwork.results.life import damage_of, damages, load_cycles
 from shaftwork.results.limits import beside
-from shaftwork.results.observer import Array, Dense, Observer
+from shaftwork.results.observer import Array, DenseStates, Observer
 from shaftwork.results.rainflow import SMALLEST, Rainflow
 from shaftwork.results.reader import Reader
 from shaftwork.results.samples import warn_of_coarse_samples
@@ -86,7 +86,7 @@ class Solution:
     engine: str
     why: str
     statistics: Mapping[str, int]
-    dense: Dense
+    dense: DenseStates
     observer: Observer
     events: tuple[tuple[float, str, str, str], ...] = ()
     phases: tuple[PhaseRow, ...] = ()

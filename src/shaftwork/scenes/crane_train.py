@@ -9,15 +9,15 @@ from shaftwork.components.translation import Mass, TranslationalSpring, Wheel
 from shaftwork.pipeline.network import Network
 from shaftwork.scenes.catalog import Scene, choice
 from shaftwork.scenes.crane import BRAKE_AT_MOTOR, GEAR, MOTOR, RESISTANCE, T_BRAKE, WHEEL_RADIUS
-from shaftwork.scenes.reducer import DAMPING, Stage, add_reducer, steel
+from shaftwork.scenes.reducer import DAMPING, GearStage, add_reducer, steel
 
 # All chosen, in whole teeth and such that what is before the last shaft, each inertia times the square of 35.5, 10, 2.5
 # or 1, is J_1 = 27.35 of the source, and wheel and mass together are its J_2 = 62.5 kg m2.
 ROTOR, COUPLING = 0.0172, 0.003  # kg m2: rotor with its fan, and coupling with the disc of the brake
 STAGES = (
-    Stage(71 / 20, pinion=0.0002, gear=0.0115, mesh=5e5, shaft=3.8e4),
-    Stage(80 / 20, pinion=0.001, gear=0.036, mesh=1.5e6, shaft=1.17e5),
-    Stage(50 / 20, pinion=0.004, gear=0.1409, mesh=5e6),
+    GearStage(71 / 20, pinion=0.0002, gear=0.0115, mesh=5e5, shaft=3.8e4),
+    GearStage(80 / 20, pinion=0.001, gear=0.036, mesh=1.5e6, shaft=1.17e5),
+    GearStage(50 / 20, pinion=0.004, gear=0.1409, mesh=5e6),
 )
 MOTOR_SHAFT, INPUT_SHAFT = 12e3, 400.0  # N m/rad: the second with the rubber of the coupling
 RUBBER = 0.1  # N m s/rad

@@ -7,16 +7,16 @@ from shaftwork.components.rotation import Inertia, Spring
 from shaftwork.pipeline.network import Network
 from shaftwork.scenes.catalog import Scene
 from shaftwork.scenes.excavator import PULL_UP_SPEED, T_END, cage_motor, digging
-from shaftwork.scenes.reducer import Stage, add_reducer, steel
+from shaftwork.scenes.reducer import GearStage, add_reducer, steel
 
 # All chosen, in whole teeth and such that rotor and coupling are J_1 = 27 of the source, and what is behind the inlet
 # shaft its J_2 = 8.2 kg m2, each inertia divided by the square of 1, 3, 12, 48 or 120, the ratio down to it.
 ROTOR, COUPLING = 10.5, 16.5  # kg m2: the second with the drum of the brake
 STAGES = (
-    Stage(60 / 20, pinion=0.3, gear=8.1, mesh=4.5e7, shaft=6e5),
-    Stage(80 / 20, pinion=1.35, gear=38.4, mesh=1.5e8, shaft=8e6),
-    Stage(80 / 20, pinion=4.8, gear=430.0, mesh=8e8, shaft=1e8),
-    Stage(50 / 20, pinion=30.8, gear=1440.0, mesh=4e9),
+    GearStage(60 / 20, pinion=0.3, gear=8.1, mesh=4.5e7, shaft=6e5),
+    GearStage(80 / 20, pinion=1.35, gear=38.4, mesh=1.5e8, shaft=8e6),
+    GearStage(80 / 20, pinion=4.8, gear=430.0, mesh=8e8, shaft=1e8),
+    GearStage(50 / 20, pinion=30.8, gear=1440.0, mesh=4e9),
 )
 MOTOR_SHAFT, WHEEL_SHAFT = 2e6, 4.5e8  # N m/rad
 WHEEL = 90_000.0  # kg m2: with its buckets

@@ -14,7 +14,7 @@ DAMPING = 2e-5  # s, chosen: damping over stiffness of steel shafts and teeth, 0
 
 
 @dataclass(frozen=True)
-class Stage:
+class GearStage:
     """A gear pair, and the shaft behind it.
 
     Args:
@@ -32,7 +32,7 @@ class Stage:
     shaft: float | None = None
 
 
-def add_reducer(net: Network, stages: tuple[Stage, ...], mesh: str, efficiency: float = 1.0) -> str:
+def add_reducer(net: Network, stages: tuple[GearStage, ...], mesh: str, efficiency: float = 1.0) -> str:
     """Add the gears "gear 1", "gear 2" and so on, the meshes between them and the shafts behind.
 
     Args:

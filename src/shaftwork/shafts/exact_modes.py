@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.shafts.line import Array, Line, Section, Side
+from shaftwork.shafts.line import Array, Section, SectionLine, Side
 
 Counts = npt.NDArray[np.int64]
 
@@ -18,7 +18,7 @@ SMALL = 0.3
 
 
 @dataclass(frozen=True)
-class Modes:
+class LineModes:
     """Natural frequencies and mode shapes of a line, each of unit modal inertia.
 
     Law: phi_k(x) cos(omega_k t), with the integral of J' phi_k^2 and the sum of J phi_k^2 over the discs equal to 1, so
@@ -32,7 +32,7 @@ class Modes:
         ends: angle and torque at the right end of each section, shape (2, n, k).
     """
 
-    line: Line
+    line: SectionLine
     frequencies: Array
     starts: Array
     ends: Array
@@ -75,7 +75,7 @@ class Modes:
         return shapes[:, 0].T, shapes[:, 1].T
 
 
-def modes(line: Line, count: int | None = None, *, f_max: float | None = None) -> Modes:
+def modes(line: SectionLine, count: int | None = None, *, f_max: float | None = None) -> LineModes:
     """Natural frequencies and mode shapes, the first `count` or all up to `f_max`.
 
     Law: as for `natural_frequencies`; a shape is swept from both ends and joined in the section where the two sweeps
@@ -98,10 +98,10 @@ def modes(line: Line, count: int | None = None, *, f_max: float | None = None) -
         rigid = np.zeros((2, len(line.sections), 1))
         rigid[0] = line.inertia**-0.5
         starts, ends = np.concatenate([rigid, starts], axis=-1), np.concatenate([rigid, ends], axis=-1)
-    return Modes(line, frequencies, starts, ends)
+    return LineModes(line, frequencies, starts, ends)
 
 
-def natural_frequencies(line: Line, count: int | None = None, *, f_max: float | None = None) -> Array:
+def natural_frequencies(line: SectionLine, count: int | None = None, *, f_max: float | None = None) -> Array:
     """Natural frequencies in Hz, rising, the first `count` or all up to `f_max`, to rounding.
 
     Law: write angle and torque in a section as phi = A cos(psi), tau = Z omega A sin(psi). Then psi grows by
@@ -136,7 +136,7 @@ def natural_frequencies(line: Line, count: int | None = None, *, f_max: float | 
     return np.concatenate([np.zeros(rigid), roots / (2 * math.pi)])
 
 
-def modes_below(line: Line, frequencies: Array) -> Counts:
+def modes_below(line: SectionLine, frequencies: Array) -> Counts:
     """How many modes, the rigid one included, lie below each frequency in Hz.
 
     Raises:
@@ -146,7 +146,7 @@ def modes_below(line: Line, frequencies: Array) -> Counts:
     return _sweep(line, 2 * math.pi * np.atleast_1d(np.asarray(frequencies, dtype=float))).modes_below
 
 
-def _check_lossless(line: Line) -> None:
+def _check_lossless(line: SectionLine) -> None:
     if not line.lossless:
         raise ParameterError("A line with damping or friction has no real modes. Take line.without_losses().")
 
@@ -165,7 +165,7 @@ def _advance(section: Section, omega: Array, state: Array, distance: float) -> A
 
 
 @dataclass(frozen=True)
-class _Sweep:
+class _ModeSweep:
     """Motions that meet the left end condition, one for each angular frequency; each section's are scaled apart.
 
     Args:
@@ -181,7 +181,7 @@ class _Sweep:
     modes_below: Counts
 
 
-def _sweep(line: Line, omega: Array) -> _Sweep:
+def _sweep(line: SectionLine, omega: Array) -> _ModeSweep:
     """Sweep from the left to the right end, counting the half turns of the phase psi."""
     held_left, held_right = line.clamped[0], line.clamped[-1]
     state = np.array([np.full_like(omega, 0.0 if held_left else 1.0), np.full_like(omega, -1.0 if held_left else 0.0)])
@@ -206,10 +206,10 @@ def _sweep(line: Line, omega: Array) -> _Sweep:
         sizes.append(size)
     torque = state[1] + line.discs[-1] * omega**2 * state[0]
     below = nodes if held_right else nodes + (sign * torque > 0)
-    return _Sweep(np.stack(starts, axis=1), np.stack(ends, axis=1), np.array(sizes), below)
+    return _ModeSweep(np.stack(starts, axis=1), np.stack(ends, axis=1), np.array(sizes), below)
 
 
-def _upper_bound(line: Line, count: int) -> float:
+def _upper_bound(line: SectionLine, count: int) -> float:
     """An angular frequency above the first `count` natural frequencies."""
     upper = math.pi * (count + 1) / math.fsum(section.delay for section in line.sections)
     while _sweep(line, np.array([upper])).modes_below[0] < count:
@@ -217,7 +217,7 @@ def _upper_bound(line: Line, count: int) -> float:
     return upper
 
 
-def _bisect(line: Line, wanted: Counts, upper: float) -> Array:
+def _bisect(line: SectionLine, wanted: Counts, upper: float) -> Array:
     """The angular frequencies at which the count of modes passes from k to k + 1, for each k that is wanted."""
     low, high = np.zeros(wanted.size), np.full(wanted.size, upper)
     while True:
@@ -228,12 +228,12 @@ def _bisect(line: Line, wanted: Counts, upper: float) -> Array:
         low, high = np.where(above, low, middle), np.where(above, middle, high)
 
 
-def _shapes(line: Line, omega: Array) -> tuple[Array, Array]:
+def _shapes(line: SectionLine, omega: Array) -> tuple[Array, Array]:
     """Angles and torques at the starts and at the ends of the sections, shape (2, n, k) each, of any size."""
     left, mirrored = _sweep(line, omega), _sweep(line.mirrored(), omega)
     # Seen from the right end, angles are the same and torques change their sign.
     turn = np.array([1.0, -1.0])[:, None, None]
-    right = _Sweep(
+    right = _ModeSweep(
         turn * mirrored.ends[:, ::-1], turn * mirrored.starts[:, ::-1], mirrored.sizes[::-1], mirrored.modes_below
     )
     meeting, factor = _join(line, omega, left, right)
@@ -246,7 +246,7 @@ def _shapes(line: Line, omega: Array) -> tuple[Array, Array]:
     return starts, ends
 
 
-def _join(line: Line, omega: Array, left: _Sweep, right: _Sweep) -> tuple[Counts, Array]:
+def _join(line: SectionLine, omega: Array, left: _ModeSweep, right: _ModeSweep) -> tuple[Counts, Array]:
     """The section (k,) in which the sweeps are joined, and the factor (k,) of the right one's motion in it.
 
     The two motions span a parallelogram of the same area Z omega A_left A_right sin(psi_left - psi_right) in every
@@ -262,7 +262,7 @@ def _join(line: Line, omega: Array, left: _Sweep, right: _Sweep) -> tuple[Counts
     return meeting, factors[meeting, np.arange(omega.size)]
 
 
-def _modal_inertia(line: Line, omega: Array, starts: Array, ends: Array) -> Array:
+def _modal_inertia(line: SectionLine, omega: Array, starts: Array, ends: Array) -> Array:
     """Integral of J' phi^2 and sum of J phi^2 over the discs, shape (k,)."""
     total = np.zeros_like(omega)
     for index, section in enumerate(line.sections):

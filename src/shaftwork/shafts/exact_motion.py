@@ -11,7 +11,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from shaftwork.core.errors import ParameterError, SimulationError
-from shaftwork.shafts.line import Array, Line, Side
+from shaftwork.shafts.line import Array, SectionLine, Side
 from shaftwork.shafts.panels import Period, radau_basis
 
 # Delays are multiples of a common step where their ratios are such fractions, up to this relative difference.
@@ -27,7 +27,7 @@ EPSILON = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
-class Torque:
+class JunctionTorque:
     """A torque on a junction, smooth between its breakpoints.
 
     Args:
@@ -45,7 +45,7 @@ class Torque:
 
 
 @dataclass(frozen=True)
-class Motion:
+class LineMotion:
     """The motion of a lossless line: polynomials on panels between which alone it may have jumps and kinks.
 
     At a jump the value just after it is returned.
@@ -61,7 +61,7 @@ class Motion:
             times the impedance: the last coefficients, summed over all panels, and a rounding for each step.
     """
 
-    line: Line
+    line: SectionLine
     edges: Array
     rightward: Array
     leftward: Array
@@ -117,14 +117,14 @@ class Motion:
 
 
 def motion(
-    line: Line,
-    torques: Sequence[Torque],
+    line: SectionLine,
+    torques: Sequence[JunctionTorque],
     t_end: float,
     *,
     initial_speed: float = 0.0,
     order: int = 16,
     tolerance: float = 1e-14,
-) -> Motion:
+) -> LineMotion:
     """The motion under torques, from a steady rotation without torque, which a clamped end stops at t = 0.
 
     Law: in each section speed = a + b and tau = Z (a - b), where the wave a to the right and the wave b to the left
@@ -169,7 +169,7 @@ def motion(
     return march.motion()
 
 
-def common_step(line: Line) -> tuple[float, tuple[int, ...]]:
+def common_step(line: SectionLine) -> tuple[float, tuple[int, ...]]:
     """The largest step in s of which the delays of all sections are multiples, and those multiples.
 
     Raises:
@@ -194,7 +194,7 @@ class _March:
     """The periods of a motion, one after the other; the first ones are the rest before t = 0."""
 
     def __init__(
-        self, line: Line, torques: tuple[Torque, ...], initial_speed: float, order: int, tolerance: float
+        self, line: SectionLine, torques: tuple[JunctionTorque, ...], initial_speed: float, order: int, tolerance: float
     ) -> None:
         self.line, self.torques, self.initial_speed, self.tolerance = line, torques, initial_speed, tolerance
         self.step, self.multiples = common_step(line)
@@ -332,7 +332,7 @@ class _March:
                 speed = np.full_like(speed, np.nan)
             speeds[junction] = speed
 
-    def motion(self) -> Motion:
+    def motion(self) -> LineMotion:
         """The record of all periods since t = 0."""
         periods = self.periods[max(self.multiples) :]
         starts = (self.step * number + period.edges[:-1] for number, period in enumerate(periods))
@@ -343,4 +343,4 @@ class _March:
 
         right, left, speeds = (coefficients(name) for name in ("rightward", "leftward", "speeds"))
         error = self.error / self.scale if self.scale else 0.0
-        return Motion(self.line, edges, right, left, speeds, self.initial_speed, self.step, error)
+        return LineMotion(self.line, edges, right, left, speeds, self.initial_speed, self.step, error)

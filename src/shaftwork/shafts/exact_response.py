@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.shafts.line import Array, Line, Section, Side
+from shaftwork.shafts.line import Array, Section, SectionLine, Side
 
 Complex = npt.NDArray[np.complex128]
 Drive = Literal["torque", "speed"]
@@ -27,11 +27,11 @@ class Response:
         junction: number of the driven junction.
     """
 
-    line: Line
+    line: SectionLine
     s: Complex
     drive: Drive
     junction: int
-    _parts: tuple[_Sweep, _Sweep]
+    _parts: tuple[_ResponseSweep, _ResponseSweep]
     _factors: tuple[Complex, Complex]
 
     def speeds(self, stations: Array) -> Complex:
@@ -72,7 +72,7 @@ class Response:
         return values[:, 0].T, values[:, 1].T
 
 
-def frequency_response(line: Line, frequencies: Array, junction: int, *, drive: Drive = "torque") -> Response:
+def frequency_response(line: SectionLine, frequencies: Array, junction: int, *, drive: Drive = "torque") -> Response:
     """Response to sinusoids: `laplace_response` at s = 2 pi i f.
 
     Args:
@@ -87,7 +87,7 @@ def frequency_response(line: Line, frequencies: Array, junction: int, *, drive: 
     return laplace_response(line, 2j * math.pi * np.asarray(frequencies, dtype=float), junction, drive=drive)
 
 
-def laplace_response(line: Line, s: Complex, junction: int, *, drive: Drive = "torque") -> Response:
+def laplace_response(line: SectionLine, s: Complex, junction: int, *, drive: Drive = "torque") -> Response:
     """Response of speed and torque, from rest, for complex s.
 
     Law: along a section [speed, tau] obeys the two-port [[cosh G, -B sinhc G], [-C sinhc G, cosh G]] with
@@ -135,7 +135,7 @@ def laplace_response(line: Line, s: Complex, junction: int, *, drive: Drive = "t
 
 
 @dataclass(frozen=True)
-class _Sweep:
+class _ResponseSweep:
     """The motion that meets the left end condition, of any size, from the left end to the driven junction.
 
     Args:
@@ -162,7 +162,7 @@ class _Sweep:
         return speed * factor, torque * factor
 
 
-def _sweep(line: Line, s: Complex, junction: int) -> _Sweep:
+def _sweep(line: SectionLine, s: Complex, junction: int) -> _ResponseSweep:
     """Sweep from the left end to a junction."""
     held = line.clamped[0]
     speed = np.full_like(s, 0.0 if held else 1.0)
@@ -182,7 +182,7 @@ def _sweep(line: Line, s: Complex, junction: int) -> _Sweep:
         passed = passed + grown
         logs.append(-passed)
         passed = passed + scale_log
-    return _Sweep(sections, s, tuple(starts), tuple(reversed(logs)), speed, torque)
+    return _ResponseSweep(sections, s, tuple(starts), tuple(reversed(logs)), speed, torque)
 
 
 def _advance(

@@ -118,7 +118,7 @@ class Section:
 
 
 @dataclass(frozen=True)
-class Line:
+class SectionLine:
     """Sections in a row with a disc at each of their n + 1 junctions, the two ends included.
 
     Args:
@@ -178,14 +178,14 @@ class Line:
         inner = (False,) * (len(self.sections) - 1)
         return (self.ends[0] == "clamped", *inner, self.ends[1] == "clamped")
 
-    def without_losses(self) -> Line:
+    def without_losses(self) -> SectionLine:
         """The same line without dampers, damping and friction."""
         sections = tuple(dataclasses.replace(section, damping=0.0, friction=0.0) for section in self.sections)
-        return Line(sections, self.discs, ends=self.ends)
+        return SectionLine(sections, self.discs, ends=self.ends)
 
-    def mirrored(self) -> Line:
+    def mirrored(self) -> SectionLine:
         """The same line read from right to left."""
-        return Line(self.sections[::-1], self.discs[::-1], self.dampers[::-1], (self.ends[1], self.ends[0]))
+        return SectionLine(self.sections[::-1], self.discs[::-1], self.dampers[::-1], (self.ends[1], self.ends[0]))
 
     def junction(self, number: int) -> int:
         """The number of a junction, checked: 0 is the left end, n the right one.

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from shaftwork.core.errors import MissingExtraError, ParameterError
 from shaftwork.core.parameters import in_si
 from shaftwork.results.observer import Array
-from shaftwork.results.quadrature import Panels
+from shaftwork.results.quadrature import LobattoPanels
 from shaftwork.sizing.catalogue import ROUNDING, CatalogueMotor, catalogue
 from shaftwork.sizing.duty_cycle import Duty, cooling_at
 from shaftwork.sizing.motor_shaft import REST, RPM
@@ -226,7 +226,7 @@ class _Demand:
     """
 
     duty: Duty
-    panels: Panels
+    panels: LobattoPanels
     tau: Array
     alpha: Array
     n: Array

@@ -11,7 +11,7 @@ import numpy as np
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
 from shaftwork.results.observer import Array
-from shaftwork.results.quadrature import Panels, integrate
+from shaftwork.results.quadrature import LobattoPanels, integrate
 from shaftwork.results.turning import turning_points
 from shaftwork.sizing.duty_cycle import Duty, Flow, cooling_at
 from shaftwork.sizing.motor_shaft import RPM, SMALLEST, MotorShaft, motor_shaft
@@ -112,7 +112,7 @@ class _Integrand:
     cooling: float
     n_cooling: float
 
-    def __call__(self, panels: Panels) -> Array:
+    def __call__(self, panels: LobattoPanels) -> Array:
         """(13, p, 8) rows in the order in which `_measured` takes them."""
         times = panels.times.ravel()
         (tau, omega), step = self.shaft.read(times), self.shaft.step_at(times)

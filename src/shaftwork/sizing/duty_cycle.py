@@ -13,7 +13,7 @@ import numpy as np
 from shaftwork.core.errors import MissingExtraError, ParameterError
 from shaftwork.core.parameters import in_si
 from shaftwork.results.observer import Array
-from shaftwork.results.quadrature import Panels
+from shaftwork.results.quadrature import LobattoPanels
 from shaftwork.sizing.motor_shaft import MotorShaft
 from shaftwork.sizing.reserve import Limit, Reserve, reserve_of
 from shaftwork.sizing.run_up import run_up
@@ -99,7 +99,7 @@ class Duty:
     cooling: float
     n_cooling: float
     shaft: MotorShaft = field(repr=False)
-    panels: Panels = field(repr=False)
+    panels: LobattoPanels = field(repr=False)
 
     @property
     def tau_peak(self) -> float:

@@ -18,7 +18,7 @@ from shaftwork.core.errors import ParameterError, SignalError
 from shaftwork.core.parameters import in_si
 from shaftwork.network.wording import at_nodes, listed
 from shaftwork.results.observer import Array
-from shaftwork.results.quadrature import Panels
+from shaftwork.results.quadrature import LobattoPanels
 from shaftwork.results.solution import Solution
 from shaftwork.results.turning import turning_points
 
@@ -86,9 +86,9 @@ class MotorShaft:
         return self.solution.steps
 
     @cached_property
-    def within(self) -> Panels:
+    def within(self) -> LobattoPanels:
         """Every step as a panel."""
-        return Panels(self.steps[:-1], self.steps[1:])
+        return LobattoPanels(self.steps[:-1], self.steps[1:])
 
     @cached_property
     def speeds_within(self) -> Array:

@@ -22,7 +22,7 @@ from shaftwork.pipeline.prepared import NOMINAL
 from shaftwork.results.observer import Array
 from shaftwork.studies.arguments import engine_names, several, shaft_models
 from shaftwork.studies.stability_cases import CASES, TORQUE, Case
-from shaftwork.studies.stability_truth import QUANTITIES, Motion, exact, predicted
+from shaftwork.studies.stability_truth import QUANTITIES, EndMotion, exact, predicted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -176,7 +176,7 @@ def _named(name: str) -> Case:
     raise ParameterError(f"There is no case {name!r}. There are: {', '.join(case.name for case in CASES)}.")
 
 
-def _row(case: Case, model: ShaftModel, engines: Sequence[str], truth: Motion) -> list[Cell]:
+def _row(case: Case, model: ShaftModel, engines: Sequence[str], truth: EndMotion) -> list[Cell]:
     """One model with each engine."""
     own = truth if isinstance(model, Wave) else predicted(case, model)
     label = (case.name, _text(model))
@@ -191,7 +191,13 @@ def _row(case: Case, model: ShaftModel, engines: Sequence[str], truth: Motion) -
 
 
 def _cell(
-    case: Case, label: tuple[str, str], compiled: Model, engine: str, truth: Motion, own: Motion | None, warned: str
+    case: Case,
+    label: tuple[str, str],
+    compiled: Model,
+    engine: str,
+    truth: EndMotion,
+    own: EndMotion | None,
+    warned: str,
 ) -> Cell:
     began = time.process_time()
     try:
@@ -214,7 +220,7 @@ def _cell(
     return Cell(*label, engine, run.engine, verdict, measured, expected, deviation, energy, cpu, why)
 
 
-def distances(found: dict[str, Array], truth: Motion, own: Motion | None) -> tuple[float, float, float]:
+def distances(found: dict[str, Array], truth: EndMotion, own: EndMotion | None) -> tuple[float, float, float]:
     """Of a run from the truth, of its model's own motion from the truth, and of the run from that motion.
 
     All are the largest over time and quantities, of the largest torque or speed of the truth and of the model's own

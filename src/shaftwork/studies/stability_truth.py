@@ -13,9 +13,9 @@ from scipy.linalg import expm
 
 from shaftwork.components.shaft_models import OneSpring, Rigid, ShaftModel, Wave
 from shaftwork.results.observer import Array
-from shaftwork.shafts.exact_motion import Torque, motion
+from shaftwork.shafts.exact_motion import JunctionTorque, motion
 from shaftwork.shafts.exact_response import Complex, laplace_response
-from shaftwork.shafts.line import Line, Section
+from shaftwork.shafts.line import Section, SectionLine
 from shaftwork.studies.stability_cases import TORQUE, Case
 
 QUANTITIES = ("tau_a", "tau_b", "omega_a", "omega_b")
@@ -30,7 +30,7 @@ MASSLESS = 1e-13
 
 
 @dataclass(frozen=True)
-class Motion:
+class EndMotion:
     """End torques and speeds of a shaft at the times of a case.
 
     Args:
@@ -44,7 +44,7 @@ class Motion:
     source: str
 
 
-def exact(case: Case) -> Motion:
+def exact(case: Case) -> EndMotion:
     """The motion of the continuous shaft.
 
     Without damping and springs by characteristics, to rounding; after a pulse on a free shaft it repeats itself, so
@@ -58,17 +58,17 @@ def exact(case: Case) -> Motion:
     late = case.t_end - 6 * case.section.delay if case.periods else 0.0
     t = case.times - late
     kinks = (case.rise * case.section.delay,) if case.form in ("pulse", "ramp") else ()
-    found = motion(line, [Torque(0, lambda t: _torque(case, t), kinks)], case.t_end - late)
+    found = motion(line, [JunctionTorque(0, lambda t: _torque(case, t), kinks)], case.t_end - late)
     values = {
         "tau_a": found.torque_in(0, t, "left"),
         "tau_b": found.torque_in(0, t, "right"),
         "omega_a": found.junction_speed(0, t),
         "omega_b": found.junction_speed(1, t),
     }
-    return Motion(values, found.error, "characteristics")
+    return EndMotion(values, found.error, "characteristics")
 
 
-def _line(case: Case) -> Line:
+def _line(case: Case) -> SectionLine:
     """The shaft, and a spring behind it as a section that hardly weighs anything."""
     section, ends = case.section, ("free", "clamped" if case.clamped else "free")
     sections, discs, dampers = [section], [case.drive * case.inertia], [0.0]
@@ -77,10 +77,10 @@ def _line(case: Case) -> Line:
         discs.append(0.0)
         dampers.append(0.0)
     loads = (*discs, case.load * case.inertia), (*dampers, case.damper * section.impedance)
-    return Line(tuple(sections), *loads, ends=ends)  # type: ignore[arg-type]
+    return SectionLine(tuple(sections), *loads, ends=ends)  # type: ignore[arg-type]
 
 
-def _by_transform(case: Case) -> Motion:
+def _by_transform(case: Case) -> EndMotion:
     t, period = case.times, 2 * case.t_end
     s = np.asarray((DECAY + 1j * np.pi * np.arange(TERMS)) / period, dtype=np.complex128)
     response, ends = laplace_response(_line(case), s, 0), np.array([0.0, case.section.length])
@@ -90,7 +90,7 @@ def _by_transform(case: Case) -> Motion:
     values, coarser = ((waves[:, :count] @ transforms[:count]).real / period for count in (TERMS, TERMS // 2))
     sizes = np.repeat([np.abs(values[:, :2]).max(), np.abs(values[:, 2:]).max()], 2)
     error = float((np.abs(values - coarser).max(axis=0) / sizes).max())
-    return Motion(dict(zip(QUANTITIES, values.T, strict=True)), error, "exact two-port")
+    return EndMotion(dict(zip(QUANTITIES, values.T, strict=True)), error, "exact two-port")
 
 
 def _torque(case: Case, t: Array) -> Array:
@@ -147,14 +147,14 @@ class _Chain:
     far: Array
 
 
-def predicted(case: Case, model: ShaftModel) -> Motion | None:
+def predicted(case: Case, model: ShaftModel) -> EndMotion | None:
     """The motion that a model has by its definition, or None where it has none of its own or is too large.
 
     The matrices are written down here from the nodes, stations and weights of the model, in coordinates whose square is
     the energy, and exponentiated.
     """
     if (at_rest := _without_states(case, model)) is not None:
-        return Motion(dict(zip(QUANTITIES, at_rest, strict=True)), 0.0, repr(model))
+        return EndMotion(dict(zip(QUANTITIES, at_rest, strict=True)), 0.0, repr(model))
     chain = None if isinstance(model, Wave) else _chain(case, model)
     if chain is None or not (chain.masses > 0).all():
         return None
@@ -170,7 +170,7 @@ def predicted(case: Case, model: ShaftModel) -> Motion | None:
         "omega_a": speeds[:, 0],
         "omega_b": speeds @ chain.far,
     }
-    return Motion(values, 0.0, repr(model))
+    return EndMotion(values, 0.0, repr(model))
 
 
 def _without_states(case: Case, model: ShaftModel) -> tuple[Array, ...] | None:

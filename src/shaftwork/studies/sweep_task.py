@@ -218,12 +218,12 @@ def _checked(part: Component) -> set[str]:
     """The names that a part's check of its values reads, for the values that it has."""
     read = set[str]()
 
-    class Told(type(part)):  # type: ignore[misc] # the same part, which tells what is read of it
+    class ToldParts(type(part)):  # type: ignore[misc] # the same part, which tells what is read of it
         def __getattribute__(self, name: str) -> Any:
             read.add(name)
             return super().__getattribute__(name)
 
-    told: Any = object.__new__(Told)
+    told: Any = object.__new__(ToldParts)
     object.__getattribute__(told, "__dict__").update(vars(part))
     with muted(NetworkWarning, AccuracyWarning):  # what is odd about it was said when it was made
         told.__post_init__()

@@ -23,8 +23,8 @@ from shaftwork.pipeline.network import Network
 from shaftwork.results.modes import Modes
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
-from shaftwork.shafts.exact_motion import Torque, motion
-from shaftwork.shafts.line import Line, Section
+from shaftwork.shafts.exact_motion import JunctionTorque, motion
+from shaftwork.shafts.line import Section, SectionLine
 
 QUANTITIES = ("tau_a", "tau_b", "tau_mid", "omega_a", "omega_b")
 """What is compared: torque at both ends and in the middle, speed of both ends."""
@@ -157,7 +157,7 @@ def _read(net: Network, shaft: str, t_end: float, t: Array, rtol: float = TIGHT)
 def _by_characteristics(netlist: Netlist, shaft: str, t_end: float, t: Array) -> tuple[dict[str, Array], float]:
     order, shafts = _train(netlist)
     sections = [_section(placed.part) for placed in shafts]
-    line = Line(
+    line = SectionLine(
         tuple(sections),
         tuple(_total(netlist, node, Inertia, "J") for node in order),
         tuple(_total(netlist, node, Damper, "d") for node in order),
@@ -215,9 +215,11 @@ def _total(netlist: Netlist, node: str, kind: type, name: str) -> float:
     return float(sum(getattr(part, name) for part in members))
 
 
-def _torque(placed: Placed, order: list[str]) -> Torque:
+def _torque(placed: Placed, order: list[str]) -> JunctionTorque:
     law = as_expression(placed.part.tau)  # type: ignore[attr-defined]
     if not law.free_symbols <= {TIME}:
         raise ParameterError("A torque depends on more than time.")
     value = lambdify(TIME, law, modules=[NUMERICAL, "numpy"])
-    return Torque(order.index(placed.nodes[0]), lambda t: np.broadcast_to(value(t), np.shape(t)), breakpoints(law))
+    return JunctionTorque(
+        order.index(placed.nodes[0]), lambda t: np.broadcast_to(value(t), np.shape(t)), breakpoints(law)
+    )

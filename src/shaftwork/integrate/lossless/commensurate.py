@@ -13,9 +13,9 @@ from shaftwork.core.notices import warn
 from shaftwork.integrate.engines import WAVE
 from shaftwork.integrate.lossless.collocation import STAGES
 from shaftwork.integrate.lossless.lattice import ROUNDING, Lattice
-from shaftwork.integrate.lossless.leaps import Far, Leaps
 from shaftwork.integrate.lossless.lines import DelayProblem, DelayTrajectory
 from shaftwork.integrate.lossless.panel_maps import Matrices, panel_map
+from shaftwork.integrate.lossless.periodic_propagation import Far, PeriodicPropagation
 
 # Delays are whole multiples of a part of the shortest one, up to rounding, and no longer than so many of them.
 MOST_PARTS, MOST_PERIODS = 12, 64
@@ -85,7 +85,7 @@ def _far(lattice: Lattice, rtol: float) -> tuple[DelayTrajectory | None, list[bo
     """As `_whole`, for a long motion of few outputs."""
     times = np.asarray(lattice.problem.t_eval, dtype=float)
     run = lattice.run(lattice.edges[-2] + max(BEGINNING * lattice.size, lattice.reach))
-    leaps = Leaps(lattice, run)
+    leaps = PeriodicPropagation(lattice, run)
     asked = np.unique(lattice.panels(times))
     late = leaps.run(np.append(asked[asked >= leaps.first], lattice.count - 1))
     bad = [any(both) for both in zip(lattice.unresolved(run, rtol), lattice.unresolved(late, rtol), strict=True)]

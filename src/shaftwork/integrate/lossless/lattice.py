@@ -15,8 +15,8 @@ from shaftwork.integrate.lossless.collocation import GAUSS, POWERS, STAGES, STAT
 from shaftwork.integrate.lossless.lines import DelayProblem, DelayTrajectory, Past, past_of
 from shaftwork.integrate.lossless.panel_maps import PanelMap
 from shaftwork.integrate.lossless.scales import RESOLVED, Scales, left_out
-from shaftwork.integrate.lossless.waveforms import Panels, trajectory
-from shaftwork.integrate.pieces import Piece, failure, pieces, start_of_piece
+from shaftwork.integrate.lossless.waveforms import WavePanels, trajectory
+from shaftwork.integrate.pieces import SmoothInterval, failure, pieces, start_of_piece
 from shaftwork.integrate.problem import Array
 
 # Numbers of panels.
@@ -28,7 +28,7 @@ ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
-class Run:
+class LatticeRun:
     """Some panels, solved.
 
     Args:
@@ -119,7 +119,7 @@ class Lattice:
         places = np.searchsorted(self._offsets, elapsed - periods * self._period, side="right") - 1
         return np.asarray(periods.astype(np.intp) * self.size + np.maximum(places, 0))
 
-    def run(self, count: int) -> Run:
+    def run(self, count: int) -> LatticeRun:
         """Solve the first panels."""
         waves = np.empty((self.reach + count, self._q, STAGES))
         waves[: self.reach] = self._before
@@ -140,9 +140,9 @@ class Lattice:
         arrived = -waves[np.arange(count)[:, None] + self.reach - self.lags, self.partners]
         numbers = np.arange(count)
         states = self.inside(numbers, starts, arrived, inputs)
-        return Run(numbers, starts, states, waves[self.reach :], arrived, ends)
+        return LatticeRun(numbers, starts, states, waves[self.reach :], arrived, ends)
 
-    def inputs(self, piece: Piece, low: int, high: int) -> Array:
+    def inputs(self, piece: SmoothInterval, low: int, high: int) -> Array:
         """Inputs u, then e (high - low, (n + q) s) of the panels of a piece."""
         if self.problem.steady:
             values = self._constants(np.array([(piece.low + piece.high) / 2]))
@@ -232,7 +232,7 @@ class Lattice:
             waves[panel + self.reach] = change[self._n :].reshape(arrived.shape)
         return states, waves[self.reach :]
 
-    def unresolved(self, run: Run, rtol: float) -> list[bool]:
+    def unresolved(self, run: LatticeRun, rtol: float) -> list[bool]:
         """Whether each panel of the period must be finer."""
         problem = self.problem
         rows = np.concatenate([run.waves, run.states], axis=1)
@@ -251,12 +251,12 @@ class Lattice:
             raise self.failure(panel, run.starts[panel], "a wave or a state is not finite")
         return [not fits[run.numbers % self.size == place].all() for place in range(self.size)]
 
-    def wrinkles(self, run: Run) -> float:
+    def wrinkles(self, run: LatticeRun) -> float:
         """The part of the largest wave that panels leave out, about."""
         rows = np.concatenate([run.waves, run.states], axis=1)
         return float(left_out(rows, run.starts)[:, : self._q].max() / np.abs(run.waves).max())
 
-    def trajectory(self, run: Run, times: Array | None) -> DelayTrajectory:
+    def trajectory(self, run: LatticeRun, times: Array | None) -> DelayTrajectory:
         """What was found in the first panels, or in all, at times (k,) in s or at the ends of the panels."""
         problem, count = replace(self.problem, t_eval=times), len(run.numbers)
         starts, lengths = self.times(run.numbers), self.lengths[run.numbers % self.size]
@@ -265,7 +265,7 @@ class Lattice:
         place = 2 * (problem.t_end - starts[-1]) / lengths[-1] - 1
         end = states[-1] @ STATE_POWERS @ place ** np.arange(STAGES + 1)
         passed = tuple(zip(self.edges[1:], [*run.ends[:-1], end], strict=True))
-        panels = Panels(starts, lengths, states, run.waves, passed, self.near)
+        panels = WavePanels(starts, lengths, states, run.waves, passed, self.near)
         return trajectory(problem, panels, {"steps": count})
 
     def failure(self, panel: int, x: Array, reason: str) -> SimulationError:

@@ -13,11 +13,11 @@ from shaftwork.integrate.engines import WAVE
 from shaftwork.integrate.guards import GuardWatch
 from shaftwork.integrate.lossless.collocation import GAUSS, LEFT, POWERS, RADAU, RIGHT, STATE_POWERS, Scheme
 from shaftwork.integrate.lossless.lines import DelayProblem, Lines, past_of
-from shaftwork.integrate.lossless.panels import History
+from shaftwork.integrate.lossless.panels import WaveHistory
 from shaftwork.integrate.lossless.restriction import Restriction
 from shaftwork.integrate.lossless.scales import RESOLVED, Scales, left_out
-from shaftwork.integrate.lossless.stages import Stages
-from shaftwork.integrate.lossless.waveforms import Panels, Polynomials, StatesDense, Still
+from shaftwork.integrate.lossless.stages import CollocationStages
+from shaftwork.integrate.lossless.waveforms import Polynomials, StatesDense, Still, WavePanels
 from shaftwork.integrate.pieces import failure, pieces, reached, start_of_piece
 from shaftwork.integrate.problem import Array, Trajectory
 
@@ -28,7 +28,7 @@ SEEN = 1e-3
 
 
 @dataclass
-class Equations:
+class MarchEquations:
     """What a march keeps of a set of equations that it may come back to.
 
     Args:
@@ -36,7 +36,7 @@ class Equations:
         scales: sizes of waves and states.
     """
 
-    stages: Stages
+    stages: CollocationStages
     scales: Scales
 
 
@@ -52,7 +52,7 @@ class _Panel:
 
 
 @dataclass
-class _Span:
+class _MarchSpan:
     """What a march has done in one set of equations: its first panel, smooth pieces, and the guard that ended it."""
 
     first: int
@@ -82,13 +82,13 @@ class March:
         self._ends = 2 * problem.delays.size
         self._twice = 2 * np.repeat(problem.impedances, 2)[:, None]
         past = past_of(problem)
-        self._history = History(self._lines, past, self._merge)
+        self._history = WaveHistory(self._lines, past, self._merge)
         self._past = past.starts.size
         self._kinks: list[float] = []
         self._states: list[Array] = []
         self._arrived: list[Array] = []
         self._layers = 0
-        self._enter(problem, Equations(Stages(problem, self._rtol), self._scales_of(problem)))
+        self._enter(problem, MarchEquations(CollocationStages(problem, self._rtol), self._scales_of(problem)))
         self._equations.scales.see(np.abs(past.waves).max(axis=(0, 2))[:, None], self._x[:, None])
         for number in range(1, self._past):
             self._follow(number)
@@ -96,13 +96,13 @@ class March:
     def _scales_of(self, problem: DelayProblem) -> Scales:
         return Scales(problem.impedances, problem.atol_waves, problem.atol, self._rtol)
 
-    def _enter(self, problem: DelayProblem, equations: Equations) -> None:
+    def _enter(self, problem: DelayProblem, equations: MarchEquations) -> None:
         self._problem, self._equations = problem, equations
         self._x = np.asarray(problem.x0, dtype=float)
         self._trend = np.zeros(self._x.size)
-        self._span = _Span(len(self._states), problem.t0)
+        self._span = _MarchSpan(len(self._states), problem.t0)
 
-    def go_on(self, problem: DelayProblem, equations: Equations | None) -> Equations:
+    def go_on(self, problem: DelayProblem, equations: MarchEquations | None) -> MarchEquations:
         """Begin a span in other equations, where the last one has ended.
 
         Args:
@@ -111,7 +111,7 @@ class March:
         """
         waves = self._equations.scales.waves
         if equations is None:
-            equations = Equations(Stages(problem, self._rtol), self._scales_of(problem))
+            equations = MarchEquations(CollocationStages(problem, self._rtol), self._scales_of(problem))
         self._enter(problem, equations)
         equations.scales.see(waves[:, None], self._x[:, None])
         return equations
@@ -275,10 +275,10 @@ class March:
     def _failure(self, t: float, reason: str) -> SimulationError:
         return failure(self._problem, "delay", t, self._x, reason)
 
-    def panels(self) -> tuple[Panels, dict[str, int]]:
+    def panels(self) -> tuple[WavePanels, dict[str, int]]:
         """All panels since the start, and their statistics."""
         history = self._history
-        found = Panels(
+        found = WavePanels(
             np.array(history.starts[self._past :]),
             np.array(history.lengths[self._past :]),
             np.array(self._states),

@@ -12,7 +12,7 @@ from shaftwork.integrate.lossless.lines import Lines, Past
 from shaftwork.integrate.problem import Array
 
 
-class History:
+class WaveHistory:
     """The waves w = 2 Z v + h (N m) that have left the ends of the lines, panel by panel.
 
     Args:

@@ -27,7 +27,7 @@ _ENDS = np.column_stack([LEFT[:, 0], RIGHT[:, 0]])
 _TO_RATES = np.linalg.inv(GAUSS.matrix).T
 
 
-class Stages:
+class CollocationStages:
     """The stage equations X = x0 + length f(X) A^T of one panel, by simplified Newton iteration.
 
     Args:

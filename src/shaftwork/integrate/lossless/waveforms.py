@@ -169,7 +169,7 @@ def one_sided(problem: DelayProblem, times: Array, *, left: bool = False) -> Arr
 
 
 @dataclass(frozen=True)
-class Panels:
+class WavePanels:
     """All panels of a run.
 
     Args:
@@ -189,7 +189,7 @@ class Panels:
     merge: float
 
 
-def trajectory(problem: DelayProblem, panels: Panels, statistics: Mapping[str, int]) -> DelayTrajectory:
+def trajectory(problem: DelayProblem, panels: WavePanels, statistics: Mapping[str, int]) -> DelayTrajectory:
     """The panels of a run at the output times, and their dense output."""
     past = past_of(problem)
     waves = Polynomials(

@@ -15,19 +15,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.stores import Stores
+from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import CompileError, NetworkError
 from shaftwork.integrate.lanes import LaneRun, Room, Steps
 from shaftwork.network.graph import GraphPart
-from shaftwork.pipeline.ensemble.equations import Entry, Equations
+from shaftwork.pipeline.ensemble.equations import EnsembleEquations, PhaseEntry
 from shaftwork.pipeline.ensemble.extremes import largest
-from shaftwork.pipeline.ensemble.groups import Group, Index, Mask, joined
+from shaftwork.pipeline.ensemble.groups import Index, Mask, VariantGroup, joined
 from shaftwork.pipeline.ensemble.programs import EXTREMES, EnsembleCode
 from shaftwork.pipeline.ensemble.rises import first_rises
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.phases.assemblies import Assembly
-from shaftwork.pipeline.phases.elements import ModeNames
+from shaftwork.pipeline.phases.assemblies import ModeEquations
+from shaftwork.pipeline.phases.mode_machines import ModeNames
 from shaftwork.pipeline.phases.model import PhasedModel
 from shaftwork.pipeline.phases.regimes import with_modes
 from shaftwork.pipeline.phases.starts import conditional
@@ -73,7 +73,7 @@ class Ensemble:
         self.model, self.names, self.measures = model, tuple(names), tuple(measures)
         self.span, self.rtol = span, rtol
         self._first = dict(first)
-        self._equations: dict[ModeNames, Equations | str] = {}
+        self._equations: dict[ModeNames, EnsembleEquations | str] = {}
         self._codes: dict[Model, EnsembleCode] = {}
         self.room = Room()
         self._refuse()
@@ -131,25 +131,25 @@ class Ensemble:
         """Whether the values (names,) of the parameters that vary leave the modes at the start as they are."""
         return self._first_modes(dict(zip(self.names, column.tolist(), strict=True))) == self.start
 
-    def equations(self, modes: ModeNames) -> Equations | None:
+    def equations(self, modes: ModeNames) -> EnsembleEquations | None:
         """The equations of a combination of modes, or None where variants cannot run side by side in them."""
         if modes not in self._equations:
             try:
                 assembly = None if self.phased is None else self.phased.phases.assembly(modes)
                 code = self._code(assembly)
-                self._equations[modes] = Equations(code, assembly, modes, self._first, self.names, self.span)
+                self._equations[modes] = EnsembleEquations(code, assembly, modes, self._first, self.names, self.span)
             except (CompileError, NetworkError) as error:
                 self._equations[modes] = str(error)
         made = self._equations[modes]
         return None if isinstance(made, str) else made
 
-    def _code(self, assembly: Assembly | None) -> EnsembleCode:
+    def _code(self, assembly: ModeEquations | None) -> EnsembleCode:
         """The programs of a set of equations, which several combinations of modes may share."""
         model = self.model if assembly is None else assembly.model
         if model not in self._codes:
             if assembly is None:
                 bound = model.prepare(model.vector(self._first)).symbolic()
-                program, stores = None if bound is None else bound.program, Stores(model.form)
+                program, stores = None if bound is None else bound.program, StateTransfer(model.form)
             else:
                 program, stores = assembly.program, assembly.stores
             if program is not None and program.fading:
@@ -168,7 +168,7 @@ class Ensemble:
         Returns:
             (measures, k), and (k,) whether a variant has come to its end here; of the others nothing is known.
         """
-        return _Way(self, columns).go()
+        return _VariantCourse(self, columns).go()
 
     @cached_property
     def decisive(self) -> bool:
@@ -179,7 +179,7 @@ class Ensemble:
         symbols = {f"{made.part.name}.{symbol.name}" for made in elements for symbol in conditional(made.modes)}
         return not symbols.isdisjoint(self.names)
 
-    def after(self, group: Group, guard: int, p: Array) -> list[tuple[ModeNames, Mask]]:
+    def after(self, group: VariantGroup, guard: int, p: Array) -> list[tuple[ModeNames, Mask]]:
         """The modes to which a guard leads by itself, and the lanes (k,) that go there."""
         phased = self.phased
         assert phased is not None  # noqa: S101 (only its lanes meet guards)
@@ -197,7 +197,7 @@ class Ensemble:
         return [(with_modes(group.modes, {number: to}), np.array([name == to for name in names])) for to in found]
 
 
-class _Way:
+class _VariantCourse:
     """The way of some variants through their phases."""
 
     def __init__(self, ensemble: Ensemble, columns: Array) -> None:
@@ -218,7 +218,7 @@ class _Way:
                 waiting = [made for group in joined(waiting) for made in self._stretch(group)]
         return self._results(), self.done
 
-    def _begin(self) -> list[Group]:
+    def _begin(self) -> list[VariantGroup]:
         ensemble = self.ensemble
         equations = ensemble.equations(ensemble.start)
         assert equations is not None  # noqa: S101 (checked when it was made)
@@ -226,9 +226,11 @@ class _Way:
         if ensemble.decisive:
             lanes = lanes[[ensemble.starts_alike(column) for column in self.columns[:, lanes].T]]
         size = len(equations.code.model.states)
-        return [Group(ensemble.start, lanes, np.full(lanes.size, ensemble.span[0]), np.zeros((size, lanes.size)))]
+        return [
+            VariantGroup(ensemble.start, lanes, np.full(lanes.size, ensemble.span[0]), np.zeros((size, lanes.size)))
+        ]
 
-    def _stretch(self, group: Group) -> list[Group]:
+    def _stretch(self, group: VariantGroup) -> list[VariantGroup]:
         """Up to the next change of mode in each lane; the groups that go on from there."""
         equations = self.ensemble.equations(group.modes)
         if equations is None or not group.lanes.size:
@@ -245,7 +247,7 @@ class _Way:
             made += self._changed(equations, ends.group.some(ends.met == guard), guard)
         return made
 
-    def _followed(self, equations: Equations, group: Group, p: Array, entry: Entry) -> _Ends:
+    def _followed(self, equations: EnsembleEquations, group: VariantGroup, p: Array, entry: PhaseEntry) -> _Ends:
         """Lanes up to their guards or the end of the motion."""
         span, code, size = self.ensemble.span, equations.code, len(group.x)
         rates = code.motion(group.t, group.x, p)[0]
@@ -269,7 +271,7 @@ class _Way:
             run.keep(good & ~done, steps)
         return ends
 
-    def _changed(self, before: Equations, group: Group, guard: int) -> list[Group]:
+    def _changed(self, before: EnsembleEquations, group: VariantGroup, guard: int) -> list[VariantGroup]:
         """Past a guard: what is stored goes over to the equations that follow, where it goes over unchanged."""
         p = before.parameters(self.columns[:, group.lanes])
         held, made = before.code.stored(group.t, group.x, p), []
@@ -283,10 +285,10 @@ class _Way:
             for kind in after.code.kinds:
                 size = np.maximum(np.abs(own[kind]).max(axis=0, initial=0.0), 1.0)
                 same &= (np.abs(new[kind] - own[kind]) <= SAME * size).all(axis=0)
-            made.append(Group(modes, group.lanes[there], t, x).some(same))
+            made.append(VariantGroup(modes, group.lanes[there], t, x).some(same))
         return made
 
-    def _measure(self, equations: Equations, steps: Steps, lanes: Index, good: Mask, ended: Mask) -> None:
+    def _measure(self, equations: EnsembleEquations, steps: Steps, lanes: Index, good: Mask, ended: Mask) -> None:
         """What some steps of lanes (k,) add to the extremes: of those that go well, and those that end at a guard."""
         for row, measure in enumerate(self.ensemble.measures):
             for sign in EXTREMES.get(measure.kind, ()):
@@ -298,12 +300,12 @@ class _Way:
                 found = largest(quantity.t, quantity.jets, self.values[row, lanes[near]], quantity.at)
                 self.values[row, lanes[near]] = np.where(good[near], found, self.values[row, lanes[near]])
 
-    def _integrate(self, equations: Equations, lanes: Index, integrals: Array) -> None:
+    def _integrate(self, equations: EnsembleEquations, lanes: Index, integrals: Array) -> None:
         """What a stretch adds to the measures that are integrals."""
         for row, place in equations.code.integral_of.items():
             self.values[row, lanes] += integrals[place]
 
-    def _end(self, equations: Equations, group: Group, p: Array, over: Mask) -> None:
+    def _end(self, equations: EnsembleEquations, group: VariantGroup, p: Array, over: Mask) -> None:
         """The variants that have come to the end of their motion."""
         self.done[group.lanes[over]] = True
         if any(measure.kind == "end" for measure in self.ensemble.measures) and over.any():
@@ -334,11 +336,11 @@ class _Ends:
         met: (k,) the guard that each has met, OVER at the end of the motion, or LOST.
     """
 
-    group: Group
+    group: VariantGroup
     met: NDArray[np.intp]
 
 
-def _met(equations: Equations, offsets: Array, steps: Steps) -> tuple[NDArray[np.intp], Array]:
+def _met(equations: EnsembleEquations, offsets: Array, steps: Steps) -> tuple[NDArray[np.intp], Array]:
     """(k,) the guard that each lane meets first, or ON, and the rows (rows, k) there; from there on it stays there."""
     met, first = np.full(steps.t.shape[1], ON), np.full(steps.t.shape[1], np.inf)
     at, rows = np.zeros(met.size, dtype=np.intp), np.zeros_like(steps.last)
@@ -389,9 +391,9 @@ class _Quantity:
         return jet
 
 
-def _kept(group: Group, p: Array, entry: Entry) -> tuple[Group, Array, Entry]:
+def _kept(group: VariantGroup, p: Array, entry: PhaseEntry) -> tuple[VariantGroup, Array, PhaseEntry]:
     """Those of a group whose modes are consistent with their motion."""
     if entry.good.all():
         return group, p, entry
     on = entry.good
-    return group.some(on), p[:, on], Entry(on[on], entry.offsets[:, on])
+    return group.some(on), p[:, on], PhaseEntry(on[on], entry.offsets[:, on])

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from shaftwork.codegen.elements import Array
 from shaftwork.pipeline.ensemble.programs import EnsembleCode
-from shaftwork.pipeline.phases.assemblies import Assembly
+from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.courses import FEW
-from shaftwork.pipeline.phases.elements import ModeNames
-from shaftwork.pipeline.phases.moments import AHEAD, AHEAD_OF_RUN, CLEAR, EPS, GOLDEN, NOTHING, ROUNDINGS
+from shaftwork.pipeline.phases.hybrid_state import AHEAD, AHEAD_OF_RUN, CLEAR, EPS, GOLDEN, NOTHING, ROUNDINGS
+from shaftwork.pipeline.phases.mode_machines import ModeNames
 from shaftwork.pipeline.prepared import NOMINAL
 
 Mask = NDArray[np.bool_]
@@ -22,7 +22,7 @@ Course = tuple[Array, Array, Array, Array]
 
 
 @dataclass(frozen=True, eq=False)
-class Entry:
+class PhaseEntry:
     """Where variants enter a phase.
 
     Args:
@@ -34,7 +34,7 @@ class Entry:
     offsets: Array
 
 
-class Equations:
+class EnsembleEquations:
     """The equations of one combination of modes.
 
     Args:
@@ -49,7 +49,7 @@ class Equations:
     def __init__(
         self,
         code: EnsembleCode,
-        assembly: Assembly | None,
+        assembly: ModeEquations | None,
         modes: ModeNames,
         first: Mapping[str, float],
         names: Sequence[str],
@@ -76,8 +76,8 @@ class Equations:
             p[place] = columns[column]
         return self.code.program.parameters(p)
 
-    def entered(self, t: Array, x: Array, p: Array) -> Entry:
-        """Whether every guard is on its own side, or on its limit and about to be, as `Settling` would find.
+    def entered(self, t: Array, x: Array, p: Array) -> PhaseEntry:
+        """Whether every guard is on its own side, or on its limit and about to be, as `EventIteration` would find.
 
         Args:
             t: (k,) s.
@@ -85,7 +85,7 @@ class Equations:
             p: (parameters, k).
         """
         if not len(self.sides):
-            return Entry(np.ones(t.size, dtype=bool), np.zeros((0, t.size)))
+            return PhaseEntry(np.ones(t.size, dtype=bool), np.zeros((0, t.size)))
         rates, now = self.code.motion(t, x, p)
         moved = self._rounded(x, rates)
         near_rates, near = self.code.motion(t + self._tick, moved, p)
@@ -101,7 +101,7 @@ class Equations:
             known |= sure
         good = (value < -bands) | ((value <= bands) & falls)
         clear = np.where(2 * value > -CLEAR * bands, np.maximum(value, 0.0) + CLEAR * bands, bands)
-        return Entry(np.all(good[self.watched], axis=0), np.maximum(clear, NOTHING))
+        return PhaseEntry(np.all(good[self.watched], axis=0), np.maximum(clear, NOTHING))
 
     def _rounded(self, x: Array, rates: Array) -> Array:
         """The states so far away as rounding may move them, and the time by a tick; see `moments.Regime.rounded`."""
@@ -122,6 +122,6 @@ class Equations:
         later = x + step * rates
         return t + step, later, *self.code.motion(t + step, later, p)
 
-    def leaves_behind(self, before: Equations, guard: int) -> bool:
+    def leaves_behind(self, before: EnsembleEquations, guard: int) -> bool:
         """Whether the guard by which these modes were entered is met no more; `entered` looks at all the others."""
         return before.code is not self.code or not self.sides[guard] == before.sides[guard] != 0.0

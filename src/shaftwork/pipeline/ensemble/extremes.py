@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.quintics import BEYOND, apart, inner
+from shaftwork.codegen.hermite import BEYOND, apart, inner
 
 NEARLY = 0.1
 """Of the range: so near to the top a peak and a dip between the same two samples are looked for."""

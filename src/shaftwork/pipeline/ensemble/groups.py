@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.codegen.elements import Array
-from shaftwork.pipeline.phases.elements import ModeNames
+from shaftwork.pipeline.phases.mode_machines import ModeNames
 
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class Group:
+class VariantGroup:
     """Variants in the same modes, ready to go on.
 
     Args:
@@ -31,19 +31,19 @@ class Group:
     t: Array
     x: Array
 
-    def some(self, on: Mask | Index) -> Group:
+    def some(self, on: Mask | Index) -> VariantGroup:
         """Those of the lanes (k,) that are marked, or those that are named."""
-        return Group(self.modes, self.lanes[on], self.t[on], self.x[:, on])
+        return VariantGroup(self.modes, self.lanes[on], self.t[on], self.x[:, on])
 
 
-def joined(groups: Sequence[Group]) -> list[Group]:
+def joined(groups: Sequence[VariantGroup]) -> list[VariantGroup]:
     """Groups in the same modes as one."""
-    alike: dict[ModeNames, list[Group]] = {}
+    alike: dict[ModeNames, list[VariantGroup]] = {}
     for group in groups:
         if group.lanes.size:
             alike.setdefault(group.modes, []).append(group)
     return [
-        Group(
+        VariantGroup(
             modes,
             np.concatenate([one.lanes for one in several]),
             np.concatenate([one.t for one in several]),

@@ -11,10 +11,10 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.lane_program import LaneProgram, lane_expressions, lane_function, lane_program
 from shaftwork.codegen.lanes import LaneStep, Use
-from shaftwork.codegen.stores import Stores
+from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.core.errors import CompileError
 from shaftwork.pipeline.model import Model
-from shaftwork.reduction.expressed import Expressed
+from shaftwork.reduction.symbolic_observables import SymbolicObservables
 from shaftwork.results.measures import Measure
 
 EXTREMES = {"max": (1.0,), "min": (-1.0,), "peak": (1.0, -1.0)}
@@ -36,11 +36,11 @@ class EnsembleCode:
         CompileError: variants cannot run side by side in them.
     """
 
-    def __init__(self, model: Model, program: Any, stores: Stores, measures: Sequence[Measure]) -> None:
+    def __init__(self, model: Model, program: Any, stores: StateTransfer, measures: Sequence[Measure]) -> None:
         if model.rows is None or program is None or not model.states:
             raise CompileError("These equations have no program of their own.")
         self.model, self._rows, self._stores = model, model.rows, stores
-        self._expressed = Expressed(model.form, model.rows)
+        self._expressed = SymbolicObservables(model.form, model.rows)
         quantities = [self._expressed.quantity(measure.quantity) for measure in measures]
         read = [found for found in quantities if found is not None]
         if len(read) < len(quantities):

@@ -17,9 +17,9 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.linear_readings import ReadingMatrices
 from shaftwork.codegen.many import ManyExpressions
 from shaftwork.codegen.matrices import LinearPart
-from shaftwork.codegen.recovery import History
+from shaftwork.codegen.recovery import BranchHistory
 from shaftwork.codegen.scalar import ScalarProgram
-from shaftwork.codegen.stores import Stores
+from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.codegen.timeline import Timeline
 from shaftwork.codegen.valueless import first_missing, in_words, rough, without_value
 from shaftwork.components.laws import as_expression
@@ -29,18 +29,18 @@ from shaftwork.core.errors import CompileError, SimulationError, no_value
 from shaftwork.core.kept import Kept
 from shaftwork.integrate.engines import available
 from shaftwork.integrate.problem import Guards, Problem, changed
-from shaftwork.pipeline.phases.elements import Element, ModeNames
+from shaftwork.pipeline.phases.mode_guards import ModeGuards
+from shaftwork.pipeline.phases.mode_machines import ModeMachine, ModeNames
 from shaftwork.pipeline.phases.rates import rates_of
-from shaftwork.pipeline.phases.shown import Shown
-from shaftwork.pipeline.phases.watch import Watch
+from shaftwork.pipeline.phases.shown import GuardReadings
 from shaftwork.pipeline.prepared import Prepared
 from shaftwork.reduction.names import Names
-from shaftwork.reduction.readings import NamedReadings, Readings
+from shaftwork.reduction.observables import NamedReadings, Observables
 from shaftwork.reduction.rows import Rows
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.model import Model
-    from shaftwork.pipeline.phases.moments import Moment
+    from shaftwork.pipeline.phases.hybrid_state import HybridState
 
 KEPT = 64
 """Parameter vectors whose matrices are kept."""
@@ -56,7 +56,7 @@ Limits = Callable[[float, list[float]], list[float]]
 Near = Callable[[float, list[float], float, Moves, float], tuple[list[float], list[float], list[float]]]
 
 
-class Assembly:
+class ModeEquations:
     """One set of equations and its guards.
 
     Args:
@@ -69,24 +69,24 @@ class Assembly:
     def __init__(
         self,
         model: Model,
-        elements: Sequence[Element],
+        elements: Sequence[ModeMachine],
         forms: Sequence[str | None],
         rows: Rows | None = None,
     ) -> None:
         self.model, self.elements = model, elements
-        self.whole: Assembly = self
+        self.whole: ModeEquations = self
         """Where what holds is numbers in the equations: those in which nothing does, of which these are a copy."""
-        self.stores, self.quantities = Stores(model.form), Names(model.form)
+        self.stores, self.quantities = StateTransfer(model.form), Names(model.form)
         self._places = {name: k for k, name in enumerate(model.parameters)}
         self._rows = rows = model.rows if rows is None and None not in forms else rows
-        self._readings = readings = NamedReadings(model.form) if rows is None else Readings(model.form, rows)
+        self._readings = readings = NamedReadings(model.form) if rows is None else Observables(model.form, rows)
         names = tuple(Symbol(name, real=True) for name in model.parameters)
         self._parameters = names if rows is None else rows.parameters
         self.parts = {part.name: part for part in model.form.graph.parts}
-        found = Watch(model.form, elements, forms, readings)
+        found = ModeGuards(model.form, elements, forms, readings)
         self.resting, self.watched, self.sides = found.resting, found.watched, found.sides
         self._expressions, self._owners = found.expressions, found.owners
-        self._shown = Shown(elements, self.parts, readings, self._parameters)
+        self._shown = GuardReadings(elements, self.parts, readings, self._parameters)
         if rows is None:
             _ = self._shown.function  # so that all quantities are known before any function of them is made
         self._prepared = Kept[bytes, Prepared](KEPT)
@@ -172,7 +172,7 @@ class Assembly:
         return self._reading(bound, self._matrices(bound.part, lambda: ReadingMatrices(bound, reads)))
 
     def _reading(self, bound: Any, matrices: ReadingMatrices) -> Callable[[Array, Array], Array]:
-        return lambda times, states: matrices(History(bound, times, states))
+        return lambda times, states: matrices(BranchHistory(bound, times, states))
 
     def _read_at(self, t: float, x: Array, p: Array) -> list[float]:
         return [float(np.ravel(value)[0]) for value in self._read(p)(np.array([t]), x[None, :])]
@@ -206,7 +206,7 @@ class Assembly:
         part = self.parts[element.part.name]
         return self._translated((number, wanted), lambda: self._readings.guard(part, element.modes, wanted))
 
-    def problem(self, moment: Moment, span: tuple[float, float], times: Timeline) -> Problem:
+    def problem(self, moment: HybridState, span: tuple[float, float], times: Timeline) -> Problem:
         """The motion of a phase, before it is known where it ends; tolerances are for rtol = 1.
 
         Its states are those of the model and, behind them, the integrals of the guards in `clocks`.
@@ -261,11 +261,11 @@ class Assembly:
         size, clocks = len(self.model.states), sparse.csc_array((len(self.clocks),) * 2)
         return lambda t, y: sparse.block_diag((bind().jacobian(t, y[:size]), clocks), "csc")
 
-    def alike(self, modes: ModeNames) -> tuple[Assembly, ModeNames]:
+    def alike(self, modes: ModeNames) -> tuple[ModeEquations, ModeNames]:
         """Equations and modes that are the same for the choice of an engine: a law knows a mode by its number alone."""
         return self, tuple(element.alike[name] for element, name in zip(self.elements, modes, strict=True))
 
-    def judged(self, moment: Moment, problem: Problem) -> Problem:  # noqa: ARG002
+    def judged(self, moment: HybridState, problem: Problem) -> Problem:  # noqa: ARG002
         """The motion by which an engine is chosen."""
         return problem
 
@@ -314,7 +314,7 @@ class Assembly:
         """The right-hand side in scalar code, where there are rows."""
         return self.model.scalar
 
-    def _sizes(self, moment: Moment, span: tuple[float, float]) -> Array:
+    def _sizes(self, moment: HybridState, span: tuple[float, float]) -> Array:
         """The size of each clock over a phase, as far as the time alone tells."""
         length = span[1] - span[0]
         times = np.linspace(span[0], span[1] - SOON * length, SAMPLES)

@@ -34,9 +34,9 @@ from shaftwork.core.errors import SimulationError
 from shaftwork.core.kept import Kept
 from shaftwork.network.graph import GROUND
 from shaftwork.pipeline.phases.contacts import Contact, lasting, limited, one_side, opens_at
-from shaftwork.pipeline.phases.elements import NO_IMPACT, Element, ModeNames
-from shaftwork.pipeline.phases.impulses import Blow, Impulses, Stage, Start
-from shaftwork.pipeline.phases.moments import CLEAR, NOTHING, Moment, Regime
+from shaftwork.pipeline.phases.hybrid_state import CLEAR, NOTHING, HybridState, Regime
+from shaftwork.pipeline.phases.impulses import Blow, ImpactStage, ImpactStart, Impulses
+from shaftwork.pipeline.phases.mode_machines import NO_IMPACT, ModeMachine, ModeNames
 from shaftwork.pipeline.phases.regimes import Regimes, with_modes
 
 KEPT = 64
@@ -58,7 +58,7 @@ class Collision(NamedTuple):
         given: energy in J that prescribed speeds give, by part.
     """
 
-    after: Moment
+    after: HybridState
     stays: tuple[Contact, ...]
     thrown: tuple[Contact, ...]
     lost: dict[str, float]
@@ -75,11 +75,13 @@ class Collisions:
         together: whether what touches is thrown back in the same instant as what is hit, and not after it.
     """
 
-    def __init__(self, regimes: Regimes, elements: Sequence[Element], impulses: Impulses, *, together: bool) -> None:
+    def __init__(
+        self, regimes: Regimes, elements: Sequence[ModeMachine], impulses: Impulses, *, together: bool
+    ) -> None:
         self._regimes, self._elements, self._impulses, self._together = regimes, elements, impulses, together
         self._mobilities = Kept[tuple[Regime, tuple[tuple[int, int], ...]], Mobility](KEPT)
 
-    def impact(self, t: float, moment: Moment, number: int, leave: Leave) -> Collision:
+    def impact(self, t: float, moment: HybridState, number: int, leave: Leave) -> Collision:
         """The impact of an element that closes.
 
         Args:
@@ -105,7 +107,11 @@ class Collisions:
             t, {c.number for c, share in zip(contacts, back.tolist(), strict=True) if share >= 1}, touching
         )
         modes = moment.regime.modes
-        begins, stages, both_ways = self._apart(t, moment, modes, contacts), tuple[Stage, ...](), tuple[Contact, ...]()
+        begins, stages, both_ways = (
+            self._apart(t, moment, modes, contacts),
+            tuple[ImpactStage, ...](),
+            tuple[Contact, ...](),
+        )
         if all(contact.number != number for contact in contacts):  # it carries both ways, as a switch that closes
             both_ways = (Contact(number, 0.0, modes[number], leave.to),)
             stages = self._joined(t, begins, {number: leave.to}, contacts)
@@ -138,8 +144,8 @@ class Collisions:
                 )
 
     def pulled(
-        self, before: float, t: float, moment: Moment, modes: ModeNames, least: float
-    ) -> tuple[Moment, tuple[Stage, ...]]:
+        self, before: float, t: float, moment: HybridState, modes: ModeNames, least: float
+    ) -> tuple[HybridState, tuple[ImpactStage, ...]]:
         """What follows where prescribed speeds jump or gears jam: what is closed takes it up or opens.
 
         Args:
@@ -161,10 +167,10 @@ class Collisions:
         t: float,
         before: ModeNames,
         contacts: Sequence[Contact],
-        stages: Sequence[Stage],
+        stages: Sequence[ImpactStage],
         least: float,
         hit: Sequence[Contact],
-    ) -> tuple[Moment, list[Contact], tuple[Stage, ...]]:
+    ) -> tuple[HybridState, list[Contact], tuple[ImpactStage, ...]]:
         """What follows stages, the contacts that are closed then, of those that were open only what was hit, and what
         passes on through contacts beside massless nodes.
 
@@ -183,7 +189,7 @@ class Collisions:
         )
         if not open_yet or not self._differs(t, new, apart, least):
             return new, closed, ()
-        further = tuple[Stage, ...]()
+        further = tuple[ImpactStage, ...]()
         while open_yet:
             speed, contact = min(zip(opens_at(t, apart, open_yet), open_yet, strict=True), key=itemgetter(0))
             if speed >= -least:
@@ -195,15 +201,15 @@ class Collisions:
             open_yet.remove(contact)
         return apart, [c for c in closed if c not in open_yet], further
 
-    def _differs(self, t: float, one: Moment, other: Moment, least: float) -> bool:
+    def _differs(self, t: float, one: HybridState, other: HybridState, least: float) -> bool:
         """Whether speeds at two moments of the same time are not the same."""
         held, others = self._regimes.held(one, t), self._regimes.held(other, t)
         return any(abs(value - others[name]) > least for name, value in held.items())
 
-    def _compressed(self, t: float, begins: Start, contacts: Sequence[Contact]) -> tuple[Stage, ...]:
+    def _compressed(self, t: float, begins: ImpactStart, contacts: Sequence[Contact]) -> tuple[ImpactStage, ...]:
         """Until nothing closes any more, with all contacts open; where nothing stops them, what closes is joined."""
 
-        def compressed(start: Start, _: Sequence[Stage]) -> Blow:
+        def compressed(start: ImpactStart, _: Sequence[ImpactStage]) -> Blow:
             modes = start.moment.regime.modes
             moment = start.moment if start.t == t else self._regimes.taking(modes, t, start.held)
             mobility, opens = self._mobility(t, moment, contacts)
@@ -216,22 +222,22 @@ class Collisions:
 
         return self._impulses.stages(t, begins, compressed)
 
-    def joined(self, t: float, moment: Moment, joins: Mapping[int, str]) -> Moment:
+    def joined(self, t: float, moment: HybridState, joins: Mapping[int, str]) -> HybridState:
         """What follows where elements are joined at once, by what impulses it takes."""
         return self._joined(t, self._impulses.begins(moment, t), joins, ())[-1].blow.after
 
     def _joined(
-        self, t: float, begins: Start, joins: Mapping[int, str], contacts: Sequence[Contact]
-    ) -> tuple[Stage, ...]:
-        def joined(start: Start, _: Sequence[Stage]) -> Blow:
+        self, t: float, begins: ImpactStart, joins: Mapping[int, str], contacts: Sequence[Contact]
+    ) -> tuple[ImpactStage, ...]:
+        def joined(start: ImpactStart, _: Sequence[ImpactStage]) -> Blow:
             made = self._regimes.changed(start.moment, t, with_modes(start.moment.regime.modes, joins))
             return Blow(made, made.regime, np.zeros(len(contacts)))
 
         return self._impulses.stages(t, begins, joined)
 
     def _thrown_back(
-        self, t: float, contacts: Sequence[Contact], compression: tuple[Stage, ...], back: Array
-    ) -> tuple[Stage, ...]:
+        self, t: float, contacts: Sequence[Contact], compression: tuple[ImpactStage, ...], back: Array
+    ) -> tuple[ImpactStage, ...]:
         """From the end of the compression on, until contacts have given back their shares (contacts,) of it.
 
         A gear that rubs answers impulses otherwise than on the way in, so it is the energy of the same way back that
@@ -239,7 +245,7 @@ class Collisions:
         """
         shares, energy = back * _pressed(compression), self._returned(t, contacts, compression, back)
 
-        def thrown(start: Start, made: Sequence[Stage]) -> Blow:
+        def thrown(start: ImpactStart, made: Sequence[ImpactStage]) -> Blow:
             left = energy
             for begun, share in (*((stage.start, stage.share) for stage in made), (start, 0.0)):
                 mobility, opens = self._mobility(t, begun.moment, contacts)
@@ -251,7 +257,7 @@ class Collisions:
 
         return self._impulses.stages(t, self._impulses.begins(compression[-1].blow.after, t), thrown)
 
-    def _returned(self, t: float, contacts: Sequence[Contact], stages: Sequence[Stage], back: Array) -> float:
+    def _returned(self, t: float, contacts: Sequence[Contact], stages: Sequence[ImpactStage], back: Array) -> float:
         """Energy in J that comes back by shares (contacts,) of all impulses, the last first, if all answers as then."""
         energy, opens = 0.0, np.zeros(len(contacts))
         for start, blow, share in reversed(stages):
@@ -261,7 +267,7 @@ class Collisions:
             opens += gains
         return energy
 
-    def _taken(self, t: float, contacts: Sequence[Contact], stages: Sequence[Stage]) -> Array:
+    def _taken(self, t: float, contacts: Sequence[Contact], stages: Sequence[ImpactStage]) -> Array:
         """(contacts,) energy in J that contacts take up: their impulses at the mean of their closing speeds."""
         taken = np.zeros(len(contacts))
         for start, blow, share in stages:
@@ -271,7 +277,7 @@ class Collisions:
         least = np.maximum(taken, 0.0)
         return least * (taken.sum() / least.sum()) if least.any() else taken
 
-    def _apart(self, t: float, moment: Moment, modes: ModeNames, contacts: Sequence[Contact]) -> Start:
+    def _apart(self, t: float, moment: HybridState, modes: ModeNames, contacts: Sequence[Contact]) -> ImpactStart:
         """The moment in some modes, but with all contacts open, and what rubs slipping."""
         apart = {k: ways[0][1] for k, ways in self._rubbing(modes).items()} | {c.number: c.apart for c in contacts}
         loose = with_modes(modes, apart)
@@ -281,7 +287,7 @@ class Collisions:
         """Elements that hold by torques limited on both sides, with the modes to which these lead."""
         return {k: ways for k, ways in limited(self._elements, modes).items() if len(ways) > 1}
 
-    def _slipping(self, t: float, before: ModeNames, after: Moment, least: float) -> dict[int, str]:
+    def _slipping(self, t: float, before: ModeNames, after: HybridState, least: float) -> dict[int, str]:
         """The modes of what rubs after an impact: it slips where the speed across it is more than the least."""
         rubbing = self._rubbing(before)
         speeds = dict(zip(rubbing, after.speeds([*rubbing], t), strict=True))
@@ -289,14 +295,14 @@ class Collisions:
             k: next((to for side, to in ways if side * speeds[k] > least), before[k]) for k, ways in rubbing.items()
         }
 
-    def _mobility(self, t: float, moment: Moment, contacts: Sequence[Contact]) -> tuple[Mobility, Array]:
+    def _mobility(self, t: float, moment: HybridState, contacts: Sequence[Contact]) -> tuple[Mobility, Array]:
         """The answer to impulses of contacts, and the speeds at which they open; zero where no impulse passes."""
         regime, pairs = moment.regime, tuple(self._nodes(moment, contact) for contact in contacts)
         stores, p = regime.assembly.stores, regime.p
         mobility = self._mobilities((regime, pairs), lambda: stores.mobility(regime.assembly.bound(p), pairs))
         return mobility, np.where(mobility.has_inertia, opens_at(t, moment, contacts), 0.0)
 
-    def _in_turn(self, t: float, moment: Moment, contacts: list[Contact]) -> list[Contact]:
+    def _in_turn(self, t: float, moment: HybridState, contacts: list[Contact]) -> list[Contact]:
         """The contacts that take part: of those that throw back only the fastest, but if all do so together."""
         speeds = {c: -opens for c, opens in zip(contacts, opens_at(t, moment, contacts), strict=True)}
         thrown = [speed for c, speed in speeds.items() if self._restitution(c, -speed)]
@@ -305,7 +311,7 @@ class Collisions:
         fastest = (1 - SAME) * max(thrown)
         return [c for c, speed in speeds.items() if not c.restitution or speed >= fastest]
 
-    def fastest(self, t: float, moment: Moment, number: int, leave: Leave) -> Contact | None:
+    def fastest(self, t: float, moment: HybridState, number: int, leave: Leave) -> Contact | None:
         """Of what closes and is thrown back what closes fastest, first the element that is given; None where none is.
 
         Args:
@@ -316,7 +322,7 @@ class Collisions:
         thrown = (c for c, speed in zip(contacts, opens, strict=True) if self._restitution(c, speed))
         return min(thrown, key=lambda contact: contact.number != number, default=None)
 
-    def _nodes(self, moment: Moment, contact: Contact) -> tuple[int, int]:
+    def _nodes(self, moment: HybridState, contact: Contact) -> tuple[int, int]:
         """The nodes of a contact, that first whose speed opens it."""
         element = self._elements[contact.number]
         part = moment.regime.assembly.parts[element.part.name]
@@ -328,7 +334,7 @@ class Collisions:
         """The share of the speed at which a contact closes that comes back."""
         return contact.restitution if -opens * contact.restitution > contact.rest else 0.0
 
-    def _contacts(self, t: float, moment: Moment, number: int, leave: Leave) -> Iterator[Contact]:
+    def _contacts(self, t: float, moment: HybridState, number: int, leave: Leave) -> Iterator[Contact]:
         """Contacts that are closed or touch, freewheels, and the element that wants to close."""
         regime, here = moment.regime, moment.course(t)
         now, bands = here[3], regime.bands(here)
@@ -345,7 +351,7 @@ class Collisions:
                 constants = (regime.constant(k, given) for given in (closes.rebound, closes.rest))
                 yield Contact(k, side, regime.modes[k], closes.to, closes, *constants)
 
-    def _other_flanks(self, moment: Moment, closed: Sequence[Contact]) -> Iterator[Contact]:
+    def _other_flanks(self, moment: HybridState, closed: Sequence[Contact]) -> Iterator[Contact]:
         """Flanks that touch while the other one of their element is closed, as there is no gap between them."""
         for contact in closed:
             number, modes = contact.number, self._elements[contact.number].modes
@@ -360,13 +366,13 @@ class Collisions:
                     yield Contact(number, side, contact.apart, leave.to, leave, *constants)
 
 
-def _blow(moment: Moment, mobility: Mobility, impulses: Array) -> Blow:
+def _blow(moment: HybridState, mobility: Mobility, impulses: Array) -> Blow:
     """What impulses (contacts,) lead to."""
     after = moment._replace(x=mobility.moved(moment.x, impulses))
     return Blow(after, after.regime, impulses, mobility.through(impulses))
 
 
-def _pressed(stages: Sequence[Stage]) -> Array:
+def _pressed(stages: Sequence[ImpactStage]) -> Array:
     """(contacts,) the impulses of all stages."""
     return np.asarray(np.sum([stage.share * stage.blow.pressed for stage in stages], axis=0))
 

@@ -14,8 +14,8 @@ from shaftwork.components.modes import Leave, Modes
 from shaftwork.core.errors import NetworkError
 from shaftwork.pipeline.phases.contacts import one_side
 from shaftwork.pipeline.phases.courses import Way
-from shaftwork.pipeline.phases.elements import NO_IMPACT, Element, ModeNames
-from shaftwork.pipeline.phases.moments import Change, Moment
+from shaftwork.pipeline.phases.hybrid_state import Change, HybridState, Transition
+from shaftwork.pipeline.phases.mode_machines import NO_IMPACT, ModeMachine, ModeNames
 from shaftwork.pipeline.phases.regimes import Regimes, anew, with_modes
 
 MOST = 500
@@ -32,11 +32,11 @@ class Commutation:
     """
 
     def __init__(
-        self, regimes: Regimes, elements: Sequence[Element], beyond: Callable[[Moment, float], list[Way]]
+        self, regimes: Regimes, elements: Sequence[ModeMachine], beyond: Callable[[HybridState, float], list[Way]]
     ) -> None:
         self._regimes, self._elements, self._beyond = regimes, elements, beyond
 
-    def commutated(self, moment: Moment, t: float, modes: ModeNames) -> tuple[Moment, dict[int, str]]:
+    def commutated(self, moment: HybridState, t: float, modes: ModeNames) -> tuple[HybridState, dict[int, str]]:
         """The modes that are wanted, and what then takes over a torque or current that they would cut off."""
         plain = self._regimes.changed(moment, t, modes)
         names = plain.regime.assembly.stores.through
@@ -46,9 +46,7 @@ class Commutation:
                     return other, changed
         return plain, {}
 
-    def switched(
-        self, t: float, after: float, moment: Moment, number: int, to: str
-    ) -> tuple[Moment, list[Change]] | None:
+    def switched(self, t: float, after: float, moment: HybridState, number: int, to: str) -> Transition | None:
         """A switch changes, with all others whose time it is too, and diodes so that all that is stored goes on.
 
         None where that is not possible: a current is cut off, or a capacitor is charged at once. Of several switches
@@ -81,8 +79,8 @@ class Commutation:
         return [Change(t, self._elements[k], modes[k], name) for k, name in changed.items()]
 
     def _keeping(
-        self, t: float, moment: Moment, modes: ModeNames, sets: Iterable[dict[int, str]], names: Sequence[str]
-    ) -> Iterator[tuple[Moment, dict[int, str]]]:
+        self, t: float, moment: HybridState, modes: ModeNames, sets: Iterable[dict[int, str]], names: Sequence[str]
+    ) -> Iterator[tuple[HybridState, dict[int, str]]]:
         """Of modes with other ones of diodes those in which what is stored under some names goes on."""
         for pairs in sets:
             with suppress(NetworkError):
@@ -90,7 +88,7 @@ class Commutation:
                 if self._keeps(t, moment, other, names):
                     yield other, pairs
 
-    def _keeps(self, t: float, moment: Moment, other: Moment, names: Sequence[str]) -> bool:
+    def _keeps(self, t: float, moment: HybridState, other: HybridState, names: Sequence[str]) -> bool:
         """Whether what is stored under some names, torques or speeds, is the same in other modes."""
         if other.x is moment.x:
             return True
@@ -106,7 +104,7 @@ class Commutation:
         return True
 
 
-def takeovers(elements: Sequence[Element], modes: ModeNames) -> Iterator[dict[int, str]]:
+def takeovers(elements: Sequence[ModeMachine], modes: ModeNames) -> Iterator[dict[int, str]]:
     """Diodes and freewheels that may begin to conduct at one instant, with the modes in which they do."""
     return _sets(_begins(elements, modes), 1)
 
@@ -116,17 +114,17 @@ def _sets(ways: Sequence[tuple[int, str]], least: int) -> Iterator[dict[int, str
     return islice(chain.from_iterable(map(dict, combinations(ways, size)) for size in sizes), MOST)
 
 
-def _begins(elements: Sequence[Element], modes: ModeNames) -> list[tuple[int, str]]:
+def _begins(elements: Sequence[ModeMachine], modes: ModeNames) -> list[tuple[int, str]]:
     """Diodes and freewheels that do not conduct, with the modes in which they do."""
     return _led(elements, modes, ACROSS)
 
 
-def _ends(elements: Sequence[Element], modes: ModeNames) -> list[tuple[int, str]]:
+def _ends(elements: Sequence[ModeMachine], modes: ModeNames) -> list[tuple[int, str]]:
     """Those that conduct, with the modes in which they do not."""
     return _led(elements, modes, -THROUGH)
 
 
-def _led(elements: Sequence[Element], modes: ModeNames, when: Expr) -> list[tuple[int, str]]:
+def _led(elements: Sequence[ModeMachine], modes: ModeNames, when: Expr) -> list[tuple[int, str]]:
     pairs = ((k, leave) for k, name in enumerate(modes) for leave in elements[k].modes[name].leaves)
     return [(k, leave.to) for k, leave in pairs if leave.when == when and leave.to and is_one_way(elements[k].modes)]
 

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from shaftwork.components.branches import ACROSS
 from shaftwork.components.modes import Leave, Modes
-from shaftwork.pipeline.phases.elements import Element, ModeNames
-from shaftwork.pipeline.phases.moments import Moment
+from shaftwork.pipeline.phases.hybrid_state import HybridState
+from shaftwork.pipeline.phases.mode_machines import ModeMachine, ModeNames
 
 
 class Contact(NamedTuple):
@@ -33,7 +33,7 @@ class Contact(NamedTuple):
     rest: float = 0.0
 
 
-def lasting(elements: Sequence[Element], modes: ModeNames) -> Iterator[Contact]:
+def lasting(elements: Sequence[ModeMachine], modes: ModeNames) -> Iterator[Contact]:
     """Contacts that are closed, and freewheels."""
     for k, (element, name) in enumerate(zip(elements, modes, strict=True)):
         own = element.modes
@@ -52,13 +52,13 @@ def one_side(modes: Modes, name: str) -> float | None:
     return sides[0] if len(sides) == 1 and mode.form != modes.options[0].form else None
 
 
-def limited(elements: Sequence[Element], modes: ModeNames) -> dict[int, tuple[tuple[float, str], ...]]:
+def limited(elements: Sequence[ModeMachine], modes: ModeNames) -> dict[int, tuple[tuple[float, str], ...]]:
     """Elements that join by a torque that is limited, with the sides on which it is and the modes there."""
     found = {k: element.modes[name].gives_way for k, (element, name) in enumerate(zip(elements, modes, strict=True))}
     return {k: ways for k, ways in found.items() if ways}
 
 
-def opens_at(t: float, moment: Moment, contacts: Sequence[Contact]) -> list[float]:
+def opens_at(t: float, moment: HybridState, contacts: Sequence[Contact]) -> list[float]:
     """The speeds at which contacts open."""
     speeds = moment.speeds([contact.number for contact in contacts], t)
     return [contact.side * speed for contact, speed in zip(contacts, speeds, strict=True)]

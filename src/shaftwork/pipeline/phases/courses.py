@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from shaftwork.core.errors import NetworkError, SimulationError
-from shaftwork.pipeline.phases.elements import Watched
-from shaftwork.pipeline.phases.moments import ROUNDINGS, Change, Course, Regime
+from shaftwork.pipeline.phases.hybrid_state import ROUNDINGS, Change, Course, Regime
+from shaftwork.pipeline.phases.mode_machines import ActiveGuard
 
 # What a look ahead gains must be more than so many rounding units.
 FEW = 4
 
-Way = tuple[int, Watched]
+Way = tuple[int, ActiveGuard]
 """An element and a guard that may end its mode."""
 
 

@@ -30,14 +30,14 @@ from shaftwork.core.kept import Kept
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind
-from shaftwork.pipeline.phases.assemblies import Assembly
-from shaftwork.pipeline.phases.elements import Element, ModeNames, is_same
+from shaftwork.pipeline.phases.assemblies import ModeEquations
+from shaftwork.pipeline.phases.mode_machines import ModeMachine, ModeNames, is_same
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.held_rows import HeldRows, groups, held_places
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.model import Model
-    from shaftwork.pipeline.phases.moments import Moment
+    from shaftwork.pipeline.phases.hybrid_state import HybridState
 
 MANY = 12
 """From so many elements on that hold and slip matrices are quicker than equations for each combination that is met."""
@@ -45,7 +45,7 @@ KEPT_RATES = 2
 """Parameter vectors whose right-hand sides are kept in one combination of what holds."""
 
 
-class HeldAssembly(Assembly):
+class HeldAssembly(ModeEquations):
     """One set of equations for all modes of parts that hold, with those of them that do so; at first none.
 
     Args:
@@ -54,7 +54,7 @@ class HeldAssembly(Assembly):
         laws: of each element the branch of its law; None for one that is in the form that it has here.
     """
 
-    def __init__(self, model: Model, elements: Sequence[Element], laws: Sequence[int | None]) -> None:
+    def __init__(self, model: Model, elements: Sequence[ModeMachine], laws: Sequence[int | None]) -> None:
         self._entries = _entries(model, elements, laws)
         forms = [
             choice.form if law is None else None
@@ -129,11 +129,11 @@ class HeldAssembly(Assembly):
             self._joints = part, Joints(self.model.form, part, self._held)
         return self._joints[1]
 
-    def alike(self, modes: ModeNames) -> tuple[Assembly, ModeNames]:
+    def alike(self, modes: ModeNames) -> tuple[ModeEquations, ModeNames]:
         """What is the same for the choice of an engine: whether an element holds or slips does not make it stiff."""
         return self.whole, tuple("" if law is not None else name for law, name in zip(self._laws, modes, strict=True))
 
-    def judged(self, moment: Moment, problem: Problem) -> Problem:
+    def judged(self, moment: HybridState, problem: Problem) -> Problem:
         """The motion by which an engine is chosen: with nothing held, as stiffness may be hidden in what is."""
         p = moment.regime.p
         return replace(problem, jacobian=self.slopes(partial(self.prepared(p).bound.with_laws, p)))
@@ -175,7 +175,7 @@ class HeldAssembly(Assembly):
         return self._rates_made(p.tobytes(), lambda: (self._right_side(p), known))
 
 
-def laws_that_hold(model: Model, elements: Sequence[Element]) -> list[int | None] | None:
+def laws_that_hold(model: Model, elements: Sequence[ModeMachine]) -> list[int | None] | None:
     """Of each element that holds the branch of the law in whose place a reaction does so; None for others.
 
     Args:
@@ -193,7 +193,7 @@ def laws_that_hold(model: Model, elements: Sequence[Element]) -> list[int | None
     return None if any(law is None and holds(element) for law, element in zip(found, elements, strict=True)) else found
 
 
-def _entries(model: Model, elements: Sequence[Element], laws: Sequence[int | None]) -> HeldRows | None:
+def _entries(model: Model, elements: Sequence[ModeMachine], laws: Sequence[int | None]) -> HeldRows | None:
     """Rows in which what holds is numbers, or None where there are none."""
     pairs = [(element, law) for element, law in zip(elements, laws, strict=True) if law is not None]
     links = [law for _, law in pairs]
@@ -208,7 +208,7 @@ def _entries(model: Model, elements: Sequence[Element], laws: Sequence[int | Non
     return HeldRows(rows, [(link, held_places(model.form, link)) for link in links], found)
 
 
-def _vanishes(form: StateForm, element: Element, law: int) -> bool:
+def _vanishes(form: StateForm, element: ModeMachine, law: int) -> bool:
     """Whether a law is zero in all modes in which an element holds."""
     branch, (first, *others) = form.graph.branches[law], element.modes.options
     numbers = {symbol: symbol for symbol in branch.template.symbols if symbol.name == element.modes.symbol}
@@ -216,12 +216,12 @@ def _vanishes(form: StateForm, element: Element, law: int) -> bool:
     return all(branch.template.law.xreplace(dict.fromkeys(numbers, Float(value))) == 0 for value in values)
 
 
-def becomes_rigid(element: Element) -> bool:
+def becomes_rigid(element: ModeMachine) -> bool:
     """Whether an element joins its ends in some modes."""
     return len({mode.form for mode in element.modes.options}) > 1
 
 
-def _places(form: StateForm, element: Element) -> set[int]:
+def _places(form: StateForm, element: ModeMachine) -> set[int]:
     """Places of the states of speed that the nodes of an element's part turn with."""
     part = next(part for part in form.graph.parts if part.name == element.part.name)
     rows = (form.tree.potentials[node] or {} for node in part.nodes.values() if node != GROUND)
@@ -229,7 +229,7 @@ def _places(form: StateForm, element: Element) -> set[int]:
     return {place for place, tree in enumerate(form.across_states) if tree in trees}
 
 
-def holds(element: Element) -> bool:
+def holds(element: ModeMachine) -> bool:
     """Whether an element joins its ends in some modes alone, by a torque that ends these, as friction and contacts do.
 
     Freewheels and diodes have no branch while they are open, in whose place a reaction could act.
@@ -241,7 +241,7 @@ def holds(element: Element) -> bool:
     return bool(joined) and limited and has_law and not element.modes.passes_on
 
 
-def _law(form: StateForm, element: Element) -> int | None:
+def _law(form: StateForm, element: ModeMachine) -> int | None:
     """The link whose law has the mode of an element, between its ends, where inertias tell the speeds of both."""
     graph, part = form.graph, next(part for part in form.graph.parts if part.name == element.part.name)
     ends = tuple(GROUND if end is None else part.nodes[end] for end in part.ends_of(element.modes))

@@ -14,9 +14,9 @@ from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.pipeline.phases.collisions import Collisions
 from shaftwork.pipeline.phases.contacts import limited
-from shaftwork.pipeline.phases.elements import NO_IMPACT, Element, ModeNames, Watched
-from shaftwork.pipeline.phases.impulses import Blow, Impulses, Stage
-from shaftwork.pipeline.phases.moments import CLEAR, Change, Moment
+from shaftwork.pipeline.phases.hybrid_state import CLEAR, Change, HybridState, Transition
+from shaftwork.pipeline.phases.impulses import Blow, ImpactStage, Impulses
+from shaftwork.pipeline.phases.mode_machines import NO_IMPACT, ActiveGuard, ModeMachine, ModeNames
 from shaftwork.pipeline.phases.regimes import Regimes, with_modes
 
 
@@ -29,13 +29,13 @@ class Impacts:
         together: whether what touches is hit in the same instant as what hits it.
     """
 
-    def __init__(self, regimes: Regimes, elements: Sequence[Element], *, together: bool) -> None:
+    def __init__(self, regimes: Regimes, elements: Sequence[ModeMachine], *, together: bool) -> None:
         self._regimes, self._elements = regimes, elements
         self._impulses = Impulses(regimes, elements)
         self._collisions = Collisions(regimes, elements, self._impulses, together=together)
         self.gears = self._impulses.gears
 
-    def meets(self, moment: Moment, t: float, to: Mode, number: int) -> float:
+    def meets(self, moment: HybridState, t: float, to: Mode, number: int) -> float:
         """The speed across an element that is joined from now on; zero where it is no more than an error of the run."""
         regime, modes = moment.regime, self._elements[number].modes
         if to.form in (modes.options[0].form, modes[regime.modes[number]].form):
@@ -55,7 +55,7 @@ class Impacts:
         # between dampers alone a speed is whatever their torques make it: joining them stops no inertia
         return speed if any(abs(after[name] - value) > least for name, value in held.items()) else 0.0
 
-    def fastest(self, t: float, moment: Moment, number: int, ended: Watched) -> tuple[int, Watched]:
+    def fastest(self, t: float, moment: HybridState, number: int, ended: ActiveGuard) -> tuple[int, ActiveGuard]:
         """Of what is hit at an instant in s what closes fastest, element and guard: impacts follow each other."""
         if ended.leave.rebound is None:
             return number, ended
@@ -64,7 +64,7 @@ class Impacts:
             return number, ended
         return next(pair for pair in moment.regime.watched if pair[1].leave is contact.leave)
 
-    def hit(self, t: float, after: float, moment: Moment, number: int, leave: Leave) -> tuple[Moment, list[Change]]:
+    def hit(self, t: float, after: float, moment: HybridState, number: int, leave: Leave) -> Transition:
         """An impact of all contacts that touch: each is joined, or for an instant where it is thrown back."""
         regime, held = moment.regime, self._regimes.held(moment, after)
         found = self._collisions.impact(after, moment, number, leave)
@@ -83,7 +83,7 @@ class Impacts:
         self._refuse_gain(t, moment, held, self._regimes.held(new, after), hits[0])
         return new, changes
 
-    def is_last(self, t: float, moment: Moment, new: Moment, number: int, ended: Watched) -> bool:
+    def is_last(self, t: float, moment: HybridState, new: HybridState, number: int, ended: ActiveGuard) -> bool:
         """Whether a rebound would lose less than it gains, as it is found late by rounding.
 
         Args:
@@ -105,7 +105,7 @@ class Impacts:
         pushed = math.copysign(1.0, speed) * (later - flies.across(number, t)) / step
         return 0 < (1 - share**2) * speed**2 < 4 * late * pushed
 
-    def jammed(self, t: float, moment: Moment, new: Moment) -> Moment:
+    def jammed(self, t: float, moment: HybridState, new: HybridState) -> HybridState:
         """What a gear that jams stops at once: what holds by a limited torque slips in that, and contacts part.
 
         Args:
@@ -119,7 +119,7 @@ class Impacts:
             return new
         return self._collisions.pulled(t, t, moment, new.regime.modes, least)[0]
 
-    def _kept(self, t: float, before: ModeNames, moment: Moment) -> Moment:
+    def _kept(self, t: float, before: ModeNames, moment: HybridState) -> HybridState:
         """Contacts that part in an impact of others, and are pushed back before they could be found again, stay closed.
 
         Without it they would open and close for ever, each time as far beyond their limit as rounding hides it.
@@ -141,7 +141,7 @@ class Impacts:
         return self._collisions.joined(t, moment, kept) if kept else moment
 
     @staticmethod
-    def _at_limit(moment: Moment, number: int, leave: Leave) -> Moment:
+    def _at_limit(moment: HybridState, number: int, leave: Leave) -> HybridState:
         """What stays in contact is on its limit: from a little beyond it each flight would gain speed."""
         assembly, slope = moment.regime.assembly, leave.when.diff(INTEGRAL)
         place = assembly.twist(number)
@@ -152,7 +152,7 @@ class Impacts:
         return moment._replace(x=x)
 
     def _refuse_gain(
-        self, t: float, moment: Moment, before: Mapping[str, float], after: Mapping[str, float], hits: Change
+        self, t: float, moment: HybridState, before: Mapping[str, float], after: Mapping[str, float], hits: Change
     ) -> None:
         """Refuse an impact that would leave more energy than there was.
 
@@ -168,7 +168,9 @@ class Impacts:
                 "stiffness c and a damping d."
             )
 
-    def jumped(self, t: float, moment: Moment, before: float, after: float) -> tuple[Moment, list[Change], Impact]:
+    def jumped(
+        self, t: float, moment: HybridState, before: float, after: float
+    ) -> tuple[HybridState, list[Change], Impact]:
         """After a source has jumped that is rigidly joined to inertias; what it gives then, and what gears lose.
 
         What holds by a limited torque takes no speed along at once, and contacts are pressed, not pulled.
@@ -181,7 +183,7 @@ class Impacts:
         """
         regime, begins = moment.regime, self._impulses.begins(moment, before)
         new = moment._replace(x=regime.assembly.bound(regime.p).impulse(moment.x, before, after))
-        stages: tuple[Stage, ...] = (Stage(begins, Blow(new, regime), 1.0),)
+        stages: tuple[ImpactStage, ...] = (ImpactStage(begins, Blow(new, regime), 1.0),)
         # where springs alone take the jump up no impulse passes, and rounding would tell the way of it through gears
         held = self._regimes.held(new, after)
         passes = any(abs(v - begins.held[name]) > NO_IMPACT * max(abs(v), 1.0) for name, v in held.items())
@@ -195,7 +197,7 @@ class Impacts:
         """Elements that join by a torque that is limited, with the sides on which it is and the modes there."""
         return limited(self._elements, modes)
 
-    def _pairs(self, modes: ModeNames) -> enumerate[tuple[Element, str]]:
+    def _pairs(self, modes: ModeNames) -> enumerate[tuple[ModeMachine, str]]:
         return enumerate(zip(self._elements, modes, strict=True))
 
     def _differences(

@@ -14,13 +14,13 @@ from typing import NamedTuple
 import numpy as np
 
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.recovery import History
+from shaftwork.codegen.recovery import BranchHistory
 from shaftwork.components.branches import ACROSS, through_of
 from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError, SimulationError
-from shaftwork.pipeline.phases.assemblies import Assembly
-from shaftwork.pipeline.phases.elements import Element, ModeNames
-from shaftwork.pipeline.phases.moments import EPS, ROUNDINGS, Moment, Regime
+from shaftwork.pipeline.phases.assemblies import ModeEquations
+from shaftwork.pipeline.phases.hybrid_state import EPS, ROUNDINGS, HybridState, Regime
+from shaftwork.pipeline.phases.mode_machines import ModeMachine, ModeNames
 from shaftwork.pipeline.phases.regimes import Regimes, with_modes
 
 # So many times gears may come to rest in one impact.
@@ -43,25 +43,25 @@ class Blow(NamedTuple):
         through: (branches,) what of them passes through tree branches.
     """
 
-    after: Moment
+    after: HybridState
     passing: Regime
     pressed: Array = np.zeros(0)
     through: Array | float = 0.0
 
 
-class Start(NamedTuple):
+class ImpactStart(NamedTuple):
     """Where a part of an impact begins: all that is stored, and the speeds of gears; its inputs are those of a time."""
 
-    moment: Moment
+    moment: HybridState
     t: float
     held: Held
     speeds: Mapping[int, float]
 
 
-class Stage(NamedTuple):
+class ImpactStage(NamedTuple):
     """A part of an impact in which speeds change in proportion: from where, to what, and how much of that."""
 
-    start: Start
+    start: ImpactStart
     blow: Blow
     share: float
 
@@ -74,17 +74,19 @@ class Impulses:
         elements: of the network.
     """
 
-    def __init__(self, regimes: Regimes, elements: Sequence[Element]) -> None:
+    def __init__(self, regimes: Regimes, elements: Sequence[ModeMachine]) -> None:
         self._regimes, self._elements = regimes, elements
         self.gears = tuple(k for k, element in enumerate(elements) if element.modes.passes_on)
         """Elements that pass torques on by their direction."""
 
-    def begins(self, moment: Moment, t: float) -> Start:
+    def begins(self, moment: HybridState, t: float) -> ImpactStart:
         """Where an impact begins, with the inputs of a time in s."""
         speeds = dict(zip(self.gears, moment.speeds(self.gears, t), strict=True))
-        return Start(moment, t, self._regimes.held(moment, t), speeds)
+        return ImpactStart(moment, t, self._regimes.held(moment, t), speeds)
 
-    def stages(self, t: float, start: Start, blow: Callable[[Start, Sequence[Stage]], Blow]) -> tuple[Stage, ...]:
+    def stages(
+        self, t: float, start: ImpactStart, blow: Callable[[ImpactStart, Sequence[ImpactStage]], Blow]
+    ) -> tuple[ImpactStage, ...]:
         """All parts of an impulse, of which the last leads to its end.
 
         Args:
@@ -95,11 +97,11 @@ class Impulses:
         Raises:
             SimulationError: gears come to rest again and again.
         """
-        made: list[Stage] = []
+        made: list[ImpactStage] = []
         while len(made) < MOST_STAGES:
             start, found = self._consistent(t, start, lambda begun: blow(begun, made))
             share, number = min(self._coming_to_rest(t, start, found.after), default=(1.0, -1))
-            made.append(Stage(start, found, share))
+            made.append(ImpactStage(start, found, share))
             if number < 0:
                 return tuple(made)
             modes = self._at_rest(found.after.regime.modes, number)
@@ -109,7 +111,7 @@ class Impulses:
             "contact that is hit a stiffness c and a damping d."
         )
 
-    def _reached(self, t: float, stage: Stage, modes: ModeNames, number: int) -> Start:
+    def _reached(self, t: float, stage: ImpactStage, modes: ModeNames, number: int) -> ImpactStart:
         """The end of a stage, at which a gear is at rest, in the modes that go on."""
         start, blow, share = stage
         held = {
@@ -117,15 +119,17 @@ class Impulses:
             for (name, value), gain in zip(start.held.items(), self._gained(t, start, blow).values(), strict=True)
         }
         speeds = {k: v + share * (blow.after.across(k, t) - v) for k, v in start.speeds.items()}
-        return Start(self._regimes.taking(modes, t, held), t, held, {**speeds, number: 0.0})
+        return ImpactStart(self._regimes.taking(modes, t, held), t, held, {**speeds, number: 0.0})
 
-    def _in_modes(self, t: float, start: Start, modes: ModeNames) -> Start:
+    def _in_modes(self, t: float, start: ImpactStart, modes: ModeNames) -> ImpactStart:
         """The same start in other modes of gears; one that jams has stopped in it."""
-        made = Start(self._regimes.taking(modes, t, start.held), t, start.held, start.speeds)
+        made = ImpactStart(self._regimes.taking(modes, t, start.held), t, start.held, start.speeds)
         halted = {*self._stopped(made.moment)} - {*self._stopped(start.moment)}
         return self.begins(made.moment, t) if any(start.speeds[k] for k in halted) else made
 
-    def _consistent(self, t: float, start: Start, blow: Callable[[Start], Blow]) -> tuple[Start, Blow]:
+    def _consistent(
+        self, t: float, start: ImpactStart, blow: Callable[[ImpactStart], Blow]
+    ) -> tuple[ImpactStart, Blow]:
         """The modes of gears in which an impulse passes as they say; a gear that turns, and has none, jams at once."""
         found, jammed, seen = self._passed(start, blow), set[int](), {start.moment.regime.modes}
         while True:
@@ -146,7 +150,7 @@ class Impulses:
             found = self._passed(start, blow)
             seen.add(modes)
 
-    def _passed(self, start: Start, blow: Callable[[Start], Blow]) -> Blow | None:
+    def _passed(self, start: ImpactStart, blow: Callable[[ImpactStart], Blow]) -> Blow | None:
         """What an impulse leads to; None where the equations of a gear at rest contradict what it meets."""
         try:
             return blow(start)
@@ -155,7 +159,9 @@ class Impulses:
                 raise
             return None
 
-    def _released(self, t: float, start: Start, blow: Callable[[Start], Blow]) -> tuple[Start, Blow] | None:
+    def _released(
+        self, t: float, start: ImpactStart, blow: Callable[[ImpactStart], Blow]
+    ) -> tuple[ImpactStart, Blow] | None:
         """Where gears at rest and what they meet hold each other, no impulse tells its way: which gear it turns.
 
         It is one of which the modes say so as well.
@@ -173,11 +179,11 @@ class Impulses:
                     return here, found
         return None
 
-    def _stopped(self, moment: Moment) -> list[int]:
+    def _stopped(self, moment: HybridState) -> list[int]:
         """Gears in a mode of rest."""
         return [k for k in self.gears if not _turns(self._elements[k].modes[moment.regime.modes[k]])]
 
-    def _turned(self, t: float, start: Start, found: Blow) -> tuple[int, str] | None:
+    def _turned(self, t: float, start: ImpactStart, found: Blow) -> tuple[int, str] | None:
         """The gear that an impulse brings out of its mode at once, and the mode that follows."""
         if not self.gears:
             return None
@@ -196,11 +202,11 @@ class Impulses:
         ways = ways or [(ends, k, to) for began, ends, k, to in self._stopping(t, start, found.after) if began >= 0]
         return max(ways)[1:] if ways else None
 
-    def _coming_to_rest(self, t: float, start: Start, after: Moment) -> Iterator[tuple[float, int]]:
+    def _coming_to_rest(self, t: float, start: ImpactStart, after: HybridState) -> Iterator[tuple[float, int]]:
         """The share of an impulse after which a gear is at rest, and which one."""
         return ((began / (began - ends), k) for began, ends, k, _ in self._stopping(t, start, after) if began < 0)
 
-    def _stopping(self, t: float, start: Start, after: Moment) -> Iterator[tuple[float, float, int, str]]:
+    def _stopping(self, t: float, start: ImpactStart, after: HybridState) -> Iterator[tuple[float, float, int, str]]:
         """Gears that would turn round: their speeds before and after, negative the way they turn, and what follows."""
         states = (made.x[: len(made.regime.assembly.model.states)] for made in (start.moment, after))
         least = NOTHING_OF * max(np.abs(x).max(initial=0.0) for x in states)
@@ -222,12 +228,12 @@ class Impulses:
         ways = (to, *(leave.to for leave in self._elements[number].modes[to].leaves if leave.to != modes[number]))
         return next(filter(self._regimes.possible, (with_modes(modes, {number: name}) for name in ways)), modes)
 
-    def _gained(self, t: float, start: Start, blow: Blow) -> dict[str, float]:
+    def _gained(self, t: float, start: ImpactStart, blow: Blow) -> dict[str, float]:
         """What all that is stored gains by the whole of an impulse."""
         then = self._regimes.held(blow.after, t)
         return {name: then[name] - value for name, value in start.held.items()}
 
-    def given(self, t: float, stages: Sequence[Stage], before: float | None = None) -> dict[str, float]:
+    def given(self, t: float, stages: Sequence[ImpactStage], before: float | None = None) -> dict[str, float]:
         """What ideal sources give in an impulse, in J by part, their impulse times the mean of their speeds.
 
         Args:
@@ -252,7 +258,7 @@ class Impulses:
             jumped = then
         return found
 
-    def lost(self, t: float, stages: Sequence[Stage]) -> dict[str, float]:
+    def lost(self, t: float, stages: Sequence[ImpactStage]) -> dict[str, float]:
         """What gears lose in an impulse, in J by part: what passes through the mesh at the mean of the speeds there."""
         found: dict[str, float] = {}
         for stage in stages if self.gears else ():
@@ -268,7 +274,7 @@ class Impulses:
                 found[name] = found.get(name, 0.0) + float(lost)
         return found
 
-    def _impulses(self, t: float, start: Start, found: Blow) -> Array:
+    def _impulses(self, t: float, start: ImpactStart, found: Blow) -> Array:
         """(branches,) what passes through every branch at once."""
         assembly, p = found.passing.assembly, found.passing.p
         return assembly.stores.impulses(assembly.bound(p), self._gained(t, start, found)) + found.through
@@ -279,7 +285,7 @@ def _turns(mode: Mode) -> bool:
     return any(leave.when.has(ACROSS) for leave in mode.leaves)
 
 
-def _guard(assembly: Assembly, number: int, leave: Leave, impulses: Array, p: Array) -> float:
+def _guard(assembly: ModeEquations, number: int, leave: Leave, impulses: Array, p: Array) -> float:
     """A guard by torques where impulses (branches,) act, beside which nothing else counts."""
     graph, total = assembly.model.form.graph, 0.0
     for branch in assembly.parts[assembly.elements[number].part.name].branches:
@@ -288,14 +294,14 @@ def _guard(assembly: Assembly, number: int, leave: Leave, impulses: Array, p: Ar
     return total
 
 
-def _meshes(assembly: Assembly, name: str) -> list[int]:
+def _meshes(assembly: ModeEquations, name: str) -> list[int]:
     """The branches of a part in which power is lost on its way."""
     branches = assembly.model.form.graph.branches
     return [branch for branch in assembly.parts[name].branches if branches[branch].template.through]
 
 
-def _across_meshes(moment: Moment, t: float, name: str) -> list[float]:
+def _across_meshes(moment: HybridState, t: float, name: str) -> list[float]:
     """The speeds on which the lambdas of a gear's meshes act."""
     assembly = moment.regime.assembly
-    history = History(assembly.bound(moment.regime.p), np.array([t]), moment.x[None, :])
+    history = BranchHistory(assembly.bound(moment.regime.p), np.array([t]), moment.x[None, :])
     return [float(history.acted_on(assembly.parts[name], branch)[0]) for branch in _meshes(assembly, name)]

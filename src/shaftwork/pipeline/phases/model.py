@@ -32,11 +32,11 @@ from shaftwork.pipeline.analysis import (
 )
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.phases.moments import Moment
+from shaftwork.pipeline.phases.event_iteration import EventIteration
+from shaftwork.pipeline.phases.hybrid_state import HybridState
 from shaftwork.pipeline.phases.names import known_modes, modes_in, whole_name, words_of
 from shaftwork.pipeline.phases.phases import Phases
-from shaftwork.pipeline.phases.run import Run
-from shaftwork.pipeline.phases.settling import Settling
+from shaftwork.pipeline.phases.run import HybridRun
 from shaftwork.pipeline.phases.solution import solution
 from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels, warn_of_held_torques
 from shaftwork.pipeline.sizes import in_its_size
@@ -161,7 +161,7 @@ class PhasedModel(Model):
         return in_its_size(first.model.form, prepared, demand, lambda made: self._run_through(values, initial, made))
 
     def _run_through(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
-        run = Run(self.phases, values, demand)
+        run = HybridRun(self.phases, values, demand)
         run.march(initial)
         return solution(run, self.name)
 
@@ -172,10 +172,10 @@ class PhasedModel(Model):
             SimulationError: no modes go together there.
         """
         demand = Demand((0.0, 1.0), 1e-8, None, None, "auto", 1, None)
-        return self.words(Run(self.phases, {}, demand).begin(None))
+        return self.words(HybridRun(self.phases, {}, demand).begin(None))
 
     def _choice(self, demand: Demand) -> tuple[str, str]:
-        return Run(self.phases, {}, demand).choose()
+        return HybridRun(self.phases, {}, demand).choose()
 
     def _steady(self, values: Mapping[str, float], t: float, initial: Given) -> SteadyState:
         """Steady states of one set of equations after another, until no mode changes there."""
@@ -183,7 +183,7 @@ class PhasedModel(Model):
             return self.twin.steady_state(t, initial=initial, parameters=values)
         first = self.phases.assembly(self.phases.first)
         when = t if math.isfinite(t) else first.model.settled(first.vector(values, {}))
-        settling = Settling(self.phases, values, (0.0, 1.0))
+        settling = EventIteration(self.phases, values, (0.0, 1.0))
         moment = self._moment(settling, when, initial)
         for _ in range(MOST_CHANGES):
             bound = moment.regime.assembly.bound(moment.regime.p)
@@ -205,7 +205,7 @@ class PhasedModel(Model):
             f"with {self.words(moment)}. {another_start(self.form)}"
         )
 
-    def point(self, values: Mapping[str, float], at: Point, t: Time) -> tuple[float, Moment]:
+    def point(self, values: Mapping[str, float], at: Point, t: Time) -> tuple[float, HybridState]:
         """Time in s at a point, and the modes that go on there with their states.
 
         Args:
@@ -220,7 +220,7 @@ class PhasedModel(Model):
         """
         refuse_waves(self.form)
         first = self.phases.assembly(self.phases.first)
-        settling = Settling(self.phases, values, (0.0, 1.0))
+        settling = EventIteration(self.phases, values, (0.0, 1.0))
         p = settling.regime(self.phases.first).p
         if isinstance(at, Solution):
             time, stored = moment_of(at, self.states)
@@ -242,7 +242,7 @@ class PhasedModel(Model):
         title = titled(self.name, about(model, at, time), phase)
         return linear_model(title, slopes, named, moment.x, time, phase)
 
-    def words(self, moment: Moment) -> str:
+    def words(self, moment: HybridState) -> str:
         """The phase of a moment, "gap open, brake locked"."""
         pairs = zip(self.phases.elements, moment.regime.modes, strict=True)
         return ", ".join(f"{element.name} {element.modes[name].words}" for element, name in pairs)
@@ -254,7 +254,7 @@ class PhasedModel(Model):
         first = self.phases.assembly(self.phases.first)
         return first.bound(first.vector(values, {}))
 
-    def _moment(self, settling: Settling, t: float, initial: Given) -> Moment:
+    def _moment(self, settling: EventIteration, t: float, initial: Given) -> HybridState:
         first = self.phases.assembly(self.phases.first)
         p = settling.regime(self.phases.first).p
         moment = settling.started(t, initial_state(first.bound(p), initial or {}, t))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from shaftwork.components.modes import Choice, Mode, Modes
+from shaftwork.components.modes import Mode, ModeChoice, Modes
 from shaftwork.core.errors import ParameterError
 from shaftwork.network.graph import CircuitGraph, GraphPart, build_graph
 from shaftwork.network.netlist import Netlist
@@ -72,8 +72,8 @@ def meant(graph: CircuitGraph, phase: str) -> Iterator[tuple[GraphPart, tuple[Mo
         yield part, tuple(mode for mode in modes.options if mode.words == words)
 
 
-def _choice(mode: Mode) -> Choice:
-    return Choice(mode.form, mode.value)
+def _choice(mode: Mode) -> ModeChoice:
+    return ModeChoice(mode.form, mode.value)
 
 
 def _modes_in(graph: CircuitGraph, phase: str) -> dict[tuple[str, str], Mode]:

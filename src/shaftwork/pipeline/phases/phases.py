@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from shaftwork.codegen.elements import Array
-from shaftwork.components.modes import Choice
+from shaftwork.components.modes import ModeChoice
 from shaftwork.core.errors import NetworkError, NetworkWarning, ParameterError
 from shaftwork.core.kept import Kept
 from shaftwork.core.notices import muted
@@ -17,9 +17,9 @@ from shaftwork.integrate import choice
 from shaftwork.integrate.engines import ADAMS, available
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.netlist import Netlist
-from shaftwork.pipeline.phases.assemblies import Assembly
-from shaftwork.pipeline.phases.elements import ModeNames, elements_of
+from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.held import MANY, HeldAssembly, holds, laws_that_hold
+from shaftwork.pipeline.phases.mode_machines import ModeNames, elements_of
 from shaftwork.pipeline.phases.regimes import with_modes
 from shaftwork.pipeline.phases.resting import at_rest
 from shaftwork.pipeline.phases.wave_assembly import WaveAssembly
@@ -56,15 +56,15 @@ class Phases:
         self.netlist, self._rebuild = base.netlist, rebuild
         self.elements = elements_of(base)
         self.first: ModeNames = tuple(element.modes.options[0].name for element in self.elements)
-        self._assemblies: dict[tuple[str, ...], Assembly | NetworkError] = {}
+        self._assemblies: dict[tuple[str, ...], ModeEquations | NetworkError] = {}
         self._wholes: dict[tuple[str, ...], HeldAssembly | None] = {}
         self._held: dict[tuple[tuple[str, ...], tuple[int, ...]], HeldAssembly] = {}
-        self._engines: dict[tuple[Assembly, ModeNames, str], tuple[str, str]] = {}
-        self._easy: dict[Assembly, dict[tuple[int, str], tuple[str, str]]] = {}
+        self._engines: dict[tuple[ModeEquations, ModeNames, str], tuple[str, str]] = {}
+        self._easy: dict[ModeEquations, dict[tuple[int, str], tuple[str, str]]] = {}
         self.found = Kept[Any, Any](1)
         """What the last run has found out, by its values and times: the next like it goes on with that."""
 
-    def assembly(self, modes: ModeNames) -> Assembly:
+    def assembly(self, modes: ModeNames) -> ModeEquations:
         """The equations for a combination of modes.
 
         Raises:
@@ -78,8 +78,8 @@ class Phases:
                     model = self._rebuild(netlist)
                     if (resting := at_rest(netlist, model.form)) is not netlist:
                         model = self._rebuild(resting)
-                kind = WaveAssembly if model.form.waves else Assembly
-                made: Assembly | NetworkError = kind(model, self.elements, forms)
+                kind = WaveAssembly if model.form.waves else ModeEquations
+                made: ModeEquations | NetworkError = kind(model, self.elements, forms)
             except NetworkError as error:
                 made = error
             self._assemblies.setdefault(forms, made)  # another thread may have been first
@@ -88,7 +88,7 @@ class Phases:
             raise made.with_traceback(None)  # else it would keep the frames of every time that it was raised
         return made
 
-    def running(self, modes: ModeNames, values: Mapping[str, float], engine: str) -> Assembly:
+    def running(self, modes: ModeNames, values: Mapping[str, float], engine: str) -> ModeEquations:
         """The equations in which a motion goes on: those of `assembly`, or one set for all that hold.
 
         Args:
@@ -150,9 +150,9 @@ class Phases:
         return self.elements[number].modes[modes[number]].form
 
     def _netlist(self, forms: tuple[str, ...]) -> Netlist:
-        chosen: dict[str, tuple[Choice, ...]] = {}
+        chosen: dict[str, tuple[ModeChoice, ...]] = {}
         for element, form in zip(self.elements, forms, strict=True):
-            chosen[element.part.name] = (*chosen.get(element.part.name, ()), Choice(form))
+            chosen[element.part.name] = (*chosen.get(element.part.name, ()), ModeChoice(form))
         return self.netlist.with_choices(chosen)
 
     def numbers(self, modes: ModeNames) -> dict[str, float]:
@@ -161,7 +161,7 @@ class Phases:
         return {element.number: element.modes[name].value for element, name in pairs}
 
     def engine(
-        self, assembly: Assembly, modes: ModeNames, problem: Callable[[], Problem], asked: str
+        self, assembly: ModeEquations, modes: ModeNames, problem: Callable[[], Problem], asked: str
     ) -> tuple[str, str]:
         """The engine for a phase, and why: a light wheel that runs free is no trouble, and stiff in contact.
 
@@ -203,6 +203,6 @@ class Phases:
             self._engines[key] = name, why
         return self._engines[key]
 
-    def tries_heyoka(self, assembly: Assembly) -> bool:
+    def tries_heyoka(self, assembly: ModeEquations) -> bool:
         """Whether heyoka has been taken for these equations in other modes: a stiff phase may be over at once."""
         return bool(self._easy.get(assembly))

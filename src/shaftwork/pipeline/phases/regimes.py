@@ -13,13 +13,13 @@ from shaftwork.codegen.elements import Array
 from shaftwork.components.branches import INTEGRAL
 from shaftwork.core.errors import NetworkError, ParameterError, SimulationError
 from shaftwork.pipeline.ending import Ending
-from shaftwork.pipeline.phases.elements import Element, ModeNames
-from shaftwork.pipeline.phases.moments import AHEAD_OF_RUN, ROUNDINGS, Moment, Regime
+from shaftwork.pipeline.phases.hybrid_state import AHEAD_OF_RUN, ROUNDINGS, HybridState, Regime
+from shaftwork.pipeline.phases.mode_machines import ModeMachine, ModeNames
 from shaftwork.pipeline.phases.starts import begins_anew
 from shaftwork.reduction.cancelling import jamming
 
 if TYPE_CHECKING:
-    from shaftwork.pipeline.phases.assemblies import Assembly
+    from shaftwork.pipeline.phases.assemblies import ModeEquations
     from shaftwork.pipeline.phases.phases import Phases
 
 # How far in rad a motion may start beyond a rigid limit: what errors and printed digits of another run leave there.
@@ -41,7 +41,7 @@ class Regimes:
         phases: Phases,
         values: Mapping[str, float],
         span: tuple[float, float],
-        equations: Callable[[ModeNames], Assembly],
+        equations: Callable[[ModeNames], ModeEquations],
     ) -> None:
         self._phases, self._values, self._equations = phases, dict(values), equations
         self._times = ROUNDINGS * math.ulp(max(map(abs, span))), AHEAD_OF_RUN * (span[1] - span[0])
@@ -92,22 +92,22 @@ class Regimes:
                 held[k] = name
         return held
 
-    def held(self, moment: Moment, t: float) -> dict[str, float]:
+    def held(self, moment: HybridState, t: float) -> dict[str, float]:
         """All that is stored, and what arrives by waves, by name."""
         assembly, p = moment.regime.assembly, moment.regime.p
         values = assembly.stores.of(lambda: assembly.bound(p), np.array([t]), moment.x[None, :])[0]
         return dict(zip(assembly.stores.names, values.tolist(), strict=True)) | assembly.arriving(moment.x)
 
-    def taking(self, modes: ModeNames, t: float, held: Mapping[str, float]) -> Moment:
+    def taking(self, modes: ModeNames, t: float, held: Mapping[str, float]) -> HybridState:
         """A moment in the given modes that takes up what was stored, with the inputs of a time in s.
 
         Raises:
             NetworkError: the equations of these modes contradict each other.
         """
         new = self.regime(modes)
-        return Moment(new, new.assembly.taking(t, held, new.p))
+        return HybridState(new, new.assembly.taking(t, held, new.p))
 
-    def resumed(self, ending: Ending) -> Moment:
+    def resumed(self, ending: Ending) -> HybridState:
         """The moment at which another motion ended, in its modes.
 
         An element begins anew, as at a start, where a parameter has changed that says in which mode it starts.
@@ -132,7 +132,7 @@ class Regimes:
         modes = tuple(name if begins else ending.modes[e.name] for begins, name, e in triples)
         return self.taking(modes if self.possible(modes) else first, t, ending)
 
-    def changed(self, moment: Moment, t: float, modes: ModeNames) -> Moment:
+    def changed(self, moment: HybridState, t: float, modes: ModeNames) -> HybridState:
         """The same instant in other modes: all that is stored goes over.
 
         Raises:
@@ -140,11 +140,11 @@ class Regimes:
         """
         new = self.regime(modes)
         if new.assembly is moment.regime.assembly:
-            return Moment(new, moment.x)
+            return HybridState(new, moment.x)
         return self.taking(modes, t, self.held(moment, t))
 
 
-def anew(elements: Sequence[Element], moment: Moment, t: float, number: int) -> str:
+def anew(elements: Sequence[ModeMachine], moment: HybridState, t: float, number: int) -> str:
     """The mode of an element in which a motion would start, other than the one that ends."""
     regime, before = moment.regime, moment.regime.modes[number]
     for late in (0.0, regime.ahead(moment.course(t)[2])):  # by rounding, what ends the mode may not be true yet
@@ -163,7 +163,7 @@ def with_modes(modes: ModeNames, changed: Mapping[int, str]) -> ModeNames:
     return tuple(changed.get(k, name) for k, name in enumerate(modes))
 
 
-def refuse_beyond(regime: Regime, elements: Sequence[Element], t: float, x: Array) -> None:
+def refuse_beyond(regime: Regime, elements: Sequence[ModeMachine], t: float, x: Array) -> None:
     """Refuse a start beyond a rigid limit, where no motion leads.
 
     Args:

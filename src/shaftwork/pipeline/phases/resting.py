@@ -8,7 +8,7 @@ from dataclasses import replace
 from itertools import chain
 
 from shaftwork.components.branches import End
-from shaftwork.components.modes import Choice, Modes
+from shaftwork.components.modes import ModeChoice, Modes
 from shaftwork.network.graph import GROUND, GraphPart
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import Netlist
@@ -24,7 +24,7 @@ def at_rest(netlist: Netlist, form: StateForm) -> Netlist:
         form: of the same network.
     """
     parts = {part.name: part for part in form.graph.parts}
-    held: dict[str, tuple[Choice, ...]] = {}
+    held: dict[str, tuple[ModeChoice, ...]] = {}
     for item in netlist.placed:
         part = parts[item.part.name]
         pairs = zip(part.modes, item.choices, strict=False)  # nothing is chosen for what has no modes
@@ -34,7 +34,7 @@ def at_rest(netlist: Netlist, form: StateForm) -> Netlist:
     return netlist.with_choices(held) if held else netlist
 
 
-def _held(form: StateForm, part: GraphPart, element: Modes, choice: Choice) -> Choice:
+def _held(form: StateForm, part: GraphPart, element: Modes, choice: ModeChoice) -> ModeChoice:
     """What is chosen for an element, in the form of rest where it has one and is at rest."""
     forms = (mode.at_rest for mode in element.options if mode.form == choice.form and mode.at_rest is not None)
     other = next(forms, None)

@@ -26,14 +26,14 @@ from shaftwork.integrate.problem import Problem, SeriesError, StickingError, Tra
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.ending import Ending
 from shaftwork.pipeline.implicit import PRESCRIBED, at_rest
-from shaftwork.pipeline.phases.assemblies import Assembly
+from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.commutation import is_switch, takeovers
-from shaftwork.pipeline.phases.elements import NO_IMPACT
-from shaftwork.pipeline.phases.moments import Change, Moment, Regime
-from shaftwork.pipeline.phases.passing import Passing, Phase
+from shaftwork.pipeline.phases.event_iteration import EventIteration
+from shaftwork.pipeline.phases.hybrid_state import Change, HybridState, Regime, Transition
+from shaftwork.pipeline.phases.in_place_events import InPlaceEvents, Phase
+from shaftwork.pipeline.phases.mode_machines import NO_IMPACT
 from shaftwork.pipeline.phases.phases import FOLLOWING, Phases
 from shaftwork.pipeline.phases.regimes import with_modes
-from shaftwork.pipeline.phases.settling import Settling
 from shaftwork.pipeline.phases.starts import refuse_incomplete, warn_of_what_may_have_begun
 from shaftwork.pipeline.phases.wave_run import WaveRun
 from shaftwork.pipeline.start import start_of
@@ -69,20 +69,20 @@ class Known:
         begins: modes and states with which a motion from rest begins, and the changes that lead there.
     """
 
-    settling: Settling
-    timelines: dict[Assembly, Timeline] = field(default_factory=dict)
-    begins: list[tuple[Moment, list[Change]]] = field(default_factory=list)
+    settling: EventIteration
+    timelines: dict[ModeEquations, Timeline] = field(default_factory=dict)
+    begins: list[Transition] = field(default_factory=list)
 
 
 def _known(phases: Phases, values: Mapping[str, float], demand: Demand, *, own: bool) -> Known:
     """What the last run with these values over the same time has found out, or nothing yet."""
     equations = None if own else partial(phases.running, values=values, engine=demand.engine)
     key = tuple(sorted(values.items())), demand.span, own, demand.engine
-    made: Known = phases.found(key, lambda: Known(Settling(phases, values, demand.span, equations)))
+    made: Known = phases.found(key, lambda: Known(EventIteration(phases, values, demand.span, equations)))
     return made
 
 
-class Run:
+class HybridRun:
     """One motion through its phases.
 
     Args:
@@ -110,7 +110,7 @@ class Run:
         while t < end:
             t, moment = self._span(t, moment)
 
-    def begin(self, initial: Mapping[str, float] | None) -> Moment:
+    def begin(self, initial: Mapping[str, float] | None) -> HybridState:
         """The states and modes at the start."""
         start, begins = self.demand.span[0], self._known.begins
         if self.settling.regime(self.phases.first).assembly.model.form.waves:
@@ -130,11 +130,11 @@ class Run:
         self.note(start, changes)
         return moment
 
-    def _started(self, initial: Mapping[str, float] | None) -> tuple[Moment, list[Change]]:
+    def _started(self, initial: Mapping[str, float] | None) -> Transition:
         """The states and modes at the start, and what changes there; currents may need diodes that conduct."""
         if not initial:
             return self._joined({}, self._read(initial, {}))
-        readings, failed = list[tuple[int, dict[int, str], Moment]](), None
+        readings, failed = list[tuple[int, dict[int, str], HybridState]](), None
         closed = self._closed()
         for joins in [{}, closed] if closed else [{}]:
             try:
@@ -167,20 +167,20 @@ class Run:
         joins = {k: modes[k] for k in switches if modes[k] != self.phases.first[k]}
         return joins if self.settling.possible(with_modes(self.phases.first, joins)) else {}
 
-    def _read(self, initial: Mapping[str, float] | None, joins: Mapping[int, str]) -> Moment:
+    def _read(self, initial: Mapping[str, float] | None, joins: Mapping[int, str]) -> HybridState:
         """Start values in the equations in which some elements join something."""
         start, regime = self.demand.span[0], self.settling.regime(with_modes(self.phases.first, joins))
         assembly = regime.assembly
         if isinstance(initial, Mapping) and initial and start != 0:
             refuse_incomplete(assembly.stores.names, initial, start)
         x, waves = start_of(assembly.model, assembly.prepared(regime.p), initial, self.demand.span)
-        return Moment(regime, self._beside_waves(regime, x, waves))
+        return HybridState(regime, self._beside_waves(regime, x, waves))
 
     def _after(self, regime: Regime) -> float:
         """A time just after the start."""
         return self.timeline(regime.assembly, regime.p).sides(self.demand.span[0])[1]
 
-    def _joined(self, joins: Mapping[int, str], read: Moment) -> tuple[Moment, list[Change]]:
+    def _joined(self, joins: Mapping[int, str], read: HybridState) -> Transition:
         """The modes that go on from a start that has been read where some elements join something, and the changes."""
         after = self._after(read.regime)
         return self.settling.settle(self.demand.span[0], after, self.settling.started(after, read.x, joins), None)
@@ -192,7 +192,7 @@ class Run:
         self.waves = WaveRun(regime.assembly.bound(regime.p), start, self.demand.span)
         return np.concatenate([x, self.waves.arriving(self.demand.span[0])])
 
-    def _resumed(self, ending: Ending) -> tuple[Moment, list[Change]]:
+    def _resumed(self, ending: Ending) -> Transition:
         """The states and modes in which another motion ended, and what changes at that instant."""
         start, first = self.demand.span[0], self.settling.regime(self.phases.first)
         x = self._beside_waves(first, np.zeros(len(first.assembly.model.states)), ending.waves)
@@ -209,26 +209,26 @@ class Run:
         problem = self._problem(self.demand.span[0], moment)
         return self._engine(moment, lambda: problem) if problem.x0.size else ("exact", PRESCRIBED)
 
-    def _engine(self, moment: Moment, problem: Callable[[], Problem]) -> tuple[str, str]:
+    def _engine(self, moment: HybridState, problem: Callable[[], Problem]) -> tuple[str, str]:
         regime = moment.regime
         judged = partial(regime.assembly.judged, moment)
         return self.phases.engine(regime.assembly, regime.modes, lambda: judged(problem()), self.demand.engine)
 
-    def _suits_heyoka(self, t: float, moment: Moment) -> bool:
+    def _suits_heyoka(self, t: float, moment: HybridState) -> bool:
         """Whether heyoka goes on from a time on: it is what was asked for, or suits the modes."""
         return self.demand.engine != "auto" or self._engine(moment, lambda: self._problem(t, moment))[0] == "heyoka"
 
-    def timeline(self, assembly: Assembly, p: Array) -> Timeline:
+    def timeline(self, assembly: ModeEquations, p: Array) -> Timeline:
         """The instants at which inputs jump or bend."""
         timelines = self._known.timelines
         if assembly.whole not in timelines:
             timelines[assembly.whole] = assembly.model.switching.timeline(p, *self.demand.span)
         return timelines[assembly.whole]
 
-    def _instants(self, moment: Moment) -> Timeline:
+    def _instants(self, moment: HybridState) -> Timeline:
         return self.timeline(moment.regime.assembly, moment.regime.p)
 
-    def _settle(self, t: float, moment: Moment, met: int | None) -> Moment:
+    def _settle(self, t: float, moment: HybridState, met: int | None) -> HybridState:
         after = self._instants(moment).sides(t)[1]
         moment, changes = self.settling.settle(t, after, moment, met)
         self.note(t, changes)
@@ -257,7 +257,7 @@ class Run:
                     "going on. Give it damping or its neighbours an inertia, or let it rest (omega_rest)."
                 )
 
-    def _problem(self, t: float, moment: Moment, passing: Passing | None = None) -> Problem:
+    def _problem(self, t: float, moment: HybridState, passing: InPlaceEvents | None = None) -> Problem:
         """The motion from a time on, up to the next instant at which an input jumps."""
         demand, regime, times = self.demand, moment.regime, self._instants(moment)
         following = bisect_right(times.stops, t)
@@ -278,7 +278,7 @@ class Run:
             progress=demand.progress,
         )
 
-    def _span(self, t: float, moment: Moment) -> tuple[float, Moment]:
+    def _span(self, t: float, moment: HybridState) -> tuple[float, HybridState]:
         """One run of the engine, up to a change of equations or the next instant at which an input jumps."""
         regime, form = moment.regime, moment.regime.assembly.model.form
         bind = partial(regime.assembly.bound, regime.p)
@@ -298,7 +298,7 @@ class Run:
             moment, changes = passing.beyond
             self.note(t, changes)
             return t, moment
-        moment = Moment(passing.regime, x[: moment.x.size], passing.bands)
+        moment = HybridState(passing.regime, x[: moment.x.size], passing.bands)
         if sides != (t, t) and moment.regime.assembly.model.form.has_impulses:
             moment, changes, at_once = self.settling.jumped(t, moment, *sides)
             self.note(t, changes)
@@ -314,9 +314,9 @@ class Run:
         first, last = self.demand.t_eval.searchsorted((t, end))
         return self.demand.t_eval[first : last + (end == self.demand.span[1])]
 
-    def _passed(self, t: float, moment: Moment) -> tuple[Trajectory, Passing]:
+    def _passed(self, t: float, moment: HybridState) -> tuple[Trajectory, InPlaceEvents]:
         """One run of the engine; where heyoka cannot go on, or a stiff phase is long, another engine begins it anew."""
-        passing = Passing(self.settling, moment, t, self.note, self._suits_heyoka)
+        passing = InPlaceEvents(self.settling, moment, t, self.note, self._suits_heyoka)
         problem, noted, soon = self._problem(t, moment, passing), len(self.changes), [*self._soon]
         if not problem.x0.size:
             made = at_rest(problem, moment.regime.assembly.model.degree)
@@ -347,7 +347,7 @@ class Run:
                 tried += others
             del self.changes[noted:]
             self._soon = [*soon]
-            passing = Passing(self.settling, moment, t, self.note)
+            passing = InPlaceEvents(self.settling, moment, t, self.note)
         if sticks is not None and len(tried) > 1:
             raise sticks
         return self._solve(problem, last, why if failed is None else choice.no_series(failed, last)), passing

@@ -18,16 +18,16 @@ from shaftwork.core.errors import no_value
 from shaftwork.core.kept import Kept
 from shaftwork.network.graph import GraphPart
 from shaftwork.pipeline.phases.starts import conditional, starts_of
-from shaftwork.reduction.readings import Readings
+from shaftwork.reduction.observables import Observables
 
 if TYPE_CHECKING:
-    from shaftwork.pipeline.phases.elements import Element, ModeNames
+    from shaftwork.pipeline.phases.mode_machines import ModeMachine, ModeNames
 
 KEPT = 256
 """Speeds across elements that are kept with values of the parameters."""
 
 
-class Shown:
+class GuardReadings:
     """What elements show, from what guards read at one instant.
 
     Args:
@@ -39,9 +39,9 @@ class Shown:
 
     def __init__(
         self,
-        elements: Sequence[Element],
+        elements: Sequence[ModeMachine],
         parts: Mapping[str, GraphPart],
-        readings: Readings,
+        readings: Observables,
         parameters: tuple[Symbol, ...],
     ) -> None:
         self._elements, self._parts, self._readings, self._parameters = elements, parts, readings, parameters

@@ -12,16 +12,16 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.observer import Impact, ModelObserver
 from shaftwork.codegen.phase_observer import PhaseObserver, Stretch, Stretches
-from shaftwork.pipeline.phases.assemblies import Assembly
-from shaftwork.pipeline.phases.elements import Element, ModeNames
-from shaftwork.pipeline.phases.moments import Change, without_detours
-from shaftwork.pipeline.phases.passing import Phase
-from shaftwork.pipeline.phases.run import Run, Span
+from shaftwork.pipeline.phases.assemblies import ModeEquations
+from shaftwork.pipeline.phases.hybrid_state import Change, without_detours
+from shaftwork.pipeline.phases.in_place_events import Phase
+from shaftwork.pipeline.phases.mode_machines import ModeMachine, ModeNames
+from shaftwork.pipeline.phases.run import HybridRun, Span
 from shaftwork.pipeline.phases.wave_run import WaveRun
 from shaftwork.results.solution import PhaseRow, Solution
 
 
-def solution(run: Run, name: str) -> Solution:
+def solution(run: HybridRun, name: str) -> Solution:
     """The motion as a whole, to be read."""
     names = run.spans[0].phases[0].assembly.stores.names
     whole = _Whole(run) if run.waves is None else _WithWaves(run, run.waves)
@@ -40,7 +40,7 @@ def solution(run: Run, name: str) -> Solution:
     )
 
 
-def _stored(run: Run, span: Span, names: tuple[str, ...]) -> Array:
+def _stored(run: HybridRun, span: Span, names: tuple[str, ...]) -> Array:
     """(k, stores) all that is stored at the output times of a span, and what arrives by waves."""
     assembly = span.phases[0].assembly
     t, states = span.trajectory.t, span.trajectory.x[:, : _width(assembly)]
@@ -50,7 +50,7 @@ def _stored(run: Run, span: Span, names: tuple[str, ...]) -> Array:
     return np.hstack([_stores(run, span, names, states), arrived])
 
 
-def _stores(run: Run, span: Span, names: tuple[str, ...], states: Array) -> Array:
+def _stores(run: HybridRun, span: Span, names: tuple[str, ...], states: Array) -> Array:
     t, first = span.trajectory.t, span.phases[0]
     stores = first.assembly.stores
     if stores.by_loops:
@@ -66,7 +66,7 @@ def _stores(run: Run, span: Span, names: tuple[str, ...], states: Array) -> Arra
     return made
 
 
-def _width(assembly: Assembly) -> int:
+def _width(assembly: ModeEquations) -> int:
     """The number of states, and of what arrives by waves behind them."""
     return len(assembly.model.states) + len(assembly.model.form.waves)
 
@@ -74,7 +74,7 @@ def _width(assembly: Assembly) -> int:
 class _Whole:
     """All that is stored at any time of a motion; what it needs is made when it is first asked."""
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: HybridRun) -> None:
         self._run = run
 
     @cached_property
@@ -101,12 +101,12 @@ class _WithWaves(_Whole):
         waves: of it.
     """
 
-    def __init__(self, run: Run, waves: WaveRun) -> None:
+    def __init__(self, run: HybridRun, waves: WaveRun) -> None:
         super().__init__(run)
         self.held, self.leaving, self.carried = waves.held, waves.leaving, waves.carried
 
 
-def _stretch(run: Run, span: Span, phase: Phase) -> Stretch:
+def _stretch(run: HybridRun, span: Span, phase: Phase) -> Stretch:
     assembly, states = phase.assembly, phase.assembly.model.states
     size, dense = _width(assembly), span.trajectory.dense
     instants = run.timeline(assembly, phase.p)
@@ -125,7 +125,7 @@ def _stretch(run: Run, span: Span, phase: Phase) -> Stretch:
     )
 
 
-def _impacts(run: Run) -> tuple[Impact, ...]:
+def _impacts(run: HybridRun) -> tuple[Impact, ...]:
     """Changes and sources with which speeds may jump, those of one time in one, with the part that hits or changes."""
     jumps = [jump for jump in run.jumps if jump.given or jump.lost]
     for change in sorted(run.changes, key=lambda made: (made.time, not made.impact)):
@@ -147,7 +147,7 @@ def _sums(first: Mapping[str, float], second: Mapping[str, float]) -> dict[str, 
 
 def _events(changes: Iterable[Change]) -> Iterator[tuple[float, str, str, str]]:
     """Changes in words, without those that lead nowhere: what says the same before and after is none."""
-    words: dict[tuple[Element, str, str, bool], tuple[str, str, str]] = {}
+    words: dict[tuple[ModeMachine, str, str, bool], tuple[str, str, str]] = {}
     at_once = (without_detours([*made]) for _, made in groupby(changes, attrgetter("time")))
     for time, element, before, after, rebound, *_ in chain.from_iterable(at_once):
         key = element, before, after, rebound
@@ -159,7 +159,7 @@ def _events(changes: Iterable[Change]) -> Iterator[tuple[float, str, str, str]]:
             yield time, name, was, now
 
 
-def _table(run: Run) -> tuple[PhaseRow, ...]:
+def _table(run: HybridRun) -> tuple[PhaseRow, ...]:
     """The phases in words: those that say the same are one."""
     phases = [phase for span in run.spans for phase in span.phases]
     last = run.demand.span[1]

@@ -14,13 +14,13 @@ import numpy as np
 from shaftwork.codegen.code import around
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.waves import WaveSystem
-from shaftwork.pipeline.phases.assemblies import Assembly, Limits, Motion, Near
+from shaftwork.pipeline.phases.assemblies import Limits, ModeEquations, Motion, Near
 from shaftwork.pipeline.prepared import NOMINAL
 
 RATE = "rate of "
 
 
-class WaveAssembly(Assembly):
+class WaveAssembly(ModeEquations):
     """One set of equations with ends of waves, and its guards."""
 
     @property

@@ -12,10 +12,10 @@ from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.waves import WaveSystem
 from shaftwork.integrate.lossless.lines import DelayProblem, Lines
-from shaftwork.integrate.lossless.march import Equations, March
+from shaftwork.integrate.lossless.march import March, MarchEquations
 from shaftwork.integrate.lossless.waveforms import Left
 from shaftwork.integrate.problem import Problem, Trajectory
-from shaftwork.pipeline.phases.moments import Regime
+from shaftwork.pipeline.phases.hybrid_state import Regime
 from shaftwork.pipeline.waves import CarriedWaves, WaveStart, checked_lines, lines_by_shaft
 
 
@@ -45,7 +45,7 @@ class WaveRun:
         elif start is not None:
             self._start = {"speeds0": start.speeds, "torque0": start.torques}
         self._march: March | None = None
-        self._equations: dict[Regime, Equations] = {}
+        self._equations: dict[Regime, MarchEquations] = {}
 
     def arriving(self, t: float) -> Array:
         """(2 q,) what arrives at the ends of the lines at a time in s, and its rates."""

@@ -13,9 +13,9 @@ from shaftwork.codegen.differentiated import Differentiated
 from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.phases.assemblies import Assembly
-from shaftwork.pipeline.phases.elements import ModeNames
-from shaftwork.pipeline.phases.moments import Change
+from shaftwork.pipeline.phases.assemblies import ModeEquations
+from shaftwork.pipeline.phases.hybrid_state import Change
+from shaftwork.pipeline.phases.mode_machines import ModeNames
 from shaftwork.pipeline.phases.phases import Phases
 from shaftwork.pipeline.phases.regimes import with_modes
 from shaftwork.pipeline.sensitivities.legs import Leg
@@ -27,7 +27,7 @@ ALIKE = 1e-10
 """Ways lead to the same states where these differ by no more than this part of their size."""
 
 
-class _Step(NamedTuple):
+class _ModeStep(NamedTuple):
     """Into other modes; where something is thrown back, for an instant alone, and then into others.
 
     Args:
@@ -57,14 +57,14 @@ class End(NamedTuple):
     shift: Array
 
 
-class _Held(NamedTuple):
+class _StoredWithDerivatives(NamedTuple):
     """All that is stored by name, and its total derivatives (m,)."""
 
     values: Mapping[str, float]
     slopes: Mapping[str, Array]
 
 
-class Carrying:
+class SensitivityTransfer:
     """Takes states and their derivatives over from one set of equations to another.
 
     Args:
@@ -109,9 +109,9 @@ class Carrying:
             "Take the difference of two variants, studies.sweep(...)."
         )
 
-    def _ways(self, before: Leg, after: Leg, changes: Sequence[Change]) -> Iterator[tuple[_Step, ...]]:
+    def _ways(self, before: Leg, after: Leg, changes: Sequence[Change]) -> Iterator[tuple[_ModeStep, ...]]:
         """Ways to the modes that follow, the plainest first."""
-        seen: list[tuple[_Step, ...]] = []
+        seen: list[tuple[_ModeStep, ...]] = []
         for every in (False, True):
             for besides in (False, True):
                 made = self._way(before.modes, after.modes, changes, every=every, besides=besides)
@@ -121,7 +121,7 @@ class Carrying:
 
     def _way(
         self, modes: ModeNames, last: ModeNames, changes: Sequence[Change], *, every: bool, besides: bool
-    ) -> tuple[_Step, ...]:
+    ) -> tuple[_ModeStep, ...]:
         """One way.
 
         Args:
@@ -132,28 +132,28 @@ class Carrying:
             besides: in an impact other elements are already in the modes that follow.
         """
         numbers = {id(element): k for k, element in enumerate(self._phases.elements)}
-        steps: list[_Step] = []
+        steps: list[_ModeStep] = []
         for place, change in enumerate(changes):
             number = numbers[id(change.element)]
             if not change.impact:
                 modes = with_modes(modes, {number: change.after})
-                steps += [_Step(modes)] if every else []
+                steps += [_ModeStep(modes)] if every else []
                 continue
             others = {numbers[id(made.element)]: made.after for made in changes[place + 1 :] if not made.impact}
             modes = with_modes(modes, {**(others if besides else {}), number: change.after})
             if not change.rebound:
-                steps.append(_Step(modes))
+                steps.append(_ModeStep(modes))
                 continue
             leaves = change.element.modes[change.before].leaves
             share = next(leave.rebound for leave in leaves if leave.rebound is not None and leave.to == change.after)
             parted = with_modes(modes, {number: change.before})
-            steps.append(_Step(modes, (number, share), parted))
+            steps.append(_ModeStep(modes, (number, share), parted))
             modes = parted
         if not steps or (steps[-1].parted or steps[-1].modes) != last:
-            steps.append(_Step(last))
+            steps.append(_ModeStep(last))
         return tuple(steps)
 
-    def _along(self, steps: Sequence[_Step], before: Leg, t: float, end: End) -> tuple[Array, Array]:
+    def _along(self, steps: Sequence[_ModeStep], before: Leg, t: float, end: End) -> tuple[Array, Array]:
         """States (n',) and their total derivatives (n', m) at the end of a way."""
         model, p, (x, _, slopes, shift) = before.model, before.p, end
         for step in steps:
@@ -173,21 +173,30 @@ class Carrying:
             model = assembly.model
         return x, slopes
 
-    def _held(self, model: Model, t: float, x: Array, p: Array, slopes: Array, shift: Array) -> _Held:
+    def _held(self, model: Model, t: float, x: Array, p: Array, slopes: Array, shift: Array) -> _StoredWithDerivatives:
         takeover = self._equations(model).takeover
         values, made = takeover.given(t, x, p, slopes, shift)
-        return _Held(
+        return _StoredWithDerivatives(
             dict(zip(takeover.names, values.tolist(), strict=True)), dict(zip(takeover.names, made, strict=True))
         )
 
-    def _taken(self, assembly: Assembly, t: float, p: Array, held: _Held, shift: Array) -> tuple[Array, Array]:
+    def _taken(
+        self, assembly: ModeEquations, t: float, p: Array, held: _StoredWithDerivatives, shift: Array
+    ) -> tuple[Array, Array]:
         takeover = self._equations(assembly.model).takeover
         x = assembly.stores.states(assembly.bound(p), t, held.values)
         values = np.array([held.values[name] for name in takeover.names])
         slopes = np.array([held.slopes[name] for name in takeover.names]).reshape(len(values), shift.size)
         return x, takeover.taken(t, x, p, values, slopes, shift)
 
-    def _thrown(self, assembly: Assembly, p: Array, held: _Held, joined: _Held, rebound: tuple[int, Expr]) -> _Held:
+    def _thrown(
+        self,
+        assembly: ModeEquations,
+        p: Array,
+        held: _StoredWithDerivatives,
+        joined: _StoredWithDerivatives,
+        rebound: tuple[int, Expr],
+    ) -> _StoredWithDerivatives:
         """After an impact that throws back: v_joined + e (v_joined - v_before)."""
         expression = assembly.of_element(*rebound)
         shown, nowhere = self._equations(assembly.model).shown(expression), np.zeros(len(assembly.model.states))
@@ -199,4 +208,4 @@ class Carrying:
             name: slope + share * (slope - held.slopes[name]) + by_parameters * change[name]
             for name, slope in joined.slopes.items()
         }
-        return _Held(values, slopes)
+        return _StoredWithDerivatives(values, slopes)

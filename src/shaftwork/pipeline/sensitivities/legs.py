@@ -12,8 +12,8 @@ from sympy import Expr
 from shaftwork.codegen.differentiated import Differentiated
 from shaftwork.codegen.elements import Array
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.phases.assemblies import Assembly
-from shaftwork.pipeline.phases.elements import ModeNames
+from shaftwork.pipeline.phases.assemblies import ModeEquations
+from shaftwork.pipeline.phases.mode_machines import ModeNames
 
 LOOKS = np.array([0.0, 0.004, 0.07, 0.19, 0.31, 0.42, 0.53, 0.61, 0.74, 0.83, 0.91, 0.996])
 """Where in a step switches of laws are looked at: at no regular places, which a motion might share."""
@@ -49,7 +49,7 @@ class Leg:
     p: Array
     dense: Callable[[Array], Array]
     steps: Array
-    assembly: Assembly | None = None
+    assembly: ModeEquations | None = None
     modes: ModeNames = ()
     turned: tuple[Expr, ...] = ()
 

@@ -14,10 +14,10 @@ from shaftwork.core.errors import SimulationError
 from shaftwork.pipeline.analysis import Given
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.model import Model
+from shaftwork.pipeline.phases.hybrid_state import Change
 from shaftwork.pipeline.phases.model import PhasedModel
-from shaftwork.pipeline.phases.moments import Change
 from shaftwork.pipeline.phases.phases import Phases
-from shaftwork.pipeline.phases.run import Run, Span
+from shaftwork.pipeline.phases.run import HybridRun, Span
 from shaftwork.pipeline.phases.solution import solution
 from shaftwork.pipeline.sensitivities.legs import Leg
 from shaftwork.pipeline.start import start_of
@@ -27,7 +27,7 @@ MOST_STEPS = 10_000_000
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class DifferentiatedMotion:
     """A motion to be differentiated.
 
     Args:
@@ -51,25 +51,25 @@ class Motion:
         return tuple(dict.fromkeys(leg.model for leg in legs))
 
 
-def motion_of(model: Model, span: tuple[float, float], initial: Given, rtol: float) -> Motion:
+def motion_of(model: Model, span: tuple[float, float], initial: Given, rtol: float) -> DifferentiatedMotion:
     """The motion of a network.
 
     Raises:
         SimulationError: it could not be found, or a prescribed speed jumps.
     """
     if isinstance(model, PhasedModel):
-        run = Run(model.phases, {}, Demand(span, rtol, None, None, "auto", MOST_STEPS, None), own=True)
+        run = HybridRun(model.phases, {}, Demand(span, rtol, None, None, "auto", MOST_STEPS, None), own=True)
         run.march(initial)
         legs, changes = tuple(_legs_of_run(run)), tuple(run.changes)
-        made = Motion(solution(run, model.name), legs, changes, _start(run, initial), model.phases)
+        made = DifferentiatedMotion(solution(run, model.name), legs, changes, _start(run, initial), model.phases)
     else:
         found = model.simulate(span[1], t_start=span[0], initial=initial, rtol=rtol, t_eval="steps")
-        made = Motion(found, tuple(_legs_of_model(model, found)))
+        made = DifferentiatedMotion(found, tuple(_legs_of_model(model, found)))
     _refuse_impulses(made)
     return made
 
 
-def _start(run: Run, initial: Given) -> Leg:
+def _start(run: HybridRun, initial: Given) -> Leg:
     phases, span = run.phases, run.demand.span
     assembly = phases.assembly(phases.first)
     p = assembly.vector({}, phases.numbers(phases.first))
@@ -89,7 +89,7 @@ def _start(run: Run, initial: Given) -> Leg:
     )
 
 
-def _refuse_impulses(motion: Motion) -> None:
+def _refuse_impulses(motion: DifferentiatedMotion) -> None:
     """Refuse sources that jump where inertias are joined to them rigidly, also at the start."""
     first = motion.legs[0]
     pairs = [(None, first.low, first), *((old.high, new.low, new) for old, new in pairwise(motion.legs))]
@@ -103,7 +103,7 @@ def _refuse_impulses(motion: Motion) -> None:
             )
 
 
-def _legs_of_run(run: Run) -> Iterator[Leg]:
+def _legs_of_run(run: HybridRun) -> Iterator[Leg]:
     """The legs of a motion through phases."""
     for span, end in zip(
         run.spans, [*(span.phases[0].start for span in run.spans[1:]), run.demand.span[1]], strict=True

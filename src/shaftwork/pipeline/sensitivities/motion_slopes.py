@@ -9,19 +9,19 @@ import numpy as np
 from scipy.optimize import brentq
 from sympy import Expr, Symbol
 
-from shaftwork.codegen.differentiated import Differentiated, Shown
+from shaftwork.codegen.differentiated import Differentiated, ValueWithSlopes
 from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import AccuracyWarning, ParameterError, SimulationError
 from shaftwork.core.notices import warn
 from shaftwork.integrate.variation import Coefficients, Variation, variation
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.phases.moments import Change
-from shaftwork.pipeline.sensitivities.carrying import Carrying, End
+from shaftwork.pipeline.phases.hybrid_state import Change
+from shaftwork.pipeline.sensitivities.carrying import End, SensitivityTransfer
 from shaftwork.pipeline.sensitivities.differentiable import rows_of
-from shaftwork.pipeline.sensitivities.jump_conditions import ADVICE, TOGETHER, Jump, JumpConditions, by_chance
 from shaftwork.pipeline.sensitivities.legs import Leg, parted
-from shaftwork.pipeline.sensitivities.motion_legs import Motion
-from shaftwork.reduction.expressed import Expressed
+from shaftwork.pipeline.sensitivities.motion_legs import DifferentiatedMotion
+from shaftwork.pipeline.sensitivities.saltation import ADVICE, TOGETHER, Jump, JumpConditions, by_chance
+from shaftwork.reduction.symbolic_observables import SymbolicObservables
 
 ROUNDING = 1e-3
 """What a change of a parameter by all of itself does to a state is rounding below this part of the state's size."""
@@ -54,7 +54,7 @@ class MotionSlopes:
 
     def __init__(
         self,
-        motion: Motion,
+        motion: DifferentiatedMotion,
         parameters: Mapping[str, float],
         quantities: Sequence[str],
         integrands: Sequence[tuple[str, int]],
@@ -79,7 +79,7 @@ class MotionSlopes:
         """The equations of a model with their derivatives; made once."""
         if model not in self._equations:
             rows = rows_of(model)
-            expressed = Expressed(model.form, rows)
+            expressed = SymbolicObservables(model.form, rows)
             found = {name: _known(name, expressed) for name in self._quantities}
             integrands = [found[name] ** power for name, power in self._integrands]
             self._equations[model] = Differentiated(model.form, rows, self._symbols, found, integrands)
@@ -100,7 +100,7 @@ class MotionSlopes:
 
     def _integrate(self) -> None:
         motion, count = self._motion, len(self._symbols)
-        carrying = None if motion.phases is None else Carrying(motion.phases, self.equations, self.sizes)
+        carrying = None if motion.phases is None else SensitivityTransfer(motion.phases, self.equations, self.sizes)
         length, fixed = self.legs[-1].end - self.legs[0].start, np.zeros(count)
         jumps = JumpConditions(self.equations, carrying, self.sizes, self._swiftest.__getitem__, length)
         slopes = np.zeros((self._swiftest[self.legs[0].model].size, count))
@@ -210,7 +210,7 @@ class MotionSlopes:
             return float(brentq(lambda time: self._rate(quantity, leg, time), low, high, xtol=aside * ON_IT))
         return t
 
-    def _shown(self, quantity: str, leg: Leg) -> Shown:
+    def _shown(self, quantity: str, leg: Leg) -> ValueWithSlopes:
         equations = self.equations(leg.model)
         return equations.shown(equations.quantities[quantity])
 
@@ -234,7 +234,7 @@ def _warn(doubt: float, t: float) -> None:
         )
 
 
-def _known(name: str, expressed: Expressed) -> Expr:
+def _known(name: str, expressed: SymbolicObservables) -> Expr:
     found = expressed.quantity(name)
     if found is None:
         raise ParameterError(f"'{name}' has no derivative here. Take a speed, a torque or a twist.")

@@ -6,7 +6,7 @@ parameters go over into those of the new equations, x+ = h(x-), with the rates f
     S+ = h_x (S- + f- t') + h_p + h_t t' - f+ t'.
 
 A guard g(t, x, p) = 0 as the cause has t' = -(g_x S + g_p) / (g_x f + g_t); a law that switches with the time alone has
-no g_x. h is the identity within the same equations, else what `Stores` does, also in an impact.
+no g_x. h is the identity within the same equations, else what `StateTransfer` does, also in an impact.
 Source: Aizerman and Gantmacher, On the stability of periodic motions, 1958.
 """
 
@@ -23,8 +23,8 @@ from shaftwork.codegen.differentiated import Differentiated
 from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import SimulationError
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.phases.moments import Change
-from shaftwork.pipeline.sensitivities.carrying import Carrying, End
+from shaftwork.pipeline.phases.hybrid_state import Change
+from shaftwork.pipeline.sensitivities.carrying import End, SensitivityTransfer
 from shaftwork.pipeline.sensitivities.legs import Leg
 
 TOGETHER = 1e-9
@@ -73,7 +73,7 @@ class _Side:
     rates: Array
 
 
-class _Group(NamedTuple):
+class _TiedTimes(NamedTuple):
     """Causes whose times move together.
 
     Args:
@@ -102,7 +102,7 @@ class _Crossing(NamedTuple):
 
     old: _Side
     new: _Side
-    groups: Sequence[_Group]
+    groups: Sequence[_TiedTimes]
     total: Array
     shift: Array
     pace: float
@@ -144,7 +144,7 @@ class JumpConditions:
     def __init__(
         self,
         equations: Callable[[Model], Differentiated],
-        carrying: Carrying | None,
+        carrying: SensitivityTransfer | None,
         sizes: Callable[[Model], Array],
         swiftest: Callable[[Model], Array],
         span: float,
@@ -185,7 +185,7 @@ class JumpConditions:
         slopes = self._later(old, slopes, -late)
         old, new = self._moved(old, -late), self._moved(new, -late)
         groups = self._grouped(old, slopes, causes)
-        shift, pace, _ = groups[0] if groups else _Group(np.zeros(slopes.shape[1]), 1.0, [])
+        shift, pace, _ = groups[0] if groups else _TiedTimes(np.zeros(slopes.shape[1]), 1.0, [])
         return _Crossing(old, new, groups, slopes + np.outer(old.rates, shift), shift, pace, late)
 
     def _share(self, model: Model, before: Array, after: Array) -> float:
@@ -272,20 +272,20 @@ class JumpConditions:
             raise _touched(old.leg, _worded(cause))
         return -moved / rate, abs(rate) / most
 
-    def _grouped(self, old: _Side, slopes: Array, causes: Sequence[_Cause]) -> list[_Group]:
+    def _grouped(self, old: _Side, slopes: Array, causes: Sequence[_Cause]) -> list[_TiedTimes]:
         """Causes by their times."""
-        groups: list[_Group] = []
+        groups: list[_TiedTimes] = []
         for cause in causes:
             shift, pace = self._shift(old, slopes, cause)
             alike = (k for k, one in enumerate(groups) if (np.abs(one.shift - shift) <= EQUAL * np.abs(shift)).all())
             k = next(alike, None)
             if k is None:
-                groups.append(_Group(shift, pace, [cause]))
+                groups.append(_TiedTimes(shift, pace, [cause]))
             else:
-                groups[k] = _Group(shift, min(pace, groups[k].pace), [*groups[k].causes, cause])
+                groups[k] = _TiedTimes(shift, min(pace, groups[k].pace), [*groups[k].causes, cause])
         return groups
 
-    def _one_by_one(self, old: _Side, new: _Side, slopes: Array, groups: Sequence[_Group], *, adds: bool) -> Array:
+    def _one_by_one(self, old: _Side, new: _Side, slopes: Array, groups: Sequence[_TiedTimes], *, adds: bool) -> Array:
         """The derivatives (N, m) after several causes at one instant, whose order must not matter.
 
         Law: S+ = S- + sum of (f - f_k) t_k' with f_k the rates after the cause k alone; it holds in any order where

@@ -13,13 +13,13 @@ from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.pipeline.phases.commutation import Commutation, by_time, is_switch
 from shaftwork.pipeline.phases.courses import Way, chosen, endless, leaving
-from shaftwork.pipeline.phases.elements import ModeNames, Watched
+from shaftwork.pipeline.phases.hybrid_state import Change, HybridState, Transition, clear_of_limits, together
 from shaftwork.pipeline.phases.impacts import Impacts
-from shaftwork.pipeline.phases.moments import Change, Moment, clear_of_limits, together
+from shaftwork.pipeline.phases.mode_machines import ActiveGuard, ModeNames
 from shaftwork.pipeline.phases.regimes import Regimes, anew, refuse_beyond, with_modes
 
 if TYPE_CHECKING:
-    from shaftwork.pipeline.phases.assemblies import Assembly
+    from shaftwork.pipeline.phases.assemblies import ModeEquations
     from shaftwork.pipeline.phases.phases import Phases
 
 # So many changes within one instant have no end: of two rigid flanks without a gap between them, say.
@@ -29,7 +29,7 @@ MOST_REPEATS = 2
 NEAR = 64
 
 
-class Settling:
+class EventIteration:
     """Changes modes at an instant.
 
     Args:
@@ -44,7 +44,7 @@ class Settling:
         phases: Phases,
         values: Mapping[str, float],
         span: tuple[float, float],
-        equations: Callable[[ModeNames], Assembly] | None = None,
+        equations: Callable[[ModeNames], ModeEquations] | None = None,
     ) -> None:
         self._phases, self.elements = phases, phases.elements
         self._regimes = Regimes(phases, values, span, equations or phases.assembly)
@@ -53,7 +53,7 @@ class Settling:
         self._commutation = Commutation(self._regimes, self.elements, self._beyond)
         self.jumped, self.possible = self._impacts.jumped, self._regimes.possible
 
-    def started(self, t: float, x: Array, joins: Mapping[int, str] = MappingProxyType({})) -> Moment:
+    def started(self, t: float, x: Array, joins: Mapping[int, str] = MappingProxyType({})) -> HybridState:
         """The modes in which a motion starts, from the states of the equations in which no mode joins anything.
 
         An element that nothing else lets start in its mode, as a friction that a prescribed speed is about to turn,
@@ -78,15 +78,15 @@ class Settling:
                 names = (wanted[k], *(leave.to for leave in leaves if leave.to))
                 options = (with_modes(modes, {k: name}) for name in names)
                 modes = next(filter(self._regimes.possible, options), modes)
-        return self._regimes.changed(Moment(loose, x), t, modes)
+        return self._regimes.changed(HybridState(loose, x), t, modes)
 
-    def ends(self, moment: Moment, t: float, x: Array) -> bool:
+    def ends(self, moment: HybridState, t: float, x: Array) -> bool:
         """Whether states are beyond a guard of the modes of a moment."""
         now = moment.regime.limits(t, x.tolist())
         wide = moment.bands or [0.0] * len(now)
         return any(made.side * now[made.guard] > wide[made.guard] for _, made in moment.regime.watched)
 
-    def settle(self, t: float, after: float, moment: Moment, met: int | None) -> tuple[Moment, list[Change]]:
+    def settle(self, t: float, after: float, moment: HybridState, met: int | None) -> Transition:
         """The modes that go on, and the changes that lead there.
 
         Args:
@@ -114,7 +114,7 @@ class Settling:
             new, changes = self._settled(t, after, joined, next(same, None))
         return new, together([*begun, *changes])
 
-    def _settled(self, t: float, after: float, moment: Moment, met: int | None) -> tuple[Moment, list[Change]]:
+    def _settled(self, t: float, after: float, moment: HybridState, met: int | None) -> Transition:
         """The same where nothing rests by now; what does so then is joined, in the order of the network."""
         new, changes = self._fewest(t, after, moment, met)
         resting = self._resting(new, after) if changes else {}
@@ -132,13 +132,13 @@ class Settling:
             return new, together(changes) or changes
         return held, together([*changes, *at_once, *further])
 
-    def _joined(self, t: float, after: float, moment: Moment, joins: Mapping[int, str]) -> tuple[Moment, list[Change]]:
+    def _joined(self, t: float, after: float, moment: HybridState, joins: Mapping[int, str]) -> Transition:
         """The same instant with elements in modes in which they hold, and the changes to these."""
         modes, held = moment.regime.modes, self._regimes.joinable(moment.regime.modes, joins)
         changes = [Change(t, self.elements[k], modes[k], name) for k, name in held.items()]
         return self._regimes.changed(moment, after, with_modes(modes, held)), changes
 
-    def _resting(self, moment: Moment, t: float) -> dict[int, str]:
+    def _resting(self, moment: HybridState, t: float) -> dict[int, str]:
         """Elements that slip, with no speed across them as others hold their ends, and the modes in which they hold."""
         regime, found = moment.regime, {}
         for k, made in regime.watched:
@@ -156,7 +156,7 @@ class Settling:
             if (k in still and made.leave.by_speed) or now[made.guard] == near[made.guard] == 0.0
         }
 
-    def _fewest(self, t: float, after: float, moment: Moment, met: int | None) -> tuple[Moment, list[Change]]:
+    def _fewest(self, t: float, after: float, moment: HybridState, met: int | None) -> Transition:
         """Of several guards that are met at one instant, rounding tells which of them ends the phase.
 
         So each is followed first, and the fewest changes are taken: two flanks that one torque has pressed together
@@ -165,7 +165,7 @@ class Settling:
         if met is None:
             return self._consistent(t, after, moment, None)
         named = next(pair for pair in moment.regime.watched if pair[1].guard == met)
-        found: list[tuple[Moment, list[Change]]] = []
+        found: list[Transition] = []
         failed: list[SimulationError] = []
         ways = self._at_once(moment, after, named)
         least = max(1, len({number for number, made in ways if made.leave.by_twist}))  # an angle waits for nothing
@@ -182,7 +182,7 @@ class Settling:
             raise failed[0]
         return min(found, key=lambda made: len(made[1]))
 
-    def _at_once(self, moment: Moment, t: float, named: Way) -> list[Way]:
+    def _at_once(self, moment: HybridState, t: float, named: Way) -> list[Way]:
         """The guards that are met at the instant at which one is, in the order of their elements."""
         regime, others = moment.regime, [pair for pair in moment.regime.watched if pair is not named]
         now, bands = regime.limits(t, moment.x.tolist()), moment.bands
@@ -193,7 +193,7 @@ class Settling:
             ways.append(named)
         return sorted(ways, key=moment.regime.watched.index)
 
-    def _consistent(self, t: float, after: float, moment: Moment, first: Way | None) -> tuple[Moment, list[Change]]:
+    def _consistent(self, t: float, after: float, moment: HybridState, first: Way | None) -> Transition:
         """Modes that are consistent with the motion that follows, by one change after another; see `settle`.
 
         Args:
@@ -237,8 +237,8 @@ class Settling:
         return moment, changes
 
     def _violated(
-        self, moment: Moment, t: float, ended: Moment, still: Sequence[Way], repeats: int = 0
-    ) -> tuple[Moment, Way | None]:
+        self, moment: HybridState, t: float, ended: HybridState, still: Sequence[Way], repeats: int = 0
+    ) -> tuple[HybridState, Way | None]:
         """The guard that is farthest beyond its limit, or on it and about to go beyond; the moment with its bands.
 
         Args:
@@ -251,20 +251,27 @@ class Settling:
         moment, found = self._exceeded(moment, t, ended, still, in_order=in_order, again=in_order)
         return moment, chosen(found, in_order=in_order)
 
-    def _beyond(self, moment: Moment, t: float) -> list[Way]:
+    def _beyond(self, moment: HybridState, t: float) -> list[Way]:
         """Elements and guards that end modes at once."""
         return [way for _, way in self._exceeded(moment, t, moment, (), in_order=False)[1]]
 
     def _exceeded(
-        self, moment: Moment, t: float, ended: Moment, still: Sequence[Way], *, in_order: bool, again: bool = False
-    ) -> tuple[Moment, list[tuple[float, Way]]]:
+        self,
+        moment: HybridState,
+        t: float,
+        ended: HybridState,
+        idle: Sequence[Way],
+        *,
+        in_order: bool,
+        again: bool = False,
+    ) -> tuple[HybridState, list[tuple[float, Way]]]:
         """The guards beyond their limits, or on them and about to go beyond, and how far; the moment with its bands.
 
         Args:
             moment: modes and states.
             t: s.
             ended: the moment before any change.
-            still: elements and guards that were found here already and change nothing.
+            idle: elements and guards that were found here already and change nothing.
             in_order: whether the first one will be taken, and not the worst.
             again: whether modes have come back.
         """
@@ -278,7 +285,7 @@ class Settling:
         for pair in regime.watched:
             k = pair[1].guard
             value = pair[1].side * now[k]
-            if value < -wide[k] or pair in still:
+            if value < -wide[k] or pair in idle:
                 continue
             if value <= wide[k] or pair[1].leave.rebound is not None:  # only what comes nearer is thrown back
                 on_limit.append(pair)
@@ -293,11 +300,11 @@ class Settling:
             soon_beyond = leaving(regime, here, beside, on_limit, again=again)
             hits = [excess for excess in soon_beyond if excess[1][1].leave.rebound is not None]
             beyond = beyond + soon_beyond if in_order else beyond or soon_beyond
-        return Moment(regime, moment.x, clear_of_limits(regime, now, bands)), hits or beyond
+        return HybridState(regime, moment.x, clear_of_limits(regime, now, bands)), hits or beyond
 
     def _follow(
-        self, t: float, after: float, moment: Moment, number: int, ended: Watched, tried: int = 0
-    ) -> tuple[Moment, list[Change], NetworkError | None, float]:
+        self, t: float, after: float, moment: HybridState, number: int, ended: ActiveGuard, tried: int = 0
+    ) -> tuple[HybridState, list[Change], NetworkError | None, float]:
         """The mode of an element changes, or what hits is thrown back; what kept it from what it wanted, and how long
         ago, in s, it was hit. Of the ways round what keeps it, some have been tried.
         """
@@ -324,8 +331,8 @@ class Settling:
             return *self._around(t, after, moment, (number, to), error, tried), error, 0.0
 
     def _hit(
-        self, t: float, after: float, moment: Moment, number: int, ended: Watched
-    ) -> tuple[Moment, list[Change], float]:
+        self, t: float, after: float, moment: HybridState, number: int, ended: ActiveGuard
+    ) -> tuple[HybridState, list[Change], float]:
         """An impact; what hits stays where a rebound would lose less than it gains, as it is found late by rounding.
 
         It is thrown back where it has passed its limit, and how long ago, in s, is said: what it would gain between
@@ -340,7 +347,7 @@ class Settling:
             return *self._impacts.hit(t, after, moment, number, replace(ended.leave, rebound=None)), 0.0
         return new, changes, since
 
-    def _since(self, t: float, moment: Moment, met: Watched) -> float:
+    def _since(self, t: float, moment: HybridState, met: ActiveGuard) -> float:
         """How long ago, in s, a guard passed through zero along a straight line."""
         regime, here = moment.regime, moment.course(t)
         step, beyond = regime.ahead(here[2]), met.side * here[3][met.guard]
@@ -348,8 +355,8 @@ class Settling:
         return beyond * step / gain if 0 < beyond < gain else 0.0
 
     def _around(
-        self, t: float, after: float, moment: Moment, wanted: tuple[int, str], error: NetworkError, tried: int
-    ) -> tuple[Moment, list[Change]]:
+        self, t: float, after: float, moment: HybridState, wanted: tuple[int, str], error: NetworkError, tried: int
+    ) -> Transition:
         """Past a mode whose equations contradict others: into one to which it leads, or something else gives way.
 
         A friction that a prescribed speed turns cannot stick: it passes from slipping one way to slipping the other.
@@ -379,7 +386,7 @@ class Settling:
             f"at t = {t:.9g} s. {error.problems[0]}"
         ) from error
 
-    def _passing_on(self, t: float, moment: Moment, number: int, to: str) -> tuple[Moment, str] | None:
+    def _passing_on(self, t: float, moment: HybridState, number: int, to: str) -> tuple[HybridState, str] | None:
         """Another mode of a gear at rest, and what follows, that contradicts nothing and leaves all else as it is."""
         modes, own = moment.regime.modes, self.elements[number].modes
         if moment.across(number, t) != 0:

@@ -12,13 +12,13 @@ from shaftwork.components.branches import ACROSS
 from shaftwork.components.modes import Mode, Modes
 from shaftwork.core.errors import CompileError
 from shaftwork.network.graph import GraphPart
-from shaftwork.pipeline.phases.elements import Element, ModeNames, Watched
+from shaftwork.pipeline.phases.mode_machines import ActiveGuard, ModeMachine, ModeNames
 from shaftwork.pipeline.phases.resting import holds_at_rest, rests
 from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.readings import Readings
+from shaftwork.reduction.observables import Observables
 
 
-class Watch:
+class ModeGuards:
     """The guards of all modes.
 
     Args:
@@ -29,7 +29,7 @@ class Watch:
     """
 
     def __init__(
-        self, form: StateForm, elements: Sequence[Element], forms: Sequence[str | None], readings: Readings
+        self, form: StateForm, elements: Sequence[ModeMachine], forms: Sequence[str | None], readings: Observables
     ) -> None:
         self._form, self._elements, self._readings = form, elements, readings
         self._parts = {part.name: part for part in form.graph.parts}
@@ -38,7 +38,7 @@ class Watch:
         self.resting = {k for k, e in enumerate(elements) if rests(form, self._parts[e.part.name], e.modes)}
         """Elements of which others hold both ends."""
         self._known: dict[tuple[int, Expr], int] = {}
-        self._leaves: dict[tuple[int, str], tuple[Watched, ...]] = {}
+        self._leaves: dict[tuple[int, str], tuple[ActiveGuard, ...]] = {}
         for number, element in enumerate(elements):
             part = self._parts[element.part.name]
             for mode in element.modes.options:
@@ -49,9 +49,9 @@ class Watch:
         self.owners = {made.guard: k for (k, _), found in self._leaves.items() for made in found}
         """The element of each guard."""
         self._sides: dict[ModeNames, Array] = {}
-        self._ends: dict[ModeNames, tuple[tuple[int, Watched], ...]] = {}
+        self._ends: dict[ModeNames, tuple[tuple[int, ActiveGuard], ...]] = {}
 
-    def _leaving(self, number: int, part: GraphPart, mode: Mode, still: Mapping[Symbol, Expr]) -> Iterator[Watched]:
+    def _leaving(self, number: int, part: GraphPart, mode: Mode, still: Mapping[Symbol, Expr]) -> Iterator[ActiveGuard]:
         """The guards of a mode; what another mode of the element has is shared, with the other sign as well.
 
         Args:
@@ -77,11 +77,11 @@ class Watch:
             for side, expression in ((1.0, when), (-1.0, -when)):
                 known = self._known.get((number, expression))
                 if known is not None and known not in taken:
-                    watched = Watched(known, side, leave)
+                    watched = ActiveGuard(known, side, leave)
                     break
             else:
                 self.expressions.append(when)
-                watched = Watched(len(self.expressions) - 1, 1.0, leave)
+                watched = ActiveGuard(len(self.expressions) - 1, 1.0, leave)
                 self._known.setdefault((number, when), watched.guard)
             taken.append(watched.guard)
             yield watched
@@ -94,7 +94,7 @@ class Watch:
         branch, sign = holder
         return int(sign) * self._readings.through(branch)
 
-    def watched(self, modes: ModeNames) -> tuple[tuple[int, Watched], ...]:
+    def watched(self, modes: ModeNames) -> tuple[tuple[int, ActiveGuard], ...]:
         """Element and guard of everything that may end one of the modes."""
         if modes not in self._ends:
             self._ends[modes] = tuple((k, made) for k, name in enumerate(modes) for made in self._leaves[k, name])

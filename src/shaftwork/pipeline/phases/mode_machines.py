@@ -29,7 +29,7 @@ def is_same(after: Array, before: Array) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class Element:
+class ModeMachine:
     """A piece of a part that changes its mode.
 
     Args:
@@ -54,15 +54,17 @@ class Element:
         return {mode.name: first.setdefault((mode.form, mode.value), mode.name) for mode in self.modes.options}
 
 
-def elements_of(model: Model) -> tuple[Element, ...]:
+def elements_of(model: Model) -> tuple[ModeMachine, ...]:
     """Every element of a network, in the order of its parts."""
     return tuple(
-        Element(part, modes, f"{part.name}.{modes.symbol}") for part in model.form.graph.parts for modes in part.modes
+        ModeMachine(part, modes, f"{part.name}.{modes.symbol}")
+        for part in model.form.graph.parts
+        for modes in part.modes
     )
 
 
 @dataclass(frozen=True, eq=False)
-class Watched:
+class ActiveGuard:
     """What may end a mode in a set of equations: the guard's place, the side on which it is met, and what follows."""
 
     guard: int

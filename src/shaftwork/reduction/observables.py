@@ -20,7 +20,7 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Modes
 from shaftwork.components.pieces import parts
 from shaftwork.components.slopes import slope
-from shaftwork.core.errors import NetworkError, Problem
+from shaftwork.core.errors import Diagnostic, NetworkError
 from shaftwork.network.graph import GROUND, GraphBranch, GraphPart
 from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm
@@ -28,12 +28,12 @@ from shaftwork.reduction.gains import exact_of
 from shaftwork.reduction.rows import Rows
 
 
-def _no_limit(name: str) -> Problem:
+def _no_limit(name: str) -> Diagnostic:
     message = f"a law that acts on '{name}' has no finite value where '{name}' holds still, so that nothing holds it."
-    return Problem("law with a pole", message, "Give the law a finite value at rest.", (name,))
+    return Diagnostic("law with a pole", message, "Give the law a finite value at rest.", (name,))
 
 
-class Readings:
+class Observables:
     """Expressions of what parts show, in one set of equations.
 
     Args:
@@ -167,7 +167,7 @@ class Readings:
 
 
 @dataclass(frozen=True)
-class Quantity:
+class Observable:
     """What a symbol stands for: "across" of a node, "into" a part at a port, "through" a branch, "state" by number.
 
     Args:
@@ -181,7 +181,7 @@ class Quantity:
     port: End = None
 
 
-class NamedReadings(Readings):
+class NamedReadings(Observables):
     """Symbols in place of expressions, for networks that have no rows: each is recovered from the states.
 
     Args:
@@ -190,29 +190,29 @@ class NamedReadings(Readings):
 
     def __init__(self, form: StateForm) -> None:
         self.form, self.graph = form, form.graph
-        self.quantities: dict[Quantity, Symbol] = {}
+        self.quantities: dict[Observable, Symbol] = {}
 
     @property
     def symbols(self) -> tuple[Symbol, ...]:
         """One for each of `quantities`, in their order."""
         return tuple(self.quantities.values())
 
-    def _symbol(self, quantity: Quantity) -> Symbol:
+    def _symbol(self, quantity: Observable) -> Symbol:
         return self.quantities.setdefault(quantity, Symbol(f"quantity {len(self.quantities)}", real=True))
 
     def across(self, part: GraphPart, port: End) -> Expr:
         """The across variable of a port against the reference."""
         node = GROUND if port is None else part.nodes[port]
-        return Integer(0) if node == GROUND else self._symbol(Quantity("across", node))
+        return Integer(0) if node == GROUND else self._symbol(Observable("across", node))
 
     def into(self, part: GraphPart, port: End) -> Expr:
         """What the node at a port gives to the part."""
-        return self._symbol(Quantity("into", self.graph.parts.index(part), port))
+        return self._symbol(Observable("into", self.graph.parts.index(part), port))
 
     def through(self, branch: int) -> Expr:
         """The through variable of a branch."""
-        return self._symbol(Quantity("through", branch))
+        return self._symbol(Observable("through", branch))
 
     def _integral(self, part: GraphPart, label: str) -> Expr:
         state = super()._integral(part, label)
-        return self._symbol(Quantity("state", [made.name for made in self.form.states].index(state.name)))
+        return self._symbol(Observable("state", [made.name for made in self.form.states].index(state.name)))

@@ -15,8 +15,8 @@ from sympy import Expr
 from shaftwork.codegen.code import Moves
 from shaftwork.codegen.elements import Array
 from shaftwork.components.laws import t as TIME
-from shaftwork.pipeline.phases.assemblies import Assembly, Limits, Motion, Near
-from shaftwork.pipeline.phases.elements import Element, ModeNames, Watched
+from shaftwork.pipeline.phases.assemblies import Limits, ModeEquations, Motion, Near
+from shaftwork.pipeline.phases.mode_machines import ActiveGuard, ModeMachine, ModeNames
 from shaftwork.pipeline.prepared import NOMINAL
 
 # A guard within so many rounding units of zero is on its limit, and only its further course tells its side.
@@ -42,7 +42,7 @@ class Change(NamedTuple):
     """
 
     time: float
-    element: Element
+    element: ModeMachine
     before: str
     after: str
     rebound: bool = False
@@ -97,14 +97,14 @@ class Regime:
     """
 
     modes: ModeNames
-    assembly: Assembly
+    assembly: ModeEquations
     p: Array
     motion: Motion
     limits: Limits
     near: Near
     sides: Array
     sizes: list[float]
-    watched: tuple[tuple[int, Watched], ...]
+    watched: tuple[tuple[int, ActiveGuard], ...]
     tick: float
     longest: float
     ways: dict[int, Any] = field(default_factory=dict)
@@ -184,7 +184,7 @@ class Regime:
         return t + step, [v + step * rate for v, rate in zip(x, rates, strict=True)]
 
 
-class Moment(NamedTuple):
+class HybridState(NamedTuple):
     """A combination of modes, the states (n,), and how far rounding moves each guard."""
 
     regime: Regime
@@ -203,9 +203,13 @@ class Moment(NamedTuple):
         """The speeds across elements at a time in s."""
         return self.regime.assembly.across(numbers, t, self.x, self.regime.p)
 
-    def moved(self, t: float, step: float) -> Moment:
+    def moved(self, t: float, step: float) -> HybridState:
         """The same modes a step in s later or earlier, along a straight line."""
         return self._replace(x=self.x + step * np.array(self.course(t)[2])) if step else self
+
+
+Transition = tuple[HybridState, list[Change]]
+"""The state that follows at an instant, and the changes of mode that lead there."""
 
 
 def clear_of_limit(beyond: float, band: float) -> float:

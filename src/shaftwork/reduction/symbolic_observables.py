@@ -10,11 +10,11 @@ from shaftwork.components.base import Signal
 from shaftwork.network.graph import GROUND, GraphPart, signals_of
 from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm, store_name
-from shaftwork.reduction.readings import Readings
+from shaftwork.reduction.observables import Observables
 from shaftwork.reduction.rows import Rows
 
 
-class Expressed:
+class SymbolicObservables:
     """Quantities of a network by name, each in the symbols of its rows.
 
     Args:
@@ -23,7 +23,7 @@ class Expressed:
     """
 
     def __init__(self, form: StateForm, rows: Rows) -> None:
-        self._form, self._graph, self._readings = form, form.graph, Readings(form, rows)
+        self._form, self._graph, self._readings = form, form.graph, Observables(form, rows)
 
     def quantity(self, name: str) -> Expr | None:
         """A quantity such as "shaft.tau"; None for an energy, a power or what does not exist."""

@@ -14,7 +14,7 @@ ROUNDING = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True, eq=False)
-class Row:
+class TridiagonalChain:
     """Inertias in a row, springs between neighbours, and springs to the frame.
 
     Args:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from shaftwork.integrate.lossless.collocation import POWERS, STAGES, STATE_POWERS, squared
-from shaftwork.integrate.lossless.lattice import Lattice, Numbers, Run
+from shaftwork.integrate.lossless.lattice import Lattice, LatticeRun, Numbers
 from shaftwork.integrate.lossless.lines import DelayTrajectory
 from shaftwork.integrate.lossless.waveforms import one_sided
 from shaftwork.integrate.pieces import pieces
@@ -17,7 +17,7 @@ LEAP = 256
 SIDE_BY_SIDE = 64
 
 
-class Leaps:
+class PeriodicPropagation:
     """The panels after a run, at constant inputs.
 
     Args:
@@ -25,7 +25,7 @@ class Leaps:
         run: its first panels, past the last breakpoint by the longest delay or more.
     """
 
-    def __init__(self, lattice: Lattice, run: Run) -> None:
+    def __init__(self, lattice: Lattice, run: LatticeRun) -> None:
         self._lattice, self.first = lattice, len(run.numbers)
         window = run.waves[-lattice.reach :]
         self._shape, self._n = window.shape, run.starts.shape[1]
@@ -40,7 +40,7 @@ class Leaps:
         while 2 ** len(self._powers) * self._length <= lattice.count:
             self._powers.append(self._powers[-1] @ self._powers[-1])
 
-    def run(self, panels: Numbers) -> Run:
+    def run(self, panels: Numbers) -> LatticeRun:
         """Some panels (m,), rising, none before the first."""
         leaps, steps = np.divmod(panels - self.first, self._length)
         places, done, pasts = self._start, 0, []
@@ -57,7 +57,7 @@ class Leaps:
         starts, waves, arrived, squares = (np.concatenate(part) for part in zip(*parts, strict=True))
         inputs = np.broadcast_to(self._input, (len(panels), self._input.shape[1]))
         states = self._lattice.inside(panels, starts, arrived, inputs)
-        return Run(panels, starts, states, waves, arrived, [], squares)
+        return LatticeRun(panels, starts, states, waves, arrived, [], squares)
 
     def _panels(self, pasts: Array, steps: Numbers) -> tuple[Array, Array, Array, Array]:
         """Start states, waves, history torques and squares of panels some steps (c,) after their pasts (z, c)."""
@@ -83,7 +83,7 @@ class Far:
         lattice: of the panels.
     """
 
-    def __init__(self, near: DelayTrajectory, leaps: Leaps, lattice: Lattice) -> None:
+    def __init__(self, near: DelayTrajectory, leaps: PeriodicPropagation, lattice: Lattice) -> None:
         self._near, self._leaps, self._lattice = near, leaps, lattice
 
     @property
@@ -135,7 +135,7 @@ class Far:
         h = np.einsum("kqp,kp->kq", (run.arrived @ POWERS)[index], powers[:, :-1])
         return x, h, np.asarray(problem.speeds(one_sided(problem, times), x.T, h.T)).T
 
-    def _panels_at(self, times: Array, panels: Numbers) -> tuple[Run, Numbers, Array]:
+    def _panels_at(self, times: Array, panels: Numbers) -> tuple[LatticeRun, Numbers, Array]:
         """The panels in which times (k,) lie, solved once each; for each time its panel among them, and its place."""
         numbers, index = np.unique(panels, return_inverse=True)
         lattice = self._lattice

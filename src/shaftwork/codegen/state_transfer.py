@@ -20,13 +20,13 @@ from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array, GainMatrix, potential_matrix, share_matrix
 from shaftwork.codegen.matrices import LinearPart
 from shaftwork.codegen.mobility import Mobility
-from shaftwork.codegen.recovery import History
+from shaftwork.codegen.recovery import BranchHistory
 from shaftwork.core.errors import CompileError
 from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm, store_name
 
 
-class Stores:
+class StateTransfer:
     """What one set of equations stores, and how its states follow from that.
 
     Args:
@@ -97,7 +97,7 @@ class Stores:
         return self._map[1]
 
     def _recovered(self, bound: BoundArrays, t: Array, x: Array) -> Array:
-        history, columns = History(bound, t, x), []
+        history, columns = BranchHistory(bound, t, x), []
         for name, column in zip(self.names, self._columns, strict=True):
             if column >= 0:
                 columns.append(x[:, column])

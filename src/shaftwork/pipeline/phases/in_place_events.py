@@ -11,10 +11,10 @@ import numpy as np
 
 from shaftwork.codegen.elements import Array
 from shaftwork.integrate.problem import Reaction, SeriesError
-from shaftwork.pipeline.phases.assemblies import Assembly
-from shaftwork.pipeline.phases.elements import Element, ModeNames, Watched, is_same
-from shaftwork.pipeline.phases.moments import CLEAR, Change, Moment, Regime, clear_of_limit
-from shaftwork.pipeline.phases.settling import Settling
+from shaftwork.pipeline.phases.assemblies import ModeEquations
+from shaftwork.pipeline.phases.event_iteration import EventIteration
+from shaftwork.pipeline.phases.hybrid_state import CLEAR, Change, HybridState, Regime, Transition, clear_of_limit
+from shaftwork.pipeline.phases.mode_machines import ActiveGuard, ModeMachine, ModeNames, is_same
 
 # Of so many roundings of the time a guard may be late that is met together with another one.
 LATE = 1e4
@@ -32,7 +32,7 @@ class Phase(NamedTuple):
 
     start: float
     modes: ModeNames
-    assembly: Assembly
+    assembly: ModeEquations
     p: Array
 
 
@@ -43,12 +43,12 @@ _Entered = tuple[Sequence[float], Sequence[float], list[float], Array | None]
 """Guards at an instant and later, how far beyond zero each is met, and the states if they are other ones."""
 
 
-def _always(_t: float, _moment: Moment) -> bool:
+def _always(_t: float, _moment: HybridState) -> bool:
     return True
 
 
 @dataclass(frozen=True, eq=False)
-class _Way:
+class _Transition:
     """From one combination of modes to another in the same equations, by one guard.
 
     Args:
@@ -62,11 +62,11 @@ class _Way:
     to: Regime
     side: float
     watched: tuple[tuple[int, float, bool], ...]
-    change: tuple[Element, str, str]
+    change: tuple[ModeMachine, str, str]
     holds: bool
 
 
-class Passing:
+class InPlaceEvents:
     """Lets an engine go on past guards; `Problem.react`.
 
     A change that leaves all other modes as they are is looked up and checked here; any other is settled in full.
@@ -81,11 +81,11 @@ class Passing:
 
     def __init__(
         self,
-        settling: Settling,
-        moment: Moment,
+        settling: EventIteration,
+        moment: HybridState,
         start: float,
         note: Callable[[float, list[Change]], None],
-        suits: Callable[[float, Moment], bool] = _always,
+        suits: Callable[[float, HybridState], bool] = _always,
     ) -> None:
         self._settling, self._suits = settling, suits
         self.regime, self.bands = moment.regime, moment.bands
@@ -96,7 +96,7 @@ class Passing:
         """The phases so far."""
         self._reactions: list[Reaction] = []
         self._suited: set[Regime] = set()
-        self.beyond: tuple[Moment, list[Change]] | None = None
+        self.beyond: Transition | None = None
         """What comes after the last guard, where the engine had to stop for it."""
 
     def __call__(self, number: int, met: int, t: float, x: Array) -> Reaction | None:
@@ -109,7 +109,7 @@ class Passing:
             return None
         regime, bands, changes, y = found
         if regime not in self._suited:
-            moment = Moment(regime, x[: self._size].copy() if y is None else y, bands)
+            moment = HybridState(regime, x[: self._size].copy() if y is None else y, bands)
             if not self._suits(t, moment):
                 self.beyond = moment, changes
                 return None
@@ -129,7 +129,7 @@ class Passing:
         self._note, self._suits = None, _always
 
     def _settled(self, met: int, t: float, x: Array) -> _Following | None:
-        before = Moment(self.regime, x[: self._size].copy(), self.bands)
+        before = HybridState(self.regime, x[: self._size].copy(), self.bands)
         self.refuse_missed(met, t, x)
         moment, changes = self._settling.settle(t, t, before, met)
         if moment.x is before.x:
@@ -166,8 +166,8 @@ class Passing:
     def _direct(self, met: int, t: float, x: Array) -> _Following | None:
         """The modes that follow by this guard alone, or None where it takes more to tell.
 
-        The same as in `Settling`, for the guards of one combination of modes only, as it is asked at every change. What
-        comes to hold by more than it can gives way at once.
+        The same as in `EventIteration`, for the guards of one combination of modes only: it is asked at every change.
+        What comes to hold by more than it can gives way at once.
         """
         way = self._way(self.regime, met)
         if way is None:
@@ -187,7 +187,7 @@ class Passing:
             return None
         return way.to, bands, changes, y
 
-    def _entered(self, way: _Way, t: float, x: Array) -> _Entered | int | None:
+    def _entered(self, way: _Transition, t: float, x: Array) -> _Entered | int | None:
         """Guards now and later and their bands in the modes of a way, with the states where they are others; or the
         number of one that is beyond its limit; None where it takes more to tell.
         """
@@ -206,13 +206,13 @@ class Passing:
             bands[guard] = clear_of_limit(beyond, band)
         return now, later, bands, y
 
-    def _way(self, regime: Regime, met: int) -> _Way | None:
+    def _way(self, regime: Regime, met: int) -> _Transition | None:
         """Where a guard leads in the same equations."""
         ways = regime.ways
-        found: _Way | None = ways[met] if met in ways else ways.setdefault(met, self._find(regime, met))
+        found: _Transition | None = ways[met] if met in ways else ways.setdefault(met, self._find(regime, met))
         return found
 
-    def _find(self, regime: Regime, met: int) -> _Way | None:
+    def _find(self, regime: Regime, met: int) -> _Transition | None:
         pairs = [pair for pair in regime.watched if pair[1].guard == met]
         (number, ended), elements = pairs[0], self._settling.elements
         element, leave = elements[number], ended.leave
@@ -224,10 +224,10 @@ class Passing:
             return None
         to = self._settling.regime((*regime.modes[:number], leave.to, *regime.modes[number + 1 :]))
         watched = tuple((made.guard, made.side, _tells(number, ended, k, made, holds=holds)) for k, made in to.watched)
-        return _Way(to, ended.side, watched, (element, before, leave.to), holds)
+        return _Transition(to, ended.side, watched, (element, before, leave.to), holds)
 
 
-def _tells(number: int, ended: Watched, other: int, made: Watched, *, holds: bool) -> bool:
+def _tells(number: int, ended: ActiveGuard, other: int, made: ActiveGuard, *, holds: bool) -> bool:
     """Whether a guard must be within its limit where another one has led to its mode: it is not the same one.
 
     What gives way is at rest, and about to move as the torque that it has met grows.

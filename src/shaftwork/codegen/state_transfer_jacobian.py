@@ -1,4 +1,4 @@
-"""What parameters do to the states that new equations start with: the derivative of what `Stores` does in numbers.
+"""What parameters do to the states that new equations start with: the derivative of what `StateTransfer` does.
 
 With H(x) all that the new equations store in states x, v what was stored, K the coefficients and F, Q the loops and
 cutsets, the states that take v up obey, for every speed and every torque of a spring among them,
@@ -21,13 +21,13 @@ from shaftwork.codegen.derivatives import SlopeMatrix, Values
 from shaftwork.codegen.elements import Array
 from shaftwork.components.laws import t as TIME
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.expressed import Expressed
 from shaftwork.reduction.form import State, StateForm, store_name
 from shaftwork.reduction.gains import Number, exact_of
 from shaftwork.reduction.rows import Rows
+from shaftwork.reduction.symbolic_observables import SymbolicObservables
 
 
-class Takeover:
+class StateTransferJacobian:
     """Stores of one set of equations, and its states from what was stored, both with their derivatives.
 
     Args:
@@ -40,12 +40,12 @@ class Takeover:
         self._form, self._rows, self._by = form, rows, (rows.states, tuple(parameters), (TIME,))
         kinds = (Kind.ACROSS_STORE, Kind.THROUGH_STORE)
         stores = (branch for branch in form.graph.branches if branch.template.kind in kinds)
-        expressed = Expressed(form, rows)
+        expressed = SymbolicObservables(form, rows)
         self._branches = {store_name(form.graph, branch): branch.index for branch in stores}
         self._stored = {name: expressed.store(name) for name in self._branches}
         self._stored |= {state.name: Symbol(state.name, real=True) for state in form.states if state.kind == "integral"}
         self.names = tuple(self._stored)
-        """Every store and angle, as in `Stores`."""
+        """Every store and angle, as in `StateTransfer`."""
 
     @cached_property
     def _shows(self) -> tuple[Values, tuple[SlopeMatrix, ...]]:
