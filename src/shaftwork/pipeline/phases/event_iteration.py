@@ -188,7 +188,7 @@ class EventIteration:
         now, bands = regime.limits(t, moment.x.tolist()), moment.bands
         if bands and all(made.side * now[made.guard] < -NEAR * bands[made.guard] for _, made in others):
             return [named]
-        ways = [pair for _, pair in self._exceeded(moment, t, moment, (), in_order=True)[1]]
+        ways = [pair for _, pair in self._exceeded(moment, t, moment, (), in_order=True, again=False)[1]]
         if named not in ways and (not named[1].leave.by_torque or all(pair[1].leave.by_torque for pair in ways)):
             ways.append(named)
         return sorted(ways, key=moment.regime.watched.index)
@@ -253,17 +253,10 @@ class EventIteration:
 
     def _beyond(self, moment: HybridState, t: float) -> list[Way]:
         """Elements and guards that end modes at once."""
-        return [way for _, way in self._exceeded(moment, t, moment, (), in_order=False)[1]]
+        return [way for _, way in self._exceeded(moment, t, moment, (), in_order=False, again=False)[1]]
 
     def _exceeded(
-        self,
-        moment: HybridState,
-        t: float,
-        ended: HybridState,
-        idle: Sequence[Way],
-        *,
-        in_order: bool,
-        again: bool = False,
+        self, moment: HybridState, t: float, ended: HybridState, idle: Sequence[Way], *, in_order: bool, again: bool
     ) -> tuple[HybridState, list[tuple[float, Way]]]:
         """The guards beyond their limits, or on them and about to go beyond, and how far; the moment with its bands.
 
