@@ -46,6 +46,16 @@ def test_no_file_is_longer_than_400_lines() -> None:
     assert {name: length for name, length in lengths.items() if length > 400} == {}
 
 
+def test_every_class_has_a_name_of_its_own() -> None:
+    places: dict[str, list[str]] = {}
+    for file in FILES:
+        for node in ast.walk(tree(file)):
+            if isinstance(node, ast.ClassDef):
+                places.setdefault(node.name, []).append(place(file, node))
+    # how a part works, for authors of parts, and the free motions of a network: users know both by this name
+    assert {name: found for name, found in places.items() if len(found) > 1 and name != "Modes"} == {}
+
+
 def test_95_percent_of_the_functions_have_at_most_40_lines() -> None:
     lengths = dict(functions())
     long = {name: length for name, length in lengths.items() if length > 40}
