@@ -16,7 +16,7 @@ from shaftwork.components.base import Profile, Signal
 from shaftwork.components.branches import INTEGRAL, RATE, End
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import slope
-from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart
+from shaftwork.network.graph import CircuitGraph, GraphPart
 from shaftwork.network.kinds import Kind
 from shaftwork.network.templates import BranchTemplate
 from shaftwork.reduction.form import StateForm
@@ -191,7 +191,7 @@ class BranchHistory:
         """(k,) one of the part's signals."""
         match signal.kind:
             case "across":
-                plus, minus = (GROUND if end is None else part.nodes[end] for end in signal.ends)
+                plus, minus = map(part.node_at, signal.ends)
                 return np.asarray(signal.sign * (self.potentials[plus] - self.potentials[minus]))
             case "through":
                 return signal.sign * self._through_port(part, str(signal.ends[0]))

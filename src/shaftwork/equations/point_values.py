@@ -147,7 +147,7 @@ class _Point:
             value = Rational(_finite(f"at: {name}", given))
             if name in names.signals and names.signals[name][1].kind == "across":
                 part, signal = names.signals[name]
-                plus, minus = (GROUND if end is None else part.nodes[end] for end in signal.ends)
+                plus, minus = map(part.node_at, signal.ends)
                 sign, symbol = (signal.sign * quantities.across((plus, minus))).as_coeff_Mul()
                 if minus == GROUND:
                     self._set(plus, signal.sign * value, name)

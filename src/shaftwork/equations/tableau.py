@@ -91,14 +91,14 @@ class Tableau:
         if place.branch >= 0:
             return {("through", place.branch): place.signal.sign}
         part = self._graph.parts[place.part]
-        plus, minus = (GROUND if end is None else part.nodes[end] for end in place.signal.ends)
+        plus, minus = map(part.node_at, place.signal.ends)
         pairs = ((plus, -place.signal.sign), (minus, place.signal.sign))
         return {("across", node): sign for node, sign in pairs if node != GROUND}
 
     def signal(self, part: GraphPart, signal: Signal) -> Sum:
         """A quantity of a part; of a torque without what an input adds to it."""
         if signal.kind == "across":
-            plus, minus = (GROUND if end is None else part.nodes[end] for end in signal.ends)
+            plus, minus = map(part.node_at, signal.ends)
             return total([(signal.sign, self.node(plus)), (-signal.sign, self.node(minus))])
         branches = [self._graph.branches[index] for index in part.branches]
         if signal.kind == "through":

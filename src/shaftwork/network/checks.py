@@ -308,7 +308,7 @@ def _shared_names(graph: CircuitGraph) -> Iterator[Diagnostic]:
     for number, (node, domain) in enumerate(zip(graph.nodes, graph.domains, strict=True)):
         if (part := parts.get(node)) is None or (read := signals_of(graph, part).get(domain.across.name)) is None:
             continue
-        ends = tuple(GROUND if end is None else part.nodes[end] for end in read.ends)
+        ends = tuple(map(part.node_at, read.ends))
         if (read.kind, ends, read.sign) == ("across", (number, GROUND), 1):
             continue
         quantity, at = f"{node}.{domain.across.name}", tuple(graph.node_name(end) for end in ends if end != GROUND)

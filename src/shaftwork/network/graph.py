@@ -74,6 +74,10 @@ class GraphPart:
         """Name of the part."""
         return self.component.name
 
+    def node_at(self, end: End) -> int:
+        """The node at one of its ports; None stands for the frame."""
+        return GROUND if end is None else self.nodes[end]
+
     def ends_of(self, element: Modes) -> tuple[End, End]:
         """The ports that the across variable of an element is of; its own two by default."""
         ports = [port.name for port in self.component.ports]

@@ -11,7 +11,7 @@ from shaftwork.components.base import Component
 from shaftwork.components.branches import End
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import SignalError
-from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch
+from shaftwork.network.graph import CircuitGraph, GraphBranch
 from shaftwork.network.kinds import Kind
 from shaftwork.network.templates import BranchTemplate
 from shaftwork.network.wording import listed
@@ -44,7 +44,7 @@ def with_meters(graph: CircuitGraph, names: Sequence[str]) -> tuple[CircuitGraph
             index = next(own, len(branches))
             if index == len(branches):
                 template = BranchTemplate(Kind.THROUGH_SOURCE, Integer(0), ends, (), label, (), Integer(0), meter=True)
-                plus, minus = (GROUND if end is None else part.nodes[end] for end in ends)
+                plus, minus = map(part.node_at, ends)
                 branches.append(GraphBranch(index, places[name], template, plus, minus, ()))
                 parts[places[name]] = dataclasses.replace(part, branches=(*part.branches, index))
             angles.append(index)

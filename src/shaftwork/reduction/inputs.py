@@ -95,7 +95,7 @@ def with_inputs(form: StateForm, places: Sequence[Place]) -> tuple[StateForm, tu
         loops[index] = _row(form, part, place.signal, tree.loops, tree.potentials)
         if cutsets is not loops:
             cutsets[index] = _row(form, part, place.signal, tree.cutsets, tree.shares)
-        plus, minus = (GROUND if end is None else part.nodes[end] for end in ends)
+        plus, minus = map(part.node_at, ends)
         template = BranchTemplate(Kind.THROUGH_SOURCE, Integer(0), ends, (), "", (), Integer(0))
         branches.append(GraphBranch(index, place.part, template, plus, minus, ()))
         parts[place.part] = dataclasses.replace(part, branches=(*part.branches, index))
@@ -118,7 +118,7 @@ def _row(
     for index in part.branches:
         if index in links and form.graph.branches[index].template.ends == signal.ends:
             return links[index]
-    ends = [GROUND if end is None else part.nodes[end] for end in signal.ends]
+    ends = [*map(part.node_at, signal.ends)]
     rows = [{} if end == GROUND else _of_node(form, part, end, nodes) for end in ends]
     loop = dict(rows[0])
     for key, factor in rows[1].items():

@@ -88,7 +88,7 @@ class Observables:
 
     def across(self, part: GraphPart, port: End) -> Expr:
         """The across variable of a port against the reference."""
-        node = GROUND if port is None else part.nodes[port]
+        node = part.node_at(port)
         row = None if node == GROUND else self.form.tree.potentials[node]
         if row is None:
             return Integer(0)
@@ -202,7 +202,7 @@ class NamedReadings(Observables):
 
     def across(self, part: GraphPart, port: End) -> Expr:
         """The across variable of a port against the reference."""
-        node = GROUND if port is None else part.nodes[port]
+        node = part.node_at(port)
         return Integer(0) if node == GROUND else self._symbol(Observable("across", node))
 
     def into(self, part: GraphPart, port: End) -> Expr:

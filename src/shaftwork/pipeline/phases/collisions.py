@@ -32,7 +32,6 @@ from shaftwork.components.branches import INTEGRAL
 from shaftwork.components.modes import Leave
 from shaftwork.core.errors import SimulationError
 from shaftwork.core.kept import Kept
-from shaftwork.network.graph import GROUND
 from shaftwork.pipeline.phases.contacts import Contact, lasting, limited, one_side, opens_at
 from shaftwork.pipeline.phases.hybrid_state import CLEAR, NOTHING, HybridState, Regime
 from shaftwork.pipeline.phases.impulses import Blow, ImpactStage, ImpactStart, Impulses
@@ -327,7 +326,7 @@ class Collisions:
         element = self._elements[contact.number]
         part = moment.regime.assembly.parts[element.part.name]
         ends = part.ends_of(element.modes)[:: int(contact.side)]
-        first, second = (GROUND if end is None else part.nodes[end] for end in ends)
+        first, second = map(part.node_at, ends)
         return first, second
 
     def _restitution(self, contact: Contact, opens: float) -> float:

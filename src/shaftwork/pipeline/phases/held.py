@@ -244,7 +244,7 @@ def holds(element: ModeMachine) -> bool:
 def _law(form: StateForm, element: ModeMachine) -> int | None:
     """The link whose law has the mode of an element, between its ends, where inertias tell the speeds of both."""
     graph, part = form.graph, next(part for part in form.graph.parts if part.name == element.part.name)
-    ends = tuple(GROUND if end is None else part.nodes[end] for end in part.ends_of(element.modes))
+    ends = tuple(map(part.node_at, part.ends_of(element.modes)))
     for index in part.branches:
         branch = graph.branches[index]
         symbols = {symbol.name for symbol in branch.template.law.free_symbols}

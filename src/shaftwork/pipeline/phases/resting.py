@@ -74,5 +74,5 @@ def holds_at_rest(form: StateForm, part: GraphPart, element: Modes) -> tuple[int
 
 
 def _potential(form: StateForm, part: GraphPart, end: End) -> Mapping[int, Number] | None:
-    node = GROUND if end is None else part.nodes[end]
+    node = part.node_at(end)
     return {} if node == GROUND else form.tree.potentials[node]
