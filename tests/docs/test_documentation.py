@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
+import importlib.util
 import json
 import re
 from pathlib import Path
@@ -157,6 +157,14 @@ def test_the_sign_page_names_every_test_of_signs_and_no_other() -> None:
     named = set(TEST.findall(TEXTS["signs.md"]))
     assert named - {reversal} == set(re.findall(r"^def (test_\w+)", tests, re.MULTILINE))
     assert f"def {reversal}" in (ROOT / "tests/properties/test_invariance.py").read_text(encoding="utf-8")
+
+
+def test_every_term_of_the_glossary_stands_in_the_module_that_it_names() -> None:
+    rows = [row.split("|") for row in TEXTS["glossary.md"].splitlines() if row.startswith("| ") and "`" in row]
+    places = [module for row in rows for module in re.findall(r"`([\w.]+)`", row[-2])]
+    assert len(places) >= 20
+    missing = [place for place in places if importlib.util.find_spec(f"shaftwork.{place}") is None]
+    assert missing == []
 
 
 def test_the_page_of_the_interface_has_every_public_name() -> None:
