@@ -10,7 +10,7 @@ from numpy.polynomial import polynomial
 from scipy import sparse
 from scipy.integrate import solve_ivp
 
-from shaftwork.core.errors import SimulationError
+from shaftwork.core.errors import AccuracyWarning, SimulationError
 from shaftwork.integrate.lossless import commensurate
 from shaftwork.integrate.lossless import engine as delay
 from shaftwork.integrate.lossless.collocation import POINTS
@@ -469,6 +469,15 @@ def test_a_layer_that_is_too_narrow_so_late_is_named():
     # Late in a run times are rounded to more than the part of a delay that rtol lets an engine step over.
     problem = two_inertias(step, 3000 * T, (1e-14 * Z * T, JB), rtol=1e-11)
     with pytest.raises(SimulationError, match="too narrow to be resolved"):
+        delay.solve(problem)
+
+
+def test_a_long_motion_that_its_panels_cannot_resolve_says_so(monkeypatch):
+    # Ends that start with a jump of their speed excite all modes alike, and these run out of step.
+    monkeypatch.setattr(commensurate, "MOST_PANELS_FAR", 4)
+    times = np.array([1e5, 2e5]) * T
+    problem = replace(two_inertias(step, 2e5 * T, rtol=1e-7, t_eval=times, steady=True), x0=np.array([1.0, -1.0]))
+    with pytest.warns(AccuracyWarning, match="wrinkles finer than [34] panels in a delay"):
         delay.solve(problem)
 
 

@@ -8,18 +8,22 @@ from itertools import pairwise
 
 import numpy as np
 
+from shaftwork.core.errors import AccuracyWarning
+from shaftwork.core.notices import warn
 from shaftwork.integrate.engines import WAVE
 from shaftwork.integrate.lossless.collocation import STAGES
 from shaftwork.integrate.lossless.lattice import ROUNDING, Lattice
 from shaftwork.integrate.lossless.lines import DelayProblem, DelayTrajectory
 from shaftwork.integrate.lossless.panel_maps import Matrices, panel_map
+from shaftwork.integrate.lossless.periodic_propagation import Far, PeriodicPropagation
 
 # Delays are whole multiples of a part of the shortest one, up to rounding, and no longer than so many of them.
 MOST_PARTS, MOST_PERIODS = 12, 64
 # More panels in a period, or unknowns in a panel, are left to the march.
-MOST_PANELS, MOST_ROWS = 64, 400
-# A motion of fewer panels is short.
-SHORT = 2_000
+MOST_PANELS, MOST_ROWS = 16, 400
+MOST_PANELS_FAR = 64
+# A motion of fewer panels is short. One of more, and of more for each output, is leapt through after so many periods.
+SHORT, LONG, LONG_GAP, BEGINNING = 2_000, 20_000, 100, 256
 
 
 def solve(problem: DelayProblem) -> DelayTrajectory | None:
@@ -28,6 +32,9 @@ def solve(problem: DelayProblem) -> DelayTrajectory | None:
     Law: every period, of the length of that measure, is divided alike, at t0 and at the breakpoints and where a layer
     needs it, so each panel is one constant map from (x, h) to (x, waves). Blocks of periods are marched side by side
     from zero and from unit vectors, then their true starts are carried from block to block, and they are marched again.
+    A long motion under constant inputs with few outputs is leapt through: the map over 256 periods is marched, squared
+    again and again, and applied from output to output. What is asked for is checked as elsewhere; where modes
+    have run too far out of step for 64 panels a period, a warning says how much of the waves is not resolved.
 
     Raises:
         SimulationError: as `shaftwork.integrate.lossless.engine.solve`.
@@ -44,8 +51,9 @@ def solve(problem: DelayProblem) -> DelayTrajectory | None:
     resolved = (problem.t_end - problem.t0) / period * len(pattern) < SHORT
     while True:
         lattice = Lattice(problem, map_of, period, multiples, pattern)
+        far = _is_long(lattice)  # a long motion scrambles its modes, and the march cannot take it over
         if resolved:
-            found, bad = _whole(lattice, rtol)
+            found, bad = _far(lattice, rtol) if far else _whole(lattice, rtol)
             if found is not None:
                 return found
         else:
@@ -53,8 +61,15 @@ def solve(problem: DelayProblem) -> DelayTrajectory | None:
             bad = lattice.unresolved(lattice.run(min(lattice.count, beginning)), rtol)
         resolved = not any(bad)
         pattern = _refined(pattern, bad)
-        if not resolved and len(pattern) > MOST_PANELS:
+        if not far and not resolved and len(pattern) > MOST_PANELS:
             return None
+
+
+def _is_long(lattice: Lattice) -> bool:
+    problem = lattice.problem
+    if not problem.steady or problem.t_eval is None:
+        return False
+    return bool(lattice.count - lattice.edges[-2] > max(LONG, LONG_GAP * problem.t_eval.size))
 
 
 def _whole(lattice: Lattice, rtol: float) -> tuple[DelayTrajectory | None, list[bool]]:
@@ -64,6 +79,31 @@ def _whole(lattice: Lattice, rtol: float) -> tuple[DelayTrajectory | None, list[
     run = lattice.run(lattice.count)
     bad = lattice.unresolved(run, rtol)
     return (None if any(bad) else lattice.trajectory(run, lattice.problem.t_eval)), bad
+
+
+def _far(lattice: Lattice, rtol: float) -> tuple[DelayTrajectory | None, list[bool]]:
+    """As `_whole`, for a long motion of few outputs."""
+    times = np.asarray(lattice.problem.t_eval, dtype=float)
+    run = lattice.run(lattice.edges[-2] + max(BEGINNING * lattice.size, lattice.reach))
+    leaps = PeriodicPropagation(lattice, run)
+    asked = np.unique(lattice.panels(times))
+    late = leaps.run(np.append(asked[asked >= leaps.first], lattice.count - 1))
+    bad = [any(both) for both in zip(lattice.unresolved(run, rtol), lattice.unresolved(late, rtol), strict=True)]
+    if any(bad):
+        if 2 * lattice.size <= MOST_PANELS_FAR:
+            return None, bad
+        warn(
+            f"After {lattice.count // lattice.size:g} delays the modes have run out of step and the waves have "
+            f"wrinkles finer than {lattice.size} panels in a delay: about {lattice.wrinkles(late):.1g} of the largest "
+            f"wave is not resolved (asked: {rtol:.1g}). The energy is kept all the same. An input without jumps, or a "
+            "little damping with model=Spectral(16), leaves fewer wrinkles.",
+            AccuracyWarning,
+        )
+        bad = [False] * lattice.size
+    far = Far(lattice.trajectory(run, np.empty(0)), leaps, lattice)
+    x, h, v = far.all(times)
+    statistics = {"steps": len(run.numbers) + len(asked)}
+    return DelayTrajectory(times, x, far, statistics, h, v, waves=far.waves, squares=far.squares, past=None), bad
 
 
 def _measure(problem: DelayProblem) -> tuple[float, tuple[int, ...]] | None:

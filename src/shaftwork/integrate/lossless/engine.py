@@ -26,7 +26,8 @@ def solve(problem: DelayProblem) -> DelayTrajectory:
     tolerance, so the panels are graded towards the boundary layer of a light end. A layer that is narrower than the
     hundredth part of rtol times the shortest delay is stepped over by Radau IIA, which leaves no ringing; in it the
     output is that of a straightened layer. Linear networks whose delays have a common measure are solved by one
-    constant map a panel (`shaftwork.integrate.lossless.commensurate`).
+    constant map a panel, and long ones with constant inputs and few outputs by its powers
+    (`shaftwork.integrate.lossless.commensurate`).
 
     Raises:
         SimulationError: a value is not finite, Newton's method fails, a layer cannot be resolved, or too many panels.

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.core.errors import SimulationError
-from shaftwork.integrate.lossless.collocation import GAUSS, POWERS, STAGES, STATE_POWERS
+from shaftwork.integrate.lossless.collocation import GAUSS, POWERS, STAGES, STATE_POWERS, WEIGHTS
 from shaftwork.integrate.lossless.lines import DelayProblem, DelayTrajectory, Past, past_of
 from shaftwork.integrate.lossless.panel_maps import PanelMap
 from shaftwork.integrate.lossless.scales import RESOLVED, Scales, left_out
@@ -38,6 +38,8 @@ class LatticeRun:
         waves: (m, q, s) that leave the ends.
         arrived: (m, q, s) history torques.
         ends: state before each breakpoint and at the end of the last panel.
+        squares: (m, q) integrals of the squared wave that leaves each end, over the delay before a panel's start; only
+            where they were asked for.
     """
 
     numbers: Numbers
@@ -46,6 +48,7 @@ class LatticeRun:
     waves: Array
     arrived: Array
     ends: list[Array]
+    squares: Array = field(default_factory=lambda: np.empty((0, 0)))
 
 
 class Lattice:
@@ -104,6 +107,10 @@ class Lattice:
         """Start times of panels in s."""
         periods, places = np.divmod(panels, self.size)
         return np.asarray(self.problem.t0 + (periods * self._period + self._offsets[places]), dtype=float)
+
+    def weights(self, panels: Numbers) -> Array:
+        """Weights (..., s) in s of the values at the Gauss points in an integral over each panel."""
+        return np.asarray(self.lengths[panels % self.size, None] / 2 * WEIGHTS)
 
     def panels(self, times: Array) -> Numbers:
         """The panels in which times (k,) in s lie, the later ones where two meet."""
@@ -185,14 +192,14 @@ class Lattice:
     def _block_starts(self, first: int, x: Array, window: Array, driven: Array) -> Array:
         """State and window (n + reach q s, blocks) with which each block starts."""
         blocks = driven.shape[2]
-        power, forced = self._power(first, driven)
+        power, forced = self.power(first, driven)
         starts = np.empty((len(power), blocks))
         starts[:, 0] = np.concatenate([x, window.ravel()])
         for block in range(1, blocks):
             starts[:, block] = power @ starts[:, block - 1] + forced[:, block - 1]
         return starts
 
-    def _power(self, first: int, driven: Array) -> tuple[Array, Array]:
+    def power(self, first: int, driven: Array) -> tuple[Array, Array]:
         """What a block makes of unit vectors (z, z) and of its inputs alone (z, blocks), z = n + reach q s."""
         length, _, blocks = driven.shape
         size = self._n + self.reach * self._q * STAGES
@@ -243,6 +250,11 @@ class Lattice:
             panel = int(np.argmin(finite))
             raise self.failure(panel, run.starts[panel], "a wave or a state is not finite")
         return [not fits[run.numbers % self.size == place].all() for place in range(self.size)]
+
+    def wrinkles(self, run: LatticeRun) -> float:
+        """The part of the largest wave that panels leave out, about."""
+        rows = np.concatenate([run.waves, run.states], axis=1)
+        return float(left_out(rows, run.starts)[:, : self._q].max() / np.abs(run.waves).max())
 
     def trajectory(self, run: LatticeRun, times: Array | None) -> DelayTrajectory:
         """What was found in the first panels, or in all, at times (k,) in s or at the ends of the panels."""
