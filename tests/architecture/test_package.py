@@ -67,6 +67,7 @@ def test_a_sub_package_is_loaded_when_it_is_first_asked_for(name: str, monkeypat
 
 
 @pytest.mark.slow
+@pytest.mark.study
 def test_fewer_examples_than_the_default_break_no_property() -> None:
     options = ("-q", "-n", "0", "-p", "no:cacheprovider", "-m", "not slow", "tests/properties")
     done = subprocess.run(
