@@ -50,7 +50,7 @@ def hand_derived(_: float, x: np.ndarray) -> list[float]:
 
 
 @pytest.mark.parametrize(
-    ("engine", "rtol", "within"), [("scipy", 1e-12, 1e-10), ("heyoka", 1e-12, 1e-10), ("sundials", 1e-7, 1e-3)]
+    ("engine", "rtol", "within"), [("scipy", 1e-12, 1e-10), ("heyoka", 1e-12, 1e-10), ("sundials", 1e-9, 1e-5)]
 )
 def test_an_arm_moves_as_lagrange_says_and_keeps_its_energy(engine: str, rtol: float, within: float) -> None:
     start = {"motor.omega": 3.0, "arm.omega": 1.0, "arm.phi": 0.4}
