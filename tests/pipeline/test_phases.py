@@ -414,3 +414,18 @@ def test_a_motion_is_freed_with_its_last_holder(engine: str) -> None:
         gc.set_debug(0)
         gc.garbage.clear()
         gc.enable()
+
+
+@pytest.mark.parametrize("load", [sw.CoulombLoad("load", tau=1.0), sw.Damper("load", d=1.0)], ids=["phases", "none"])
+def test_a_motion_is_not_run_again_for_what_nobody_asks(load: sw.Component, monkeypatch: pytest.MonkeyPatch) -> None:
+    heyoka = pytest.importorskip("shaftwork.integrate.heyoka_taylor")
+
+    def refuse(_: object) -> None:
+        raise AssertionError("the motion is run again")
+
+    monkeypatch.setattr(heyoka._TaylorReplay, "_segments", property(refuse))
+    net = sw.Network("drive")
+    net.add(sw.TorqueSource("motor", tau=2.0), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(load, "a")
+    assert len(net.simulate(1.0, engine="heyoka", t_eval=[0.5, 1.0]).t) == 2

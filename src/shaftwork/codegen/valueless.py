@@ -52,14 +52,15 @@ def without_value(bound: BoundArrays, times: Array, states: Array) -> Simulation
 
 
 def refuse_vanishing(
-    form: StateForm, bind: Callable[[], BoundArrays], steps: Array, x: Callable[[Array], Array]
+    form: StateForm, bind: Callable[[], BoundArrays], steps: Callable[[], Array], x: Callable[[Array], Array]
 ) -> None:
     """Refuse a motion in which an inertia that changes is not above zero.
 
     Args:
         form: the equations.
         bind: makes them for their parameters.
-        steps: (k,) times in s at which the steps of the motion end, or its start alone.
+        steps: makes (k,) times in s at which the steps of the motion end, or its start alone; not called, as the
+            motion may have to be run again for it, where no inertia may vanish.
         x: from times to (k, n) states, or more.
 
     Raises:
@@ -71,7 +72,7 @@ def refuse_vanishing(
         def course(times: Array, bound: BoundArrays = bound, change: int = change) -> Array:
             return _capacity(bound, change, times, x(times)[:, : len(form.states)])
 
-        times = _with_lowest(course, steps)
+        times = _with_lowest(course, steps())
         if (error := _objection(bound, change, times, course(times), course)) is not None:
             raise error
 

@@ -158,9 +158,9 @@ class Model(CompiledModel):
     def _run(self, prepared: Prepared, initial: Given, demand: Demand) -> Solution:
         x0, waves = start_of(self, prepared, initial, demand.span)
         problem, bind = self._problem(prepared, x0, demand), lambda: prepared.bound
-        refuse_vanishing(self.form, bind, np.array([problem.t0]), lambda _: x0[None])
+        refuse_vanishing(self.form, bind, lambda: np.array([problem.t0]), lambda _: x0[None])
         trajectory, name, why = self._solve(prepared, problem, waves, demand.engine)
-        refuse_vanishing(self.form, bind, trajectory.dense.steps, trajectory.dense)
+        refuse_vanishing(self.form, bind, lambda: trajectory.dense.steps, trajectory.dense)
         return Solution(
             name=self.name,
             t=trajectory.t,

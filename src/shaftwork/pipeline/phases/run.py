@@ -282,10 +282,10 @@ class HybridRun:
         """One run of the engine, up to a change of equations or the next instant at which an input jumps."""
         regime, form = moment.regime, moment.regime.assembly.model.form
         bind = partial(regime.assembly.bound, regime.p)
-        refuse_vanishing(form, bind, np.array([t]), lambda _: moment.x[None])
+        refuse_vanishing(form, bind, lambda: np.array([t]), lambda _: moment.x[None])
         trajectory, passing = self._passed(t, moment)
         passing.close()
-        refuse_vanishing(form, bind, trajectory.dense.steps, trajectory.dense)
+        refuse_vanishing(form, bind, lambda: trajectory.dense.steps, trajectory.dense)
         self.steps += trajectory.statistics.get("steps", 0)
         assert trajectory.end is not None  # noqa: S101 (engines that follow guards say it)
         t, x = trajectory.end
