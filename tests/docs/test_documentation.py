@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import json
 import re
@@ -23,6 +24,7 @@ STORIES = TEXTS | {
     )
     for notebook in NOTEBOOKS
 }
+BENCHMARKS = {path.name: path.read_text(encoding="utf-8") for path in sorted((ROOT / "benchmarks").glob("*.py"))}
 
 CODE = re.compile(r"```.*?```|(?<!`)`([^`\n]+)`(?!`)", re.DOTALL)
 """Fenced blocks, and what stands between single quotes of code."""
@@ -32,6 +34,7 @@ QUALIFIED = re.compile(r"\bsw\.([A-Za-z]\w*)(?:\.([a-z]\w*))?")
 MEMBER = re.compile(r"([A-Z][a-z]+\w*)\.([a-z]\w*)(?:\(.*\))?")
 CAPITALISED = re.compile(r"([A-Z][a-z]+\w*)(?:\(.*\))?")
 TEST = re.compile(r"`(test_\w+)`")
+IMPORT = re.compile(r"^from (shaftwork[\w.]*) import (\([^)]*\)|.*)$", re.MULTILINE)
 LARGEST_PICTURE = 150_000
 LONGEST_README = 150
 
@@ -134,6 +137,16 @@ def test_only_names_that_exist_are_named(name: str) -> None:
             assert _has(getattr(sw, found[1]), found[2]), code
         elif found := CAPITALISED.fullmatch(code):
             assert hasattr(sw, found[1]) or hasattr(sympy, found[1]), code
+
+
+@pytest.mark.parametrize("name", [*STORIES, *BENCHMARKS])
+def test_what_pages_notebooks_and_benchmarks_import_is_there(name: str) -> None:
+    """Also where they run in minutes only, so that a renamed class is seen at once."""
+    for module, names in IMPORT.findall(STORIES[name] if name in STORIES else BENCHMARKS[name]):
+        where = importlib.import_module(module)
+        for imported in re.findall(r"\w+", names):
+            if not hasattr(where, imported):
+                importlib.import_module(f"{module}.{imported}")
 
 
 def _has(owner: Any, member: str) -> bool:
