@@ -10,6 +10,7 @@ print. Readers do not see these, which stand between the blocks:
 
     <!-- python ... -->                     code that runs like a block
     <!--= expression -->figure<!--/-->      a figure in a sentence: what the expression is in that namespace
+    ![text](pictures/x.png)<!-- drawn: expression -->    a picture: the matplotlib figure that the expression is
     <!-- made: name --> ... <!-- end -->    what the function of this name in `MADE` returns
     <!-- measured: script --> ... <!-- end -->    what a script of benchmarks/ prints on the machine that it names
     <!-- given: 250 kW, two masses -->      figures that no code makes: of sources, norms and definitions
@@ -36,6 +37,10 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
+import numpy as np
+from matplotlib.figure import Figure
+from PIL import Image
+
 from shaftwork.cli import main as command_line
 from shaftwork.components import REGISTRY, Component, Port
 from shaftwork.core.parameters import Parameter
@@ -48,8 +53,14 @@ NOTEBOOKS = tuple(sorted((ROOT / "notebooks").glob("*.ipynb")))
 
 BLOCK = re.compile(r"^```(?P<language>\w+)\n(?P<body>.*?)^```$", re.MULTILINE | re.DOTALL)
 MADE_PART = re.compile(r"(?P<start><!-- made: (?P<name>[\w ]+) -->\n).*?(?P<end><!-- end -->)", re.DOTALL)
-HIDDEN = re.compile(r"<!-- python\n(?P<code>.*?)-->|<!--=(?P<expression>.*?)-->(?P<figure>.*?)<!--/-->", re.DOTALL)
-"""Code that runs, and figures that are computed, between the blocks."""
+HIDDEN = re.compile(
+    r"<!-- python\n(?P<code>.*?)-->|<!--=(?P<expression>.*?)-->(?P<figure>.*?)<!--/-->"
+    r"|\((?P<picture>pictures/[\w-]+\.png)\)<!-- drawn: (?P<drawn>.*?) -->",
+    re.DOTALL,
+)
+"""Code that runs, figures that are computed, and pictures that are drawn, between the blocks."""
+RESOLUTION = 100
+"""Pixels per inch of a picture: a small file that is sharp in a column of text."""
 OUTPUT = ("text", "toml", "latex", "c")
 """Languages of the blocks that hold what the block before them printed."""
 FAMILIES = (
@@ -78,16 +89,18 @@ MACHINE = re.compile(r"^\d+(?= steps[,;])|(?<=; energy residual )\S+(?= of the w
 from one machine to the next; nothing else on a page may."""
 
 
-def remade(page: Path, text: str, *, slow: bool = False) -> str:
+def remade(page: Path, text: str, *, slow: bool = False, draw: bool = False) -> str:
     """The text of a page with everything in it that is made from the code made anew.
 
     Args:
         page: its file, for messages.
         text: the page as it stands.
         slow: whether what takes minutes is made anew, too.
+        draw: whether pictures that do not show what the code says are drawn anew.
 
     Raises:
-        ValueError: an example prints something that the page does not show.
+        ValueError: an example prints something that the page does not show, or a picture shows something else
+            (without `draw`).
         Exception: whatever an example raises.
     """
 
@@ -98,10 +111,10 @@ def remade(page: Path, text: str, *, slow: bool = False) -> str:
     text = MADE_PART.sub(made, text)
     # components that a page defines are forgotten after it
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder), mock.patch.dict(REGISTRY):
-        return "".join(_executed(page, text))
+        return "".join(_executed(page, text, draw))
 
 
-def _executed(page: Path, text: str) -> Iterator[str]:
+def _executed(page: Path, text: str, draw: bool) -> Iterator[str]:
     """The page piece by piece, with the outputs of its blocks and the figures of its sentences replaced."""
     namespace: dict[str, Any] = {"__name__": "__main__"}
     place, printed = 0, ""
@@ -110,7 +123,7 @@ def _executed(page: Path, text: str) -> Iterator[str]:
         if printed and (between.strip() or language not in OUTPUT):
             line = text.count("\n", 0, place)
             raise ValueError(f"{page.name}:{line}: the example prints {printed[:60]!r}, which is not shown.")
-        yield _told(between, page, text.count("\n", 0, place), namespace)
+        yield _told(between, page, text.count("\n", 0, place), namespace, draw)
         if printed:
             body, printed = printed, ""
         elif language == "python":
@@ -121,10 +134,10 @@ def _executed(page: Path, text: str) -> Iterator[str]:
         place = match.end()
     if printed:
         raise ValueError(f"{page.name}: the last example prints {printed[:60]!r}, which is not shown.")
-    yield _told(text[place:], page, text.count("\n", 0, place), namespace)
+    yield _told(text[place:], page, text.count("\n", 0, place), namespace, draw)
 
 
-def _told(text: str, page: Path, line: int, namespace: dict[str, Any]) -> str:
+def _told(text: str, page: Path, line: int, namespace: dict[str, Any], draw: bool) -> str:
     """Sentences with their figures computed; hidden code between them runs."""
 
     def computed(match: re.Match[str]) -> str:
@@ -132,6 +145,9 @@ def _told(text: str, page: Path, line: int, namespace: dict[str, Any]) -> str:
         if match["code"] is not None:
             if printed := _run(match["code"], page, place + 1, namespace):
                 raise ValueError(f"{page.name}:{place}: hidden code prints {printed[:60]!r}, which is not shown.")
+            return match[0]
+        if match["drawn"] is not None:
+            _drawn(ROOT / "docs" / match["picture"], eval(match["drawn"], namespace), draw)  # noqa: S307 - as below
             return match[0]
         if text[: match.start()].rpartition("\n")[2].strip() in ("", "-"):
             raise ValueError(
@@ -141,6 +157,23 @@ def _told(text: str, page: Path, line: int, namespace: dict[str, Any]) -> str:
         return f"<!--={match['expression']}-->{figure}<!--/-->"
 
     return HIDDEN.sub(computed, text)
+
+
+def curves(figure: Figure) -> str:
+    """The curves of a figure, each by its label and its range to four digits."""
+    lines = (line for axes in figure.axes for line in axes.lines)
+    ranges = ((line.get_label(), np.asarray(line.get_ydata(), float)) for line in lines)
+    return "; ".join(f"{label}: {values.min():.4g} to {values.max():.4g}" for label, values in ranges)
+
+
+def _drawn(path: Path, figure: Figure, draw: bool) -> None:
+    """Compare a picture with a figure: it says in its description which curves it shows."""
+    text = curves(figure)
+    if path.exists() and Image.open(path).text.get("Description") == text:
+        return
+    if not draw:
+        raise ValueError(f"{path.name} does not show what the code says: {text}. Run python docs/generate.py.")
+    figure.savefig(path, dpi=RESOLUTION, metadata={"Description": text})
 
 
 def _run(code: str, page: Path, line: int, namespace: dict[str, Any]) -> str:
@@ -294,7 +327,7 @@ def main() -> None:
     slow = "--slow" in sys.argv
     for page in [Path(name).resolve() for name in sys.argv[1:] if name != "--slow"] or PAGES:
         text = page.read_text(encoding="utf-8")
-        made = remade(page, text, slow=slow)
+        made = remade(page, text, slow=slow, draw=True)
         if not same(text, made):
             page.write_text(made, encoding="utf-8")
             sys.stdout.write(f"written: {page.relative_to(ROOT)}\n")

@@ -1,6 +1,6 @@
-"""Makes the pictures of the pages.
+"""Makes the pictures of the first page; those of other pages are drawn by their examples (`generate.py`).
 
-python docs/pictures.py             needs the extra `plot`, pdflatex and pdftoppm
+python -m docs.pictures             needs the extra `plot`, pdflatex and pdftoppm
 
 Each file says in its description what it was made of, `sources()`; the tests compare that with what the code says now.
 """
@@ -15,12 +15,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.image import imread, imsave
 
+from docs.generate import RESOLUTION, curves
 from shaftwork import scenes
 from shaftwork.scenes.crane import WHEEL_RADIUS
 
 PICTURES = Path(__file__).parent / "pictures"
-RESOLUTION = 110
-"""Pixels per inch: small files that are sharp in a column of text."""
 EQUATIONS, START = "crane-equations.png", "crane-start.png"
 
 MARGIN = 20
@@ -62,13 +61,6 @@ def crane_start() -> Figure:
         axis.grid(alpha=0.3)
         axis.set_xlim(0.0, scene.t_end)
     return figure
-
-
-def curves(figure: Figure) -> str:
-    """The curves of a figure, each by its label and its range to four digits."""
-    lines = (line for axes in figure.axes for line in axes.lines)
-    ranges = ((line.get_label(), np.asarray(line.get_ydata(), float)) for line in lines)
-    return "; ".join(f"{label}: {values.min():.4g} to {values.max():.4g}" for label, values in ranges)
 
 
 def sources() -> dict[str, str]:

@@ -207,11 +207,11 @@ def test_every_kind_of_problem_on_the_page_is_one_of_the_code() -> None:
 
 
 def test_pictures_show_what_the_code_says_now() -> None:
-    """`python docs/pictures.py` makes them so."""
+    """`python -m docs.pictures` makes them so."""
     images = pytest.importorskip("PIL.Image", reason="matplotlib brings it")
-    pictures = importlib.import_module("docs.pictures")
-    shown = {picture.name: images.open(picture).text.get("Description") for picture in (DOCS / "pictures").iterdir()}
-    assert shown == pictures.sources()
+    sources = importlib.import_module("docs.pictures").sources()
+    shown = {name: images.open(DOCS / "pictures" / name).text.get("Description") for name in sources}
+    assert shown == sources
 
 
 def test_the_readme_is_short() -> None:
