@@ -111,10 +111,10 @@ def remade(page: Path, text: str, *, slow: bool = False, draw: bool = False) -> 
     text = MADE_PART.sub(made, text)
     # components that a page defines are forgotten after it
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder), mock.patch.dict(REGISTRY):
-        return "".join(_executed(page, text, draw))
+        return "".join(_executed(page, text, draw=draw))
 
 
-def _executed(page: Path, text: str, draw: bool) -> Iterator[str]:
+def _executed(page: Path, text: str, *, draw: bool) -> Iterator[str]:
     """The page piece by piece, with the outputs of its blocks and the figures of its sentences replaced."""
     namespace: dict[str, Any] = {"__name__": "__main__"}
     place, printed = 0, ""
@@ -123,7 +123,7 @@ def _executed(page: Path, text: str, draw: bool) -> Iterator[str]:
         if printed and (between.strip() or language not in OUTPUT):
             line = text.count("\n", 0, place)
             raise ValueError(f"{page.name}:{line}: the example prints {printed[:60]!r}, which is not shown.")
-        yield _told(between, page, text.count("\n", 0, place), namespace, draw)
+        yield _told(between, page, text.count("\n", 0, place), namespace, draw=draw)
         if printed:
             body, printed = printed, ""
         elif language == "python":
@@ -134,10 +134,10 @@ def _executed(page: Path, text: str, draw: bool) -> Iterator[str]:
         place = match.end()
     if printed:
         raise ValueError(f"{page.name}: the last example prints {printed[:60]!r}, which is not shown.")
-    yield _told(text[place:], page, text.count("\n", 0, place), namespace, draw)
+    yield _told(text[place:], page, text.count("\n", 0, place), namespace, draw=draw)
 
 
-def _told(text: str, page: Path, line: int, namespace: dict[str, Any], draw: bool) -> str:
+def _told(text: str, page: Path, line: int, namespace: dict[str, Any], *, draw: bool) -> str:
     """Sentences with their figures computed; hidden code between them runs."""
 
     def computed(match: re.Match[str]) -> str:
@@ -147,7 +147,7 @@ def _told(text: str, page: Path, line: int, namespace: dict[str, Any], draw: boo
                 raise ValueError(f"{page.name}:{place}: hidden code prints {printed[:60]!r}, which is not shown.")
             return match[0]
         if match["drawn"] is not None:
-            _drawn(ROOT / "docs" / match["picture"], eval(match["drawn"], namespace), draw)  # noqa: S307 - as below
+            _drawn(ROOT / "docs" / match["picture"], eval(match["drawn"], namespace), draw=draw)  # noqa: S307 - as below
             return match[0]
         if text[: match.start()].rpartition("\n")[2].strip() in ("", "-"):
             raise ValueError(
@@ -166,7 +166,7 @@ def curves(figure: Figure) -> str:
     return "; ".join(f"{label}: {values.min():.4g} to {values.max():.4g}" for label, values in ranges)
 
 
-def _drawn(path: Path, figure: Figure, draw: bool) -> None:
+def _drawn(path: Path, figure: Figure, *, draw: bool) -> None:
     """Compare a picture with a figure: it says in its description which curves it shows."""
     text = curves(figure)
     if path.exists() and Image.open(path).text.get("Description") == text:

@@ -1,7 +1,7 @@
 """Notebooks in the built site, executed, with their outputs and figures.
 
-mkdocs calls `on_files` and `on_page_markdown` (`hooks` in mkdocs.yml). `mkdocs serve` shows the notebooks without
-outputs, as they would be executed anew after every change of a page.
+mkdocs calls `on_files` and `on_page_markdown` (`hooks` in mkdocs.yml). With EXECUTE_NOTEBOOKS=false in the environment
+the notebooks have no outputs, and the site is built in seconds: for `mkdocs serve` while one writes.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import asyncio
 import os
 import re
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import nbformat
 from mkdocs.config.defaults import MkDocsConfig
@@ -27,14 +27,6 @@ OTHER = re.compile(r"\]\(([\w-]+)\.ipynb\)")
 STYLE = re.compile(r"<style scoped>.*?</style>", re.DOTALL)
 """What pandas puts before every table."""
 
-_command = "build"
-
-
-def on_startup(command: Literal["build", "gh-deploy", "serve"], **_: Any) -> None:
-    """Remember whether the site is built or served."""
-    global _command
-    _command = command
-
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """The files of the site, with a page and the figures of every notebook.
@@ -44,7 +36,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     """
     paths = sorted(NOTEBOOKS.glob("*.ipynb"))
     notebooks = [nbformat.read(path, as_version=4) for path in paths]
-    if _command != "serve":
+    if config.extra["execute_notebooks"]:
         asyncio.run(_execute(notebooks))
     exporter = MarkdownExporter()
     for path, notebook in zip(paths, notebooks, strict=True):
