@@ -26,7 +26,7 @@ _QUANTITIES = {
 class Inverse(NamedTuple):
     """A letter for the reciprocal of a parameter, as for a compliance in place of a stiffness.
 
-    Args:
+    Attributes:
         latex: the letter.
         unit: its SI unit.
         meaning: a few words for the nomenclature.

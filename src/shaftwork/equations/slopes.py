@@ -21,7 +21,7 @@ VARIED = Symbol("varied", real=True)
 class Slope(NamedTuple):
     """What the letter of a slope stands for: how what a law lets through changes with what it reads.
 
-    Args:
+    Attributes:
         of: symbol of what passes through, with a sign; zero where that of the law alone has none.
         by: what the law reads.
         value: the slope, in quantities of the network.
