@@ -21,6 +21,8 @@ pytestmark = pytest.mark.slow
 
 FENCE = re.compile(r"^```.*?^```$|`[^`\n]+`", re.MULTILINE | re.DOTALL)
 FORMULA = re.compile(r"\$\$.+?\$\$|\$[^$\n]+\$", re.DOTALL)
+PRINTED = re.compile(r"^```latex$.*?^```$", re.MULTILINE | re.DOTALL)
+"""LaTeX that an example printed."""
 EXTERNAL = re.compile(r"""<(?:script|link|img)[^>]+(?:src|href)=["'](?:https?:)?//""")
 
 MEASURED = """
@@ -67,11 +69,13 @@ def test_the_site_is_built_without_a_warning_and_loads_nothing_from_the_internet
 
 
 @pytest.mark.skipif(CHROMIUM is None and "CI" not in os.environ, reason="needs chromium (Debian package); CI has it")
-@pytest.mark.parametrize("name", ["states", "frequency", "names", "command-line", "components"])
+@pytest.mark.parametrize("name", ["states", "frequency", "names", "command-line", "components", "tutorial"])
 def test_a_browser_without_network_draws_every_formula_and_cuts_nothing_off(
     site: Path, name: str, tmp_path: Path
 ) -> None:
-    written = FORMULA.findall(FENCE.sub("", (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")))
+    source = (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
+    formulas = len(FORMULA.findall(FENCE.sub("", source)))
+    printed = sum(block.count(r"\begin{align*}") for block in PRINTED.findall(source))
     page = site / name / "measured.html"
     text = (site / name / "index.html").read_text(encoding="utf-8")
     page.write_text(text.replace("</head>", f"{MEASURED}</head>"), encoding="utf-8")
@@ -93,7 +97,7 @@ def test_a_browser_without_network_draws_every_formula_and_cuts_nothing_off(
         timeout=120,
     ).stdout
     result = json.loads(unescape(shown.split("MEASURED")[-2]))
-    assert (result["formulas"], result["empty"], result["cut"]) == (len(written), [], [])
+    assert (result["formulas"], result["empty"], result["cut"]) == (formulas + printed, [], [])
     assert all(above < below for above, below in result["fractions"])
 
 
