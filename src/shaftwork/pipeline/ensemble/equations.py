@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.codegen.elements import Array
+from shaftwork.pipeline.arguments import NOMINAL
 from shaftwork.pipeline.ensemble.programs import EnsembleCode
 from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.courses import FEW
 from shaftwork.pipeline.phases.hybrid_state import AHEAD, AHEAD_OF_RUN, CLEAR, EPS, GOLDEN, NOTHING, ROUNDINGS
 from shaftwork.pipeline.phases.mode_machines import ModeNames
-from shaftwork.pipeline.prepared import NOMINAL
 
 Mask = NDArray[np.bool_]
 Course = tuple[Array, Array, Array, Array]

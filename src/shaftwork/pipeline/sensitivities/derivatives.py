@@ -15,7 +15,6 @@ from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import ParameterError, SimulationError
 from shaftwork.pipeline.analysis import Given, Point, Time, operating_point
 from shaftwork.pipeline.arguments import relative_tolerance, time_span
-from shaftwork.pipeline.ending import refuse_motion
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.model import PhasedModel
 from shaftwork.pipeline.sensitivities.differentiable import rows_of, smooth_parameters
@@ -23,6 +22,7 @@ from shaftwork.pipeline.sensitivities.measure_slopes import integrand, measured
 from shaftwork.pipeline.sensitivities.motion_legs import motion_of
 from shaftwork.pipeline.sensitivities.motion_slopes import MotionSlopes
 from shaftwork.pipeline.sensitivities.start_slopes import without_start
+from shaftwork.pipeline.start import refuse_motion
 from shaftwork.results.measures import Measure
 from shaftwork.results.sensitivities import FrequencySensitivities, MotionSensitivities
 from shaftwork.results.slopes import Complex
