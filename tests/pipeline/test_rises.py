@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import shaftwork as sw
 from shaftwork.codegen.elements import Array
-from shaftwork.pipeline.ensemble.rises import first_rises
+from shaftwork.pipeline.ensemble.extremes import first_rises
 from shaftwork.studies import sweep
 
 

@@ -9,8 +9,7 @@ from typing import Self, TypeVar, overload
 
 from shaftwork.components.base import Component
 from shaftwork.core.errors import ParameterError, ShaftworkError
-from shaftwork.network.netlist import IMPACTS, Impacts, Netlist, Placed
-from shaftwork.network.overview import overview
+from shaftwork.network.netlist import IMPACTS, Impacts, Netlist, Placed, overview
 
 C = TypeVar("C", bound=Component)
 N = TypeVar("N", bound="NetworkBuilder")

@@ -1,4 +1,4 @@
-"""The words of laws as text: tokens, functions, limits, and the message that points at a fault."""
+"""Laws as text: words, functions and limits of the grammar, and the message that points at a fault."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from shaftwork.core.errors import ModelFileError
 
 MAXIMUM_LENGTH = 200_000
 """Characters of an expression; long tables take most of them."""
-MAXIMUM_TOKENS = 1000
+MAXIMUM_WORDS = 1000
 """Numbers, names and signs of an expression; a list of a table counts as one."""
 MAXIMUM_DEPTH = 30
 """Parentheses, functions and exponents inside each other."""
@@ -45,15 +45,6 @@ class Function:
     fewest: int
     most: int
     value: Callable[..., float]
-
-
-@dataclass(frozen=True)
-class Token:
-    """A word of a text: "number", "name", "list", "sign" or "end", and its place counted from 0."""
-
-    kind: str
-    text: str
-    position: int
 
 
 def _sign(x: float) -> float:
@@ -85,11 +76,16 @@ FUNCTION_NAMES = ", ".join([*FUNCTIONS, "Piecewise", "Table"])
 COMPARISONS = {"<": sympy.Lt, "<=": sympy.Le, ">": sympy.Gt, ">=": sympy.Ge, "==": sympy.Eq, "!=": sympy.Ne}
 
 _NUMBER = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
-_TOKEN = re.compile(
-    rf"[ \t\r\n]*(?:(?P<number>{_NUMBER})|(?P<name>[A-Za-z_][A-Za-z_0-9]*)|(?P<list>\[[^\[\]]*\])"
-    r"|(?P<sign>\*\*|<=|>=|==|!=|[-+*/<>(),])|(?P<end>\Z)|(?P<other>(?s:.)))"
+SIGNED_NUMBER = re.compile(rf"[+-]?{_NUMBER}")
+"""An item of a list of a table."""
+_WORD = re.compile(
+    r"\s*(?:(?P<sign>\*\*|<=|>=|==|!=|[-+*/<>(),]|(?<![0-9.])(?:and|or|not)\b)"
+    rf"|(?P<value>{_NUMBER}|[A-Za-z_]\w*|\[[\w\s.,=!<>()*/+-]*\])"
+    r"|(?P<end>\Z)|(?P<other>(?s:.)))",
+    re.ASCII,
 )
-_LISTED = re.compile(rf"[ \t\r\n]*([+-]?{_NUMBER})[ \t\r\n]*")
+_PREFIXES = ("(", "+", "-", "not")
+"""Signs that begin a value."""
 _HINTS = {
     "^": "Write a power as x**2.",
     "=": "Compare with == inside Piecewise.",
@@ -98,37 +94,46 @@ _HINTS = {
     "~": "Negate a condition with 'not'.",
     "!": "Write != or 'not'.",
 }
+ALLOWED = "Write numbers, names, + - * / ** ( ) , comparisons and Table([...], [...])."
 
 
-def tokens_of(text: str) -> list[Token]:
-    """The words of a text, the last of kind "end".
+def words_of(text: str) -> list[str]:
+    """The numbers, names, lists and signs of a text, in an order that an expression can have.
 
     Raises:
-        ModelFileError: the text is too long, or has a character that the grammar has no use for.
+        ModelFileError: the text is beyond a limit, has a character that the grammar has no use for, or lacks a value, a
+            sign or a parenthesis.
     """
     if len(text) > MAXIMUM_LENGTH:
         raise ModelFileError(
             f"the expression of {len(text)} characters is longer than {MAXIMUM_LENGTH}. Use a Table of fewer points."
         )
-    tokens: list[Token] = []
-    for match in _TOKEN.finditer(text):
+    words: list[str] = []
+    depth, follows_value = 0, False
+    for match in _WORD.finditer(text):
         kind = str(match.lastgroup)
-        token = Token(kind, match[kind], match.start(kind))
+        word, place, ends = match[kind], match.start(kind), kind == "end"
+        shown = "but the expression ends" if ends else f"not {word[:20]!r}"
         if kind == "other":
-            hint = _HINTS.get(token.text, "Write numbers, names, + - * / ** ( ) , comparisons and Table([...], [...]).")
-            fail(text, token, f"contains {token.text!r}, which is not allowed", hint)
-        if len(tokens) == MAXIMUM_TOKENS:
-            fail(text, token, f"has more than {MAXIMUM_TOKENS} numbers, names and signs", "Use a Table.")
-        tokens.append(token)
-    return tokens
-
-
-def listed_numbers(text: str, token: Token) -> list[float]:
-    """The numbers of a token of kind "list"."""
-    matches = [_LISTED.fullmatch(item) for item in token.text[1:-1].split(",")]
-    if None in matches:
-        fail(text, token, f"has a list whose item {matches.index(None) + 1} is no number", "Lists hold numbers alone.")
-    return [float(match[1]) for match in matches if match]
+            fail(text, place, f"contains {word!r}, which is not allowed", _HINTS.get(word, ALLOWED))
+        if ends and not words:
+            fail(text, place, "is empty", "Write a number or an expression.")
+        if len(words) == MAXIMUM_WORDS:
+            fail(text, place, f"has more than {MAXIMUM_WORDS} numbers, names and signs", "Use a Table.")
+        if len(word) > MAXIMUM_DIGITS and word[0] in "0123456789.":
+            fail(text, place, f"has a number of more than {MAXIMUM_DIGITS} characters", "17 digits are enough.")
+        if follows_value and (kind == "value" or word == "not" or (word == ")" and not depth)):
+            fail(text, place, f"does not go on with {word[:20]!r}", "Write an operator between two values.")
+        if not follows_value and kind != "value" and word not in _PREFIXES:
+            fail(text, place, f"needs a value here, {shown}", "Write a number, a name, a function or a parenthesis.")
+        depth += (word == "(") - (word == ")")
+        if depth > MAXIMUM_DEPTH:
+            fail(text, place, f"is nested deeper than {MAXIMUM_DEPTH}", "Use fewer parentheses.")
+        if ends and depth:
+            fail(text, place, f"needs ')' to close a parenthesis, {shown}", "Check the parentheses and commas.")
+        follows_value = kind == "value" or word == ")"
+        words.append(word)
+    return words
 
 
 def finite(number: float) -> float:
@@ -152,11 +157,10 @@ def fault_of(expression: sympy.Basic) -> str | None:
     return None
 
 
-def fail(text: str, token: Token, what: str, hint: str) -> NoReturn:
-    """Raise the error that shows the place in the text, what is wrong and the next step."""
-    start = max(0, token.position - 60)
-    shown = "".join(c if c.isprintable() else " " for c in text[start : token.position + 30])
+def fail(text: str, place: int, what: str, hint: str) -> NoReturn:
+    """Raise the error that shows a place in the text, counted from 0, what is wrong and the next step."""
+    start = max(0, place - 60)
+    shown = "".join(c if c.isprintable() else " " for c in text[start : place + 30])
     raise ModelFileError(
-        f"the expression {what}, at character {token.position + 1}:\n"
-        f"    {shown}\n    {' ' * (token.position - start)}^\n{hint}"
+        f"the expression {what}, at character {place + 1}:\n    {shown}\n    {' ' * (place - start)}^\n{hint}"
     )

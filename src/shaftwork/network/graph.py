@@ -18,8 +18,7 @@ from shaftwork.components.modes import Modes
 from shaftwork.components.tables import Table
 from shaftwork.core.domains import ROTATION, Domain
 from shaftwork.network.kinds import Kind
-from shaftwork.network.netlist import REFERENCE, Netlist, Placed
-from shaftwork.network.overview import overview
+from shaftwork.network.netlist import REFERENCE, Netlist, Placed, overview
 from shaftwork.network.sharing import Shared
 from shaftwork.network.templates import BranchTemplate, make_template, with_factors
 

@@ -1,8 +1,8 @@
-"""What the laws of a part read that they may not, first as given, then in the branches that they end in."""
+"""What is wrong with the laws of a part, and with what it says of itself: ports, stores, signals, profiles, modes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import ItemsView, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import sympy
@@ -10,17 +10,19 @@ from sympy.core.relational import Relational
 from sympy.functions.elementary.piecewise import ExprCondPair
 from sympy.logic.boolalg import BooleanAtom, BooleanFunction
 
-from shaftwork.components.base import Component
-from shaftwork.components.branches import ACROSS, HISTORY, INTEGRAL
+from shaftwork.components.base import Component, Port, Profile, Signal
+from shaftwork.components.branches import ACROSS, HISTORY, INTEGRAL, THROUGH, End, named_in
 from shaftwork.components.laws import SYMBOLS, t
+from shaftwork.components.modes import ANEW, Modes
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.components.tables import Interpolation, InterpolationSlope, Table
+from shaftwork.core.declarations import is_label
+from shaftwork.core.domains import ROTATION
 from shaftwork.network.changing import StoreFaultError
 from shaftwork.network.controlled import check_readings
-from shaftwork.network.declared import check_declared
 from shaftwork.network.grammar import FUNCTION_NAMES, FUNCTIONS
 from shaftwork.network.kinds import Kind
-from shaftwork.network.templates import BranchTemplate, make_template, substitution
+from shaftwork.network.templates import BranchTemplate, Template, make_template, substitution
 
 _READS: Mapping[Kind, frozenset[sympy.Symbol]] = {
     Kind.ACROSS_SOURCE: frozenset({t}),
@@ -69,9 +71,9 @@ def law_faults(part: Component, values: Mapping[str, Any]) -> Iterator[Fault]:
         yield Fault(moving[0] if len(moving) == 1 else "", str(error), error.hint)
         return
     templates = made.branches
-    _check_ends(part, templates)
+    _check_branch_ends(part, templates)
     check_readings(part, templates)
-    check_declared(part, made)
+    _check_declared(part, made)
     for template in {(x.kind, x.law, x.terms, x.through, x.stored): x for x in templates}.values():
         if unreadable := _unreadable("", template.law) or _unreadable("", template.stored):
             yield unreadable._replace(what=f"a branch law {unreadable.what}")
@@ -131,7 +133,74 @@ def _strange_symbols(template: BranchTemplate) -> set[sympy.Symbol]:
     return set(found - {*template.symbols} - _READS.get(template.kind, frozenset()))
 
 
-def _check_ends(part: Component, templates: tuple[BranchTemplate, ...]) -> None:
+def _check_declared(part: Component, template: Template) -> None:
+    """That a part's stores can be told apart, and that its signals, profiles and modes are of what it has.
+
+    Raises:
+        TypeError, ValueError: one is not; says which.
+    """
+    inner: Any = part.inner_ports()
+    if not isinstance(inner, tuple) or not all(isinstance(port, Port) for port in inner):
+        raise TypeError(f"inner_ports() gives {inner!r}, not a tuple such as (Port('middle'),)")
+    ports = {port.name: port for port in (*part.ports, *inner)}
+    _check_stores(ports, template.branches)
+    _check_signals(part, ports, template.branches)
+    for element in template.modes:
+        _check_modes(part, ports, template, element)
+
+
+def _check_stores(ports: Mapping[str, Port], branches: tuple[BranchTemplate, ...]) -> None:
+    """No two stores of a part have one name: it is that of a state."""
+    names: set[str] = set()  # only asked for membership
+    for made in (made for made in branches if made.kind in (Kind.ACROSS_STORE, Kind.THROUGH_STORE)):
+        domain = next((ports[end].domain for end in made.ends if end is not None), None) or ROTATION
+        name = made.label or (domain.across if made.kind is Kind.ACROSS_STORE else domain.through).name
+        if name in names:
+            raise ValueError(f"two of its stores have the name {name!r}; give each branch a label of its own")
+        names.add(name)
+
+
+def _check_signals(part: Component, ports: Mapping[str, Port], branches: tuple[BranchTemplate, ...]) -> None:
+    stores = {made.label for made in branches if made.kind is Kind.THROUGH_STORE}
+    for name, signal in _records("signals", part.signals(), Signal):
+        _check_ends(f"signal {name!r}", signal.ends, ports)
+        if signal.kind in ("twist", "store") and stores and signal.label and signal.label not in stores:
+            raise ValueError(f"its signal {name!r} is of a store {signal.label!r}, which it does not have")
+    for name, profile in _records("profiles", part.profiles(), Profile):
+        if profile.length not in part.declared:
+            raise ValueError(f"its profile {name!r} has the length {profile.length!r}, which is no parameter")
+
+
+def _check_modes(part: Component, ports: Mapping[str, Port], template: Template, element: Modes) -> None:
+    _check_ends("element with modes", element.ends or (), ports)
+    readable = {str(symbol.name) for symbol in (ACROSS, THROUGH, INTEGRAL, t)}
+    readable |= {*part.declared, *(made.name for made in template.derived), *template.parameters}
+    readable |= {made.symbol for made in template.modes}
+    names = [mode.name for mode in element.options]
+    for leave in (leave for mode in element.options for leave in mode.leaves):
+        if leave.to not in (*names, ANEW):
+            raise ValueError(f"a mode leads to {leave.to!r}, which is none of: {', '.join(names)}")
+        strange = {symbol.name for symbol in leave.when.free_symbols if not named_in(symbol)[0]} - readable
+        if strange:
+            raise ValueError(f"what ends a mode reads {min(strange)}; it can read {', '.join(sorted(readable))}")
+
+
+def _check_ends(what: str, ends: tuple[End, ...], ports: Mapping[str, Port]) -> None:
+    if strange := [end for end in ends if end is not None and end not in ports]:
+        raise ValueError(f"its {what} is of {strange[0]!r}, which is no port")
+
+
+def _records(what: str, made: Any, kind: type) -> ItemsView[str, Any]:
+    """The pairs of a mapping from names to records of a kind."""
+    if not isinstance(made, Mapping):
+        raise TypeError(f"{what}() gives {made!r}, not names with a {kind.__name__} each")
+    for name, record in made.items():
+        if not is_label(name) or not isinstance(record, kind):
+            raise TypeError(f"{what}() has {name!r}: {record!r}, not a name without dots with a {kind.__name__}")
+    return made.items()
+
+
+def _check_branch_ends(part: Component, templates: tuple[BranchTemplate, ...]) -> None:
     ports = {None, *(port.name for port in (*part.ports, *part.inner_ports()))}
     couplings = (ends for template in templates for _, *ends in template.terms)
     ends = [end for pair in (*(template.ends for template in templates), *couplings) for end in pair]

@@ -15,7 +15,7 @@ from shaftwork.core.errors import ModelFileError, ParameterError
 from shaftwork.core.files import replaced
 from shaftwork.network import expressions, textfile
 from shaftwork.network.expression_reader import parse
-from shaftwork.network.grammar import fault_of, tokens_of
+from shaftwork.network.grammar import fault_of, words_of
 from shaftwork.network.netlist import Netlist, Origin, Placed
 from shaftwork.network.textfile import ModelText, PartText
 from shaftwork.network.wording import title
@@ -101,7 +101,7 @@ def _refuse_endless_laws(model: ModelText) -> None:
             if not isinstance(value, str) or not _is_law(REGISTRY.get(part.type), name):
                 continue
             try:
-                words += len(tokens_of(value))
+                words += len(words_of(value))
             except ModelFileError as error:
                 raise _fault(part, name, f"{name}: {error}") from None
             if words > MAXIMUM_LAW_WORDS:

@@ -10,9 +10,8 @@
     c = 24206.0
     d = 14.0
 
-Values are numbers, texts (laws, see `expressions`) and tables `{ x = [...], y = [...] }`. A file is plain data: a first
-pass over its words refuses what the format has no use for (nested tables, dotted keys, deep or endless lists), so the
-TOML reader behind it never meets its own worst cases.
+Values are numbers, texts (laws, see `expressions`) and tables `{ x = [...], y = [...] }`. A file is plain data, which
+`tomllib` reads. Keys of many dots, with which it would take hours, are refused before.
 """
 
 from __future__ import annotations
@@ -36,12 +35,8 @@ FORMAT = 1
 """Version of the format; a reader refuses any other."""
 MAXIMUM_SIZE = 2_500_000
 """Bytes of a model file; 20000 parts take about 2 000 000."""
-MAXIMUM_WORDS = 800_000
-"""Values, keys and brackets of a model file."""
-MAXIMUM_DEPTH = 2
-"""Brackets inside each other: a list in a table."""
-MAXIMUM_NUMBER = 64
-"""Characters of a number."""
+MAXIMUM_KEY = 64
+"""Characters of the name of a parameter."""
 MAXIMUM_TEXT = 200_000
 """Characters of a text value; a law with long tables takes most of them."""
 MAXIMUM_NAME = 200
@@ -54,10 +49,11 @@ Value = int | float | str | Table
 
 _RESERVED = ("type", "name", "nodes", "symbol")
 _KEY = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
-_WORD = re.compile(
-    r"[ \t]*(?:(?P<newline>\r?\n)|(?P<comment>#[^\n]*)|(?P<multiline>\"\"\"|''')"
-    r"|(?P<text>\"[^\"\\\n]*(?:\\.[^\"\\\n]*)*\"|'[^'\n]*')|(?P<mark>[=,])|(?P<header>\[\[[ \t]*part[ \t]*\]\])"
-    r"|(?P<open>[\[{])|(?P<close>[\]}])|(?P<bare>[A-Za-z0-9_+-]+(?:\.[A-Za-z0-9_+-]+)?)|(?P<end>\Z)|(?P<other>(?s:.)))"
+_LINE = re.compile(r"[ \t]*(?:(?P<part>\[\[[ \t]*part[ \t]*\]\])|(?P<key>[A-Za-z_][A-Za-z0-9_]*)[ \t]*=)")
+_TEXT = re.compile(r"""#[^\n]*|(?P<multiline>\"{3}|'{3})|"(?:[^"\\\n]|\\.)*"|'[^'\n]*'|(?P<unclosed>["'])""")
+_DOTS = re.compile(r"\.[ \t]*[\w\"'-]+[ \t]*\.")
+_USE = (
+    "Write [[part]], then lines key = value; a value is a number, a text, a list of texts, or { x = [...], y = [...] }."
 )
 
 
@@ -88,8 +84,8 @@ class PartText:
         _check_name("type", self.type)
         _check_name("name", self.name)
         if not isinstance(self.nodes, tuple) or not self.nodes:
-            found = "is missing" if self.nodes is None else f"is {_shown(self.nodes)}"
-            raise ModelFileError(f'nodes {found}. Give one node or more, such as nodes = ["rotor", "wheel"].')
+            state = "is missing" if self.nodes is None else f"is {_shown(self.nodes)}"
+            raise ModelFileError(f'nodes {state}. Give one node or more, such as nodes = ["rotor", "wheel"].')
         for node in self.nodes:
             _check_name("nodes", node)
         if self.symbol not in (None, ""):  # parts with an empty symbol have letters without a subscript
@@ -142,10 +138,9 @@ def read_table(key: str, text: str) -> Table:
     Raises:
         ModelFileError: there is none.
     """
-    line, values = f"{key} = {text}", dict[str, Any]()
+    values = dict[str, Any]()
     with suppress(ModelFileError):  # which would tell of parts
-        _part_lines(line)
-        values = _tables(line)
+        values = _tables(f"{key} = {text}")
     if list(values) != [key] or not isinstance(values[key], dict):
         raise ModelFileError(f"{key} is {_shown(text)}. Write a table as {{ x = [0.0, 1.0], y = [0.0, 5.0] }}.")
     return _table(key, values[key])
@@ -187,8 +182,8 @@ def _text_of(path: Path) -> str:
     """The text of a file, at most one byte more than allowed."""
     try:
         if not path.is_file():
-            found = "is no file" if path.exists() else f"does not exist, seen from {Path.cwd()}"
-            raise FileNotFoundError(found)
+            reason = "is no file" if path.exists() else f"does not exist, seen from {Path.cwd()}"
+            raise FileNotFoundError(reason)
         with path.open("rb") as file:
             content = file.read(MAXIMUM_SIZE + 1)
     except (OSError, ValueError) as error:
@@ -202,61 +197,45 @@ def _text_of(path: Path) -> str:
         raise ModelFileError(f"{path}, line {line}: is not UTF-8 ({error.reason}). Save it as UTF-8.") from None
 
 
-def _part_lines(text: str) -> list[dict[str, int]]:
-    """Lines of each part's header and keys, counted from 1, after a check that every word is one of the format."""
-    parts: list[dict[str, int]] = []
-    line, depth, starts, words = 1, 0, True, 0
-    for match in _WORD.finditer(text):
-        kind = match.lastgroup
-        if kind == "newline":
-            line, starts = line + 1, depth == 0
-            continue
-        words += 1
-        if kind == "header" and starts:
-            parts.append({"": line})
-        elif fault := _word_fault(str(kind), match[str(kind)], starts=starts):
-            raise ModelFileError(f"line {line}: {fault}")
-        elif starts and kind == "bare" and parts:
-            parts[-1][match[kind]] = line
-        depth += (kind == "open") - (kind == "close")
-        if depth > MAXIMUM_DEPTH:
-            raise ModelFileError(
-                f"line {line}: brackets stand inside each other more than {MAXIMUM_DEPTH} deep. {_USE}"
-            )
-        if words > MAXIMUM_WORDS:
-            raise ModelFileError(f"line {line}: there are more than {MAXIMUM_WORDS} words. Split the model.")
-        starts = starts and kind == "comment"
-    return parts
-
-
-_USE = (
-    "Write [[part]], then lines key = value; a value is a number, a text, a list of texts, or { x = [...], y = [...] }."
-)
-
-
-def _word_fault(kind: str, word: str, *, starts: bool) -> str | None:
-    """What is wrong with a word, or None; `starts` where it is the first of its line."""
-    if kind == "other":
-        return f"{word!r} is not expected here. Close each text with its quote. {_USE}"
-    if kind == "multiline":
-        return f"a text stands between {word}. Write texts on one line between single quotes."
-    if kind == "bare" and len(word) > MAXIMUM_NUMBER:
-        return f"a number or key has more than {MAXIMUM_NUMBER} characters. Numbers need 17 digits."
-    if starts and kind in ("open", "text"):
-        return f"a line starts with {word[:40]}. {_USE}"
-    if starts and kind == "bare" and not _KEY.fullmatch(word):
-        return f"the key {word} is no name: letters, digits and _ without dots. {_USE}"
-    return None
-
-
 def _tables(text: str) -> dict[str, Any]:
+    """What TOML makes of a text.
+
+    Raises:
+        ModelFileError: it is no TOML, or has texts of several lines or keys of several dots.
+    """
+    for match in _TEXT.finditer(text):
+        if match.lastgroup:
+            line, quote = text.count("\n", 0, match.start()) + 1, match[0]
+            if match["multiline"]:
+                what = f"a text stands between {quote}. Write texts on one line between single quotes."
+                raise ModelFileError(f"line {line}: {what}")
+            raise ModelFileError(f"line {line}: {quote!r} is not expected here. Close each text with its quote. {_USE}")
+    bare = _TEXT.sub('""', text)
+    if dots := _DOTS.search(bare):
+        line = bare.count("\n", 0, dots.start()) + 1
+        raise ModelFileError(f"line {line}: a key has dots. Use letters, digits and _. {_USE}")
     try:
         return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except RecursionError:
+        raise ModelFileError(f"brackets stand inside each other too deep. {_USE}") from None
+    except ValueError as error:
         place = re.search(r"\(at (.*)\)$", str(error))
         reason = str(error).partition(" (at ")[0]
         where = "" if place is None else f"{place[1].split(',')[0]}: "
         raise ModelFileError(f"{where}this is no TOML: {reason}. {_USE}") from None
+
+
+def _part_lines(text: str) -> list[dict[str, int]]:
+    """Lines of each part's header, under "", and of its keys, counted from 1."""
+    parts: list[dict[str, int]] = []
+    for number, line in enumerate(text.split("\n"), 1):
+        if (match := _LINE.match(line)) is None:
+            continue
+        if match["part"]:
+            parts.append({"": number})
+        elif parts:
+            parts[-1].setdefault(match["key"], number)
+    return parts
 
 
 def _model(text: str, *, is_file: bool) -> ModelText:
@@ -266,7 +245,6 @@ def _model(text: str, *, is_file: bool) -> ModelText:
         what = _shown(text) if text.strip() else "an empty text"
         hint = "" if is_file else ' To read a file, give its place as pathlib.Path("crane.toml").'
         raise ModelFileError(f"{what} has no line key = value. A model starts with: format = {FORMAT}.{hint}")
-    lines = _part_lines(text)
     tables = _tables(text)
     if "format" not in tables:
         raise ModelFileError(f"the key format is missing. Start the file with: format = {FORMAT}")
@@ -281,12 +259,12 @@ def _model(text: str, *, is_file: bool) -> ModelText:
         )
     name: Any = tables.get("name")
     ports: Any = tables.get("ports", [])
-    parts = tables.get("part", [])
+    parts, lines = tables.get("part", []), _part_lines(text)
     if not isinstance(parts, list) or len(parts) != len(lines):
         raise ModelFileError(f"part is {_shown(parts)}. {_USE}")
-    made = tuple(_part(table, place) for table, place in zip(parts, lines, strict=True))
     impacts: Any = tables.get("impacts", IMPACTS[0])
-    return ModelText(name, made, tuple(ports) if isinstance(ports, list) else ports, impacts)
+    texts = tuple(_part(table, places) for table, places in zip(parts, lines, strict=True))
+    return ModelText(name, texts, tuple(ports) if isinstance(ports, list) else ports, impacts)
 
 
 def _part(table: dict[str, Any], lines: Mapping[str, int]) -> PartText:
@@ -329,7 +307,7 @@ def _check_name(key: str, value: Any) -> None:
 
 def _checked(key: str, value: Any) -> Value:
     """A parameter's value as it can stand in a file."""
-    if not isinstance(key, str) or not _KEY.fullmatch(key) or key in _RESERVED or len(key) > MAXIMUM_NUMBER:
+    if not isinstance(key, str) or not _KEY.fullmatch(key) or key in _RESERVED or len(key) > MAXIMUM_KEY:
         raise ModelFileError(f"{key} is no name of a parameter. Use letters, digits and _, not {', '.join(_RESERVED)}.")
     match value:
         case bool():

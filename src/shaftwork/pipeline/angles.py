@@ -1,14 +1,19 @@
-"""Angles that are recorded, and what is said where one cannot be."""
+"""Angles that are recorded, each by a branch without torque whose speed is integrated."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Iterator, Sequence
 
-from sympy import Add, Symbol
+from sympy import Add, Integer, Symbol
 
+from shaftwork.components.base import Component
+from shaftwork.components.branches import End
+from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import SignalError
-from shaftwork.network.graph import CircuitGraph
-from shaftwork.network.meters import with_meters
+from shaftwork.network.graph import CircuitGraph, GraphBranch
+from shaftwork.network.kinds import Kind
+from shaftwork.network.templates import BranchTemplate
 from shaftwork.network.wording import listed
 from shaftwork.reduction.form import StateForm, state_form
 from shaftwork.reduction.gains import exact_of
@@ -21,7 +26,7 @@ def with_angles(graph: CircuitGraph, names: Sequence[str]) -> StateForm:
         SignalError: a part has no angle, or its speed contains the rate of a torque, as that of a node between springs
             in series does: such an angle jumps with a torque, and no state does.
     """
-    form = state_form(*with_meters(graph, names))
+    form = state_form(*_with_meters(graph, names))
     hidden = frozenset(form.dependent_through)
     for branch in form.angles:
         loop = form.tree.loops.get(branch, {})
@@ -57,3 +62,46 @@ def _instead(form: StateForm, branch: int) -> str:
         terms.append(gain * Symbol(f"sol['{part.name}.{name}']"))
     asked = f", with angles={stores}" if stores else ""
     return f"{Add(*terms)}{asked}, less what that is at the start"
+
+
+def _with_meters(graph: CircuitGraph, names: Sequence[str]) -> tuple[CircuitGraph, tuple[int, ...]]:
+    """The graph with a branch for every angle of some parts, and these branches.
+
+    Each speed of a part has its angle: omega of a part at one node, omega_rel between two, omega_a and omega_b of a
+    gear. Nothing passes through the branch, whatever mode the part is in, so that nothing else changes. Where a law
+    of the part reads that angle, it is recorded anyway.
+
+    Args:
+        graph: the circuit graph.
+        names: of parts.
+
+    Raises:
+        SignalError: there is no such part, or it has no speed.
+    """
+    branches, parts, angles = list(graph.branches), list(graph.parts), list[int]()
+    places = {part.name: number for number, part in enumerate(parts)}
+    for name in dict.fromkeys(names):
+        speeds = dict(_speeds(parts[places[name]].component)) if name in places else {}
+        if not speeds:
+            able = tuple(part.name for part in parts if any(_speeds(part.component)))
+            raise SignalError(f"There is no angle of '{name}'. Parts with an angle are: {listed(able)}.")
+        for label, ends in speeds.items():
+            part, read = parts[places[name]], graph.integrated[places[name]]
+            own = (k for k in read if graph.branches[k].template.ends == ends and not label)
+            index = next(own, len(branches))
+            if index == len(branches):
+                template = BranchTemplate(Kind.THROUGH_SOURCE, Integer(0), ends, (), label, (), Integer(0), meter=True)
+                plus, minus = map(part.node_at, ends)
+                branches.append(GraphBranch(index, places[name], template, plus, minus, ()))
+                parts[places[name]] = dataclasses.replace(part, branches=(*part.branches, index))
+            angles.append(index)
+    return dataclasses.replace(graph, parts=tuple(parts), branches=tuple(branches)), tuple(angles)
+
+
+def _speeds(part: Component) -> Iterator[tuple[str, tuple[End, End]]]:
+    """What tells the speeds of a part apart, nothing or the name of a side, and the ends of each; else its voltages."""
+    signals = {name: made for name, made in part.signals().items() if made.kind == "across" and made.domain is not None}
+    mechanical = {name: made for name, made in signals.items() if made.domain is not ELECTRICAL}
+    for name, made in (mechanical or signals).items():
+        _, _, side = name.partition("_")
+        yield "" if side == "rel" else side, made.ends

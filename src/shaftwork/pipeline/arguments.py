@@ -15,13 +15,14 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si, numbers_in_si, whole
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.netlist import Netlist
-from shaftwork.pipeline.prepared import NOMINAL
 from shaftwork.reduction.form import StateForm
 
 OUTPUTS, MOST_OUTPUTS = 1001, 10_000_000
 """Output times when the user gives none, and the most that can be asked for."""
 FINEST_RTOL = float(np.finfo(float).eps)
 """What doubles can keep; a smaller tolerance would promise what no engine holds."""
+NOMINAL = 1e-3
+"""Absolute tolerance as a fraction of the relative one, for a speed of 1 rad/s (m/s, V)."""
 OutputTimes = int | Sequence[float] | Array | Literal["steps"] | None
 
 

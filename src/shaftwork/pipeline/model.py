@@ -5,29 +5,27 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cache, cached_property
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.operating import steady_state
-from shaftwork.codegen.start_values import initial_state
-from shaftwork.codegen.switching import Switching
-from shaftwork.codegen.valueless import refuse_vanishing, rough, without_value
+from shaftwork.codegen.start_values import initial_state, with_others
+from shaftwork.codegen.valueless import refuse_vanishing
 from shaftwork.core.callbacks import Callback
-from shaftwork.core.errors import CompileError, ParameterError
+from shaftwork.core.errors import ParameterError
 from shaftwork.core.kept import Kept
 from shaftwork.core.notices import PulsationWarning, muted
 from shaftwork.core.parameters import in_si
+from shaftwork.core.screen import counted, named, on_one_screen
 from shaftwork.integrate import choice
 from shaftwork.integrate.engines import available
-from shaftwork.integrate.problem import Fractions, LinearInputs, Problem, Trajectory
+from shaftwork.integrate.problem import Problem, Trajectory
 from shaftwork.network.netlist import Netlist
-from shaftwork.pipeline.accuracy import with_accuracy
 from shaftwork.pipeline.arguments import (
     Demand,
     OutputTimes,
@@ -39,20 +37,26 @@ from shaftwork.pipeline.arguments import (
     step_limit,
     time_span,
 )
-from shaftwork.pipeline.ending import Ending, ending_of, refuse_motion, time_of_start
 from shaftwork.pipeline.implicit import IMPLICIT, PRESCRIBED, at_rest, solve_loops, start_of_loops
-from shaftwork.pipeline.overview import model_overview
-from shaftwork.pipeline.prepared import Prepared, nominal_tolerances, observed
+from shaftwork.pipeline.prepared import EngineModel, Prepared
 from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels
-from shaftwork.pipeline.sizes import in_its_size
-from shaftwork.pipeline.start import start_of, warn_of_rest
-from shaftwork.pipeline.stored import Rebuild, Repetition, call_of, model_again, remember
+from shaftwork.pipeline.sizes import in_its_size, with_accuracy
+from shaftwork.pipeline.start import (
+    CarriedWaves,
+    Ending,
+    WaveStart,
+    ending_of,
+    refuse_motion,
+    start_of,
+    time_of_start,
+    warn_of_rest,
+)
+from shaftwork.pipeline.stored import Repetition, call_of, model_again, remember
 from shaftwork.reduction.form import StateForm
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.analysis import Given, Names, Point, Time
-    from shaftwork.pipeline.waves import CarriedWaves, WaveStart
     from shaftwork.results.linear import LinearModel
 
 VARIANTS = 8
@@ -62,7 +66,7 @@ SIMILAR = 5.0
 EngineName = Literal["auto", "scipy", "scipy-radau", "heyoka", "sundials", "exact", "banded", "wave"]
 
 
-class Model(CompiledModel):
+class Model(EngineModel):
     """A network as a fast function of time, states and parameters, ready to be simulated again and again.
 
     Args:
@@ -71,10 +75,9 @@ class Model(CompiledModel):
         rebuild: makes the model of a changed netlist; used where a new parameter value changes the structure.
     """
 
-    def __init__(self, form: StateForm, netlist: Netlist, rebuild: Rebuild) -> None:
+    def __init__(self, form: StateForm, netlist: Netlist, rebuild: Callable[[Netlist], Model]) -> None:
         super().__init__(form)
         self.netlist, self._rebuild = netlist, rebuild
-        self._prepared = Kept[bytes, Prepared](1)
         self._variants = Kept[tuple[tuple[str, float], ...], Model](VARIANTS)
         self._choices: list[tuple[tuple[float, float, float], Array, tuple[str, str]]] = []
 
@@ -82,7 +85,7 @@ class Model(CompiledModel):
         return model_again, remember(self, self._rebuild)
 
     def __repr__(self) -> str:
-        return model_overview(self)
+        return _overview(self)
 
     @property
     def name(self) -> str:
@@ -140,16 +143,15 @@ class Model(CompiledModel):
             options: dict[str, Any] = {"t_start": t_start, "rtol": rtol, "atol": atol, "t_eval": t_eval}
             options |= {"engine": engine, "initial": initial, "max_steps": max_steps, "progress": progress}
             return self._variant(values).simulate(t_end, **options)
-        span = time_span(t_start, t_end)
-        asked = relative_tolerance(rtol), atol, output_times(t_eval, *span), engine, step_limit(max_steps)
-        told = Callback(progress)
-        demand = Demand(span, *asked, told if progress else None)
-        made = dict(zip(self.parameters, self.defaults.tolist(), strict=True)) | values
+        told, span = Callback(progress), time_span(t_start, t_end)
+        wanted = relative_tolerance(rtol), atol, output_times(t_eval, *span), engine, step_limit(max_steps)
+        demand = Demand(span, *wanted, told if progress else None)
         if initial is None or (isinstance(initial, Mapping) and not isinstance(initial, Ending)):
             warn_of_rest(self.form.graph, initial or {})
         motion = with_accuracy(told.of(lambda: self._motion(values, initial, demand)), demand)
+        parameters = dict(zip(self.parameters, self.defaults.tolist(), strict=True)) | values
         again = Repetition(self._rebuild, self.netlist, call_of(motion, demand, values, initial), self)
-        return replace(motion, parameters=made, initial=dict(initial or {}), rtol=demand.rtol, again=again)
+        return replace(motion, parameters=parameters, initial=dict(initial or {}), rtol=demand.rtol, again=again)
 
     def _motion(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
         prepared = self.prepare(self.vector(values) if values else self.defaults)
@@ -157,7 +159,7 @@ class Model(CompiledModel):
 
     def _run(self, prepared: Prepared, initial: Given, demand: Demand) -> Solution:
         x0, waves = start_of(self, prepared, initial, demand.span)
-        problem, bind = self._problem(prepared, x0, demand), lambda: prepared.bound
+        problem, bind = self.problem(prepared, x0, demand), lambda: prepared.bound
         refuse_vanishing(self.form, bind, lambda: np.array([problem.t0]), lambda _: x0[None])
         trajectory, name, why = self._solve(prepared, problem, waves, demand.engine)
         refuse_vanishing(self.form, bind, lambda: trajectory.dense.steps, trajectory.dense)
@@ -248,10 +250,6 @@ class Model(CompiledModel):
         p = self.vector(values or {})
         return linearized(self, p, at, t, self.settled(p), inputs, outputs)
 
-    def settled(self, p: Array) -> float:
-        """A time in s after which no law switches any more, for a parameter vector."""
-        return max((0.0, *self.switching.known(p))) + 1.0
-
     def choose_engine(self, t_end: float, *, t_start: float = 0.0, rtol: float = 1e-8) -> tuple[str, str]:
         """The engine that "auto" takes for a motion, and why."""
         return self._choice(Demand(time_span(t_start, t_end), relative_tolerance(rtol), None, None, "auto", 1, None))
@@ -259,7 +257,7 @@ class Model(CompiledModel):
     def _choice(self, demand: Demand) -> tuple[str, str]:
         prepared = self.prepare(self.defaults)
         x0, _ = start_of(self, prepared, None, demand.span)
-        return self._engine(prepared, self._problem(prepared, x0, demand), "auto")
+        return self._engine(prepared, self.problem(prepared, x0, demand), "auto")
 
     def _solve(
         self, prepared: Prepared, problem: Problem, waves: WaveStart | CarriedWaves | None, asked: str
@@ -300,88 +298,12 @@ class Model(CompiledModel):
         self._choices = [*self._choices[1 - VARIANTS :], (key, prepared.p, chosen)]
         return chosen
 
-    def _problem(self, prepared: Prepared, x0: Array, demand: Demand) -> Problem:
-        span, rtol = demand.span, demand.rtol
-        instants = self.switching.timeline(prepared.p, *span)
-        return Problem(
-            rhs=prepared.rhs,
-            jacobian=prepared.jacobian,
-            x0=x0,
-            t0=span[0],
-            t_end=span[1],
-            names=self.states,
-            atol=demand.tolerances(prepared.atol, self.states),
-            rtol=rtol,
-            overall=demand.sizes.overall,
-            breakpoints=tuple(time for time in instants.stops if span[0] < time < span[1]),
-            jump=(lambda t, x: prepared.bound.impulse(x, *instants.sides(t))) if self.form.has_impulses else None,
-            sides=instants.sides,
-            switches=(lambda t, x: prepared.bound.switches(t, x))  # noqa: PLW0108 (which makes the matrices)
-            if self.arrays.inputs.switching
-            else None,
-            t_eval=demand.t_eval,
-            linear=prepared.linear,
-            observed=observed(prepared) if self.linear else None,
-            symbolic=prepared.symbolic,
-            explain=lambda t, x: without_value(prepared.bound, t, x),
-            rough=lambda t, x: rough(prepared.bound, t, x),
-            max_steps=demand.max_steps,
-            progress=demand.progress,
-        )
-
-    def prepare(self, p: Array) -> Prepared:
-        """Everything that depends on a parameter vector alone; the last one is kept."""
-        return self._prepared(p.tobytes(), lambda: self._prepare(p))
-
-    def _prepare(self, p: Array) -> Prepared:
-        scalar = self.scalar
-        return Prepared(
-            p=p,
-            bind=self.bind,
-            rhs=self.bind(p).rhs if scalar is None else scalar.bind(p),
-            symbolic=cache(lambda: None if self._program is None else self._program.bind(p)),
-            linear=self._linear_inputs(p),
-            atol=nominal_tolerances(self.form, self.arrays.assembly.coefficients(p)),
-            form=self.form,
-        )
-
-    @cached_property
-    def _program(self) -> Any:
-        """The heyoka program, where there are rows, heyoka is installed and knows every function in them."""
-        if self.rows is None or not available("heyoka"):
-            return None
-        from shaftwork.codegen.heyoka import build
-        from shaftwork.components.laws import t as time
-
-        try:
-            return build(self.rows.states, time, self.rows.parameters, self.rows.rates)
-        except CompileError:
-            return None
-
-    @cached_property
-    def switching(self) -> Switching:
-        """What switches because of the time alone."""
-        return Switching(self.form)
-
     @cached_property
     def twin(self) -> Model:
         """The network with springs in place of its waves: it stands and turns steadily as they do."""
         from shaftwork.pipeline.waves import twin
 
         return self._rebuild(twin(self.netlist))
-
-    def _linear_inputs(self, p: Array) -> LinearInputs | None:
-        """The linear form, where the network is linear."""
-        if self.form.waves or not self.linear:
-            return None
-        n, bound, straight = len(self.states), self.bind(p), self.degree is not None
-
-        def fractions() -> Fractions | None:
-            found = bound.rational()
-            return None if found is None else Fractions(*found)
-
-        matrix = bound.jacobian(0.0, np.zeros(n)).tocsr()
-        return LinearInputs(matrix, lambda t: bound.rhs(t, np.zeros((n, *np.shape(t)))), fractions, straight)
 
     def _changes_structure(self, values: Mapping[str, float]) -> bool:
         """Whether other equations hold for new values."""
@@ -398,3 +320,49 @@ class Model(CompiledModel):
     def _variant(self, values: Mapping[str, float]) -> Model:
         """The model of the same network with other values where these change its structure; the last few are kept."""
         return self._variants(tuple(sorted(values.items())), lambda: self._rebuild(self.netlist.with_values(values)))
+
+
+def _overview(model: Model) -> str:
+    """States, parameters with their values, and the modes of parts that change theirs."""
+    sizes = f"{counted(len(model.states), 'state')}, {counted(len(model.parameters), 'parameter')}"
+    kind = "linear" if not model.form.waves and model.linear else "nonlinear"
+    values = [f"{name} = {value:.6g}" for name, value in model.parameters.items()]
+    changing = [
+        f"{part.name}: {', '.join(dict.fromkeys(mode.words for element in part.modes for mode in element.options))}"
+        for part in model.form.graph.parts
+        if part.modes
+    ]
+    waves = [model.form.graph.part_of(end).name for end in model.form.waves[::2]]
+    lines = [
+        *named("states", model.states),
+        *named("travelling waves", waves),
+        *named("parameters", values, most=6),
+        *(
+            line
+            for text in changing[:6]
+            for line in named(text.partition(": ")[0], text.partition(": ")[2].split(", "))
+        ),
+    ]
+    return on_one_screen(
+        f"Model of '{model.name}': {sizes}, {kind if not changing else 'parts that change their mode'}",
+        lines,
+        len(lines),
+    )
+
+
+def steady_start(
+    model: Model, others: Mapping[str, float], parameters: Mapping[str, float] | None = None
+) -> dict[str, float]:
+    """Start values: the steady state with the laws at t = 0 s, in which some stores have other values.
+
+    Args:
+        model: the compiled network.
+        others: start values by name; what is stored elsewhere is that of the steady state.
+        parameters: values that differ from the network's.
+
+    Raises:
+        ParameterError: a start value is none.
+        SimulationError: nothing comes to rest or to a steady speed.
+    """
+    steady = model.steady_state(t=0.0, parameters=parameters)
+    return with_others(model.start_equations(parameters or {}), steady, others, 0.0) if others else dict(steady)

@@ -1,10 +1,11 @@
-"""What depends on the parameter vector alone, and is made once for a run of equal calls."""
+"""A compiled network as engines take it: all that depends on parameters alone, and the problem of one run."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import chain
 from typing import Any
 
@@ -12,14 +13,18 @@ import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
+from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.recovery import BranchHistory
-from shaftwork.integrate.problem import LinearInputs, Observed
+from shaftwork.codegen.switching import Switching
+from shaftwork.codegen.valueless import rough, without_value
+from shaftwork.core.errors import CompileError
+from shaftwork.core.kept import Kept
+from shaftwork.integrate.engines import available
+from shaftwork.integrate.problem import Fractions, LinearInputs, Observed, Problem
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind
+from shaftwork.pipeline.arguments import NOMINAL, Demand
 from shaftwork.reduction.form import StateForm
-
-NOMINAL = 1e-3
-"""Absolute tolerance as a fraction of the relative one, for a speed of 1 rad/s (m/s, V)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +47,104 @@ class Prepared:
     def jacobian(self, t: float, x: Array) -> Any:
         """Of the right-hand side, sparse."""
         return self.bound.jacobian(t, x)
+
+
+class EngineModel(CompiledModel, ABC):
+    """A compiled network whose motions engines can find.
+
+    Args:
+        form: the state form.
+    """
+
+    def __init__(self, form: StateForm) -> None:
+        super().__init__(form)
+        self._prepared = Kept[bytes, Prepared](1)
+
+    @property
+    @abstractmethod
+    def twin(self) -> EngineModel:
+        """The network with springs in place of its waves."""
+
+    @cached_property
+    def switching(self) -> Switching:
+        """What switches because of the time alone."""
+        return Switching(self.form)
+
+    def settled(self, p: Array) -> float:
+        """A time in s after which no law switches any more, for a parameter vector."""
+        return max((0.0, *self.switching.known(p))) + 1.0
+
+    def prepare(self, p: Array) -> Prepared:
+        """Everything that depends on a parameter vector alone; the last one is kept."""
+        return self._prepared(p.tobytes(), lambda: self._prepare(p))
+
+    def _prepare(self, p: Array) -> Prepared:
+        scalar = self.scalar
+        return Prepared(
+            p=p,
+            bind=self.bind,
+            rhs=self.bind(p).rhs if scalar is None else scalar.bind(p),
+            symbolic=cache(lambda: None if self._program is None else self._program.bind(p)),
+            linear=self._linear_inputs(p),
+            atol=nominal_tolerances(self.form, self.arrays.assembly.coefficients(p)),
+            form=self.form,
+        )
+
+    @cached_property
+    def _program(self) -> Any:
+        """The heyoka program, where there are rows, heyoka is installed and knows every function in them."""
+        if self.rows is None or not available("heyoka"):
+            return None
+        from shaftwork.codegen.heyoka import build
+        from shaftwork.components.laws import t as time
+
+        try:
+            return build(self.rows.states, time, self.rows.parameters, self.rows.rates)
+        except CompileError:
+            return None
+
+    def _linear_inputs(self, p: Array) -> LinearInputs | None:
+        """The linear form, where the network is linear."""
+        if self.form.waves or not self.linear:
+            return None
+        n, bound, straight = len(self.states), self.bind(p), self.degree is not None
+
+        def fractions() -> Fractions | None:
+            found = bound.rational()
+            return None if found is None else Fractions(*found)
+
+        matrix = bound.jacobian(0.0, np.zeros(n)).tocsr()
+        return LinearInputs(matrix, lambda t: bound.rhs(t, np.zeros((n, *np.shape(t)))), fractions, straight)
+
+    def problem(self, prepared: Prepared, x0: Array, demand: Demand) -> Problem:
+        """A run from states (n,) as an engine takes it."""
+        span, rtol = demand.span, demand.rtol
+        instants = self.switching.timeline(prepared.p, *span)
+        return Problem(
+            rhs=prepared.rhs,
+            jacobian=prepared.jacobian,
+            x0=x0,
+            t0=span[0],
+            t_end=span[1],
+            names=self.states,
+            atol=demand.tolerances(prepared.atol, self.states),
+            rtol=rtol,
+            overall=demand.sizes.overall,
+            breakpoints=tuple(time for time in instants.stops if span[0] < time < span[1]),
+            jump=(lambda t, x: prepared.bound.impulse(x, *instants.sides(t))) if self.form.has_impulses else None,
+            sides=instants.sides,
+            switches=(lambda t, x: prepared.bound.switches(t, x))  # noqa: PLW0108 (which makes the matrices)
+            if self.arrays.inputs.switching
+            else None,
+            t_eval=demand.t_eval,
+            linear=prepared.linear,
+            observed=observed(prepared) if self.linear else None,
+            symbolic=prepared.symbolic,
+            explain=lambda t, x: without_value(prepared.bound, t, x),
+            rough=lambda t, x: rough(prepared.bound, t, x),
+            max_steps=demand.max_steps,
+            progress=demand.progress,
+        )
 
 
 def observed(prepared: Prepared) -> Observed:

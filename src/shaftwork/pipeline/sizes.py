@@ -1,4 +1,4 @@
-"""Tiny motions: absolute tolerances of the size of a motion, where those for ordinary speeds would hide it."""
+"""What a tolerance is worth: that of tiny motions, which ordinary ones would hide, and what an engine cannot keep."""
 
 from __future__ import annotations
 
@@ -9,8 +9,11 @@ from dataclasses import replace
 import numpy as np
 
 from shaftwork.codegen.elements import Array
-from shaftwork.pipeline.arguments import Demand, Sizes
-from shaftwork.pipeline.prepared import NOMINAL, Prepared
+from shaftwork.core.errors import AccuracyWarning
+from shaftwork.core.notices import warn
+from shaftwork.integrate.engines import too_fine
+from shaftwork.pipeline.arguments import NOMINAL, Demand, Sizes
+from shaftwork.pipeline.prepared import Prepared
 from shaftwork.reduction.form import StateForm
 from shaftwork.results.solution import Solution
 
@@ -79,3 +82,19 @@ def _largest(motion: Solution) -> dict[str, float]:
     enough = motion.engine == "heyoka" or len(motion.t) >= ENOUGH
     x = motion.x if enough else motion.dense(motion.steps)
     return dict(zip(motion.states, np.abs(x[:, : len(motion.states)]).max(axis=0).tolist(), strict=True))
+
+
+def with_accuracy(motion: Solution, demand: Demand) -> Solution:
+    """A motion that says with which tolerance it was made, where that is not the one that was asked for.
+
+    Warns:
+        AccuracyWarning: the motion has a caveat; or the engine that cannot keep the tolerance was asked for by name.
+    """
+    if motion.caveat:
+        warn(motion.caveat, AccuracyWarning)
+    told = too_fine(motion.engine, demand.rtol)
+    if not told:
+        return motion
+    if demand.engine != "auto":
+        warn(f"{told} Ask for no finer tolerance, or take another engine.", AccuracyWarning)
+    return replace(motion, why=f"{motion.why.rstrip('.')}. {told}")

@@ -1,29 +1,192 @@
-"""How the motion of a set of equations starts: at rest, from values by name, or where another motion ended."""
+"""How a motion starts: at rest, from values by name, or where another motion ended, as if there had been no end."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.start_values import initial_state, with_others
+from shaftwork.codegen.start_values import initial_state
 from shaftwork.codegen.state_transfer import StateTransfer
-from shaftwork.core.errors import Diagnostic, NetworkWarning
+from shaftwork.core.errors import AccuracyWarning, Diagnostic, NetworkWarning, ParameterError
 from shaftwork.core.notices import warn
+from shaftwork.core.parameters import in_si
 from shaftwork.network.checks import resting_trains
 from shaftwork.network.graph import CircuitGraph
-from shaftwork.pipeline.ending import Ending
+from shaftwork.network.wording import listed
+from shaftwork.pipeline.prepared import EngineModel, Prepared
+from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
-    from shaftwork.pipeline.model import Model
-    from shaftwork.pipeline.prepared import Prepared
-    from shaftwork.pipeline.waves import CarriedWaves, WaveStart
+    from shaftwork.integrate.lossless.lines import Past
 
 _RESTING: WeakKeyDictionary[CircuitGraph, tuple[Diagnostic, ...]] = WeakKeyDictionary()
 """What `resting_trains` gives: it takes as long as a short run."""
+SAME_TIME = 1e-12
+"""Times that differ by less than this fraction are one: units are converted."""
+NAMED = 3
+"""Parts of another network that a message names."""
+
+
+@dataclass(frozen=True)
+class CarriedWaves:
+    """What is on its way in lines where a motion ended.
+
+    Args:
+        past: what has left their ends.
+        lines: by shaft (2, lines), impedances in N m s and delays in s.
+    """
+
+    past: Past
+    lines: Mapping[str, Array]
+
+
+@dataclass(frozen=True)
+class WaveStart:
+    """How lines start: their speed runs straight from end to end, their torque is the same all along.
+
+    Args:
+        speeds: (2 lines,) of the ends, rad/s.
+        torques: (lines,) that the first end takes in, N m.
+    """
+
+    speeds: Array
+    torques: Array
+
+
+@runtime_checkable
+class _Carries(Protocol):
+    """Dense output that knows the waves on their way."""
+
+    def carried(self, t: float) -> CarriedWaves | None:
+        """What is on its way at a time in s; None where leaps do not know it."""
+        ...
+
+
+def on_their_way(dense: object, t: float) -> CarriedWaves | None:
+    """The waves on their way at a time in s of a motion with this dense output; None where leaps do not know them."""
+    return dense.carried(t) if isinstance(dense, _Carries) else None
+
+
+def waving(graph: CircuitGraph) -> tuple[str, ...]:
+    """Names of the parts that waves travel along."""
+    histories = (branch.index for branch in graph.branches if branch.template.is_history)
+    return tuple(dict.fromkeys(graph.part_of(index).name for index in histories))
+
+
+class Ending(dict[str, float]):
+    """All that a motion hands over at its last output time: start values by name, and what they do not tell.
+
+    Args:
+        stored: the speed of every inertia, the torque of every spring, every angle, in SI.
+        t: the time, s.
+        read: the time at which inputs are read, s: at the end of a run before whatever jumps there.
+        modes: of every element that changes its mode.
+        parameters: of the motion, "part.parameter" to value in SI, where it is not zero.
+        waves: on their way through shafts; None where there are none, or a run in leaps does not know them.
+    """
+
+    def __init__(
+        self,
+        stored: Mapping[str, float],
+        t: float,
+        read: float,
+        modes: Mapping[str, str],
+        parameters: Mapping[str, float],
+        waves: CarriedWaves | None,
+    ) -> None:
+        super().__init__(stored)
+        self.t, self.read, self.modes, self.parameters, self.waves = t, read, dict(modes), dict(parameters), waves
+
+    def __bool__(self) -> bool:
+        return True  # waves may be all that goes on
+
+    def __repr__(self) -> str:
+        beside = f"t={self.t!r}, modes={self.modes}, parameters={self.parameters}, waves={self.waves!r}"
+        return f"Ending({super().__repr__()}, {beside})"
+
+    def beside(self, arriving: Mapping[str, float]) -> Ending:
+        """The same with what arrives by waves, by name."""
+        if not arriving:
+            return self
+        return Ending({**self, **arriving}, self.t, self.read, self.modes, self.parameters, self.waves)
+
+    def changed(self, parameters: Mapping[str, float]) -> frozenset[str]:
+        """The names of the parameters that are others from now on."""
+        names = {**self.parameters, **parameters}
+        return frozenset(name for name in names if self.parameters.get(name, 0.0) != parameters.get(name, 0.0))
+
+    def refuse_lacking(self, names: Iterable[str]) -> None:
+        """Refuse to go on where something is stored that the motion did not store.
+
+        Raises:
+            ParameterError: names what is missing.
+        """
+        if missing := tuple(name for name in names if name not in self):
+            raise ParameterError(
+                f"initial is a motion that does not tell {listed(missing)}, stored here: it was simulated without some "
+                "angles=..., or with a zero in place of a value. Simulate it as this one; or give all start values by "
+                "name, initial={name: sol[name][-1] for name in sol.states} and those, with t_start=sol.t[-1]."
+            )
+
+
+def ending_of(motion: Solution, graph: CircuitGraph) -> Ending:
+    """Where a motion ended: at its last output time.
+
+    Args:
+        motion: of the same network, whose parameters may have had other values.
+        graph: of the network.
+
+    Raises:
+        ParameterError: it is a motion of another network; names what differs.
+    """
+    here, there = graph.wiring, motion.observer.wiring
+    names = dict.fromkeys((*here, *there))
+    if other := [name for name in names if here.get(name) != there.get(name)]:
+        told = [f"'{n}' is {there.get(n, 'not there')} instead of {here.get(n, 'not there')}" for n in other[:NAMED]]
+        more = f" and {len(other) - NAMED} more" if len(other) > NAMED else ""
+        raise ParameterError(
+            f"initial is a motion of '{motion.name}', which is another network than '{graph.name}': "
+            f"{', '.join(told)}{more}. Give a motion of the same network; numbers of its parts may differ. "
+            "Or begin with start values, initial={name: sol[name][-1] for name in sol.states} and t_start=sol.t[-1]."
+        )
+    t, x = float(motion.t[-1]), motion.x[-1]
+    observer, waves = motion.observer, on_their_way(motion.dense, t) if waving(graph) else None
+    return Ending(observer.held(t, x), t, observer.read_at(t), observer.modes_at(t), motion.parameters, waves)
+
+
+def time_of_start(t_start: Any, initial: Any) -> Any:
+    """The start of a motion, s: 0 by default, and the end of the motion that goes on.
+
+    Raises:
+        ParameterError: another time is given than that at which the motion ended.
+    """
+    if not isinstance(initial, Ending):
+        return 0.0 if t_start is None else t_start
+    if t_start is not None and not math.isclose(in_si("t_start", t_start, "s"), initial.t, rel_tol=SAME_TIME):
+        raise ParameterError(
+            f"t_start = {t_start} is not the time at which the motion ended that goes on, {initial.t:.9g} s. Leave "
+            "t_start out; initial=sol.at([t]) goes on from a time t within the motion."
+        )
+    return initial.t
+
+
+def refuse_motion(initial: Any, what: str) -> None:
+    """Refuse a motion where start values by name are wanted.
+
+    Raises:
+        ParameterError: it is one.
+    """
+    if isinstance(initial, Solution):
+        raise ParameterError(
+            f"{what} takes start values by name, not a motion. Give those of its end, "
+            "initial={name: sol[name][-1] for name in sol.states}."
+        )
 
 
 def warn_of_rest(graph: CircuitGraph, initial: Mapping[str, float]) -> None:
@@ -41,26 +204,8 @@ def warn_of_rest(graph: CircuitGraph, initial: Mapping[str, float]) -> None:
             warn(f"'{graph.name}' has a train that stays at rest: {found}", NetworkWarning)
 
 
-def steady_start(
-    model: Model, others: Mapping[str, float], parameters: Mapping[str, float] | None = None
-) -> dict[str, float]:
-    """Start values: the steady state with the laws at t = 0 s, in which some stores have other values.
-
-    Args:
-        model: the compiled network.
-        others: start values by name; what is stored elsewhere is that of the steady state.
-        parameters: values that differ from the network's.
-
-    Raises:
-        ParameterError: a start value is none.
-        SimulationError: nothing comes to rest or to a steady speed.
-    """
-    steady = model.steady_state(t=0.0, parameters=parameters)
-    return with_others(model.start_equations(parameters or {}), steady, others, 0.0) if others else dict(steady)
-
-
 def start_of(
-    model: Model, prepared: Prepared, initial: Mapping[str, float] | None, span: tuple[float, float]
+    model: EngineModel, prepared: Prepared, initial: Mapping[str, float] | None, span: tuple[float, float]
 ) -> tuple[Array, WaveStart | CarriedWaves | None]:
     """The states (n,) at the start, and the waves where they are not at rest.
 
@@ -82,7 +227,7 @@ def start_of(
         return _taken_up(prepared, initial, after, changes=bool(initial.changed(given))), initial.waves
     if not model.form.waves:
         return initial_state(prepared.bound, {} if initial is None else initial, after), None
-    from shaftwork.pipeline.waves import start_of_waves, warn_of_lost_waves
+    from shaftwork.pipeline.waves import start_of_waves
 
     if isinstance(initial, Ending):
         warn_of_lost_waves(span[0], in_leaps=True)
@@ -109,3 +254,21 @@ def _taken_up(prepared: Prepared, ending: Ending, after: float, *, changes: bool
         ending.refuse_lacking(state.name for state in form.states)
         x = np.array([ending[state.name] for state in form.states])
     return bound.impulse(x, ending.read, after) if form.has_impulses and after != ending.read else x
+
+
+def warn_of_lost_waves(t_start: float, *, in_leaps: bool = False) -> None:
+    """Warn of a motion that goes on at a time in s without what was on its way.
+
+    Args:
+        t_start: the time, s.
+        in_leaps: whether the motion before is known and has leapt through its waves; else only start values are.
+    """
+    why, remedy = "start values tell of their ends alone", "Give the motion itself, initial=sol"
+    if in_leaps:
+        why, remedy = "a long run leaps from one output time to the next", "Simulate it with t_eval='steps'"
+    warn(
+        f"The motion goes on at t_start = {t_start:g} s without the waves that were on their way through shafts: "
+        f"{why}, and the torque of a shaft begins as in steady operation. {remedy}; or simulate all of it in one run, "
+        "or take another model of the shaft, such as Lumped(20).",
+        AccuracyWarning,
+    )

@@ -7,32 +7,40 @@ output times, and the call that led to them.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 from weakref import WeakValueDictionary
 
 from shaftwork.core.errors import AccuracyWarning, NetworkWarning
 from shaftwork.core.notices import muted
 from shaftwork.network.netlist import Netlist
-from shaftwork.pipeline.ending import Ending
+from shaftwork.pipeline.arguments import Demand
+from shaftwork.pipeline.start import Ending
+from shaftwork.results.solution import Solution
 
-if TYPE_CHECKING:
-    from shaftwork.pipeline.arguments import Demand
-    from shaftwork.pipeline.model import Model
-    from shaftwork.results.solution import Solution
 
-Rebuild = Callable[[Netlist], "Model"]
+class Simulated(Protocol):
+    """What `Model` is here."""
 
-_LIVING: WeakValueDictionary[tuple[Rebuild, Netlist], Model] = WeakValueDictionary()
+    netlist: Netlist
+
+    def simulate(self, *args: Any, **options: Any) -> Solution:
+        """Integrate the motion."""
+        ...
+
+
+Rebuild = Callable[[Netlist], Simulated]
+"""Makes the model of a network."""
+_LIVING: WeakValueDictionary[tuple[Rebuild, Netlist], Simulated] = WeakValueDictionary()
 """Models that have been stored or made again: all motions of one network that a process reads share one."""
 
 
-def remember(model: Model, rebuild: Rebuild) -> tuple[Rebuild, Netlist]:
+def remember(model: Simulated, rebuild: Rebuild) -> tuple[Rebuild, Netlist]:
     """What a model is stored as."""
     _LIVING[rebuild, model.netlist] = model
     return rebuild, model.netlist
 
 
-def model_again(rebuild: Rebuild, netlist: Netlist) -> Model:
+def model_again(rebuild: Rebuild, netlist: Netlist) -> Simulated:
     """The model of a network; its author has been warned when it was first made."""
     model = _LIVING.get((rebuild, netlist))
     if model is None:
@@ -72,7 +80,7 @@ class Repetition:
     """
 
     def __init__(
-        self, rebuild: Rebuild, netlist: Netlist, options: Mapping[str, Any], model: Model | None = None
+        self, rebuild: Rebuild, netlist: Netlist, options: Mapping[str, Any], model: Simulated | None = None
     ) -> None:
         self._rebuild, self._netlist, self._options, self._model = rebuild, netlist, options, model
 

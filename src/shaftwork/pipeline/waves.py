@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -29,6 +28,7 @@ from shaftwork.integrate.lossless.waveforms import Polynomials
 from shaftwork.integrate.problem import Problem, Trajectory
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import Netlist
+from shaftwork.pipeline.start import CarriedWaves, WaveStart
 from shaftwork.reduction.form import StateForm
 
 WHY = "Shafts are travelling waves, so states and delays are solved together."
@@ -80,41 +80,6 @@ class _StatesAndWaves:
         return None if self.found.past is None else CarriedWaves(self.found.past(t), self.lines)
 
 
-@dataclass(frozen=True)
-class CarriedWaves:
-    """What is on its way in lines where a motion ended.
-
-    Args:
-        past: what has left their ends.
-        lines: by shaft (2, lines), impedances in N m s and delays in s.
-    """
-
-    past: Past
-    lines: Mapping[str, Array]
-
-
-@runtime_checkable
-class _Carries(Protocol):
-    """Dense output that knows the waves on their way."""
-
-    def carried(self, t: float) -> CarriedWaves | None:
-        """What is on its way at a time in s; None where leaps do not know it."""
-        ...
-
-
-@dataclass(frozen=True)
-class WaveStart:
-    """How lines start: their speed runs straight from end to end, their torque is the same all along.
-
-    Args:
-        speeds: (2 lines,) of the ends, rad/s.
-        torques: (lines,) that the first end takes in, N m.
-    """
-
-    speeds: Array
-    torques: Array
-
-
 def twin(netlist: Netlist) -> Netlist:
     """The network with a spring or two in place of every wave, which stands and turns steadily as the waves do.
 
@@ -128,29 +93,6 @@ def twin(netlist: Netlist) -> Netlist:
 
     placed = (dataclasses.replace(item, part=stiff(item.part)) for item in netlist.placed)
     return Netlist(netlist.name, tuple(placed))
-
-
-def on_their_way(dense: object, t: float) -> CarriedWaves | None:
-    """The waves on their way at a time in s of a motion with this dense output; None where leaps do not know them."""
-    return dense.carried(t) if isinstance(dense, _Carries) else None
-
-
-def warn_of_lost_waves(t_start: float, *, in_leaps: bool = False) -> None:
-    """Warn of a motion that goes on at a time in s without what was on its way.
-
-    Args:
-        t_start: the time, s.
-        in_leaps: whether the motion before is known and has leapt through its waves; else only start values are.
-    """
-    why, remedy = "start values tell of their ends alone", "Give the motion itself, initial=sol"
-    if in_leaps:
-        why, remedy = "a long run leaps from one output time to the next", "Simulate it with t_eval='steps'"
-    warn(
-        f"The motion goes on at t_start = {t_start:g} s without the waves that were on their way through shafts: "
-        f"{why}, and the torque of a shaft begins as in steady operation. {remedy}; or simulate all of it in one run, "
-        "or take another model of the shaft, such as Lumped(20).",
-        AccuracyWarning,
-    )
 
 
 def start_of_waves(

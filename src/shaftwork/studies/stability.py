@@ -17,8 +17,8 @@ from shaftwork.components.shaft_models import ShaftModel, Wave
 from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError, in_one_line
 from shaftwork.core.files import replaced
 from shaftwork.integrate.engines import ENGINES, available
+from shaftwork.pipeline.arguments import NOMINAL
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.prepared import NOMINAL
 from shaftwork.results.observer import Array
 from shaftwork.studies.arguments import engine_names, several, shaft_models
 from shaftwork.studies.stability_cases import CASES, TORQUE, Case

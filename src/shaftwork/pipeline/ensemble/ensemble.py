@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.state_transfer import StateTransfer
@@ -20,11 +19,16 @@ from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import CompileError, NetworkError
 from shaftwork.integrate.lanes import LaneRun, Room, Steps
 from shaftwork.network.graph import GraphPart
-from shaftwork.pipeline.ensemble.equations import EnsembleEquations, PhaseEntry
-from shaftwork.pipeline.ensemble.extremes import largest
-from shaftwork.pipeline.ensemble.groups import Index, Mask, VariantGroup, joined
-from shaftwork.pipeline.ensemble.programs import EXTREMES, EnsembleCode
-from shaftwork.pipeline.ensemble.rises import first_rises
+from shaftwork.pipeline.ensemble.equations import (
+    EXTREMES,
+    POWERS,
+    EnsembleCode,
+    EnsembleEquations,
+    PhaseEntry,
+    VariantGroup,
+    joined,
+)
+from shaftwork.pipeline.ensemble.extremes import Index, Mask, first_rises, largest
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.mode_machines import ModeNames
@@ -43,7 +47,6 @@ ON, OVER, LOST = -1, -2, -3
 """What a lane has met where that is no guard: nothing, the end of the motion, and what it cannot pass."""
 FADING = "A law fades to a constant, as exp and tanh do, and a long step might pass over where it changes."
 CLOCKED = "A limit at which a mode ends changes with the time by itself, and a long step might pass over that."
-MEASURED = ("max", "min", "peak", "mean", "rms", "end")
 
 
 class Ensemble:
@@ -95,7 +98,7 @@ class Ensemble:
             raise CompileError("A parameter that varies decides which equations hold.")
         if any(isinstance(part.component, Shaft) for part in self._varied):
             raise CompileError("A parameter of a shaft varies, which may change its model.")
-        if unknown := [measure for measure in self.measures if measure.kind not in MEASURED]:
+        if unknown := [measure for measure in self.measures if measure.kind not in (*EXTREMES, *POWERS, "end")]:
             raise CompileError(f"'{unknown[0]}' is read from the motion of one variant.")
 
     @property
@@ -267,7 +270,8 @@ class _VariantCourse:
             done = good & (met != ON)
             there = own[done]
             ends.met[there], ends.group.t[there], ends.group.x[:, there] = met[done], rows[-2, done], rows[:size, done]
-            self._integrate(equations, group.lanes[there], rows[size:-2, done])
+            for row, place in code.integral_of.items():
+                self.values[row, group.lanes[there]] += rows[size + place, done]
             run.keep(good & ~done, steps)
         return ends
 
@@ -299,11 +303,6 @@ class _VariantCourse:
                 quantity = _Quantity(steps, equations.code.step.jet(number), sign, 0.0, near)
                 found = largest(quantity.t, quantity.jets, self.values[row, lanes[near]], quantity.at)
                 self.values[row, lanes[near]] = np.where(good[near], found, self.values[row, lanes[near]])
-
-    def _integrate(self, equations: EnsembleEquations, lanes: Index, integrals: Array) -> None:
-        """What a stretch adds to the measures that are integrals."""
-        for row, place in equations.code.integral_of.items():
-            self.values[row, lanes] += integrals[place]
 
     def _end(self, equations: EnsembleEquations, group: VariantGroup, p: Array, over: Mask) -> None:
         """The variants that have come to the end of their motion."""
@@ -337,10 +336,10 @@ class _Ends:
     """
 
     group: VariantGroup
-    met: NDArray[np.intp]
+    met: Index
 
 
-def _met(equations: EnsembleEquations, offsets: Array, steps: Steps) -> tuple[NDArray[np.intp], Array]:
+def _met(equations: EnsembleEquations, offsets: Array, steps: Steps) -> tuple[Index, Array]:
     """(k,) the guard that each lane meets first, or ON, and the rows (rows, k) there; from there on it stays there."""
     met, first = np.full(steps.t.shape[1], ON), np.full(steps.t.shape[1], np.inf)
     at, rows = np.zeros(met.size, dtype=np.intp), np.zeros_like(steps.last)

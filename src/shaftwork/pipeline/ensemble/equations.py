@@ -1,24 +1,108 @@
-"""One set of equations of many variants: programs, and whether modes are consistent with the motion in them."""
+"""One set of equations of many variants: its compiled code, and whether modes are consistent with the motion in it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shaftwork.codegen.elements import Array
-from shaftwork.pipeline.ensemble.programs import EnsembleCode
+from shaftwork.codegen.lane_program import LaneProgram, lane_expressions, lane_function, lane_program
+from shaftwork.codegen.lanes import LaneStep, Use
+from shaftwork.codegen.state_transfer import StateTransfer
+from shaftwork.core.errors import CompileError
+from shaftwork.pipeline.arguments import NOMINAL
+from shaftwork.pipeline.ensemble.extremes import Index, Mask
+from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.courses import FEW
 from shaftwork.pipeline.phases.hybrid_state import AHEAD, AHEAD_OF_RUN, CLEAR, EPS, GOLDEN, NOTHING, ROUNDINGS
 from shaftwork.pipeline.phases.mode_machines import ModeNames
-from shaftwork.pipeline.prepared import NOMINAL
+from shaftwork.reduction.symbolic_observables import SymbolicObservables
+from shaftwork.results.measures import Measure
 
-Mask = NDArray[np.bool_]
+EXTREMES = {"max": (1.0,), "min": (-1.0,), "peak": (1.0, -1.0)}
+"""Measures that are the largest value of a quantity, times these signs."""
+POWERS = {"mean": 1, "rms": 2}
+"""Measures that are integrals of a quantity to some power."""
 Course = tuple[Array, Array, Array, Array]
 """Times (k,), states (n, k), their rates, and guards (guards, k)."""
+
+
+class EnsembleCode:
+    """The programs of one set of equations.
+
+    Args:
+        model: the equations.
+        program: the heyoka program for one variant.
+        stores: what the equations store.
+        measures: what is read.
+
+    Raises:
+        CompileError: variants cannot run side by side in them.
+    """
+
+    def __init__(self, model: Model, program: Any, stores: StateTransfer, measures: Sequence[Measure]) -> None:
+        if model.rows is None or program is None or not model.states:
+            raise CompileError("These equations have no program of their own.")
+        self.model, self._rows, self._stores = model, model.rows, stores
+        self._expressed = SymbolicObservables(model.form, model.rows)
+        quantities = [self._expressed.quantity(measure.quantity) for measure in measures]
+        read = [found for found in quantities if found is not None]
+        if len(read) < len(quantities):
+            raise CompileError("A measure is of a power, an energy or a place along a shaft.")
+        self._extremes = [row for row, measure in enumerate(measures) if measure.kind in EXTREMES]
+        integrated = [row for row, measure in enumerate(measures) if measure.kind in POWERS]
+        self.integral_of = {row: k for k, row in enumerate(integrated)}
+        """By measure, which of the integrals behind the states is its."""
+        self.program: LaneProgram = lane_program(program, model.rows, read)
+        uses = [Use(EXTREMES.get(measure.kind, ()), POWERS.get(measure.kind, 0)) for measure in measures]
+        self.step = LaneStep(self.program, tuple(uses))
+        self._parts = {"rates": self.program.rates, "guards": self.program.guards, "shown": self.program.quantities}
+        stored = [self._expressed.store(name) for name in stores.names] if self.program.guards else []
+        self._parts["stored"] = lane_expressions(self._rows, stored)
+        made = tuple(one for part in self._parts.values() for one in part)
+        self._points = lane_function(made, self.program.variables)
+        """What is asked for at the ends of phases."""
+
+    def extreme(self, row: int) -> int:
+        """Which of the quantities that a step shows is that of a measure that is an extreme."""
+        return self._extremes.index(row)
+
+    def guard(self, number: int) -> int:
+        """Which of the quantities that a step shows is a guard."""
+        return len(self._extremes) + number
+
+    def motion(self, t: Array, x: Array, p: Array) -> tuple[Array, Array]:
+        """Rates (n, k) and guards (guards, k) at times (k,), states (n, k), parameters (parameters, k)."""
+        made = self._part(t, x, p)
+        return made["rates"], made["guards"]
+
+    def stored(self, t: Array, x: Array, p: Array) -> Array:
+        """All that is stored, in the order of the names of `codegen.stores.Stores`; arguments as for `motion`."""
+        return self._part(t, x, p)["stored"]
+
+    def shown(self, t: Array, x: Array, p: Array) -> Array:
+        """What the measures read; arguments as for `motion`."""
+        return self._part(t, x, p)["shown"]
+
+    def _part(self, t: Array, x: Array, p: Array) -> dict[str, Array]:
+        ends = np.cumsum([len(part) for part in self._parts.values()])[:-1]
+        return dict(zip(self._parts, np.split(self._points(t, x, p), ends), strict=True))
+
+    @cached_property
+    def state_rows(self) -> list[int]:
+        """For each state, its place among all that is stored."""
+        return [self._stores.names.index(name) for name in self.model.states]
+
+    @cached_property
+    def kinds(self) -> tuple[list[int], list[int]]:
+        """Places of torques and currents among all that is stored, and of the rest."""
+        through = [k for k, name in enumerate(self._stores.names) if name in self._stores.through]
+        return through, [k for k in range(len(self._stores.names)) if k not in through]
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,3 +209,41 @@ class EnsembleEquations:
     def leaves_behind(self, before: EnsembleEquations, guard: int) -> bool:
         """Whether the guard by which these modes were entered is met no more; `entered` looks at all the others."""
         return before.code is not self.code or not self.sides[guard] == before.sides[guard] != 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class VariantGroup:
+    """Variants in the same modes, ready to go on.
+
+    Args:
+        modes: of every element; empty where nothing changes its mode.
+        lanes: (k,) numbers of the variants.
+        t: (k,) s.
+        x: (n, k) states.
+    """
+
+    modes: ModeNames
+    lanes: Index
+    t: Array
+    x: Array
+
+    def some(self, on: Mask | Index) -> VariantGroup:
+        """Those of the lanes (k,) that are marked, or those that are named."""
+        return VariantGroup(self.modes, self.lanes[on], self.t[on], self.x[:, on])
+
+
+def joined(groups: Sequence[VariantGroup]) -> list[VariantGroup]:
+    """Groups in the same modes as one."""
+    alike: dict[ModeNames, list[VariantGroup]] = {}
+    for group in groups:
+        if group.lanes.size:
+            alike.setdefault(group.modes, []).append(group)
+    return [
+        VariantGroup(
+            modes,
+            np.concatenate([one.lanes for one in several]),
+            np.concatenate([one.t for one in several]),
+            np.concatenate([one.x for one in several], axis=1),
+        )
+        for modes, several in alike.items()
+    ]

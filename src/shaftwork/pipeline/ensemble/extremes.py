@@ -1,4 +1,4 @@
-"""The largest value of a quantity in every lane, between the samples too.
+"""The largest value of a quantity in every lane, and its first rise through zero, between the samples too.
 
 Where its slope falls through zero between two samples, or does so and rises again, the polynomial through its values
 and its first two derivatives at both says about when. From the first of these samples the motion is followed to that
@@ -9,6 +9,7 @@ the tolerance of the motion, whatever the distance of the samples.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import reduce
 
 import numpy as np
@@ -26,10 +27,13 @@ PLACES, NEWTON = 7, 5
 INSIDE = 1e-4
 """Of an interval: the motion is followed to so far from its ends."""
 NEAR = 1e-9
-"""Of the range: a peak is known where Newton's step rises by less, or a polynomial misses it by less."""
+"""Of the range: a peak is known where Newton's step rises by less, or a polynomial misses it by less; one that is so
+near zero need not be found."""
 CLOSE = 0.01
 """Of an interval: a polynomial is trusted so far from where it has been put right."""
-MOST_ROUNDS = 20
+MOST_ROUNDS, MOST_ITERATIONS = 20, 100
+ROUNDING, ROUNDINGS = 2 * float(np.finfo(float).eps), 16
+"""A time is known to rounding, and to so many roundings of the step."""
 
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
@@ -144,3 +148,85 @@ def _horner(coefficients: tuple[Array, ...] | list[Array], u: Array) -> Array:
     for coefficient in coefficients[1:]:
         value = value * u + coefficient
     return value
+
+
+@dataclass(frozen=True, eq=False)
+class Rises:
+    """The first rises through zero.
+
+    Args:
+        at: (k,) samples before; behind the last one where there is none.
+        t: (k,) times, s; infinite where there is none.
+    """
+
+    at: Index
+    t: Array
+
+
+def first_rises(t: Array, jets: Array, there: There) -> Rises:
+    """Where a quantity first is above zero.
+
+    Args:
+        t: (m, k) times of the samples, s.
+        jets: (3, m, k) values, below zero at the first sample, and their first two derivatives by time.
+        there: follows the motion from a sample.
+    """
+    above = jets[0] > 0.0
+    seen = above.any(axis=0)
+    at = np.where(seen, above.argmax(axis=0) - 1, len(t) - 1)
+    upper = np.where(seen, np.take_along_axis(t, np.minimum(at + 1, len(t) - 1)[None], axis=0)[0], np.inf)
+    for sample, lane, time in zip(*_hidden(t, jets, at, there), strict=True):
+        if time < upper[lane]:
+            at[lane], upper[lane] = sample, time
+    own = np.flatnonzero(np.isfinite(upper))
+    times = np.full(t.shape[1], np.inf)
+    if own.size:
+        times[own] = _rise(t[at[own], own], upper[own], at[own], own, there)
+    return Rises(at, times)
+
+
+def _hidden(t: Array, jets: Array, until: Index, there: There) -> tuple[list[int], list[int], list[float]]:
+    """Samples, lanes and times of values above zero between samples that are not, up to samples (k,)."""
+    top, bottom = jets[0].max(axis=0), jets[0].min(axis=0)
+    size = top - bottom
+    at, own = likely(t, jets, np.zeros_like(top), top - NEARLY * size)
+    early = at < until[own]
+    at, own = at[early], own[early]
+    left, right = (np.array([t[k, own], *jets[:, k, own]]) for k in (at, at + 1))
+    found: tuple[list[int], list[int], list[float]] = [], [], []
+    for _ in range(MOST_ROUNDS):
+        if not own.size:
+            break
+        times, height = peak(left, right)
+        on = height + beyond(left, right) > NEAR * size[own]
+        at, own, left, right, times = at[on], own[on], left[:, on], right[:, on], times[on]
+        if not own.size:
+            break
+        middle = np.array([times, *there(at, own, times)])
+        rose = middle[1] > 0.0
+        for place, more in enumerate((at, own, times)):
+            found[place].extend(more[rose].tolist())
+        at, own = (np.tile(values[~rose], 2) for values in (at, own))
+        left = np.concatenate([left[:, ~rose], middle[:, ~rose]], axis=1)
+        right = np.concatenate([middle[:, ~rose], right[:, ~rose]], axis=1)
+    return found
+
+
+def _rise(low: Array, high: Array, at: Index, own: Index, there: There) -> Array:
+    """Times (c,) of a rise between two times (c,): Newton's steps, halves where they leave."""
+    u, on = low + (high - low) / 2, np.ones(low.size, dtype=bool)
+    nothing, low, high = ROUNDING * (np.abs(high) + ROUNDINGS * (high - low)), low.copy(), high.copy()
+    for _ in range(MOST_ITERATIONS):
+        value, slope, _ = there(at[on], own[on], u[on])
+        low[on] = np.where(value <= 0.0, u[on], low[on])
+        high[on] = np.where(value > 0.0, u[on], high[on])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            new = u[on] - value / slope
+        inside = (new >= low[on]) & (new <= high[on]) & (slope > 0)
+        new = np.where(inside, new, low[on] + (high[on] - low[on]) / 2)
+        moved = np.abs(new - u[on])
+        u[on] = new
+        on[on] = np.minimum(moved, high[on] - low[on]) > nothing[on]
+        if not on.any():
+            break
+    return np.asarray(u)

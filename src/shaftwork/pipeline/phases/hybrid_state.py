@@ -15,9 +15,9 @@ from sympy import Expr
 from shaftwork.codegen.code import Moves
 from shaftwork.codegen.elements import Array
 from shaftwork.components.laws import t as TIME
+from shaftwork.pipeline.arguments import NOMINAL
 from shaftwork.pipeline.phases.assemblies import Limits, ModeEquations, Motion, Near
 from shaftwork.pipeline.phases.mode_machines import ActiveGuard, ModeMachine, ModeNames
-from shaftwork.pipeline.prepared import NOMINAL
 
 # A guard within so many rounding units of zero is on its limit, and only its further course tells its side.
 ROUNDINGS = 64.0

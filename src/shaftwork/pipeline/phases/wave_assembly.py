@@ -14,8 +14,8 @@ import numpy as np
 from shaftwork.codegen.code import around
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.waves import WaveSystem
+from shaftwork.pipeline.arguments import NOMINAL
 from shaftwork.pipeline.phases.assemblies import Limits, ModeEquations, Motion, Near
-from shaftwork.pipeline.prepared import NOMINAL
 
 RATE = "rate of "
 

@@ -1,16 +1,21 @@
-"""What of a network can be differentiated: its symbolic equations, by the parameters in which they are smooth."""
+"""What of a network can be differentiated: its symbolic equations, by parameters in which these are smooth."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
+import numpy as np
 from sympy import Symbol
 
+from shaftwork.codegen.elements import Array
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.components.slopes import slope
 from shaftwork.core.errors import CompileError, ParameterError
+from shaftwork.pipeline.analysis import Given
 from shaftwork.pipeline.model import Model
+from shaftwork.pipeline.phases.model import PhasedModel
+from shaftwork.pipeline.start import start_of
 from shaftwork.reduction.rows import Rows
 
 NO_DERIVATIVE = {
@@ -21,6 +26,10 @@ NO_DERIVATIVE = {
     "edge": "moves a switch that is exactly at the start or at the end of the motion, where it comes in or goes out. "
     "Take another t_end, or leave it out.",
 }
+SHIFT = 1e-3
+"""By this part a parameter is made smaller."""
+STILL = 1e-9
+"""States that change by less than this part of the largest have not moved: that is rounding."""
 
 
 def rows_of(model: Model) -> Rows:
@@ -91,3 +100,53 @@ def _at_edges(model: Model, span: tuple[float, float]) -> Iterator[str]:
         for argument in switching.passed(p, time - aside, time + aside, modes=True) if aside else ():
             here = {**values, TIME: time}
             yield from (s.name for s in argument.free_symbols - {TIME} if slope(argument, s).xreplace(here) != 0)
+
+
+def without_start(
+    model: Model, names: Sequence[str], initial: Given, span: tuple[float, float], *, are_asked: bool
+) -> tuple[str, ...]:
+    """The parameters that do not move the start.
+
+    Speeds inside a shaft run straight between those of its ends, which a source or the ratio of a gear may determine.
+
+    Args:
+        model: the compiled network.
+        names: parameters.
+        initial: start values of states.
+        span: start and end of the motion, s.
+        are_asked: whether each of the names must remain.
+
+    Raises:
+        ParameterError: one that is asked for moves the start.
+    """
+    if not initial or not _moved(model, names, initial, span):
+        return tuple(names)
+    moved = {name: states for name in names if (states := _moved(model, (name,), initial, span))}
+    if moved and are_asked:
+        name, states = next(iter(moved.items()))
+        raise ParameterError(
+            f"'{name}' moves the start: {', '.join(states)} follow from it and the start values. Give them start "
+            "values as well."
+        )
+    return tuple(name for name in names if name not in moved)
+
+
+def _moved(model: Model, names: Sequence[str], initial: Given, span: tuple[float, float]) -> tuple[str, ...]:
+    """The states that start elsewhere where some parameters are others."""
+    values = {name: model.parameters[name] for name in names}
+    states, start = _start(model, {}, initial, span)
+    other = _start(model, {name: value * (1 - SHIFT) for name, value in values.items()}, initial, span)[1]
+    far = np.abs(other - start) > STILL * SHIFT * np.abs(start).max(initial=0.0)
+    return tuple(name for name, moves in zip(states, far.tolist(), strict=True) if moves)
+
+
+def _start(
+    model: Model, values: Mapping[str, float], initial: Given, span: tuple[float, float]
+) -> tuple[tuple[str, ...], Array]:
+    """The states by name, and where they start, in the equations in which nothing is joined."""
+    if not isinstance(model, PhasedModel):
+        return tuple(model.states), start_of(model, model.prepare(model.vector(values)), initial, span)[0]
+    phases = model.phases
+    assembly = phases.assembly(phases.first)
+    p = assembly.vector(values, phases.numbers(phases.first))
+    return tuple(assembly.model.states), start_of(assembly.model, assembly.prepared(p), initial, span)[0]

@@ -18,8 +18,7 @@ from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.hybrid_state import Change
 from shaftwork.pipeline.sensitivities.carrying import End, SensitivityTransfer
 from shaftwork.pipeline.sensitivities.differentiable import rows_of
-from shaftwork.pipeline.sensitivities.legs import Leg, parted
-from shaftwork.pipeline.sensitivities.motion_legs import DifferentiatedMotion
+from shaftwork.pipeline.sensitivities.legs import DifferentiatedMotion, Leg, parted
 from shaftwork.pipeline.sensitivities.saltation import ADVICE, TOGETHER, Jump, JumpConditions, by_chance
 from shaftwork.reduction.symbolic_observables import SymbolicObservables
 
