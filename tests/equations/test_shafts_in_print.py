@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import shaftwork as sw
-from shaftwork.equations.notation import without_marks
 from shaftwork.equations.records import Equations
+from shaftwork.equations.spelling import without_marks
 
 
 def drive(model: object, **shaft: float) -> sw.Network:

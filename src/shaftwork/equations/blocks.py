@@ -8,26 +8,22 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import zip_longest
-from typing import TYPE_CHECKING
 
 from sympy import Add, Expr, Float, Integer, Symbol, preorder_traversal
 
 from shaftwork.core.domains import ELECTRICAL, ROTATION, TRANSLATION
 from shaftwork.core.errors import CompileError
-from shaftwork.equations.assembly import FactoredTerms, Sides, sides, tidy
-from shaftwork.equations.notation import INDEX_CLOSES, INDEX_OPENS
+from shaftwork.equations.assembly import FactoredTerms, Sides, sides, terms_of, tidy
+from shaftwork.equations.fields import fields_of
+from shaftwork.equations.network_equations import NetworkEquations
 from shaftwork.equations.notations import in_letters
-from shaftwork.equations.printing import LINE_WIDTH, Line, Writer, with_rates
+from shaftwork.equations.printing import LINE_WIDTH, Line, Writer, printed_width, with_rates
 from shaftwork.equations.quantities import ThroughQuantity, rate_of
+from shaftwork.equations.rows import Eliminated, Row, StateEquation
 from shaftwork.equations.second_order import SecondOrder
-from shaftwork.equations.spelling import in_text
+from shaftwork.equations.spelling import INDEX_CLOSES, INDEX_OPENS, in_text
 from shaftwork.equations.sums import MEANING, WEIGHTS, Sums, sums_of
-from shaftwork.equations.widths import printed_width
 from shaftwork.network.kinds import Kind
-
-if TYPE_CHECKING:  # the records print themselves through this module
-    from shaftwork.equations.records import Equations
-    from shaftwork.equations.rows import Eliminated, Row, StateEquation
 
 AUXILIARY = (r"\sigma", r"\zeta", r"\xi", r"\chi")
 """Letters for sums that occur more than once in a law, such as a slip."""
@@ -56,7 +52,7 @@ class Blocks:
         values: print the parameters' values instead of their symbols.
     """
 
-    equations: Equations
+    equations: NetworkEquations
     values: bool
 
     def kirchhoff(self, *, twists: bool = True) -> Iterator[Block]:
@@ -123,9 +119,9 @@ class Blocks:
         """
         rows = [row for row in self.equations.states if not self._is_summed(row)]
         shown = [row.sides if row.explicit and _rates_in(row.coupled.left) <= 1 else row.coupled for row in rows]
-        coupled = any(made is not row.sides for made, row in zip(shown, rows, strict=True))
+        coupled = any(shape is not row.sides for shape, row in zip(shown, rows, strict=True))
         remark = "Rates that stand together on a left side are coupled by inertias or springs." if coupled else ""
-        summed = (line for made in self.sums for line in made.states())
+        summed = (line for sums in self.sums for line in sums.states())
         yield Block("State equations", (*map(self.writer.line, shown), *summed), remark)
         algebraic = [row for row in self.equations.eliminated if row.kind == "algebraic"]
         standing = self._laws_in_states() if laws else ()
@@ -142,8 +138,8 @@ class Blocks:
             lines = tuple(self._motions(form))
         yield Block("Equations of motion", lines)
         flows = self.equations.assembly.quantities.flows
-        known = [flow for flow in flows if self.equations.assembly.quantities.through(flow) in form.laws]
-        laws = [line for flow in known for line in self.law(flow, form.across)]
+        by_symbol = [flow for flow in flows if self.equations.assembly.quantities.through(flow) in form.laws]
+        laws = [line for flow in by_symbol for line in self.law(flow, form.across)]
         assembly = self.equations.assembly
         for end, other in assembly.opposite.items():
             across = assembly.quantities.across(assembly.ends(other)).xreplace(form.across)
@@ -156,9 +152,9 @@ class Blocks:
         Raises:
             CompileError: there are none.
         """
-        if not self.equations.fields:
+        if not (fields := fields_of(self.equations)):
             raise CompileError(f"'{self.equations.form.graph.name}' has no Shaft. Take form='state'.")
-        for field in self.equations.fields:
+        for field in fields:
             along, boundary, definitions = field.lines(values=self.values)
             yield Block(f"Along {in_text(field.part.name)}", along)
             yield Block("At its ends", boundary)
@@ -184,20 +180,20 @@ class Blocks:
     def _motions(self, form: SecondOrder) -> Iterator[Line]:
         """Row by row; shafts whose ends are coordinates have one row for all inside."""
         nodes, summed = self.equations.form.graph.nodes, self.summed_between(form.nodes)
-        inside = {nodes[node] for made in summed for node in made.inside}
+        inside = {nodes[node] for sums in summed for node in sums.inside}
         yield from (self._motion(form, row) for row, node in enumerate(form.nodes) if node not in inside)
-        for made in summed:
-            yield from made.motion()
+        for sums in summed:
+            yield from sums.motion()
 
     def summed_between(self, free: Collection[str]) -> tuple[Sums, ...]:
         """The shafts whose rows are printed as sums in the equations of motion: the nodes at both ends are free."""
         nodes = self.equations.form.graph.nodes
-        return tuple(made for made in self.sums if {nodes[made.part.nodes[end]] for end in ("a", "b")} <= set(free))
+        return tuple(sums for sums in self.sums if {nodes[sums.part.nodes[end]] for end in ("a", "b")} <= set(free))
 
     def _motion(self, form: SecondOrder, row: int) -> Line:
         left = self.writer.pieces((FactoredTerms(Integer(1), tuple(map(tidy, form.terms(row)))),))
         force = form.forces[row]
-        right = self.writer.pieces(sides(Integer(0), force.args if force.is_Add else (force,)).groups) or ("0",)
+        right = self.writer.pieces(sides(Integer(0), terms_of(force)).groups) or ("0",)
         return Line("", (*left, f"= {right[0]}", *right[1:]), relation="")
 
     @cached_property
@@ -251,8 +247,8 @@ class Blocks:
         for flow in flows:
             across = assembly.quantities.across((flow.plus, flow.minus))
             sign = -1 if across.could_extract_minus_sign() else 1
-            known = sign * Add(*assembly.around(flow.branches[0]))
-            yield from self.law(flow, {} if across == 0 else {sign * across: known})
+            around = sign * Add(*assembly.around(flow.branches[0]))
+            yield from self.law(flow, {} if across == 0 else {sign * across: around})
         for source in self.equations.form.across_sources:
             prescribed = assembly.law_of_source(source)
             if self._stands(source) and prescribed.groups[0].terms != (prescribed.left,):
@@ -268,26 +264,26 @@ class Blocks:
         letters = self.equations.assembly.quantities.across(self.equations.assembly.ends(source)).free_symbols
         return any(not letters.isdisjoint(row.expression.free_symbols) for row in rows)
 
-    def law(self, flow: ThroughQuantity, known: Mapping[Expr, Expr]) -> Iterator[Line]:
+    def law(self, flow: ThroughQuantity, replaced: Mapping[Expr, Expr]) -> Iterator[Line]:
         """A flow's law, and the letters in it; nothing where the law is a parameter alone."""
         symbol = self.equations.assembly.quantities.through(flow)
         shared, terms = self._split[flow]
         if terms != (symbol,):
-            yield self.writer.line(sides(symbol, (term.xreplace(known) for term in terms)))
+            yield self.writer.line(sides(symbol, (term.xreplace(replaced) for term in terms)))
             for letter, expression in shared:
-                yield self.writer.line(_in_order(letter, expression.xreplace(known)))
+                yield self.writer.line(sides(letter, terms_of(expression.xreplace(replaced))))
 
     @cached_property
     def _split(self) -> dict[ThroughQuantity, tuple[tuple[tuple[Symbol, Expr], ...], tuple[Expr, ...]]]:
         """For each flow the letters in its law and the terms that contain them."""
         assembly = self.equations.assembly
-        made = {}
+        split = {}
         for number, flow in enumerate(assembly.quantities.flows):
             if any(assembly.kind(branch) is Kind.ACROSS_SOURCE for branch in flow.branches):
                 continue
             ((_, terms),) = assembly.law_of_flow(flow).groups
-            made[flow] = _shared_sums(terms, f"flow {number}")
-        return made
+            split[flow] = _shared_sums(terms, f"flow {number}")
+        return split
 
     @cached_property
     def _auxiliary_names(self) -> dict[str, str]:
@@ -324,7 +320,7 @@ def _shared_sums(terms: tuple[Expr, ...], owner: str) -> tuple[tuple[tuple[Symbo
     return tuple(shared), terms
 
 
-def _dotted(equations: Equations) -> dict[str, str]:
+def _dotted(equations: NetworkEquations) -> dict[str, str]:
     """Rates of angles and positions with dots, as the second-order form has them."""
     quantities, names = equations.assembly.quantities, equations.symbol_names
     dotted: dict[str, str] = {}
@@ -350,7 +346,3 @@ def _with_indices(sentence: str) -> str:
         in_text(word) if isinstance(word, str) else f"{word[1]}$_{{{INDEX_OPENS}{word[2]}{INDEX_CLOSES}}}$"
         for word in words
     )
-
-
-def _in_order(letter: Symbol, expression: Expr) -> Sides:
-    return sides(letter, expression.args if expression.is_Add else (expression,))

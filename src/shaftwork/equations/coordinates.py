@@ -155,6 +155,11 @@ def _independent(rows: Mapping[int, Row], parameters: Mapping[str, float]) -> tu
     return tuple(kept)
 
 
+def shortest(ratio: Expr) -> Expr:
+    """A ratio without common factors above and below; decimals are rounded only once."""
+    return in_decimals(cancel(exactly(ratio)))
+
+
 def _solved(rows: Sequence[Row], columns: Sequence[int]) -> Iterator[tuple[int, Row]]:
     """The leading node of each row after elimination, and the sum of the others that its position is."""
     if not rows:
@@ -163,6 +168,6 @@ def _solved(rows: Sequence[Row], columns: Sequence[int]) -> Iterator[tuple[int, 
     entries = {i: {place[key]: exactly(factor) for key, factor in row.items()} for i, row in enumerate(rows)}
     reduced, pivots = DomainMatrix.from_dict_sympy(len(rows), len(columns), entries).to_field().rref()
     for i, made in sorted(reduced.to_dod().items()):
-        found = {columns[k]: in_decimals(cancel(-reduced.domain.to_sympy(entry))) for k, entry in made.items()}
+        found = {columns[k]: shortest(-reduced.domain.to_sympy(entry)) for k, entry in made.items()}
         del found[columns[pivots[i]]]
         yield columns[pivots[i]], found

@@ -13,25 +13,23 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from sympy import Add, Derivative, Eq, Expr, Float, Function, Integer, Symbol, sqrt
+from sympy import Add, Derivative, Eq, Expr, Function, Integer, Symbol, sqrt
 from sympy.core.function import AppliedUndef
 
 from shaftwork.components.base import Derived, symbols_of
 from shaftwork.components.laws import t
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.domains import ROTATION
-from shaftwork.core.parameters import Parameter
 from shaftwork.equations.assembly import sides, terms_of
-from shaftwork.equations.notation import Letter, without_marks
-from shaftwork.equations.notations import in_letters, inverses_of
+from shaftwork.equations.letters import parameter_letters
+from shaftwork.equations.network_equations import NetworkEquations, with_derived
+from shaftwork.equations.notations import Letter, in_letters, inverses_of
 from shaftwork.equations.printing import Line, Writer, with_rates
 from shaftwork.equations.quantities import ThroughQuantity
+from shaftwork.equations.spelling import without_marks
 from shaftwork.network.graph import GROUND, GraphPart
-
-if TYPE_CHECKING:  # the records make these
-    from shaftwork.equations.records import Equations
 
 X = Symbol("x", real=True)
 """The place along a shaft, from its node a."""
@@ -46,7 +44,7 @@ class Field:
         part: the shaft.
     """
 
-    equations: Equations
+    equations: NetworkEquations
     part: GraphPart
 
     @cached_property
@@ -82,9 +80,9 @@ class Field:
         damping, friction = self.symbol("damping"), self.symbol("friction")
         kinetic = Eq(-torque.diff(X), inertia * speed.diff(t) + friction * speed)
         if damping == 0:
-            found = (kinetic, Eq(-speed.diff(X), compliance * torque.diff(t)))
+            lossless = (kinetic, Eq(-speed.diff(X), compliance * torque.diff(t)))
             factors = () if friction != 0 else (inertia * compliance, 1 / self.symbol("v") ** 2)
-            return (*found, *(Eq(f.diff(X, 2), k * f.diff(t, 2)) for k in factors for f in (torque, speed)))
+            return (*lossless, *(Eq(f.diff(X, 2), k * f.diff(t, 2)) for k in factors for f in (torque, speed)))
         bent = -(torque.diff(X, 2) + friction * speed.diff(X)) / inertia
         return (
             kinetic,
@@ -97,18 +95,18 @@ class Field:
     @cached_property
     def boundary(self) -> tuple[Eq, ...]:
         """Speed and torque at both ends: the speeds of the nodes, and what the other parts there give."""
-        found, quantities = list[Eq](), self.equations.assembly.quantities
+        conditions, quantities = list[Eq](), self.equations.assembly.quantities
         for end, place, sign in (("a", Integer(0), 1), ("b", self.symbol("length"), -1)):
             node = self.part.nodes[end]
-            found.append(Eq(self.speed.subs(X, place), quantities.node(node), evaluate=False))
+            conditions.append(Eq(self.speed.subs(X, place), quantities.node(node), evaluate=False))
             if node != GROUND:  # the frame takes any torque
-                found.append(Eq(self.torque.subs(X, place), sign * Add(*self._given(node)), evaluate=False))
-        return tuple(found)
+                conditions.append(Eq(self.torque.subs(X, place), sign * Add(*self._taken_from(node)), evaluate=False))
+        return tuple(conditions)
 
-    def _given(self, node: int) -> Iterator[Expr]:
+    def _taken_from(self, node: int) -> Iterator[Expr]:
         """What the other parts at a node give, less what their inertias take."""
         assembly, graph = self.equations.assembly, self.equations.form.graph
-        for other in self.equations.fields:
+        for other in self._fields:
             if other.part is not self.part:
                 ends = (("a", -1, Integer(0)), ("b", 1, other.symbol("length")))
                 yield from (sign * other.torque.subs(X, x) for end, sign, x in ends if other.part.nodes[end] == node)
@@ -125,20 +123,20 @@ class Field:
     @cached_property
     def definitions(self) -> Mapping[Symbol, Expr]:
         """The letters in the rows that follow from parameters."""
-        found = {self.symbol(made.name): made.law for made in self._derived}
+        definitions = {self.symbol(derived.name): derived.law for derived in self._derived}
         if any(row.has(self.symbol("v")) for row in self.rows):
-            found[self.symbol("v")] = sqrt(self.symbol("line_stiffness") / self.symbol("line_inertia"))
-        return found
+            definitions[self.symbol("v")] = sqrt(self.symbol("line_stiffness") / self.symbol("line_inertia"))
+        return definitions
 
     @cached_property
     def _derived(self) -> tuple[Derived, ...]:
         names = ("area_moment", "line_inertia", "line_stiffness")
         symbols: Any = symbols_of({name: self.symbol(name) for name in (*self.part.component.declared, *names)})
-        return tuple(made for made in self.part.component.derived(symbols) if made.name in names)
+        return tuple(derived for derived in self.part.component.derived(symbols) if derived.name in names)
 
     def lines(self, *, values: bool = False) -> tuple[tuple[Line, ...], tuple[Line, ...], tuple[Line, ...]]:
         """The rows, the boundary conditions and the definitions in LaTeX; with values there are no definitions."""
-        writer = self._writer(self._values if values else {})
+        writer = self._writer(with_derived(self.equations.values, self.definitions) if values else {})
         defined = () if values else in_letters(self.definitions, self._inverses)
         return (
             tuple(dict.fromkeys(self._line(row, writer) for row in self.rows)),  # (14) and (15) have the same numbers
@@ -151,11 +149,9 @@ class Field:
         return writer.line(sides(left, terms_of(right)))
 
     @cached_property
-    def _values(self) -> dict[str, float]:
-        known = dict(self.equations.values)
-        for symbol, law in self.definitions.items():
-            known[symbol.name] = float(law.xreplace({each: Float(known[each.name]) for each in law.free_symbols}))
-        return known
+    def _fields(self) -> tuple[Field, ...]:
+        """Of all shafts of the network."""
+        return fields_of(self.equations)
 
     @cached_property
     def _atoms(self) -> dict[Expr, Symbol]:
@@ -168,11 +164,7 @@ class Field:
         """The letters of the shaft."""
         component, name = self.part.component, self.part.name
         waves = Derived("v", Integer(0), "m/s", "speed of waves", "v")
-        declared: list[Parameter | Derived] = [*component.declared.values(), *self._derived, waves]
-        parameters = (
-            Letter(f"{name}.{made.name}", *_spelt(made.latex), made.unit, made.meaning, parameter=True)
-            for made in declared
-        )
+        parameters = parameter_letters(name, (*component.declared.values(), *self._derived, waves))
         quantities = (("tau", ROTATION.through, ""), ("tau_c", ROTATION.through, "c"), ("omega", ROTATION.across, ""))
         variables = (Letter(f"{name}.{label}", q.latex, mark, q.unit, "") for label, q, mark in quantities)
         return tuple(map(self.equations.source.written, (*parameters, *variables)))
@@ -189,24 +181,19 @@ class Field:
 
     def _writer(self, values: Mapping[str, float]) -> Writer:
         rates = with_rates(self.equations.symbol_names, self.equations.source.rate_of)
-        own = {name: latex for field in self.equations.fields for name, latex in field._names.items()}  # noqa: SLF001
-        atoms = {symbol.name: _printed(atom, own) for atom, symbol in self._atoms.items()}
-        names = {**own, **atoms, **{name: latex for name, latex in rates.items() if name not in own}}
+        along = {name: latex for field in self._fields for name, latex in field._names.items()}  # noqa: SLF001
+        atoms = {symbol.name: _printed(atom, along) for atom, symbol in self._atoms.items()}
+        names = {**along, **atoms, **{name: latex for name, latex in rates.items() if name not in along}}
         parameters = [letter.name for letter in (*self.equations.letters, *self._letters) if letter.parameter]
         order = sorted(names, key=lambda name: name not in set(parameters))
         last = [symbol.name for symbol in self._atoms.values()]
         return Writer({name: names[name] for name in order}, parameters, last, values, self._inverses)
 
 
-def fields_of(equations: Equations) -> tuple[Field, ...]:
+def fields_of(equations: NetworkEquations) -> tuple[Field, ...]:
     """The equations along every shaft of a network."""
     shafts = (part for part in equations.form.graph.parts if isinstance(part.component, Shaft))
     return tuple(Field(equations, part) for part in shafts)
-
-
-def _spelt(latex: str) -> tuple[str, str]:
-    base, _, mark = latex.partition("_")
-    return base if len(base) == 1 or base.startswith("\\") or "'" in base else rf"\{base}", mark.strip("{}")
 
 
 def _printed(atom: Expr, letters: Mapping[str, str]) -> str:

@@ -5,19 +5,16 @@ from __future__ import annotations
 import re
 from collections.abc import Container, Iterator, Mapping, Sequence
 from itertools import zip_longest
-from typing import TYPE_CHECKING
 
 from sympy import Basic
 
 from shaftwork.components.tables import Table
-from shaftwork.equations.notation import INDEX_CLOSES, INDEX_OPENS, Letter, split_index, without_marks
+from shaftwork.equations.network_equations import NetworkEquations
+from shaftwork.equations.notations import Letter
 from shaftwork.equations.printing import Writer, printed_number
 from shaftwork.equations.series import Numbers, listed, replaced, series_in
-from shaftwork.equations.spelling import in_text
+from shaftwork.equations.spelling import INDEX_CLOSES, INDEX_OPENS, in_text, split_index, without_marks
 from shaftwork.network.effective import effective
-
-if TYPE_CHECKING:  # the records print themselves through this module
-    from shaftwork.equations.records import Equations
 
 LAWS = "Formula, or points of a table, over $t$ in s if nothing else is said"
 ALL_DIGITS = 15
@@ -29,7 +26,7 @@ Cells = tuple[str, ...]
 
 
 def nomenclature(
-    equations: Equations, used: Container[str], noted: Mapping[str, str], besides: Sequence[Cells] = ()
+    equations: NetworkEquations, used: Container[str], noted: Mapping[str, str], besides: Sequence[Cells] = ()
 ) -> str:
     """The tables of the variables that equations contain, of the parameters, and of the laws that are given.
 
@@ -68,7 +65,7 @@ def nomenclature(
     return "\n".join(filter(None, tables))
 
 
-def _laws(equations: Equations) -> Iterator[Cells]:
+def _laws(equations: NetworkEquations) -> Iterator[Cells]:
     """Rows of the laws that are given as tables or formulas."""
     writer = Writer({}, (), (), {})
     for part in equations.form.graph.parts:
@@ -140,13 +137,13 @@ def table(columns: str, headings: Cells, rows: Sequence[Cells]) -> str:
 
 
 def _condensed(rows: Sequence[Cells]) -> Iterator[Cells]:
-    found = series_in(["\n".join(cells) for cells in rows])
-    gone = replaced(found)
+    series = series_in(["\n".join(cells) for cells in rows])
+    inside = replaced(series)
     for place, cells in enumerate(rows):
-        if place in found:
-            for stretch in found[place].stretches:
-                yield _drawn_together(stretch, {number: rows[found[place].members[number]] for number in stretch})
-        elif place not in gone:
+        if place in series:
+            for stretch in series[place].stretches:
+                yield _drawn_together(stretch, {number: rows[series[place].members[number]] for number in stretch})
+        elif place not in inside:
             yield cells
 
 

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from sympy import Expr, Symbol
 
 from shaftwork.core.domains import DOMAINS
 from shaftwork.core.errors import ParameterError
-
-if TYPE_CHECKING:
-    from shaftwork.equations.notation import Letter
+from shaftwork.equations.spelling import indexed
 
 INVERSE = " inverse"
 """At the end of the name of a letter that stands for the reciprocal of a parameter."""
@@ -21,6 +19,36 @@ _QUANTITIES = {
     for domain in DOMAINS
     for quantity in (domain.across, domain.through, domain.integral)
 }
+
+
+@dataclass(frozen=True)
+class Letter:
+    """A symbol before its part's subscript is added.
+
+    Args:
+        name: name of the sympy symbol.
+        base: the letter in LaTeX.
+        mark: subscript of its own, before that of the part.
+        unit: SI unit.
+        meaning: a few words for the nomenclature.
+        parameter: whether it is a parameter, with a value.
+        owner: name of the part or node that it belongs to.
+        number: running number within the part.
+    """
+
+    name: str
+    base: str
+    mark: str
+    unit: str
+    meaning: str
+    parameter: bool = False
+    owner: str = ""
+    number: str = ""
+
+    def printed(self, subscript: str) -> str:
+        """The symbol in LaTeX."""
+        subscripts = ",".join(text for text in (self.mark, subscript, indexed(self.number)) if text)
+        return f"{self.base}_{{{subscripts}}}" if subscripts else self.base
 
 
 class Inverse(NamedTuple):
@@ -80,8 +108,8 @@ class Notation:
         quantity = _QUANTITIES.get((letter.base.removeprefix(sign), letter.unit), "")
         if quantity not in self.quantities:
             return letter
-        made = _spelt(letter, self.quantities[quantity])
-        return replace(made, base=sign + made.base, mark=",".join(filter(None, (made.mark, letter.mark))))
+        spelt = _spelt(letter, self.quantities[quantity])
+        return replace(spelt, base=sign + spelt.base, mark=",".join(filter(None, (spelt.mark, letter.mark))))
 
     def rate_of(self, latex: str) -> str:
         """A time derivative."""
@@ -128,16 +156,16 @@ NOTATIONS: Mapping[str, Notation] = {
 """The notations that equations are printed in by name."""
 
 
-def notation_of(asked: str | Notation) -> Notation:
+def notation_of(source: str | Notation) -> Notation:
     """A notation by its name.
 
     Raises:
         ParameterError: there is no such one.
     """
-    if isinstance(asked, Notation):
-        return asked
-    if not isinstance(asked, str) or asked not in NOTATIONS:
+    if isinstance(source, Notation):
+        return source
+    if not isinstance(source, str) or source not in NOTATIONS:
         raise ParameterError(
-            f"There is no notation {asked!r}. There are: {', '.join(map(repr, NOTATIONS))}; or give a Notation."
+            f"There is no notation {source!r}. There are: {', '.join(map(repr, NOTATIONS))}; or give a Notation."
         )
-    return NOTATIONS[asked]
+    return NOTATIONS[source]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+import re
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
@@ -13,7 +14,7 @@ from sympy.printing.latex import LatexPrinter
 from shaftwork.components.laws import t as TIME
 from shaftwork.equations.assembly import FactoredTerms, Sides, rising_first
 from shaftwork.equations.quantities import rate_of
-from shaftwork.equations.widths import printed_width
+from shaftwork.equations.spelling import without_marks
 
 LINE_WIDTH = 76
 """Characters of ordinary width that fit on a printed line beside its left side."""
@@ -23,6 +24,25 @@ WIDEST_CASE = 36
 """A sum that is wider is broken within the row of its case: there are the left side and the condition beside it."""
 DIGITS = 6
 """Significant digits of numbers in equations."""
+TOKEN = re.compile(r"\\[A-Za-z]+|\\.|.", re.DOTALL)
+WIDTHS = {
+    **dict.fromkeys("+-=<>", 2.5),
+    **dict.fromkeys("()[].:!|", 0.65),
+    **dict.fromkeys(",;", 0.8),
+    **dict.fromkeys(" &$", 0.0),
+    **dict.fromkeys((r"\left", r"\right", r"\biggl", r"\biggr", r"\displaystyle"), 0.25),
+    r"\,": 0.3,
+    r"\ ": 0.6,
+    r"\quad": 1.9,
+    r"\qquad": 3.8,
+    r"\Delta": 1.5,
+    r"\dots": 2.3,
+    r"\cdot": 1.3,
+}
+"""Widths in units of an ordinary letter, about 5.7 points at a font size of 11 points."""
+LETTER, CAPITAL, GREEK, DIGIT = 1.0, 1.35, 1.1, 0.95
+SCRIPT_SIZE, SCRIPT_SPACE = 0.75, 0.1
+FUNCTION = re.compile(r"\\(tanh|cosh|sinh|cos|sin|tan|exp|log|sqrt|operatorname|max|min|sign)$")
 OPENS, CLOSES = "\ue002", "\ue003"
 """Stand for the brackets of a group until it is known whether it stays on one line."""
 
@@ -165,8 +185,8 @@ class Writer:
 
     def pieces(self, groups: Iterable[FactoredTerms]) -> tuple[str, ...]:
         """The terms of all groups, each with its sign, the first without a plus."""
-        made = [piece for group in groups for piece in self._group(group)]
-        return (made[0].removeprefix("+ "), *made[1:]) if made else ()
+        signed = [piece for group in groups for piece in self._group(group)]
+        return (signed[0].removeprefix("+ "), *signed[1:]) if signed else ()
 
     def _group(self, group: FactoredTerms) -> list[str]:
         """The pieces of a group, each with its sign."""
@@ -237,8 +257,8 @@ def _rounded(expression: Expr) -> Expr:
 def aligned(lines: Sequence[Line]) -> str:
     """Lines as the rows of an aligned block, broken where they are too long for the page."""
     widths = [printed_width(line.left) for line in lines]
-    own = max((width for width in widths if 2 * width > LINE_WIDTH), default=0.0)
-    most = min(LINE_WIDTH / 2, LINE_WIDTH - own if own < LINE_WIDTH else math.inf)  # a row of its own begins beside it
+    alone = max((width for width in widths if 2 * width > LINE_WIDTH), default=0.0)  # on a row of its own
+    most = min(LINE_WIDTH / 2, LINE_WIDTH - alone if alone < LINE_WIDTH else math.inf)  # which begins beside others
     beside = max((width for width in widths if width <= most), default=0.0)
     broken = [_broken(line, beside, most) for line in lines]
     rows = [" \\\\\n".join(rows) + (r" \\[1ex]" if len(rows) > 1 else r" \\") for rows in broken]
@@ -276,3 +296,44 @@ def _bracketed(text: str) -> str:
     if whole and r"\left(" not in text:
         opens, closes = r"\left(", r"\right)"
     return text.replace(OPENS, opens).replace(CLOSES, closes)
+
+
+def printed_width(latex: str) -> float:
+    """The width of a formula in ordinary letters: scripts are smaller, a fraction is as wide as its wider part."""
+    return _width(iter(TOKEN.findall(without_marks(latex))), one=False)
+
+
+def _width(tokens: Iterator[str], *, one: bool) -> float:
+    """Width of all tokens up to the end of the group, or of the next item alone."""
+    total = 0.0
+    for item in tokens:
+        if item == " " and one:
+            continue
+        if item == "}":
+            break
+        total += _item(item, tokens)
+        if one:
+            break
+    return total
+
+
+def _item(item: str, tokens: Iterator[str]) -> float:
+    match item:
+        case "{":
+            return _width(tokens, one=False)
+        case "_" | "^":
+            return SCRIPT_SPACE + SCRIPT_SIZE * _width(tokens, one=True)
+        case r"\frac":
+            return 0.4 + max(_width(tokens, one=True), _width(tokens, one=True))
+        case r"\begin" | r"\end":
+            _width(tokens, one=True)
+            return 0.0
+        case r"\mathrm" | r"\text" | r"\mathbf" | r"\mathsf" | r"\dot" | r"\ddot" | r"\operatorname":
+            return 0.0  # the group that follows has the width
+    if item in WIDTHS:
+        return WIDTHS[item]
+    if FUNCTION.match(item):
+        return 0.9 * len(item)
+    if item.isdigit():
+        return DIGIT
+    return GREEK if item.startswith("\\") else CAPITAL if item.isupper() else LETTER

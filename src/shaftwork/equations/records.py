@@ -1,39 +1,23 @@
-"""The equations of a network: all rows of Kirchhoff's equations and of the state form, and what is made of them."""
+"""The equations of a network, and what is made of them: fields, transfer functions, matrices, LaTeX."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Protocol
 
-from sympy import Basic, Expr, Float, Function, Symbol
-
-from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.screen import counted, named, on_one_screen
-from shaftwork.equations.assembly import Assembly
-from shaftwork.equations.notation import Letter, notation
-from shaftwork.equations.notations import OWN, Notation, inverses_of, notation_of
-from shaftwork.equations.rows import (
-    CouplingEquation,
-    Eliminated,
-    LawEquation,
-    LoopEquation,
-    NodeEquation,
-    Row,
-    StateEquation,
-)
-from shaftwork.equations.topology import NamedMatrix, Topology
-from shaftwork.reduction.form import StateForm
+from shaftwork.equations.network_equations import NetworkEquations
+from shaftwork.equations.notations import Notation, notation_of
 
 if TYPE_CHECKING:
     from shaftwork.equations.fields import Field
-    from shaftwork.equations.second_order import SecondOrder
+    from shaftwork.equations.report import Form
     from shaftwork.equations.state_space import StateSpace
     from shaftwork.equations.transfer import TransferFunction
 
-Form = Literal["kirchhoff", "state", "second-order", "field"]
 SHOWN = 5
 """Rows of a kind that are shown on a screen."""
 
@@ -47,124 +31,14 @@ class NamedPhase(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Equations:
+class Equations(NetworkEquations):
     """Kirchhoff's equations of a network and what becomes of them.
 
     Args:
-        form: the state form that they are written from.
-        assembly: makes the terms.
-        nodes: balance at every node.
-        loops: speed around every fundamental loop.
-        laws: constitutive laws.
-        couplings: what ideal couplings impose.
-        states: rates of the states.
-        eliminated: dependent stores, speeds without a store, reactions of couplings and prescribed speeds.
-        notes: what was left out or decided by numerical values, in words.
-        phase: the mode of every part that changes its mode, "gap open, load stuck", for which the rows hold.
         in_phase: from a phase to the equations there, where parts change their mode.
-        source: whose letters are printed.
     """
 
-    form: StateForm
-    assembly: Assembly
-    nodes: tuple[NodeEquation, ...]
-    loops: tuple[LoopEquation, ...]
-    laws: tuple[LawEquation, ...]
-    couplings: tuple[CouplingEquation, ...]
-    states: tuple[StateEquation, ...]
-    eliminated: tuple[Eliminated, ...]
-    notes: tuple[str, ...]
-    phase: str = ""
     in_phase: Callable[[str | NamedPhase], Equations] | None = None
-    source: Notation = OWN
-
-    @cached_property
-    def _notation(self) -> tuple[Mapping[str, str], tuple[Letter, ...]]:
-        return notation(self.form, self.assembly.quantities, self.source)
-
-    @cached_property
-    def inverses(self) -> Mapping[Symbol, Symbol]:
-        """For each parameter that is printed by its reciprocal the symbol of that."""
-        return inverses_of(self.letters)
-
-    @cached_property
-    def rows(self) -> tuple[Row, ...]:
-        """Every row, in the order in which they are printed, but for identities and what others have said before."""
-        kept, said = list[Row](), set[Expr]()  # only asked for membership
-        for row in (*self.nodes, *self.loops, *self.couplings, *self.laws, *self.states, *self.eliminated):
-            expression = row.expression
-            if not row.trivial and expression not in said:
-                kept.append(row)
-                said |= {expression, -expression}
-        return tuple(kept)
-
-    def in_time(self, expression: Basic) -> Basic:
-        """An expression or equation of these rows as sympy's own: J1.omega as J1.omega(t), der(J1.omega) as Derivative.
-
-        Parameters stay symbols, so the result is what `sympy.dsolve` or `sympy.diff` take.
-        """
-        parameters = {letter.name for letter in self.letters if letter.parameter}
-
-        def function(name: str) -> Expr:
-            inner = name[4:-1] if name.startswith("der(") and name.endswith(")") else ""
-            return function(inner).diff(TIME) if inner else Function(name, real=True)(TIME)
-
-        moving = (symbol for symbol in expression.free_symbols if symbol != TIME and symbol.name not in parameters)
-        return expression.xreplace({symbol: function(symbol.name) for symbol in moving})
-
-    @property
-    def letters(self) -> tuple[Letter, ...]:
-        """Every symbol with its unit and meaning, in the order of the parts."""
-        return self._notation[1]
-
-    @property
-    def symbol_names(self) -> Mapping[str, str]:
-        """LaTeX of every symbol by the symbol's name."""
-        return self._notation[0]
-
-    @cached_property
-    def definitions(self) -> Mapping[Symbol, Expr]:
-        """Derived quantities, such as an inertia per length, in parameters and in those defined before."""
-        graph, found = self.form.graph, {}
-        for part in graph.parts:
-            for made in part.derived:
-                own = {symbol: graph.symbol_of(part, symbol.name) for symbol in made.law.free_symbols}
-                found[graph.symbol_of(part, made.name)] = made.law.xreplace(own)
-        return found
-
-    @cached_property
-    def values(self) -> Mapping[str, float]:
-        """Every parameter and derived quantity by the name of its symbol, in SI."""
-        known = dict(self.form.graph.parameters)
-        for symbol, law in self.definitions.items():
-            known[symbol.name] = float(law.xreplace({each: Float(known[each.name]) for each in law.free_symbols}))
-        return known | {inverse.name: 1 / known[symbol.name] for symbol, inverse in self.inverses.items()}
-
-    @cached_property
-    def incidence(self) -> NamedMatrix:
-        """A of Kirchhoff's A i = 0: a row for each node, a column for each branch."""
-        return Topology(self.assembly).incidence()
-
-    @cached_property
-    def loop_matrix(self) -> NamedMatrix:
-        """B of Kirchhoff's B v = 0: a row for the fundamental loop of each link, a column for each branch."""
-        return Topology(self.assembly).loops()
-
-    @cached_property
-    def cutset_matrix(self) -> NamedMatrix:
-        """Q of Q i = 0: a row for the fundamental cutset of each branch of the tree, a column for each branch."""
-        return Topology(self.assembly).cutsets()
-
-    @cached_property
-    def second_order(self) -> SecondOrder:
-        """M phi'' + D phi' + K phi = T of a mechanical network.
-
-        Raises:
-            CompileError: the network has electrical nodes.
-        """
-        from shaftwork.equations.second_order import second_order
-
-        return second_order(self.form.graph)
 
     @cached_property
     def fields(self) -> tuple[Field, ...]:

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Literal, get_args
 
 from shaftwork.core.errors import CompileError, ShaftworkError
 from shaftwork.equations.blocks import Block, Blocks
+from shaftwork.equations.network_equations import NetworkEquations
 from shaftwork.equations.nomenclature import nomenclature
-from shaftwork.equations.notation import without_marks
 from shaftwork.equations.printing import aligned
 from shaftwork.equations.quantities import INSTEAD
 from shaftwork.equations.series import shortened
-from shaftwork.equations.spelling import in_text
+from shaftwork.equations.spelling import in_text, without_marks
 
-if TYPE_CHECKING:  # the records print themselves through this module
-    from shaftwork.equations.records import Equations, Form
-
+Form = Literal["kirchhoff", "state", "second-order", "field"]
 PREAMBLE = r"""\documentclass[11pt,a4paper]{article}
 \usepackage[utf8]{inputenc}
 \usepackage[T1]{fontenc}
@@ -26,24 +24,29 @@ PREAMBLE = r"""\documentclass[11pt,a4paper]{article}
 \usepackage{booktabs}
 \usepackage{longtable}
 \allowdisplaybreaks"""
-FORMS = "'kirchhoff', 'state', 'second-order' or 'field'"
+TITLES = {
+    "kirchhoff": "Kirchhoff's equations",
+    "state": "State form",
+    "second-order": "Second-order form",
+    "field": "Along the shafts",
+}
 BEGIN = r"""\date{}
 \begin{document}
 \sloppy
 \maketitle"""
 
 
-def body(equations: Equations, form: Form | None, *, values: bool) -> str:
+def body(equations: NetworkEquations, form: Form | None, *, values: bool) -> str:
     """The blocks of one form, or of Kirchhoff's equations and the state form, each under a paragraph heading."""
     return typeset(equations, blocks_of(equations, form, values=values))
 
 
-def typeset(equations: Equations, blocks: Iterable[Block]) -> str:
+def typeset(equations: NetworkEquations, blocks: Iterable[Block]) -> str:
     """Blocks for a document, below the phase for which they hold."""
     return "\n".join(("\\allowdisplaybreaks", *_phase(equations), *map(_paragraph, blocks)))
 
 
-def _phase(equations: Equations) -> tuple[str, ...]:
+def _phase(equations: NetworkEquations) -> tuple[str, ...]:
     """The modes for which the equations hold, under a heading; nothing where no part changes its mode."""
     return (f"\\paragraph{{Phase}}\\mbox{{}}\n{in_text(equations.phase)}",) if equations.phase else ()
 
@@ -52,39 +55,46 @@ def _paragraph(block: Block) -> str:
     return f"\\paragraph{{{block.heading}}}\\mbox{{}}\n{_content(block)}"
 
 
-def notebook(equations: Equations) -> str:
+def notebook(equations: NetworkEquations) -> str:
     """The body with headings that a notebook renders."""
     return rendered(equations, blocks_of(equations, None, values=False))
 
 
-def rendered(equations: Equations, blocks: Iterable[Block]) -> str:
+def rendered(equations: NetworkEquations, blocks: Iterable[Block]) -> str:
     """Blocks for a notebook, below the phase for which they hold."""
     phase = (f"$\\textbf{{Phase}}$ {in_text(equations.phase)}\n",) if equations.phase else ()
-    made = (f"$\\textbf{{{block.heading}}}$\n{_content(block)}" for block in blocks)
-    return "\n".join((*phase, *made))
+    return "\n".join((*phase, *(f"$\\textbf{{{block.heading}}}$\n{_content(block)}" for block in blocks)))
 
 
-def blocks_of(equations: Equations, form: Form | None, *, values: bool) -> tuple[Block, ...]:
+def blocks_of(equations: NetworkEquations, form: Form | None, *, values: bool) -> tuple[Block, ...]:
     """The blocks of a form of the equations that say anything.
 
     Raises:
         ShaftworkError: there is no such form.
     """
     blocks = Blocks(equations, values)
+    both = (*blocks.kirchhoff(twists=False), *blocks.state(laws=False)) if form is None else _form(blocks, form)
+    derived = () if form == "field" else (blocks.derived(),)
+    return tuple(block for block in (*both, *derived) if block.lines)
+
+
+def _form(blocks: Blocks, form: Form) -> Iterable[Block]:
+    """The blocks of one form, without the derived quantities.
+
+    Raises:
+        ShaftworkError: there is no such form.
+    """
     match form:
         case "kirchhoff":
-            made = tuple(blocks.kirchhoff())
+            return blocks.kirchhoff()
         case "state":
-            made = tuple(blocks.state())
+            return blocks.state()
         case "second-order":
-            made = tuple(blocks.second_order())
+            return blocks.second_order()
         case "field":
-            return tuple(block for block in blocks.fields() if block.lines)
-        case None:
-            made = (*blocks.kirchhoff(twists=False), *blocks.state(laws=False))
-        case _:
-            raise ShaftworkError(f"There is no form {form!r}; take {FORMS}.")
-    return tuple(block for block in (*made, blocks.derived()) if block.lines)
+            return blocks.fields()
+    *names, last = map(repr, get_args(Form))
+    raise ShaftworkError(f"There is no form {form!r}; take {', '.join(names)} or {last}.")
 
 
 def _content(block: Block) -> str:
@@ -93,25 +103,22 @@ def _content(block: Block) -> str:
     return f"{remark}\\begin{{align*}}\n{rows}\n\\end{{align*}}"
 
 
-def document(equations: Equations, form: Form | None, *, values: bool) -> str:
+def document(equations: NetworkEquations, form: Form | None, *, values: bool) -> str:
     """A LaTeX document that compiles as it is, of one form or of all."""
     blocks = Blocks(equations, values)
     states = {state.name: "state" for state in equations.form.states}
-    found = {symbol.name for row in equations.rows for symbol in row.left.free_symbols | row.right.free_symbols}
-    forms: dict[str, tuple[str, Callable[[], str]]] = {
-        "kirchhoff": (
-            "Kirchhoff's equations",
-            lambda: section((*blocks.kirchhoff(twists=form is not None), blocks.derived())),
-        ),
-        "state": ("State form", lambda: section(blocks.state(laws=form is not None))),
-        "second-order": ("Second-order form", lambda: _second_order(blocks)),
-    }
-    if form == "field":
-        forms = {"field": ("Along the shafts", lambda: section(blocks.fields()))}
-    if form not in (None, *forms):
-        raise ShaftworkError(f"There is no form {form!r}; take {FORMS}.")
-    sections = {title: text() for name, (title, text) in forms.items() if form in (None, name)}
-    sections["Nomenclature"] = nomenclature(equations, found | states.keys(), states)
+    symbols = {symbol.name for row in equations.rows for symbol in row.left.free_symbols | row.right.free_symbols}
+    if form is None:
+        sections = {
+            TITLES["kirchhoff"]: section((*blocks.kirchhoff(twists=False), blocks.derived())),
+            TITLES["state"]: section(blocks.state(laws=False)),
+            TITLES["second-order"]: _second_order(blocks),
+        }
+    else:
+        printed = _form(blocks, form)
+        derived = (blocks.derived(),) if form == "kirchhoff" else ()
+        sections = {TITLES[form]: _second_order(blocks) if form == "second-order" else section((*printed, *derived))}
+    sections["Nomenclature"] = nomenclature(equations, symbols | states.keys(), states)
     return in_sections(equations, sections)
 
 
@@ -127,13 +134,13 @@ def joined(documents: Sequence[str]) -> str:
     return f"{head}{begin}{bodies}{end}"
 
 
-def in_sections(equations: Equations, sections: Mapping[str, str]) -> str:
+def in_sections(equations: NetworkEquations, sections: Mapping[str, str]) -> str:
     """A LaTeX document of sections that say anything, after the phase and before remarks."""
     remarks = "\n\n".join(in_text(note) for note in equations.notes)
     whole = {"Phase": in_text(equations.phase), **sections, "Remarks": remarks}
-    kept = (f"\\section{{{title}}}\n{text}" for title, text in whole.items() if text)
+    printed = (f"\\section{{{title}}}\n{text}" for title, text in whole.items() if text)
     title = in_text(equations.form.graph.name)
-    return "\n".join((PREAMBLE, f"\\title{{{title}}}", BEGIN, *kept, r"\end{document}", ""))
+    return "\n".join((PREAMBLE, f"\\title{{{title}}}", BEGIN, *printed, r"\end{document}", ""))
 
 
 def _second_order(blocks: Blocks) -> str:

@@ -17,11 +17,11 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import jumps, slope
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import CompileError
+from shaftwork.equations.coordinates import coordinates, shortest
+from shaftwork.equations.motion import Motion
 from shaftwork.equations.quantities import INSTEAD, Quantities, rate_of, refuse_controlled
-from shaftwork.network.graph import GROUND, CircuitGraph
+from shaftwork.network.graph import CircuitGraph, GraphBranch
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.gains import Number, add, divide, simplified
-from shaftwork.reduction.tree import column_of
 
 Entries = Mapping[tuple[int, int], Expr]
 
@@ -88,127 +88,90 @@ def second_order(graph: CircuitGraph) -> SecondOrder:
             f"{', '.join(electrical[:6])}{', ...' if len(electrical) > 6 else ''}.{INSTEAD}"
         )
     refuse_controlled(graph)
-    return _SecondOrderWriter(graph).made()
-
-
-class _Positions:
-    """Positions of all nodes in terms of free nodes and prescribed positions (`~branch`)."""
-
-    def __init__(self, graph: CircuitGraph) -> None:
-        self.solved: dict[int, dict[int, Number]] = {}
-        stores = (b for b in graph.branches if b.template.kind is Kind.ACROSS_STORE and GROUND in (b.plus, b.minus))
-        self.heavy = frozenset(max(branch.plus, branch.minus) for branch in stores)
-        for branch in graph.branches:
-            if branch.terms or branch.template.kind is Kind.ACROSS_SOURCE:
-                column = column_of(graph, branch)
-                self._impose(column if branch.terms else {**column, ~branch.index: -1})
-
-    def reduce(self, column: Mapping[int, Number]) -> dict[int, Number]:
-        """A sum of positions in terms of free ones."""
-        result: dict[int, Number] = {}
-        for node, factor in column.items():
-            for key, entry in self.solved.get(node, {node: 1}).items():
-                product = factor * entry
-                total = add(result[key], product, []) if key in result else product
-                if isinstance(total, int) and total == 0:
-                    result.pop(key, None)
-                else:
-                    result[key] = total
-        return result
-
-    def _impose(self, column: Mapping[int, Number]) -> None:
-        """Let the sum of the column be zero: solve for a node without inertia if there is one, else for the last."""
-        reduced = self.reduce(column)
-        if not (free := [key for key in reduced if key >= 0]):
-            return
-        pivot = max(free, key=lambda node: (node not in self.heavy, node))
-        factor = reduced.pop(pivot)
-        self.solved[pivot] = {key: divide(-entry, factor) for key, entry in reduced.items()}
-        self.solved.update({node: self.reduce(row) for node, row in self.solved.items() if pivot in row})
+    return _SecondOrderWriter(graph).second_order()
 
 
 class _SecondOrderWriter:
     def __init__(self, graph: CircuitGraph) -> None:
         self.graph, self.quantities = graph, Quantities(graph)
-        self.positions = _Positions(graph)
-        self.free = tuple(node for node in range(len(graph.nodes)) if node not in self.positions.solved)
-        self.place = {node: k for k, node in enumerate(self.free)}
-        self.coordinates = tuple(map(self.quantities.angle, self.free))
+        self.motion = Motion(coordinates(self.quantities))
+        self.place = {symbol: k for k, symbol in enumerate(self.motion.coordinates.symbols)}
         self.matrices: dict[Kind, dict[tuple[int, int], list[Expr]]] = {
             kind: {} for kind in (Kind.ACROSS_STORE, Kind.CONDUCTANCE, Kind.THROUGH_STORE)
         }
-        self.forces: list[list[Expr]] = [[] for _ in self.free]
+        self.forces: list[list[Expr]] = [[] for _ in self.place]
         self.laws: dict[Symbol, Expr] = {}
         self.across: dict[Symbol, Expr] = {}
         self.prescribed: dict[Symbol, Expr] = {}
 
-    def made(self) -> SecondOrder:
+    def second_order(self) -> SecondOrder:
         for branch in self.graph.branches:
             if branch.template.kind in self.matrices:
-                self._add_linear(branch.index, branch.template.kind, self.quantities.law(branch.index))
+                self._add_linear(branch, branch.template.kind, self.quantities.law(branch.index))
             elif branch.template.kind in (Kind.LAW, Kind.THROUGH_SOURCE):
-                self._add_force(branch.index)
+                self._add_force(branch)
         mass, damping, stiffness = (
             {key: total for key in sorted(entries) if (total := Add(*entries[key])) != 0}
             for entries in self.matrices.values()
         )
-        nodes = tuple(self.graph.nodes[node] for node in self.free)
+        nodes = tuple(self.graph.nodes[node] for node in self.motion.coordinates.free)
         forces = tuple(Add(*terms) for terms in self.forces)
         return SecondOrder(
-            nodes, self.coordinates, mass, damping, stiffness, forces, self.laws, self.across, self.prescribed
+            nodes, tuple(self.place), mass, damping, stiffness, forces, self.laws, self.across, self.prescribed
         )
 
-    def _twist(self, branch: int) -> tuple[dict[int, Expr], dict[int, Expr]]:
-        """The position across a branch: factors of coordinates by place, and of prescribed positions by branch."""
-        made = self.graph.branches[branch]
-        row = self.positions.reduce(column_of(self.graph, made))
-        factors = dict(zip(sorted(row), simplified(row[key] for key in sorted(row)), strict=True))
-        own = {self.place[key]: factor for key, factor in factors.items() if key >= 0}
-        return own, {~key: factor for key, factor in factors.items() if key < 0}
+    def _gains(self, twist: Expr) -> dict[int, Expr]:
+        """The factors of the coordinates in a position, by their places, in their shortest form."""
+        symbols = sorted(twist.free_symbols & self.place.keys(), key=self.place.__getitem__)
+        gains = {self.place[symbol]: shortest(twist.diff(symbol)) for symbol in symbols}
+        return {place: gain for place, gain in gains.items() if gain != 0}
 
-    def _add_linear(self, branch: int, kind: Kind, coefficient: Expr) -> None:
+    def _driven(self, twist: Expr) -> tuple[Expr, ...]:
+        """The terms of a position that are prescribed."""
+        at = self.motion.coordinates
+        positions = [symbol for symbol in at.prescribed if symbol in twist.free_symbols]
+        self.prescribed |= {symbol: at.prescribed[symbol] for symbol in positions}
+        return tuple(shortest(twist.diff(symbol)) * symbol for symbol in positions)
+
+    def _add_linear(self, branch: GraphBranch, kind: Kind, coefficient: Expr) -> None:
         """Add coefficient * f f' for an inertia, a damping or a stiffness; what a prescribed motion asks goes to T."""
-        own, driven = self._twist(branch)
-        for i, gain in own.items():
-            for j, other in own.items():
+        twist, rate = self.motion.twist(branch), self.motion.coordinates.rate
+        gains, driven = self._gains(twist), self._driven(twist)
+        if kind is not Kind.THROUGH_STORE:
+            driven = tuple(map(rate, driven))
+        if kind is Kind.ACROSS_STORE:
+            driven = tuple(map(rate, driven))
+        for i, gain in gains.items():
+            for j, other in gains.items():
                 self.matrices[kind].setdefault((i, j), []).append(gain * coefficient * other)
-            for source, factor in driven.items():
-                self.forces[i].append(-gain * coefficient * factor * self._motion(source)[kind])
+            self.forces[i] += (-gain * coefficient * term for term in driven)
 
-    def _motion(self, source: int) -> dict[Kind, Expr]:
-        """Acceleration, speed and position of a prescribed motion."""
-        speed, position = self.quantities.law(source), self.quantities.integral(source)
-        self.prescribed[position] = speed
-        return {Kind.ACROSS_STORE: speed.diff(TIME), Kind.CONDUCTANCE: speed, Kind.THROUGH_STORE: position}
-
-    def _add_force(self, branch: int) -> None:
+    def _add_force(self, branch: GraphBranch) -> None:
         """Add the torque of a law or source to the coordinates that it drives: minus its power per speed.
 
         A law that is linear in the twist, as that of a gap in contact, is a stiffness, and what is left a torque.
         """
-        law, whole = self.quantities.law(branch), True
+        law, whole = self.quantities.law(branch.index), True
         if (stiffness := linear_stiffness(law)) != 0:
             self._add_linear(branch, Kind.THROUGH_STORE, stiffness)
             law, whole = law.subs(INTEGRAL, 0), False
             if law == 0:
                 return
-        own, driven = self._twist(branch)
-        rates = (gain * rate_of(self.coordinates[k]) for k, gain in own.items())
-        across = Add(*rates, *(gain * self._motion(source)[Kind.CONDUCTANCE] for source, gain in driven.items()))
-        angles = (gain * self.coordinates[k] for k, gain in own.items())
-        twist = Add(*angles, *(gain * self._motion(source)[Kind.THROUGH_STORE] for source, gain in driven.items()))
+        at, flow = self.motion.coordinates, self.quantities.flow_of[branch.index]
+        gains, driven = self._gains(self.motion.twist(branch)), self._driven(self.motion.twist(branch))
+        twist = Add(*(gain * at.symbols[k] for k, gain in gains.items()), *driven)
+        across = Add(*(gain * at.velocities[k] for k, gain in gains.items()), *map(at.rate, driven))
         law = law.xreplace({ACROSS: across, INTEGRAL: twist})
-        made, flow = self.graph.branches[branch], self.quantities.flow_of[branch]
-        symbol = self.quantities.across((made.plus, made.minus))
+        symbol = self.quantities.across((branch.plus, branch.minus))
         for letter in symbol.free_symbols:  # one at most: the across variable of two nodes has one symbol
             self.across[letter] = across * symbol.coeff(letter)
-        self.across[self.quantities.integral(branch)] = twist
+        self.across[self.quantities.integral(branch.index)] = twist
         if whole and len(flow.branches) == 1:
             symbol = self.quantities.through(flow)
             if symbol != flow.sign * law:
                 self.laws[symbol] = flow.sign * law
             law = flow.sign * symbol
-        for i, gain in own.items():
+        for i, gain in gains.items():
             self.forces[i].append(-gain * law)
 
 
@@ -216,5 +179,5 @@ def linear_stiffness(law: Expr) -> Expr:
     """The slope of a law over the twist where it is the same everywhere, else 0."""
     if not law.has(INTEGRAL) or jumps(law, INTEGRAL):
         return Integer(0)
-    made = slope(law, INTEGRAL)
-    return Integer(0) if made.has(ACROSS, INTEGRAL, TIME) else made
+    stiffness = slope(law, INTEGRAL)
+    return Integer(0) if stiffness.has(ACROSS, INTEGRAL, TIME) else stiffness

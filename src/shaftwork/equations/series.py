@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from shaftwork.equations.notation import INDEX_CLOSES, INDEX_OPENS
 from shaftwork.equations.printing import Line
+from shaftwork.equations.spelling import INDEX_CLOSES, INDEX_OPENS
 
 SHORTEST_SERIES = 5
 """Fewer equal rows are printed one by one."""
@@ -49,12 +49,12 @@ def shortened(lines: Sequence[Line]) -> tuple[Line, ...]:
 
     A series stands where its first row stood; all other rows keep their order.
     """
-    found = series_in([line.text for line in lines])
-    gone = replaced(found)
+    series = series_in([line.text for line in lines])
+    inside = replaced(series)
     return tuple(
-        _general(lines, found[place]) if place in found else line
+        _general(lines, series[place]) if place in series else line
         for place, line in enumerate(lines)
-        if place in found or place not in gone
+        if place in series or place not in inside
     )
 
 
@@ -67,9 +67,9 @@ def series_in(texts: Sequence[str]) -> dict[int, Series]:
     return {series.first: series for family in families.values() for series in _series_of(family)}
 
 
-def replaced(found: Mapping[int, Series]) -> frozenset[int]:
+def replaced(series: Mapping[int, Series]) -> frozenset[int]:
     """The places of all members of some series."""
-    return frozenset(place for series in found.values() for place in series.members.values())
+    return frozenset(place for each in series.values() for place in each.members.values())
 
 
 def listed(stretch: Numbers, text: Callable[[int], str], dots: str) -> str:
@@ -84,13 +84,13 @@ def _series_of(family: Mapping[int, Numbers]) -> Iterator[Series]:
     """The series in texts that are the same but for their indices, longest first."""
     left = dict(family)
     while len(left) >= SHORTEST_SERIES:
-        found = max(_candidates(left), key=lambda series: len(series.members))
-        if len(found.members) < SHORTEST_SERIES:
+        longest = max(_candidates(left), key=lambda series: len(series.members))
+        if len(longest.members) < SHORTEST_SERIES:
             return
-        kept = dict.fromkeys(number for stretch in found.stretches[:MOST_STRETCHES] for number in stretch)
-        yield Series({number: found.members[number] for number in kept}, found.running)
-        for number in kept:
-            del left[found.members[number]]
+        numbers = dict.fromkeys(number for stretch in longest.stretches[:MOST_STRETCHES] for number in stretch)
+        yield Series({number: longest.members[number] for number in numbers}, longest.running)
+        for number in numbers:
+            del left[longest.members[number]]
 
 
 def _candidates(family: Mapping[int, Numbers]) -> Iterator[Series]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 import unicodedata
 
+INDEX_OPENS, INDEX_CLOSES = "\ue000", "\ue001"
+"""Marks around the number at the end of a subscript, to recognise rows that differ by it alone; never printed."""
 ESCAPES = {
     "\\": r"\backslash ",
     "{": r"\{",
@@ -37,11 +39,27 @@ STRETCH = re.compile(f"(?P<accented>[{ACCENTED}]+)|(?P<raised>[{SUPERSCRIPTS}]+)
 """What is escaped in one go."""
 ALLOWED = re.compile(
     r"(?P<word>[A-Za-z]{2,})"
-    rf"|(?P<kept>\\(?:{'|'.join(GREEK)})(?![A-Za-z]) ?|\\mathrm\{{[A-Za-z0-9]+\}}|[A-Za-z0-9,'])"
+    rf"|(?P<plain>\\(?:{'|'.join(GREEK)})(?![A-Za-z]) ?|\\mathrm\{{[A-Za-z0-9]+\}}|[A-Za-z0-9,'])"
     r"|(?P<other>.)",
     re.DOTALL,
 )
 """What a chosen subscript may contain, and one character that it may not."""
+
+
+def indexed(digits: str) -> str:
+    """The number at the end of a subscript, between marks."""
+    return f"{INDEX_OPENS}{digits}{INDEX_CLOSES}" if digits else ""
+
+
+def without_marks(latex: str) -> str:
+    """LaTeX as it is printed."""
+    return latex.replace(INDEX_OPENS, "").replace(INDEX_CLOSES, "")
+
+
+def split_index(name: str) -> tuple[str, str]:
+    """A name as its stem and the digits at its end."""
+    stem = name.rstrip("0123456789")
+    return stem, name[len(stem) :]
 
 
 def escaped(name: str) -> str:
@@ -77,21 +95,21 @@ def _greek(character: str) -> str:
 
 def _plain(text: str) -> str:
     """A text without accents and positions: "ạ" is a, "₂" is 2; empty where nothing is left."""
-    kept = unicodedata.normalize("NFKD", text).replace("\N{MINUS SIGN}", "-")
-    return "".join(c for c in kept if c.isascii() and (c.isalnum() or c in "+-"))
+    apart = unicodedata.normalize("NFKD", text).replace("\N{MINUS SIGN}", "-")
+    return "".join(c for c in apart if c.isascii() and (c.isalnum() or c in "+-"))
 
 
 def chosen_subscript(text: str) -> str:
     """A subscript that a user has chosen: letters, digits, commas, primes and Greek letters; all else is escaped."""
     return "".join(
-        rf"\mathrm{{{match['word']}}}" if match["word"] else _spaced(match["kept"] or "") or escaped(match["other"])
+        rf"\mathrm{{{match['word']}}}" if match["word"] else _spaced(match["plain"] or "") or escaped(match["other"])
         for match in ALLOWED.finditer(unicodedata.normalize("NFC", text))
     )
 
 
-def _spaced(kept: str) -> str:
+def _spaced(text: str) -> str:
     """A control word with the one space that parts it from a letter after it."""
-    return f"{kept.rstrip()} " if kept[:1] == "\\" and kept[-1] != "}" else kept
+    return f"{text.rstrip()} " if text[:1] == "\\" and text[-1] != "}" else text
 
 
 def in_text(text: str) -> str:

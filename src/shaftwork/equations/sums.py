@@ -11,9 +11,9 @@ from sympy import Mul, Symbol
 
 from shaftwork.components.shaft_models import Spectral
 from shaftwork.components.shafts import Shaft
-from shaftwork.equations.notation import INDEX_CLOSES, INDEX_OPENS
 from shaftwork.equations.printing import Line, Writer
 from shaftwork.equations.quantities import Quantities, rate_of
+from shaftwork.equations.spelling import INDEX_CLOSES, INDEX_OPENS
 from shaftwork.network.graph import GraphPart
 from shaftwork.network.kinds import Kind
 

@@ -9,12 +9,10 @@ from sympy import Add, Expr, Integer, Symbol, default_sort_key
 
 from shaftwork.equations.assembly import FactoredTerms
 from shaftwork.equations.blocks import Blocks
-from shaftwork.equations.notation import without_marks
-from shaftwork.equations.printing import LINE_WIDTH, Line, Writer, aligned
+from shaftwork.equations.printing import LINE_WIDTH, Line, Writer, aligned, printed_width
 from shaftwork.equations.slopes import Slope
-from shaftwork.equations.spelling import escaped
+from shaftwork.equations.spelling import escaped, without_marks
 from shaftwork.equations.tableau import S
-from shaftwork.equations.widths import printed_width
 
 if TYPE_CHECKING:  # the record prints itself through this module
     from shaftwork.equations.transfer import TransferFunction

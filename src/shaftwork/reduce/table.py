@@ -16,10 +16,8 @@ from shaftwork.core.errors import SignalError
 from shaftwork.equations.assembly import FactoredTerms
 from shaftwork.equations.nomenclature import column, unit
 from shaftwork.equations.nomenclature import table as longtable
-from shaftwork.equations.notation import without_marks
-from shaftwork.equations.printing import Line, Writer, aligned, printed_number
-from shaftwork.equations.spelling import escaped, in_text
-from shaftwork.equations.widths import printed_width
+from shaftwork.equations.printing import Line, Writer, aligned, printed_number, printed_width
+from shaftwork.equations.spelling import escaped, in_text, without_marks
 from shaftwork.reduce.referred_parts import Entry
 
 HEADINGS = ("part", "quantity", "value", "unit", "ratio", "referred", "unit", "formula")

@@ -12,15 +12,12 @@ from sympy import Symbol
 from shaftwork.components.base import Derived
 from shaftwork.core.domains import ELECTRICAL, Quantity
 from shaftwork.core.parameters import Parameter
-from shaftwork.equations.notations import Notation
-from shaftwork.equations.quantities import Quantities, running_number
-from shaftwork.equations.spelling import GREEK, chosen_subscript, escaped
-from shaftwork.network.graph import GraphBranch, GraphPart
+from shaftwork.equations.notations import Letter, Notation
+from shaftwork.equations.quantities import Quantities, ThroughQuantity, running_number
+from shaftwork.equations.spelling import GREEK, chosen_subscript, escaped, indexed, split_index, without_marks
+from shaftwork.network.graph import GraphBranch
 from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm
-
-INDEX_OPENS, INDEX_CLOSES = "\ue000", "\ue001"
-"""Marks around the number at the end of a subscript, to recognise rows that differ by it alone; never printed."""
 
 WORDS = {
     "omega": "angular speed",
@@ -37,36 +34,6 @@ WORDS = {
 
 
 @dataclass(frozen=True)
-class Letter:
-    """A symbol before its part's subscript is added.
-
-    Args:
-        name: name of the sympy symbol.
-        base: the letter in LaTeX.
-        mark: subscript of its own, before that of the part.
-        unit: SI unit.
-        meaning: a few words for the nomenclature.
-        parameter: whether it is a parameter, with a value.
-        owner: name of the part or node that it belongs to.
-        number: running number within the part.
-    """
-
-    name: str
-    base: str
-    mark: str
-    unit: str
-    meaning: str
-    parameter: bool = False
-    owner: str = ""
-    number: str = ""
-
-    def printed(self, subscript: str) -> str:
-        """The symbol in LaTeX."""
-        subscripts = ",".join(text for text in (self.mark, subscript, _index(self.number)) if text)
-        return f"{self.base}_{{{subscripts}}}" if subscripts else self.base
-
-
-@dataclass(frozen=True)
 class Named:
     """A part or node and the letters that bear its name."""
 
@@ -79,12 +46,12 @@ class Named:
         """The subscript: as short as it may be (0), the whole name (1), the name and a number (2, 3, ...)."""
         if self.chosen is not None and style == 0:
             stem, index = split_index(str(self.chosen))  # `symbol=1` is a fair choice, and printing never fails
-            return f"{chosen_subscript(stem)}{_index(index)}"
+            return f"{chosen_subscript(stem)}{indexed(index)}"
         stem, index = split_index(self.name)
         comma = "" if style and stem.endswith("_") else ","
         if style == 0:
             stem = self._short(stem, index)
-        text = comma.join(part for part in (f"\\mathrm{{{escaped(stem)}}}" if stem else "", _index(index)) if part)
+        text = comma.join(part for part in (f"\\mathrm{{{escaped(stem)}}}" if stem else "", indexed(index)) if part)
         return text if style < 2 else f"{text},({style})"
 
     def _short(self, stem: str, index: str) -> str:
@@ -98,22 +65,9 @@ class Named:
         return stem[1:] if not index and stem[:1] in self.shortable and len(stem) == 2 else stem
 
 
-def _index(digits: str) -> str:
-    return f"{INDEX_OPENS}{digits}{INDEX_CLOSES}" if digits else ""
-
-
-def without_marks(latex: str) -> str:
-    """LaTeX as it is printed."""
-    return latex.replace(INDEX_OPENS, "").replace(INDEX_CLOSES, "")
-
-
-def split_index(name: str) -> tuple[str, str]:
-    """A name as its stem and the digits at its end."""
-    stem = name.rstrip("0123456789")
-    return stem, name[len(stem) :]
-
-
-def notation(form: StateForm, quantities: Quantities, source: Notation) -> tuple[Mapping[str, str], tuple[Letter, ...]]:
+def letters_of(
+    form: StateForm, quantities: Quantities, source: Notation
+) -> tuple[Mapping[str, str], tuple[Letter, ...]]:
     """LaTeX of every symbol by name, and the letters of a source in the order of the parts, for the nomenclature.
 
     Parts of one class whose names differ by a number are printed in one style, so that they stay a series.
@@ -126,13 +80,13 @@ def notation(form: StateForm, quantities: Quantities, source: Notation) -> tuple
     taken: set[str] = {"t"}  # only asked for membership, so its order does not matter
     for members in series.values():
         for style in count():
-            made = {
+            styled = {
                 letter.name: letter.printed(member.subscript(style)) for member in members for letter in member.letters
             }
-            seen = {without_marks(latex) for latex in made.values()}
-            if taken.isdisjoint(seen) and len(seen) == len(made):
+            seen = {without_marks(latex) for latex in styled.values()}
+            if taken.isdisjoint(seen) and len(seen) == len(styled):
                 break
-        printed.update(made)
+        printed.update(styled)
         taken.update(seen)
     letters = (replace(letter, owner=bearer.name) for _, bearer in bearers for letter in bearer.letters)
     return printed, tuple(letters)
@@ -140,28 +94,24 @@ def notation(form: StateForm, quantities: Quantities, source: Notation) -> tuple
 
 def _parts(form: StateForm, quantities: Quantities, source: Notation) -> Iterator[tuple[str, Named]]:
     graph = form.graph
-    own: dict[int, list[Letter]] = {number: [] for number in range(len(graph.parts))}
+    variables: dict[int, list[Letter]] = {number: [] for number in range(len(graph.parts))}
     for number, letter in _quantity_letters(form, quantities):
-        own[number].append(letter)
+        variables[number].append(letter)
     for number, part in enumerate(graph.parts):
-        letters = _distinct(map(source.written, (*_parameters(part), *own[number])))
+        declarations = [part.component.declared[name] for name in part.parameters]
+        parameters = parameter_letters(part.name, (*declarations, *part.derived))
+        letters = _distinct(map(source.written, (*parameters, *variables[number])))
         shortable = (*part.component.declared, *(letter.base for letter in letters))
         yield type(part.component).__name__, Named(part.name, letters, part.component.symbol, shortable)
 
 
-def _parameters(part: GraphPart) -> Iterator[Letter]:
-    """Those of the parameters, then those that are derived from them."""
-    declarations: list[Parameter | Derived] = [part.component.declared[name] for name in part.parameters]
-    for declared in (*declarations, *part.derived):
+def parameter_letters(part: str, declarations: Iterable[Parameter | Derived]) -> Iterator[Letter]:
+    """The letters of parameters and of what is derived from them."""
+    for declared in declarations:
         base, _, mark = declared.latex.partition("_")
         mark = mark[1:-1] if mark.startswith("{") and mark.endswith("}") else mark
         yield Letter(
-            f"{part.name}.{declared.name}",
-            _upright(base),
-            _upright(mark),
-            declared.unit,
-            declared.meaning,
-            parameter=True,
+            f"{part}.{declared.name}", _upright(base), _upright(mark), declared.unit, declared.meaning, parameter=True
         )
 
 
@@ -179,43 +129,54 @@ def _quantity_letters(form: StateForm, quantities: Quantities) -> Iterator[tuple
         quantity = quantities.domain(ends).across
         sign = "" if quantity is ELECTRICAL.across else r"\Delta "
         letter = _letter(pair.symbol, quantity, pair.label)
-        yield (
-            pair.part,
-            replace(letter, base=sign + letter.base, meaning=f"{letter.meaning} across" if sign else letter.meaning),
-        )
+        meaning = f"{letter.meaning} across" if sign else letter.meaning
+        yield pair.part, replace(letter, base=sign + letter.base, meaning=meaning)
     holding = {branch.part for branch in graph.branches if branch.terms and _numbered(quantities, branch)}
     for flow in quantities.flows:
-        quantity, several = quantities.domain((flow.plus, flow.minus)).through, len(flow.branches) > 1
-        letter = _letter(quantities.through(flow), quantity, flow.label)
-        beside = flow.part in holding and flow.label.isdecimal()
-        yield flow.part, replace(letter, meaning=f"{letter.meaning} of its law") if beside else letter
-        for index in flow.branches:
-            template = graph.branches[index].template
-            if several and template.kind is Kind.THROUGH_STORE:
-                yield flow.part, _letter(quantities.store(index), quantity, template.label)
+        yield from ((flow.part, letter) for letter in _flow_letters(quantities, flow, holds=flow.part in holding))
     for branch in graph.branches:
-        if branch.template.kind is Kind.ACROSS_SOURCE:
-            quantity = quantities.domain((branch.plus, branch.minus)).integral
-            symbol = quantities.integral(branch.index)
-            _, _, label = symbol.name.partition(f".{quantity.name}_")
-            yield branch.part, _letter(symbol, quantity, label)
-        if branch.template.is_history:
-            line, _, end = branch.template.label.partition("_")
-            meaning = f"torque wave that arrives at {end}"
-            symbol = quantities.history(branch.index)
-            yield branch.part, Letter(symbol.name, "h", _mark(end), "N*m", meaning, number=split_index(line)[1])
-        if branch.terms:
-            quantity = quantities.multiplier_quantity(branch.index)
-            label = quantities.multiplier_label(branch.index)
-            letter = _letter(quantities.multiplier(branch.index), quantity, label)
-            holds = branch.part in holding and _numbered(quantities, branch)
-            yield branch.part, replace(letter, meaning=f"{letter.meaning} that holds it") if holds else letter
+        yield from ((branch.part, letter) for letter in _branch_letters(quantities, branch))
     for state in form.states:
         if state.kind == "integral":
             branch = graph.branches[state.branch]
             quantity = quantities.domain((branch.plus, branch.minus)).integral
             label = state.name.rsplit(".", 1)[1].removeprefix(quantity.name).removeprefix("_")
             yield branch.part, _letter(quantities.integral(branch.index), quantity, label)
+
+
+def _flow_letters(quantities: Quantities, flow: ThroughQuantity, *, holds: bool) -> Iterator[Letter]:
+    """What passes through parallel branches of a part, and through a spring among them.
+
+    Args:
+        holds: whether the part has a joint too, whose torque is another one.
+    """
+    quantity = quantities.domain((flow.plus, flow.minus)).through
+    letter = _letter(quantities.through(flow), quantity, flow.label)
+    beside = holds and flow.label.isdecimal()
+    yield replace(letter, meaning=f"{letter.meaning} of its law") if beside else letter
+    for index in flow.branches if len(flow.branches) > 1 else ():
+        template = quantities.graph.branches[index].template
+        if template.kind is Kind.THROUGH_STORE:
+            yield _letter(quantities.store(index), quantity, template.label)
+
+
+def _branch_letters(quantities: Quantities, branch: GraphBranch) -> Iterator[Letter]:
+    """The position that a source prescribes, the wave that arrives at an end of a line, the reaction of a coupling."""
+    if branch.template.kind is Kind.ACROSS_SOURCE:
+        quantity = quantities.domain((branch.plus, branch.minus)).integral
+        symbol = quantities.integral(branch.index)
+        _, _, label = symbol.name.partition(f".{quantity.name}_")
+        yield _letter(symbol, quantity, label)
+    if branch.template.is_history:
+        line, _, end = branch.template.label.partition("_")
+        meaning = f"torque wave that arrives at {end}"
+        symbol = quantities.history(branch.index)
+        yield Letter(symbol.name, "h", _mark(end), "N*m", meaning, number=split_index(line)[1])
+    if branch.terms:
+        quantity = quantities.multiplier_quantity(branch.index)
+        letter = _letter(quantities.multiplier(branch.index), quantity, quantities.multiplier_label(branch.index))
+        holds = _numbered(quantities, branch)
+        yield replace(letter, meaning=f"{letter.meaning} that holds it") if holds else letter
 
 
 def _numbered(quantities: Quantities, joint: GraphBranch) -> bool:
@@ -253,16 +214,16 @@ def _mark(text: str) -> str:
 
 def _distinct(letters: Iterable[Letter]) -> tuple[Letter, ...]:
     """The letters of one part, each symbol once; a parameter that looks like a variable gets the subscript 0."""
-    kept: dict[str, Letter] = {}
+    first: dict[str, Letter] = {}
     for letter in letters:
-        kept.setdefault(letter.name, letter)
-    made: dict[str, Letter] = {}
-    for letter in sorted(kept.values(), key=lambda letter: letter.parameter):
+        first.setdefault(letter.name, letter)
+    by_latex: dict[str, Letter] = {}
+    for letter in sorted(first.values(), key=lambda letter: letter.parameter):
         marks = (letter.mark + "0" * times for times in count())
-        free = next(own for mark in marks if (own := replace(letter, mark=mark)).printed("") not in made)
-        made[free.printed("")] = free
-    order = {name: place for place, name in enumerate(kept)}
-    return tuple(sorted(made.values(), key=lambda letter: order[letter.name]))
+        free = next(new for mark in marks if (new := replace(letter, mark=mark)).printed("") not in by_latex)
+        by_latex[free.printed("")] = free
+    order = {name: place for place, name in enumerate(first)}
+    return tuple(sorted(by_latex.values(), key=lambda letter: order[letter.name]))
 
 
 def _nodes(quantities: Quantities, source: Notation) -> Iterator[tuple[str, Named]]:
