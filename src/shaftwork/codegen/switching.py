@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from sympy import Expr, Min, Symbol, pi, sin
 
-from shaftwork.codegen.bumps import GOLDEN, bumps, irregular
 from shaftwork.codegen.code import scalar, vectorised
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.timeline import CLEARANCE, NOTHING, Timeline, timeline
+from shaftwork.codegen.timeline import CLEARANCE, GOLDEN, NOTHING, Timeline, bumps, irregular, timeline
 from shaftwork.components.laws import line, narrow_places, switches, unsolved_places
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ParameterError

@@ -22,8 +22,8 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.held import HeldArrays, HeldStores, Joints
 from shaftwork.codegen.linear_readings import ReadingMatrices
 from shaftwork.codegen.matrices import LinearPart
+from shaftwork.codegen.model import ScalarProgram
 from shaftwork.codegen.products import Factor
-from shaftwork.codegen.scalar import ScalarProgram
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.components.pieces import parts
 from shaftwork.core.kept import Kept

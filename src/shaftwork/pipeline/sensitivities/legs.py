@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import brentq
 from sympy import Expr
 
-from shaftwork.codegen.differentiated import Differentiated
+from shaftwork.codegen.differentiation import Differentiated
 from shaftwork.codegen.elements import Array
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.assemblies import ModeEquations
