@@ -60,9 +60,9 @@ class RealNumbers:
     def _print_Float(self, number: Float) -> str:
         return repr(float(number))  # sympy prints 15 digits, which is another float
 
-    def _print_Pow(self, power: Pow, rational: bool = False) -> str:  # noqa: FBT001, FBT002 (sympy's signature)
+    def _print_Pow(self, power: Pow, *options: Any, **named: Any) -> str:
         if abs(power.exp) == S.Half or power.exp.is_integer:
-            return str(super()._print_Pow(power, rational))  # type: ignore[misc]
+            return str(super()._print_Pow(power, *options, **named))  # type: ignore[misc]
         # Python's own ** gives a complex number for a negative base.
         base, exponent = self._print(power.base), self._print(power.exp)
         return f"{self.power}({base}, {exponent})"  # type: ignore[attr-defined]

@@ -20,7 +20,7 @@ from shaftwork.codegen.arrays import ArrayProgram, BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.observer import ModelObserver
-from shaftwork.codegen.recovery import BranchHistory, branches_with_power
+from shaftwork.codegen.recovery import BranchHistory, GivenHistory, branches_with_power
 from shaftwork.codegen.waves import DenseWaves
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.slopes import jumps, slope
@@ -159,10 +159,10 @@ class Linearization:
             v: (m, k) those of the inputs.
             v_rate: (m, k) their derivatives by time.
         """
-        state, given, rate = (np.hstack([each.real, each.imag]) for each in (x, v, v_rate))
-        u = self._by_state @ state + self._by_input @ given
-        change = self.A @ state + self.B @ given + self.B1 @ rate
-        history = _Deviations(self._bound, state, (u, self._enter @ rate, change), self._nominal)
+        state, entering, rate = (np.hstack([each.real, each.imag]) for each in (x, v, v_rate))
+        u = self._by_state @ state + self._by_input @ entering
+        change = self.A @ state + self.B @ entering + self.B1 @ rate
+        history = _Deviations(self._nominal, state, u, self._enter @ rate, change)
         count = x.shape[1]
 
         def read(name: str) -> Complex:
@@ -263,16 +263,12 @@ def _in_a_row(part: GraphPart, stores: set[int]) -> list[tuple[int, float]]:
     return [(nodes[0], 1.0), *zip(nodes[1:], (steps / steps.mean()).tolist(), strict=True)]
 
 
-class _Deviations(BranchHistory):
-    """All branch quantities of a small motion about a point."""
+class _Deviations(GivenHistory):
+    """All branch quantities of a small motion about a point; for the arguments after that see `GivenHistory`."""
 
-    def __init__(self, bound: BoundArrays, x: Any, given: tuple[Any, Any, Any], nominal: BranchHistory) -> None:
-        super().__init__(bound, np.zeros(x.shape[1]), x.T)
-        self._given, self._nominal = given, nominal
-
-    @property
-    def inputs(self) -> tuple[Array, Array, Array]:
-        return self._given
+    def __init__(self, nominal: BranchHistory, x: Any, u: Any, slopes: Any, rate: Any) -> None:
+        super().__init__(nominal.bound, x, u, slopes, rate)
+        self._nominal = nominal
 
     def stored(self, part: GraphPart) -> Array:
         energy = np.zeros(len(self.t))
