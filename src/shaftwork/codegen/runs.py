@@ -293,8 +293,8 @@ class RunProgram:
         special = sorted({str(f.func) for f in expression.atoms(Function)} & NUMERICAL.keys())
         if special:
             raise CompileError(
-                f"'{self._title}' has a law with a table or noise, {', '.join(special)}, of which there is no code. Take "
-                "model.rhs, or a formula in place of it."
+                f"'{self._title}' has a law with a table or noise, {', '.join(special)}, of which there is no code. "
+                "Take model.rhs, or a formula in place of it."
             )
         return str(printer.doprint(expression))
 

@@ -16,7 +16,7 @@ from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.operating import steady_state
 from shaftwork.codegen.start_values import initial_state
-from shaftwork.codegen.switching import Switching
+from shaftwork.codegen.time_switches import Switching
 from shaftwork.codegen.valueless import refuse_vanishing, rough, without_value
 from shaftwork.core.callbacks import Callback
 from shaftwork.core.errors import CompileError, ParameterError
