@@ -126,26 +126,28 @@ class Linearization:
         """
         graph, form = self._form.graph, self._form
         stores = {graph.branches[k].plus for k in (*form.across_states, *form.dependent_across)}
-        found: dict[int, float] = {}
+        place_of: dict[int, float] = {}
         place = -1.0
         for part in graph.parts:
             for node, step in _in_a_row(part, stores):
-                if node not in found and node != GROUND:
+                if node not in place_of and node != GROUND:
                     place += step
-                    found[node] = place
-        across = {node: graph.domains[node].across for node in found}
-        return {f"{graph.nodes[node]}.{made.name}": (made.unit, found[node]) for node, made in across.items()}
+                    place_of[node] = place
+        across = {node: graph.domains[node].across for node in place_of}
+        return {
+            f"{graph.nodes[node]}.{variable.name}": (variable.unit, place_of[node]) for node, variable in across.items()
+        }
 
     @cached_property
     def masses(self) -> tuple[tuple[str, str], ...]:
         """(part, across variable of its node) for every across store, also those that are no states."""
         graph, form = self._form.graph, self._form
-        found = []
+        masses = []
         for k in sorted((*form.across_states, *form.dependent_across)):
             node = graph.branches[k].plus if graph.branches[k].plus != GROUND else graph.branches[k].minus
             if node != GROUND:  # the end of a shaft that is held
-                found.append((graph.part_of(k).name, f"{graph.nodes[node]}.{graph.domains[node].across.name}"))
-        return tuple(found)
+                masses.append((graph.part_of(k).name, f"{graph.nodes[node]}.{graph.domains[node].across.name}"))
+        return tuple(masses)
 
     def swinging(self, s: Complex, x: Complex, v: Complex) -> Callable[[str], Complex]:
         """`motion` where everything goes as exp(s t), s (k,)."""
@@ -198,7 +200,7 @@ def _input_slopes(bound: BoundArrays, t: float, x: Array, enter: Any) -> tuple[A
     y, _ = bound.values(t, x)
     _refuse_jumps(bound, t, y, x)
     reads, integral = inputs.slopes(t, y, x, bound.p)
-    if bad := [row for made in (reads, integral) for row in made.tocoo().row[~np.isfinite(made.tocoo().data)]]:
+    if bad := [row for matrix in (reads, integral) for row in matrix.tocoo().row[~np.isfinite(matrix.tocoo().data)]]:
         raise SimulationError(f"{_laws_of(bound, bad)} no finite slope at this point. {_elsewhere(t)}")
     slopes, through = reads @ part.C + integral, sparse.csr_array(reads @ part.D)
     if bound.loops is None:  # through D a law reads sources alone, and of those the controlled ones others
@@ -227,10 +229,10 @@ def _refuse_jumps(bound: BoundArrays, t: float, y: Array, x: Array) -> None:
     """Raise where a law that switches with its speed or angle does so at the point itself."""
     inputs, graph, p = bound.program.inputs, bound.program.form.graph, bound.p
     templates = [graph.branches[int(k)].template for k in bound.program.assembly.inputs]
-    switching = np.array([jumps(made.law, ACROSS, INTEGRAL, *made.reads) for made in templates], dtype=bool)
+    switching = np.array([jumps(template.law, ACROSS, INTEGRAL, *template.reads) for template in templates], dtype=bool)
     if not switching.any():
         return
-    step_y, step_x = (NEARBY * np.maximum(np.abs(given), 1.0) for given in (y, x))
+    step_y, step_x = (NEARBY * np.maximum(np.abs(values), 1.0) for values in (y, x))
     above, below = (inputs.values(t, y + side * step_y, x + side * step_x, p) for side in (1.0, -1.0))
     by_y, by_x = inputs.slopes(t, y, x, p)
     expected = 2 * (by_y @ step_y + by_x @ step_x[: inputs.states])
@@ -254,7 +256,7 @@ def _elsewhere(t: float) -> str:
 def _in_a_row(part: GraphPart, stores: set[int]) -> list[tuple[int, float]]:
     """The nodes of a part from its first end to its last, each with its distance from the one before, on average 1."""
     first, *others = (part.nodes[port.name] for port in part.component.ports)
-    along = next((made for made in part.component.profiles().values() if made.kind == "across"), None)
+    along = next((profile for profile in part.component.profiles().values() if profile.kind == "across"), None)
     if along is None or along.lines:
         inside = (node for node in part.nodes.values() if node in stores and node not in (first, *others))
         return [(node, 1.0) for node in (first, *inside, *others)]

@@ -148,8 +148,8 @@ class CompiledModel:
         """The largest degree in time of the laws of time between their breakpoints; None where one is no polynomial."""
         kinds = (Kind.LAW, Kind.THROUGH_SOURCE, Kind.ACROSS_SOURCE)
         laws = [b.template.law for b in self.form.graph.branches if b.template.kind in kinds]
-        found = [pieces_degree(law) for law in laws]
-        return None if None in found else max((degree for degree in found if degree is not None), default=0)
+        degrees = [pieces_degree(law) for law in laws]
+        return None if None in degrees else max((degree for degree in degrees if degree is not None), default=0)
 
     @cached_property
     def scalar(self) -> ScalarProgram | None:
@@ -219,12 +219,12 @@ class CompiledModel:
         return in_si("t", t, "s") if is_quantity(t) else t, states, values
 
     @staticmethod
-    def _vector(name: str, given: Any, size: int, what: str) -> Array:
-        numbers = np.asarray(without_unit(name, given, f"of each {what}"))
+    def _vector(name: str, value: Any, size: int, what: str) -> Array:
+        numbers = np.asarray(without_unit(name, value, f"of each {what}"))
         try:
             vector = numbers.astype(float, casting="same_kind" if numbers.dtype.kind == "c" else "unsafe", copy=False)
         except (TypeError, ValueError):
-            shown = reprlib.repr(given)
+            shown = reprlib.repr(value)
             raise ParameterError(f"{name} = {shown} must be {size} real numbers, one for each {what}.") from None
         if vector.shape != (size,):
             raise ParameterError(f"{name} has the shape {vector.shape}: give {size} numbers, one for each {what}.")

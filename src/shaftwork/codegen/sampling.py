@@ -104,9 +104,9 @@ def _reach(sides: Sides, t: Array, times: Array, old: Index, new: Index, grain: 
     while True:
         offsets = reach[:, None] * PROBES
         early, late = np.maximum(times[:, None] - offsets, t[0]), np.minimum(times[:, None] + offsets, t[-1])
-        kept = (sides(early.ravel()).reshape(early.shape) == old[:, None]) | (early == t[0])
-        kept &= (sides(late.ravel()).reshape(late.shape) == new[:, None]) | (late == t[-1])
-        farther = ~kept.all(axis=1) & (4 * reach <= farthest)
+        keeps = (sides(early.ravel()).reshape(early.shape) == old[:, None]) | (early == t[0])
+        keeps &= (sides(late.ravel()).reshape(late.shape) == new[:, None]) | (late == t[-1])
+        farther = ~keeps.all(axis=1) & (4 * reach <= farthest)
         if not farther.any():
             return reach
         reach[farther] *= 4

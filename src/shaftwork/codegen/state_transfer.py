@@ -93,34 +93,34 @@ class StateTransfer:
             columns.append((history.across if is_across else history.through)[branch])
         return np.array(columns).T
 
-    def states(self, bound: BoundArrays, t: float, held: Mapping[str, float]) -> Array:
+    def states(self, bound: BoundArrays, t: float, stored: Mapping[str, float]) -> Array:
         """(n,) the states that the equations start with.
 
         Args:
             bound: the equations with their parameters.
             t: time in s at which inputs are read.
-            held: all that was stored, by name.
+            stored: all that was stored, by name.
         """
         if not (self._form.dependent_across or self._form.dependent_through):
-            return np.array([held[name] for name in self._states])
+            return np.array([stored[name] for name in self._states])
         by_stores, by_inputs = self._maps_of(bound.part).to_states
-        x = by_stores @ np.array([held[name] for name in self.names])
+        x = by_stores @ np.array([stored[name] for name in self.names])
         if by_inputs.any():
             x += by_inputs @ bound.program.inputs.sources(t, x, bound.p)
         return np.asarray(x)
 
-    def energy(self, bound: BoundArrays, held: Mapping[str, float]) -> float:
+    def energy(self, bound: BoundArrays, stored: Mapping[str, float]) -> float:
         """What is stored, in J: k v^2 / 2 in inertias and masses, tau^2 / 2 c in springs."""
         energy = 0.0
         for name, branch in self.branches.items():
             coefficient = float(bound.part.coefficients[branch])
-            energy += 0.5 * held[name] ** 2 * (1 / coefficient if name in self.through else coefficient)
+            energy += 0.5 * stored[name] ** 2 * (1 / coefficient if name in self.through else coefficient)
         return energy
 
-    def momentum(self, bound: BoundArrays, held: Mapping[str, float]) -> float:
+    def momentum(self, bound: BoundArrays, stored: Mapping[str, float]) -> float:
         """The largest momentum of an inertia or mass: by what part of it an impulse is uncertain."""
         inertias = (pair for pair in self.branches.items() if pair[0] not in self.through)
-        return max((abs(float(bound.part.coefficients[k]) * held[name]) for name, k in inertias), default=0.0)
+        return max((abs(float(bound.part.coefficients[k]) * stored[name]) for name, k in inertias), default=0.0)
 
     def mobility(self, bound: BoundArrays, pairs: Sequence[tuple[int, int]]) -> Mobility:
         """The answer to impulses at pairs of nodes.

@@ -98,11 +98,11 @@ def _with_lowest(course: Callable[[Array], Array], steps: Array) -> Array:
     values = course(times)
     before, here, after = values[:-2], values[1:-1], values[2:]
     lowest = (here <= before) & (here <= after) & (here <= np.maximum(before, after) - here)
-    found = [
+    lowest_times = [
         minimize_scalar(lambda t: course(np.array([t]))[0], bounds=(times[k], times[k + 2]), method="bounded").x
         for k in np.flatnonzero(lowest)
     ]
-    return np.union1d(times, found)
+    return np.union1d(times, lowest_times)
 
 
 def _objection(
@@ -159,10 +159,10 @@ def first_missing(times: Array, values: Array) -> tuple[float, int] | None:
 def in_words(part: GraphPart, law: Basic) -> str:
     """What stands in a law of a part, as it was given: "tau = sqrt(1 - t) of TorqueSource 'pull'"."""
     component = part.component
-    given = {name: value for name, value in component.values.items() if isinstance(value, Expr | Table)}
+    laws = {name: value for name, value in component.values.items() if isinstance(value, Expr | Table)}
     names = substitution(component)
-    read = {name: as_expression(value).xreplace(names) for name, value in given.items()}
+    read = {name: as_expression(value).xreplace(names) for name, value in laws.items()}
     inside = [name for name, value in read.items() if law.has(value) or law.has(-value)]
-    texts = [f"{name} = {given[name]}" for name in inside or given]
+    texts = [f"{name} = {laws[name]}" for name in inside or laws]
     shown = [text if len(text) <= LONGEST else f"{text[:LONGEST]}..." for text in texts]
     return f"{' or '.join(shown) or 'the law'} of {title(component)}"
