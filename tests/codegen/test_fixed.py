@@ -5,7 +5,7 @@ import pytest
 import sympy
 from sympy import Heaviside, Max, Piecewise, cos, exp, floor, sin, sqrt
 
-from shaftwork.codegen.fixed import Fixed
+from shaftwork.codegen.heyoka_parameters import Fixed
 
 x, t, a, b, mode = sympy.symbols("x t a b mode", real=True)
 PARAMETERS = (a, b, mode)
@@ -32,7 +32,7 @@ def parts(*expressions):
     ],
 )
 def test_each_part_of_parameters_alone_is_found(expression, found):
-    assert set(parts(expression).found) == found
+    assert set(parts(expression).places) == found
 
 
 def test_values_are_those_of_the_expressions_for_one_set_of_parameters_and_for_many():
@@ -41,7 +41,7 @@ def test_values_are_those_of_the_expressions_for_one_set_of_parameters_and_for_m
     many = made.values(p)
     for k in range(2):
         numbers = dict(zip(PARAMETERS, p[:, k].tolist(), strict=True))
-        expected = [float(part.xreplace(numbers)) for part in made.found]
+        expected = [float(part.xreplace(numbers)) for part in made.places]
         assert made.values(p[:, k]) == pytest.approx(expected, rel=1e-15)  # the same functions, a rounding apart
         assert many[:, k] == pytest.approx(expected, rel=1e-15)
 
@@ -49,15 +49,15 @@ def test_values_are_those_of_the_expressions_for_one_set_of_parameters_and_for_m
 def test_what_has_no_value_is_no_error_before_it_is_needed():
     """A law may hold 1 / a in a branch that is not taken; warnings are errors here."""
     made = parts(Piecewise((x / a, x > 0), (x, True)), sqrt(b) * x)
-    values = dict(zip(made.found, made.values(np.array([0.0, -1.0, 0.0])), strict=True))
+    values = dict(zip(made.places, made.values(np.array([0.0, -1.0, 0.0])), strict=True))
     assert values[1 / a] == np.inf
     assert np.isnan(values[sqrt(b)])
 
 
 def test_parts_that_were_known_before_keep_their_places():
     before = parts(a * b * x)
-    more = Fixed(PARAMETERS, (x, t), (a / b * x, a * b * x), before=before.found)
-    assert list(more.found) == [a * b, a / b]
+    more = Fixed(PARAMETERS, (x, t), (a / b * x, a * b * x), before=before.places)
+    assert list(more.places) == [a * b, a / b]
 
 
 def test_no_part_at_all():

@@ -34,15 +34,6 @@ def shaft(model: sw.ShaftModel) -> sw.Network:
     return net
 
 
-def drive() -> sw.Network:
-    net = sw.Network("drive")
-    net.add(sw.InductionMachine("machine", U=400.0, f=50.0, p=2, R_s=0.5, R_r=0.4, L_s=0.09, L_r=0.09, L_m=0.085), "m")
-    net.add(sw.Inertia("J1", J=0.1), "m")
-    net.add(sw.Gear("gear", ratio=3.0), "m", "w")
-    net.add(sw.Inertia("J2", J=2.0), "w")
-    return net
-
-
 def crane() -> Any:
     return SCENES["crane"].build().compile().phase("brake slipping forward, load slipping forward")
 

@@ -303,11 +303,11 @@ def test_a_jump_of_a_table_over_a_sine_is_found_at_every_point_that_is_passed() 
 
 
 def test_locating_is_done_once_for_equal_runs(monkeypatch: pytest.MonkeyPatch) -> None:
-    from shaftwork.codegen import switching
+    from shaftwork.codegen import time_switches
 
     asked = []
-    original = switching._searched
-    monkeypatch.setattr(switching, "_searched", lambda *rest: asked.append(1) or original(*rest))
+    original = time_switches.sampled
+    monkeypatch.setattr(time_switches, "sampled", lambda *rest: asked.append(1) or original(*rest))
     model = chain(sympy.sign(sympy.sin(9 * sw.t) - 0.1)).compile()
     for stiffness in (100.0, 200.0, 300.0):
         model.simulate(1.0, parameters={"s1.c": stiffness}, engine="heyoka")

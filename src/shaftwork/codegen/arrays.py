@@ -8,12 +8,16 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
+from sympy import Expr
 
+from shaftwork.codegen.code import vectorised
 from shaftwork.codegen.elements import Array, GainMatrix, potential_matrix, rationals
-from shaftwork.codegen.inputs import Inputs
+from shaftwork.codegen.inputs import Inputs, where
 from shaftwork.codegen.loops import LoopSolver
 from shaftwork.codegen.matrices import LinearPart, MatrixAssembly
 from shaftwork.codegen.products import Factor, by_diagonals
+from shaftwork.components.branches import ACROSS, INTEGRAL
+from shaftwork.components.laws import t as TIME
 from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm
 
@@ -61,7 +65,7 @@ class BoundArrays:
         p = p.copy() if p.flags.writeable else p
         p.flags.writeable = False  # so that what laws read of it is looked up once
         self.program, self.p, self.part = program, p, part
-        factors: tuple[Any, ...] = part.factors if full else tuple(made.sparse for made in part.factors)
+        factors: tuple[Any, ...] = part.factors if full else tuple(factor.sparse for factor in part.factors)
         self._A, self._B, self._B1, self._C, self._D = factors
         self._has_slopes, self._controls = bool(part.B1.nnz), program.inputs.controls
         loops = program.loop_places
@@ -104,10 +108,9 @@ class BoundArrays:
             return np.empty((0, *x.shape[1:]))
         y: Array = self._C @ x[: inputs.states]
         if self.part.D.nnz:  # only inputs of time alone and controlled sources reach the outputs: else there is a loop
-            first = inputs.values(t, np.zeros((inputs.outputs, *x.shape[1:])), x, self.p)
-            y = y + self._D @ _where(inputs.of_time, first)
+            y = y + self._D @ inputs.sources(t, x, self.p)
             if self._controls.size:
-                y = y + self._D @ _where(inputs.controlled, inputs.values(t, y, x, self.p))
+                y = y + self._D @ where(inputs.controlled, inputs.values(t, y, x, self.p))
         return y
 
     def switches(self, t: Array, x: Array) -> Array:
@@ -121,7 +124,7 @@ class BoundArrays:
         return self._A if isinstance(self._A, Factor) else by_diagonals(self._A)
 
     @cached_property
-    def _given(self) -> Array | None:
+    def _constant(self) -> Array | None:
         """What inputs that parameters alone tell add to x'; None where others enter."""
         if self.loops is not None or self._has_slopes or not self.program.inputs.constant:
             return None
@@ -129,9 +132,9 @@ class BoundArrays:
 
     def rhs(self, t: Any, x: Array) -> Array:
         """x' at time t, (n,); or (n, k) for states (n, k) at times (k,)."""
-        if (given := self._given) is not None:
+        if (constant := self._constant) is not None:
             rate: Array = self._rows @ x
-            rate += given if x.ndim == 1 else given[:, None]
+            rate += constant if x.ndim == 1 else constant[:, None]
             return rate
         return self.rates(t, x, *self.values(t, x))
 
@@ -139,8 +142,7 @@ class BoundArrays:
         """x' from the states and the inputs that go with them."""
         rate: Array = self._rows @ x[: self.program.inputs.states] + self._B @ u
         if self._has_slopes:
-            slopes = self.program.inputs.time_slopes(t, y, x, self.p)
-            rate = rate + self._B1 @ _where(self.program.inputs.of_time, slopes)
+            rate = rate + self._B1 @ self.program.inputs.source_rates(t, y, x, self.p)
         return rate
 
     def jacobian(self, t: float, x: Array) -> Any:
@@ -154,7 +156,7 @@ class BoundArrays:
         """A, B and the slopes (m, n) of the inputs by the states: full arrays or of scipy.sparse."""
         inputs, part, controls = self.program.inputs, self.part, self._controls
         y, _ = self.values(t, x)
-        A, B, _, C, _ = (made.full for made in part.factors)
+        A, B, _, C, _ = (factor.full for factor in part.factors)
         if A is not None and B is not None and C is not None:
             full = inputs.along(t, y, x, self.p, C, np.eye(inputs.states))
             if controls.size:
@@ -177,16 +179,38 @@ class BoundArrays:
             return None
         inputs, part = self.program.inputs, self.program.assembly.rational(self.p)
         x0, y0 = np.zeros(inputs.states), np.zeros(inputs.outputs)
-        by_y, by_x = (rationals(made.toarray()) for made in inputs.slopes(0.0, y0, x0, self.p))
+        by_y, by_x = (rationals(slopes.toarray()) for slopes in inputs.slopes(0.0, y0, x0, self.p))
         slope = by_y @ part.C + by_x
         slope = slope + by_y @ (part.D[:, self._controls] @ slope[self._controls])
 
-        def given(t: float) -> Array:
+        def at_rest(t: float) -> Array:
             """u and u' where nothing moves."""
             y, u = self.values(t, x0)
-            return np.concatenate([u, _where(inputs.of_time, inputs.time_slopes(t, y, x0, self.p))])
+            return np.concatenate([u, inputs.source_rates(t, y, x0, self.p)])
 
-        return part.A + part.B @ slope, np.hstack([part.B, part.B1]), given
+        return part.A + part.B @ slope, np.hstack([part.B, part.B1]), at_rest
+
+    def sources(self, t: float) -> Array:
+        """(inputs,) what depends on the time alone at a time in s; zero for other inputs."""
+        return self.program.inputs.sources(t, np.zeros(self.program.inputs.states), self.p)
+
+    def law_values(self, branch: int, law: Expr, t: Array, x: Array, across: Any = 0.0) -> Array:
+        """(k,) an expression of time, of what is across a branch, its integral and its template's symbols.
+
+        Args:
+            branch: its number.
+            law: the expression.
+            t: (k,) times, s.
+            x: (n, k) states.
+            across: (k,) what is across the branch, where the expression reads it.
+        """
+        form, template = self.program.form, self.program.form.graph.branches[branch].template
+        angle: Any = 0.0
+        if branch in form.integrals:
+            angle = x[len(form.states) - len(form.integrals) + form.integrals.index(branch)]
+        names = form.graph.part_of(branch).parameters
+        values = self.p[[names[symbol.name] for symbol in template.symbols]]
+        return np.asarray(vectorised((TIME, ACROSS, INTEGRAL, *template.symbols), law)(t, across, angle, *values))
 
     def moving_laws(self, t: float) -> tuple[int, ...]:
         """The branches whose laws change with time at a time."""
@@ -204,13 +228,13 @@ class BoundArrays:
         """
         if not self._has_slopes:
             return x
-        inputs, zero = self.program.inputs, np.zeros(self.program.inputs.outputs)
-        step = inputs.values(after, zero, x, self.p)
+        inputs = self.program.inputs
+        step = inputs.sources(after, x, self.p)
         if before is not None:
-            step = step - inputs.values(before, zero, x, self.p)
-        made = x.copy()
-        made[: inputs.states] += self._B1 @ (step * inputs.of_time)  # what arrives by waves follows the states
-        return made
+            step = step - inputs.sources(before, x, self.p)
+        states = x.copy()
+        states[: inputs.states] += self._B1 @ step  # what arrives by waves follows the states
+        return states
 
 
 def _bound_again(program: ArrayProgram, p: Array, part: LinearPart, last: Array | None) -> BoundArrays:
@@ -219,8 +243,3 @@ def _bound_again(program: ArrayProgram, p: Array, part: LinearPart, last: Array 
     if bound.loops is not None and last is not None:
         bound.loops.start_from(last)
     return bound
-
-
-def _where(mask: Any, values: Array) -> Array:
-    """Values (m,) or (m, k) where the mask (m,) holds, else zero."""
-    return np.where(mask if values.ndim == 1 else mask[:, None], values, 0.0)

@@ -33,21 +33,21 @@ class RealNumbers:
     """Numbers as the floats that they are, and powers that are real or no number.
 
     Args:
-        known: names of symbols and of expressions that have been evaluated before.
+        names: of symbols, and of expressions that have been evaluated before.
     """
 
     settings: Mapping[str, Any] = MappingProxyType(SETTINGS)
 
-    def __init__(self, known: Mapping[Symbol, str]) -> None:
+    def __init__(self, names: Mapping[Symbol, str]) -> None:
         super().__init__(dict(self.settings))  # type: ignore[call-arg]
-        self.known: dict[Basic, str] = dict(known)
+        self.names: dict[Basic, str] = dict(names)
 
     def doprint(self, expression: Expr) -> str:
         """The code of an expression."""
         return self._print(expression)
 
     def _print(self, node: Any, **options: Any) -> str:
-        name = self.known.get(node) if isinstance(node, Basic) else None
+        name = self.names.get(node) if isinstance(node, Basic) else None
         return name or str(super()._print(node, **options))  # type: ignore[misc]
 
     def _print_Symbol(self, symbol: Symbol) -> str:
@@ -60,9 +60,9 @@ class RealNumbers:
     def _print_Float(self, number: Float) -> str:
         return repr(float(number))  # sympy prints 15 digits, which is another float
 
-    def _print_Pow(self, power: Pow, rational: bool = False) -> str:  # noqa: FBT001, FBT002 (sympy's signature)
+    def _print_Pow(self, power: Pow, *options: Any, **named: Any) -> str:
         if abs(power.exp) == S.Half or power.exp.is_integer:
-            return str(super()._print_Pow(power, rational))  # type: ignore[misc]
+            return str(super()._print_Pow(power, *options, **named))  # type: ignore[misc]
         # Python's own ** gives a complex number for a negative base.
         base, exponent = self._print(power.base), self._print(power.exp)
         return f"{self.power}({base}, {exponent})"  # type: ignore[attr-defined]
@@ -146,21 +146,22 @@ def bindable(
     """
     both = (*first, *second)
     printer, bound = _reading(parameters, both)
-    own, read = _reading(arguments, both)
-    printer.known |= own.known
+    arguments_printer, read = _reading(arguments, both)
+    printer.names |= arguments_printer.names
     shared = _shared(printer, both)
-    lists = [[printer.doprint(made) for made in made_of] for made_of in (first, second)]
-    given, (t, x) = {**arguments, **parameters}, arguments
-    slow = f"second({', '.join(given)})"
-    (whole, found), (alone, last) = (_evaluated(shared, some) for some in (lists, lists[1:]))
-    beside = [f"start = {t}", *read, *whole, f"rates, now = {found}", *_moved(t, x, len(first), alone, last)]
+    lists = [[printer.doprint(expression) for expression in expressions] for expressions in (first, second)]
+    everything, (t, x) = {**arguments, **parameters}, arguments
+    slow = f"second({', '.join(everything)})"
+    (whole, values), (alone, last) = (_evaluated(shared, some) for some in (lists, lists[1:]))
+    beside = [f"start = {t}", *read, *whole, f"rates, now = {values}", *_moved(t, x, len(first), alone, last)]
     inner = [
-        *_guarded(f"both({t}, {x})", [*read, *whole, f"return {found}"], f"first({', '.join(given)}), {slow}"),
+        *_guarded(f"both({t}, {x})", [*read, *whole, f"return {values}"], f"first({', '.join(everything)}), {slow}"),
         *_guarded(f"one({t}, {x})", [*read, *alone, f"return {last}"], slow),
         *_guarded(f"near({t}, {x}, tick, moves, most)", beside, f"around(both, one, start, {x}, tick, moves, most)"),
         "return both, one, near",
     ]
-    names = {**SCALAR, "first": branchwise(given, first), "second": branchwise(given, second), "around": around}
+    names = {**SCALAR, "around": around}
+    names |= {"first": branchwise(everything, first), "second": branchwise(everything, second)}
     return _compiled("bind", tuple(parameters), [*bound, *inner], names)
 
 
@@ -215,15 +216,15 @@ def branchwise(
         arguments: as of `scalar`.
         expressions: to evaluate.
     """
-    symbols = [s for given in arguments.values() for s in ((given,) if isinstance(given, Symbol) else given)]
-    made = list[Callable[..., Any]]()
+    symbols = [s for one in arguments.values() for s in ((one,) if isinstance(one, Symbol) else one)]
+    compiled = list[Callable[..., Any]]()
 
     def function(*values: Any) -> list[float]:
-        if not made:
-            made.append(vectorised_list(symbols, expressions))
+        if not compiled:
+            compiled.append(vectorised_list(symbols, expressions))
         with np.errstate(all="ignore"):
-            found = [float(value) for value in made[0](*np.hstack(values))]
-        return [value if math.isfinite(value) else math.nan for value in found]
+            numbers = [float(value) for value in compiled[0](*np.hstack(values))]
+        return [value if math.isfinite(value) else math.nan for value in numbers]
 
     return function
 
@@ -236,7 +237,7 @@ def _evaluated(shared: Mapping[str, str], lists: list[list[str]]) -> tuple[list[
 
 
 def _guarded(head: str, lines: list[str], slow: str) -> list[str]:
-    """The lines of a function that returns what is found more slowly where Python's functions raise."""
+    """The lines of a function that computes more slowly where Python's functions raise."""
     return [
         f"def {head}:",
         "    try:",
@@ -249,10 +250,10 @@ def _guarded(head: str, lines: list[str], slow: str) -> list[str]:
 def _needed(shared: Mapping[str, str], texts: Iterable[str]) -> set[str]:
     """The names of shared parts that stand in texts, or in such parts."""
     needed = set[str]()
-    found = {name for text in texts for name in SHARED.findall(text)}
-    while found:
-        needed |= found
-        found = {name for part in found for name in SHARED.findall(shared[part])} - needed
+    names = {name for text in texts for name in SHARED.findall(text)}
+    while names:
+        needed |= names
+        names = {name for part in names for name in SHARED.findall(shared[part])} - needed
     return needed
 
 
@@ -260,17 +261,17 @@ def _reading(
     arguments: Mapping[str, Symbol | Sequence[Symbol]], expressions: Sequence[Expr]
 ) -> tuple[FloatPrinter, list[str]]:
     """A printer that knows the symbols of arguments by name, and the lines that read them from lists."""
-    known: dict[Symbol, str] = {}
+    names: dict[Symbol, str] = {}
     lines = []
     used = set(parts(expressions))
-    for name, given in arguments.items():
-        if isinstance(given, Symbol):
-            known[given] = name
+    for name, symbols in arguments.items():
+        if isinstance(symbols, Symbol):
+            names[symbols] = name
             continue
-        taken = {symbol: k for k, symbol in enumerate(given) if symbol in used}
+        taken = {symbol: k for k, symbol in enumerate(symbols) if symbol in used}
         lines += [f"{name}{k} = {name}[{k}]" for k in taken.values()]
-        known |= {symbol: f"{name}{k}" for symbol, k in taken.items()}
-    return FloatPrinter(known), lines
+        names |= {symbol: f"{name}{k}" for symbol, k in taken.items()}
+    return FloatPrinter(names), lines
 
 
 def vectorised(symbols: Sequence[Symbol], expression: Expr) -> Callable[..., Any]:
@@ -282,7 +283,7 @@ def vectorised(symbols: Sequence[Symbol], expression: Expr) -> Callable[..., Any
 def _vectorised(symbols: tuple[Symbol, ...], expression: Expr) -> Callable[..., Any]:
     if len(symbols) == 1 and expression == symbols[0]:
         return lambda value: value
-    return _array_function(symbols, expression)
+    return vectorised_list(symbols, expression)
 
 
 def is_rough(function: Callable[..., Any], arguments: Iterable[Any]) -> bool:
@@ -295,28 +296,24 @@ def is_rough(function: Callable[..., Any], arguments: Iterable[Any]) -> bool:
     return False
 
 
-def vectorised_list(symbols: Sequence[Symbol], expressions: Sequence[Expr]) -> Callable[..., Any]:
-    """Several expressions as one function of arrays or floats."""
-    return _array_function(symbols, expressions)
-
-
-def _array_function(symbols: Sequence[Symbol], expressions: Expr | Sequence[Expr]) -> Callable[..., Any]:
+def vectorised_list(symbols: Sequence[Symbol], expressions: Expr | Sequence[Expr]) -> Callable[..., Any]:
+    """Several expressions as one function of arrays or floats; or one, which is not kept."""
     arguments = tuple(f"v{k}" for k in range(len(symbols)))
     return _function(ArrayPrinter(dict(zip(symbols, arguments, strict=True))), [], arguments, expressions, VECTORISED)
 
 
 def _function(
-    printer: Any, lines: list[str], arguments: tuple[str, ...], found: Expr | Sequence[Expr], names: dict[str, Any]
+    printer: Any, lines: list[str], arguments: tuple[str, ...], result: Expr | Sequence[Expr], names: dict[str, Any]
 ) -> Callable[..., Any]:
-    """A function of its own code that returns what is found: an expression, or a list of them.
+    """A function of its own code that returns an expression, or a list of them.
 
     `sympy.lambdify` builds every expression anew to rename its symbols and to share its parts: most of the time in
     which a network is compiled. A printer that knows the names does without.
     """
-    shared = _shared(printer, [found] if isinstance(found, Expr) else found)
+    shared = _shared(printer, [result] if isinstance(result, Expr) else result)
     lines += [f"{name} = {code}" for name, code in shared.items()]
-    results = printer.doprint(found) if isinstance(found, Expr) else f"[{', '.join(map(printer.doprint, found))}]"
-    return _compiled("function", arguments, [*lines, f"return {results}"], names)
+    values = printer.doprint(result) if isinstance(result, Expr) else f"[{', '.join(map(printer.doprint, result))}]"
+    return _compiled("function", arguments, [*lines, f"return {values}"], names)
 
 
 def _compiled(name: str, arguments: tuple[str, ...], lines: list[str], names: dict[str, Any]) -> Callable[..., Any]:
@@ -326,27 +323,27 @@ def _compiled(name: str, arguments: tuple[str, ...], lines: list[str], names: di
     return function
 
 
-def executed(source: str, name: str, names: dict[str, Any], made: dict[str, Any]) -> Callable[..., Any]:
+def executed(source: str, name: str, names: dict[str, Any], namespace: dict[str, Any]) -> Callable[..., Any]:
     """A function of code that was made from expressions.
 
     Args:
         source: the code.
         name: of the function.
         names: objects by their names in the code.
-        made: where all that the code defines goes.
+        namespace: where all that the code defines goes.
     """
-    exec(compile(source, "<equations>", "exec"), names, made)  # noqa: S102 (of our own making, from expressions)
-    function: Callable[..., Any] = made[name]
+    exec(compile(source, "<equations>", "exec"), names, namespace)  # noqa: S102 (of our own making, from expressions)
+    function: Callable[..., Any] = namespace[name]
     return function
 
 
 def _shared(printer: Any, expressions: Sequence[Expr]) -> dict[str, str]:
     """The code of what stands in expressions more than once, by the names that the printer knows from here on."""
-    found = {}
+    codes = {}
     for number, shared in enumerate(_repeated(expressions)):
-        found[f"s{number}"] = printer.doprint(shared)
-        printer.known[shared] = f"s{number}"
-    return found
+        codes[f"s{number}"] = printer.doprint(shared)
+        printer.names[shared] = f"s{number}"
+    return codes
 
 
 def _repeated(expressions: Sequence[Expr]) -> list[Basic]:
@@ -365,7 +362,7 @@ def _repeated(expressions: Sequence[Expr]) -> list[Basic]:
     for expression in expressions:
         count(expression)
     # a reciprocal is printed as a division
-    return [n for n, found in times.items() if found > 1 and isinstance(n, Expr) and not _is_reciprocal(n)]
+    return [n for n, uses in times.items() if uses > 1 and isinstance(n, Expr) and not _is_reciprocal(n)]
 
 
 def _is_reciprocal(node: Basic) -> bool:

@@ -41,26 +41,26 @@ class TemplateGroup:
 
 def groups_of(graph: CircuitGraph, branches: Sequence[int]) -> tuple[TemplateGroup, ...]:
     """The given branches by equal law, in order of first appearance."""
-    found: dict[tuple[Any, ...], list[int]] = {}
+    members_of: dict[tuple[Any, ...], list[int]] = {}
     for index in branches:
         template = graph.branches[index].template
-        found.setdefault((template.kind, template.law, template.symbols), []).append(index)
-    made = []
-    for members in found.values():
+        members_of.setdefault((template.kind, template.law, template.symbols), []).append(index)
+    groups = []
+    for members in members_of.values():
         template = graph.branches[members[0]].template
         places = [[graph.part_of(index).parameters[s.name] for index in members] for s in template.symbols]
         shape = (len(template.symbols), len(members))
-        made.append(
+        groups.append(
             TemplateGroup(template, np.array(members, dtype=np.intp), np.array(places, dtype=np.intp).reshape(shape))
         )
-    return tuple(made)
+    return tuple(groups)
 
 
 def rationals(values: Any) -> Array:
     """An array of floats or fractions as an array of fractions, which are these very numbers."""
-    found = np.empty(np.shape(values), dtype=object)
-    found.ravel()[:] = [Fraction(value) if value else 0 for value in np.ravel(values).tolist()]
-    return found
+    fractions = np.empty(np.shape(values), dtype=object)
+    fractions.ravel()[:] = [Fraction(value) if value else 0 for value in np.ravel(values).tolist()]
+    return fractions
 
 
 def inverse_of_fractions(matrix: Array) -> Array:
@@ -113,10 +113,10 @@ class Coefficients:
         exact = rationals(p)
         for group, function in self._groups:
             try:
-                found = function(*exact[group.places])
+                coefficients = function(*exact[group.places])
             except (AttributeError, TypeError):  # a root or a logarithm of a parameter
-                found = function(*p[group.places])
-            values[group.branches] = rationals(np.broadcast_to(found, group.branches.shape))
+                coefficients = function(*p[group.places])
+            values[group.branches] = rationals(np.broadcast_to(coefficients, group.branches.shape))
         return values
 
 
@@ -139,10 +139,10 @@ class GainMatrix:
         self._gains = tuple(gain for _, gain in variable)
         self._coefficients = coefficients_in(self._gains)
         names = {name: k for k, name in enumerate(graph.parameters)}
-        found = {symbol.name: symbol for made in self._coefficients for symbol in made.free_symbols}
-        ordered = sorted(found, key=names.__getitem__)
-        self._places = np.array([names[name] for name in ordered], dtype=np.intp)
-        self._function = scalar({"p": [found[name] for name in ordered]}, self._coefficients) if variable else None
+        symbols = {symbol for coefficient in self._coefficients for symbol in coefficient.free_symbols}
+        ordered = sorted(symbols, key=lambda symbol: names[symbol.name])
+        self._places = np.array([names[symbol.name] for symbol in ordered], dtype=np.intp)
+        self._function = scalar({"p": ordered}, self._coefficients) if variable else None
 
     def _values(self, p: Array) -> dict[Expr, float]:
         assert self._function is not None  # noqa: S101 (there are coefficients)

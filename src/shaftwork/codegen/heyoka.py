@@ -14,14 +14,12 @@ import numpy as np
 import sympy
 from numpy.typing import NDArray
 
-from shaftwork.codegen.fixed import Fixed
-from shaftwork.codegen.heyoka_held import HeldParameters
+from shaftwork.codegen.elements import Array
+from shaftwork.codegen.heyoka_parameters import Fixed, HeldParameters
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.components.pieces import parts
 from shaftwork.core.errors import MissingExtraError
 from shaftwork.core.interruption import interruptible
-
-Array = NDArray[np.float64]
 
 # From about this number of states on, unrolled code takes seconds to compile and is hardly faster.
 LARGEST_UNROLLED = 100
@@ -63,7 +61,8 @@ class HeyokaProgram:
 
     Args:
         variables: heyoka's state variables, in the order of the states.
-        rows: f, one heyoka expression for each state; parameters are par[0..], the signs of the switches follow them.
+        rows: f, one heyoka expression for each state; parameters are par[0..], and behind them those of `signs`,
+            `sides`, `offsets` and `weights`.
         switches: heyoka expressions whose sign the rows depend on.
         conditions: the same as text, for messages.
         timed: which of them depend on the time alone; their signs are known before a run, piece by piece.
@@ -72,9 +71,7 @@ class HeyokaProgram:
         fixed: what is made of the model's parameters alone.
         fading: heyoka expressions u of functions that are constant to the last bit where e^-|u| is nothing beside 1; a
             step ends where u comes near, because a series from afar does not show that they change there.
-        guards: heyoka expressions at whose change of sign a run ends; behind the signs of the switches there is a
-            parameter for each: 1 where its rise through zero ends the run, -1 where its fall does, 0 where neither; and
-            behind these another for each, how far beyond zero it has to go; last of all one for each of `fading`.
+        guards: heyoka expressions at whose change of sign a run ends.
         held: functions that are constant between switches; they are the last of the parameters.
         stepping: which of the switches depend on them.
         singular: whether a law has a root or a pole, beyond which a series may go on otherwise than the law.
@@ -96,6 +93,26 @@ class HeyokaProgram:
     _functions: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property
+    def signs(self) -> slice:
+        """Places of the signs of the switches among the parameters."""
+        return slice(self.parameter_count, self.parameter_count + len(self.switches))
+
+    @cached_property
+    def sides(self) -> slice:
+        """Places of the sides of the guards: 1 where a rise through zero ends a run, -1 where a fall does, else 0."""
+        return slice(self.signs.stop, self.signs.stop + len(self.guards))
+
+    @cached_property
+    def offsets(self) -> slice:
+        """Places of how far beyond zero the guards have to go on their sides."""
+        return slice(self.sides.stop, self.sides.stop + len(self.guards))
+
+    @cached_property
+    def weights(self) -> slice:
+        """Places of how much each of `fading` counts; they are the last."""
+        return slice(self.offsets.stop, self.offsets.stop + len(self.fading))
+
+    @cached_property
     def all_timed(self) -> bool:
         """Whether every switch depends on the time alone."""
         return bool(self.timed.all())
@@ -113,12 +130,7 @@ class HeyokaProgram:
         if self.fading:
             values = self._values("fading", self.fading, integrator.time, integrator.state, integrator.pars)
             with np.errstate(over="ignore"):
-                integrator.pars[self.first_weight :] = WEIGHT / (values * values + NEAR**2)
-
-    @property
-    def first_weight(self) -> int:
-        """The place of the first weight among the parameters."""
-        return self.parameter_count + len(self.switches) + 2 * len(self.guards)
+                integrator.pars[self.weights] = WEIGHT / (values * values + NEAR**2)
 
     @contextmanager
     def lent(self, tolerance: float) -> Iterator[Compiled]:
@@ -163,25 +175,25 @@ class HeyokaProgram:
         values: Array = compiled(x, pars=parameters[: compiled.nparams], time=t)
         return values
 
-    def switch_signs(self, t: float, x: Array, parameters: Array, held: Array | None = None) -> Array:
-        """Signs of the switches (k,) at time t in s, state x (n,) and the model's own parameters (p,).
+    def switch_signs(self, t: float, x: Array, parameters: Array, unchanged: Array | None = None) -> Array:
+        """Signs of the switches (k,) at time t in s, state x (n,) and the parameters (p,) before the signs.
 
-        Those of `held` (k,) that are not zero are taken as they are.
+        Those of `unchanged` (k,) that are not zero are taken as they are.
         """
-        held = np.zeros(len(self.switches)) if held is None else held
-        signs = held
+        unchanged = np.zeros(len(self.switches)) if unchanged is None else unchanged
+        signs = unchanged
         # A switch may depend on the sign of an earlier one: the maximum of three compares with the maximum of two.
         for left in reversed(range(len(self.switches))):
             values = self.switch_values(t, x, np.concatenate([parameters, signs]))
-            before, signs = signs, np.where(held == 0, np.sign(values), held)
+            before, signs = signs, np.where(unchanged == 0, np.sign(values), unchanged)
             if not left or np.array_equal(before, signs):
                 break
         return signs
 
     def bind(self, parameters: Array) -> BoundProgram:
         """The program with its parameter vector (p,): what `integrate.problem.Problem.symbolic` takes."""
-        known = np.concatenate([parameters, self.fixed.values(parameters)])
-        return BoundProgram(self, np.append(known, np.zeros(self.parameter_count - len(known))))
+        values = np.concatenate([parameters, self.fixed.values(parameters)])
+        return BoundProgram(self, np.append(values, np.zeros(self.parameter_count - len(values))))
 
     def step(self, number: int, integrator: Any) -> None:
         """Go on to the next whole number, or back to the last, where the motion has come to the end of one.
@@ -195,13 +207,12 @@ class HeyokaProgram:
         assert self.held is not None  # noqa: S101 (it has such a switch)
         at = integrator.time, integrator.state
         self.held.step(number, *at, integrator.pars)
-        parameters, signs = np.split(integrator.pars, [self.parameter_count])
-        signs = signs[: len(self.switches)]
+        signs = integrator.pars[self.signs]
         signs[number] = 1.0
-        own = [*self.held.by_switch]
-        kept = np.where(self.stepping, 0.0, signs)
-        kept[own] = signs[own]
-        signs[:] = self.switch_signs(*at, parameters, kept)
+        counting = [*self.held.by_switch]
+        unchanged = np.where(self.stepping, 0.0, signs)
+        unchanged[counting] = signs[counting]
+        signs[:] = self.switch_signs(*at, integrator.pars[: self.parameter_count], unchanged)
 
     def _compile(self, tolerance: float) -> Compiled:
         import heyoka
@@ -234,20 +245,19 @@ class HeyokaProgram:
         """The event that what is fading comes near."""
         import heyoka
 
-        return heyoka.t_event(heyoka.par[self.first_weight + number] * (value**2 - NEAR**2), callback=_go_on)
+        return heyoka.t_event(heyoka.par[self.weights.start + number] * (value**2 - NEAR**2), callback=_go_on)
 
     def _outgrows(self, number: int, value: Any) -> Any:
         """The event that what is fading counts too much or too little."""
         import heyoka
 
-        size = heyoka.par[self.first_weight + number] * (value**2 + NEAR**2)
-
-        program = ref(self)
+        size = heyoka.par[self.weights.start + number] * (value**2 + NEAR**2)
+        weakly = ref(self)
 
         def weigh(integrator: Any, _direction: int) -> bool:
-            made = program()
-            assert made is not None  # noqa: S101 (whose run it is)
-            made.weigh(integrator)
+            program = weakly()
+            assert program is not None  # noqa: S101 (whose run it is)
+            program.weigh(integrator)
             return True
 
         return heyoka.t_event(
@@ -258,8 +268,7 @@ class HeyokaProgram:
         """The event that a guard rises through an offset on its side; the run goes on if whoever listens says so."""
         import heyoka
 
-        first = self.parameter_count + len(self.switches) + number
-        side, offset = heyoka.par[first], heyoka.par[first + len(self.guards)]
+        side, offset = heyoka.par[self.sides.start + number], heyoka.par[self.offsets.start + number]
         met = heyoka.select(side, side * guard - offset, heyoka.expression(-1.0))
 
         def ask(_integrator: Any, _direction: int) -> bool:
@@ -275,7 +284,7 @@ class HeyokaProgram:
         one = heyoka.expression(1.0)
         # Only a fall through zero triggers, so a switch that starts at zero or touches it does not stop the run; one
         # that rests at zero has sign 0 and no event, which would trigger for ever.
-        sign = heyoka.par[self.parameter_count + number]
+        sign = heyoka.par[self.signs.start + number]
         if self.timed[number]:  # a piece ends there, and rounding would tell whether it has turned by then: never;
             # and it must not be large, for heyoka's tolerance is relative to the largest of states and events
             return heyoka.t_event(heyoka.select(sign, one, one), callback=_go_on)
@@ -284,16 +293,16 @@ class HeyokaProgram:
 
     def _passed(self, number: int) -> Callable[[Any, int], bool]:
         """What happens where a switch leaves its side: it has the other, or a whole number gives way to the next."""
-        index, program = self.parameter_count + number, ref(self)
+        place, weakly = self.signs.start + number, ref(self)
 
         def turn(integrator: Any, _direction: int) -> bool:
-            integrator.pars[index] = -integrator.pars[index]
+            integrator.pars[place] = -integrator.pars[place]
             return True
 
         def step(integrator: Any, _direction: int) -> bool:
-            made = program()
-            assert made is not None  # noqa: S101 (whose run it is)
-            made.step(number, integrator)
+            program = weakly()
+            assert program is not None  # noqa: S101 (whose run it is)
+            program.step(number, integrator)
             return True
 
         return step if self.held is not None and number in self.held.by_switch else turn
@@ -334,9 +343,10 @@ def build(
     from shaftwork.codegen.heyoka_expressions import Translator
 
     rows, guards = _in_pieces(rows), _in_pieces(guards)
-    held = sum(isinstance(part, sympy.floor | HeldNoise) for part in parts((*rows, *guards)))
+    stepping = sum(isinstance(part, sympy.floor | HeldNoise) for part in parts((*rows, *guards)))
     fixed = Fixed(parameters, (*states, time, *changing), (*rows, *guards))
-    translator = Translator(states, time, parameters, held, fixed)
+    first = len(parameters) + len(fixed.places)
+    translator = Translator(states, time, parameters, stepping, fixed)
     translated = tuple(translator.expression(row) for row in rows)
     watched = tuple(translator.expression(guard) for guard in guards)
     return HeyokaProgram(
@@ -345,11 +355,11 @@ def build(
         tuple(translator.switches),
         tuple(translator.conditions),
         np.array(translator.timed, dtype=bool),
-        len(parameters) + len(fixed.found) + held,
+        first + stepping,
         fixed,
         tuple(translator.fading.values()),
         watched,
-        HeldParameters(translator.held, translator.variables, len(parameters) + len(fixed.found)) if held else None,
+        HeldParameters(translator.held, translator.variables, first) if stepping else None,
         np.array(translator.stepping, dtype=bool),
         any(_singular(node, frozenset(states), time) for row in rows for node in row.atoms(sympy.Pow, *POLES)),
     )

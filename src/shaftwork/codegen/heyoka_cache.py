@@ -38,17 +38,17 @@ def keep_apart() -> None:
         state.set_memcache_limit(MEMORY)
     path = state.get_diskcache_path()
     if path.name == "heyoka":  # nobody has said where
-        own = path.parent / "shaftwork"
-        if not _is_sound(own):
+        folder = path.parent / "shaftwork"
+        if not _is_sound(folder):
             state.set_diskcache_enabled(False)
             return
         try:
-            state.set_diskcache_path(own)
+            state.set_diskcache_path(folder)
             state.set_diskcache_limit(ROOM)  # opens the folder
         except RuntimeError:
             state.set_diskcache_enabled(False)
         else:
-            atexit.register(_put_down_sums, own)
+            atexit.register(_put_down_sums, folder)
     elif not path.name:  # no home: it would be where the process is
         state.set_diskcache_enabled(False)
 
@@ -59,12 +59,12 @@ def _is_sound(folder: Path) -> bool:
     if not place.exists():
         return True
     try:
-        known = _known(folder)
-        with closing(_opened(place)) as kept, kept:
-            spoilt = [(key,) for key, found in _sums(kept).items() if known.get(key) != found]
+        recorded = _known(folder)
+        with closing(_opened(place)) as database, database:
+            spoilt = [(key,) for key, total in _sums(database).items() if recorded.get(key) != total]
             if spoilt:
-                kept.executemany("DELETE FROM cache WHERE hash = ?", spoilt)
-                kept.execute(
+                database.executemany("DELETE FROM cache WHERE hash = ?", spoilt)
+                database.execute(
                     "UPDATE config SET value = (SELECT coalesce(sum(size), 0) FROM cache) WHERE key = 'total_size'"
                 )
     except sqlite3.Error as error:
@@ -87,12 +87,12 @@ def _removed(folder: Path) -> bool:
 def _put_down_sums(folder: Path) -> None:
     """Put down the sums of what is new; what was there keeps that which it had."""
     with suppress(sqlite3.Error, OSError):
-        with closing(_opened(folder / KEPT)) as kept:
-            found = _sums(kept)
-        known = _known(folder)
-        if found.keys() - known.keys():
+        with closing(_opened(folder / KEPT)) as database:
+            sums = _sums(database)
+        recorded = _known(folder)
+        if sums.keys() - recorded.keys():
             with replaced(folder / SUMS) as file:
-                json.dump({key: known.get(key, made) for key, made in found.items()}, file)
+                json.dump({key: recorded.get(key, total) for key, total in sums.items()}, file)
 
 
 def _opened(place: Path) -> sqlite3.Connection:
@@ -102,13 +102,13 @@ def _opened(place: Path) -> sqlite3.Connection:
 def _known(folder: Path) -> dict[int, int]:
     """Sums by what they are of; none where they cannot be read."""
     try:
-        made: Any = json.loads((folder / SUMS).read_text(encoding="utf-8"))
-        return {int(key): int(value) for key, value in made.items()}
+        record: Any = json.loads((folder / SUMS).read_text(encoding="utf-8"))
+        return {int(key): int(value) for key, value in record.items()}
     except (OSError, ValueError, TypeError, AttributeError, RecursionError):
         return {}
 
 
-def _sums(kept: sqlite3.Connection) -> dict[int, int]:
+def _sums(database: sqlite3.Connection) -> dict[int, int]:
     """A sum over each piece of code and what it was made of."""
-    rows = kept.execute(f"SELECT {_COLUMNS} FROM cache")  # noqa: S608 (names of our own)
+    rows = database.execute(f"SELECT {_COLUMNS} FROM cache")  # noqa: S608 (names of our own)
     return {int(row[0]): zlib.crc32(repr(row).encode()) for row in rows}

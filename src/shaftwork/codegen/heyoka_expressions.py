@@ -13,9 +13,8 @@ import sympy
 from sympy.functions.elementary.piecewise import ExprCondPair
 from sympy.logic.boolalg import ITE, And, BooleanFalse, BooleanTrue, Not, Or, Xor
 
-from shaftwork.codegen.fixed import Fixed
 from shaftwork.codegen.heyoka_cache import keep_apart
-from shaftwork.codegen.heyoka_held import Held
+from shaftwork.codegen.heyoka_parameters import Fixed, Held
 from shaftwork.components import noise
 from shaftwork.components.laws import between_steps
 from shaftwork.components.noise import HeldNoise
@@ -64,7 +63,8 @@ class Translator:
         states: state symbols; they become the heyoka variables `variables`.
         time: symbol of time.
         parameters: parameter symbols; they become heyoka.par[0], heyoka.par[1], ...
-        held: number of different floors and held noises in all that is to be translated; they follow what is fixed.
+        stepping: number of different floors and held noises in all that is to be translated, which follow what is
+            fixed.
         fixed: what is made of parameters alone and follows them.
     """
 
@@ -73,7 +73,7 @@ class Translator:
         states: Sequence[sympy.Symbol],
         time: sympy.Symbol,
         parameters: Sequence[sympy.Symbol],
-        held: int = 0,
+        stepping: int = 0,
         fixed: Fixed | None = None,
     ) -> None:
         self.variables = tuple(heyoka.expression(f"x{index}") for index in range(len(states)))
@@ -85,12 +85,12 @@ class Translator:
         self._states = frozenset(states)
         self.fading: dict[sympy.Expr, Any] = {}
         self._fixed = Fixed(parameters, (), ()) if fixed is None else fixed
-        self._first_held = len(parameters) + len(self._fixed.found)
-        self._first_sign = self._first_held + held
+        self._first_held = len(parameters) + len(self._fixed.places)
+        self._first_sign = self._first_held + stepping
         self._moving = frozenset((*states, time))
         self._done: dict[sympy.Basic, Any] = dict(zip(states, self.variables, strict=True))
         self._done.update((symbol, heyoka.par[index]) for index, symbol in enumerate(parameters))
-        self._done.update((part, heyoka.par[len(parameters) + place]) for part, place in self._fixed.found.items())
+        self._done.update((part, heyoka.par[len(parameters) + place]) for part, place in self._fixed.places.items())
         self._done[time] = heyoka.time
         self._signs: dict[sympy.Basic, Any] = {}
 
@@ -138,7 +138,7 @@ class Translator:
         below: list[Any] = []
         factors = self._fixed.arguments(node)
         for factor in factors:
-            power = isinstance(factor, sympy.Pow) and factor not in self._fixed.found and factor.exp.is_number
+            power = isinstance(factor, sympy.Pow) and factor not in self._fixed.places and factor.exp.is_number
             if power and factor.exp.is_negative:
                 below.append(self.expression(1 / factor))
             elif power and isinstance(factor.base, sympy.Abs) and _rise(factors, factor.base.args[0]) > 1:
@@ -215,11 +215,11 @@ class Translator:
         """The largest or smallest of the arguments, two at a time."""
         zero = heyoka.expression(0.0)
         better = heyoka.gt if isinstance(node, sympy.Max) else heyoka.lt
-        given = sorted(node.args, key=sympy.default_sort_key)
-        result = self.expression(given[0])
-        for number, other in enumerate(given[1:], 1):
+        arguments = sorted(node.args, key=sympy.default_sort_key)
+        result = self.expression(arguments[0])
+        for number, other in enumerate(arguments[1:], 1):
             # The best so far is itself an extreme: the switch compares with it as a whole.
-            best = given[0] if number == 1 else node.func(*given[:number])
+            best = arguments[0] if number == 1 else node.func(*arguments[:number])
             wins = better(self.sign(other - best), zero)
             result = heyoka.select(wins, self.expression(other), result)
         return result

@@ -32,7 +32,7 @@ class _TemplateInputs:
     What they read of other branches, (reads, k), stands in y too. The slopes are by time, across, integral and reads.
     """
 
-    made_of: TemplateGroup
+    branches: TemplateGroup
     inputs: Index
     outputs: Index
     integrals: Index
@@ -43,22 +43,22 @@ class _TemplateInputs:
     @cached_property
     def arrives(self) -> bool:
         """Whether it is what arrives by waves, which is as it is given."""
-        return self.made_of.template.is_history
+        return self.branches.template.is_history
 
     @cached_property
     def moving(self) -> tuple[tuple[Expr, tuple[float, ...]], ...]:
         """What makes the law jump, bend or rise steeply because of the motion, each once, and at which levels."""
-        template = self.made_of.template
+        template = self.branches.template
         moves = (ACROSS, INTEGRAL, *template.reads)
         if not (template.kind is Kind.LAW or template.reads) or not template.law.has(*moves):
             return ()
-        found = ((argument, tuple(levels)) for argument, levels in switches(template.law) if argument.has(*moves))
-        return tuple(dict.fromkeys((*found, *bells(template.law, moves))))
+        pairs = ((argument, tuple(levels)) for argument, levels in switches(template.law) if argument.has(*moves))
+        return tuple(dict.fromkeys((*pairs, *bells(template.law, moves))))
 
     @cached_property
     def switches(self) -> tuple[tuple[Function, Array], ...]:
         """`moving` as functions, and the levels."""
-        symbols = _arguments(self.made_of.template)
+        symbols = _arguments(self.branches.template)
         return tuple((vectorised(symbols, argument), np.array(levels)) for argument, levels in self.moving)
 
 
@@ -81,36 +81,36 @@ class Inputs:
         integral = {branch: first + k for k, branch in enumerate(form.integrals)}
         integral |= {branch: self.states + k for k, branch in enumerate(form.waves)}
         self._graph = form.graph
-        self._groups = tuple(self._group(made, place, output, integral) for made in groups_of(form.graph, order))
+        self._groups = tuple(self._group(alike, place, output, integral) for alike in groups_of(form.graph, order))
         self.of_time = np.ones(self.size, dtype=bool)
         self.controlled = np.zeros(self.size, dtype=bool)
         for group in self._groups:
-            if group.made_of.template.kind is Kind.LAW:
+            if group.branches.template.kind is Kind.LAW:
                 self.of_time[group.inputs] = False
-            elif group.made_of.template.reads:
+            elif group.branches.template.reads:
                 self.of_time[group.inputs], self.controlled[group.inputs] = False, True
         self.controls = np.flatnonzero(self.controlled)
-        self.rates = np.array([output[made] for made in form.readings if made.kind == "rate"], dtype=np.intp)
+        self.rates = np.array([output[reading] for reading in form.readings if reading.kind == "rate"], dtype=np.intp)
         self._last: tuple[Array, tuple[tuple[Any, ...], ...]] = np.empty(0), ()
 
-    def _group(self, made: TemplateGroup, place: Any, output: Any, integral: Any) -> _TemplateInputs:
-        is_wave = made.template.is_history
-        law = INTEGRAL if is_wave else made.template.law  # both are read from x
-        symbols, reads = _arguments(made.template), made.template.reads
-        members = [int(branch) for branch in made.branches]
-        found = [[output[readings_of(self._graph, branch)[symbol]] for branch in members] for symbol in reads]
+    def _group(self, alike: TemplateGroup, place: Any, output: Any, integral: Any) -> _TemplateInputs:
+        template = alike.template
+        law = INTEGRAL if template.is_history else template.law  # both are read from x
+        symbols, reads = _arguments(template), template.reads
+        members = [int(branch) for branch in alike.branches]
+        rows = [[output[readings_of(self._graph, branch)[symbol]] for branch in members] for symbol in reads]
 
         def function(expression: Expr) -> Function | None:
             real = nan if expression.has(I) else expression  # the slope of (-2)^omega has log(-2)
             return None if real == 0 else vectorised(symbols, real)
 
-        moves = made.template.kind is Kind.LAW
+        moves = template.kind is Kind.LAW
         return _TemplateInputs(
-            made,
+            alike,
             np.array([place[branch] for branch in members], dtype=np.intp),
             np.array([output[branch] for branch in members] if moves else [], dtype=np.intp),
             np.array([integral[branch] for branch in members] if law.has(INTEGRAL) else [], dtype=np.intp),
-            np.array(found, dtype=np.intp).reshape(len(reads), len(members)),
+            np.array(rows, dtype=np.intp).reshape(len(reads), len(members)),
             function(law) or vectorised(symbols, Integer(0)),
             tuple(function(slope(law, symbol)) for symbol in (TIME, ACROSS, INTEGRAL, *reads)),
         )
@@ -120,18 +120,26 @@ class Inputs:
         last = self._last
         if last[0] is p:
             return last[1]
-        found = tuple(tuple(p[group.made_of.places]) for group in self._groups)
+        values = tuple(tuple(p[group.branches.places]) for group in self._groups)
         if not p.flags.writeable:
-            self._last = p, found
-        return found
+            self._last = p, values
+        return values
 
     def values(self, t: Any, y: Array, x: Array, p: Array) -> Array:
         """u (m,) at time t from outputs y and states x; with t (k,), y (outputs, k) and x (n, k) it is (m, k)."""
         return self._evaluate(lambda group: group.value, t, y, x, p)
 
+    def sources(self, t: Any, x: Array, p: Array) -> Array:
+        """Of u what depends on the time alone; zero for others, whose laws may have no value here."""
+        return where(self.of_time, self.values(t, np.zeros((self.outputs, *x.shape[1:])), x, p))
+
     def time_slopes(self, t: Any, y: Array, x: Array, p: Array) -> Array:
         """The partial derivative of u by time."""
         return self._evaluate(lambda group: group.slopes[0], t, y, x, p)
+
+    def source_rates(self, t: Any, y: Array, x: Array, p: Array) -> Array:
+        """Of u' that of what depends on the time alone; zero for others."""
+        return where(self.of_time, self.time_slopes(t, y, x, p))
 
     def slopes(self, t: Any, y: Array, x: Array, p: Array) -> tuple[Any, Any]:
         """The partial derivatives of u by y (m, outputs) and by the integrals among the states (m, n), sparse."""
@@ -149,7 +157,7 @@ class Inputs:
                 if integral is not None:
                     by_x.append((integral, group.inputs, group.integrals))
                 pairs = zip(others, group.reads, strict=True)
-                by_y += [(found, group.inputs, places) for found, places in pairs if found is not None]
+                by_y += [(slopes, group.inputs, places) for slopes, places in pairs if slopes is not None]
         return _matrix(by_y, (self.size, self.outputs)), _matrix(by_x, (self.size, self.states))
 
     def along(self, t: Any, y: Array, x: Array, p: Array, by_y: Array, by_x: Array | None = None) -> Array:
@@ -175,23 +183,21 @@ class Inputs:
                 read = _read(group, y, x, parameters)
                 for function, places, by in (*moved, *reads):
                     if function is not None and places.size and by is not None:
-                        made = function(t, *read) + np.zeros((group.inputs.size, *x.shape[1:]))
-                        result[group.inputs] += np.einsum("i...,iq->iq...", made, by[places])
+                        slopes = function(t, *read) + np.zeros((group.inputs.size, *x.shape[1:]))
+                        result[group.inputs] += np.einsum("i...,iq->iq...", slopes, by[places])
         return result
 
     @cached_property
     def constant(self) -> bool:
         """Whether parameters alone tell every input."""
-        templates = (group.made_of.template for group in self._groups)
-        return not any(
-            made.kind is Kind.LAW or made.reads or made.is_history or made.law.has(TIME) for made in templates
-        )
+        templates = (group.branches.template for group in self._groups)
+        return not any(one.kind is Kind.LAW or one.reads or one.is_history or one.law.has(TIME) for one in templates)
 
     @property
     def linear(self) -> bool:
         """Whether every input is linear in all that it reads, with constant slopes."""
-        templates = (made.made_of.template for made in self._groups)
-        return all(is_linear(made.law, (ACROSS, INTEGRAL, *made.reads)) for made in templates)
+        templates = (group.branches.template for group in self._groups)
+        return all(is_linear(one.law, (ACROSS, INTEGRAL, *one.reads)) for one in templates)
 
     @property
     def switching(self) -> bool:
@@ -226,8 +232,8 @@ class Inputs:
         for group, parameters in zip(self._groups, self._parameters(p), strict=True):
             read = _read(group, y, x, parameters)
             for k, place in enumerate(group.inputs.tolist()):
-                own = [np.float64(t), *(np.float64(value if np.ndim(value) == 0 else value[k]) for value in read)]
-                if any(is_rough(function, own) for function in (group.value, *group.slopes) if function is not None):
+                point = [np.float64(t), *(np.float64(value if np.ndim(value) == 0 else value[k]) for value in read)]
+                if any(is_rough(function, point) for function in (group.value, *group.slopes) if function is not None):
                     return int(place)
         return None
 
@@ -247,6 +253,11 @@ class Inputs:
         return result
 
 
+def where(mask: Any, values: Array) -> Array:
+    """Values (m,) or (m, k) where a mask (m,) holds, else zero."""
+    return np.where(mask if values.ndim == 1 else mask[:, None], values, 0.0)
+
+
 def is_linear(law: Expr, reads: Sequence[Symbol]) -> bool:
     """Whether a law is linear in what it reads, with constant slopes."""
     return not (any(slope(law, read).has(*reads, TIME) for read in reads) or jumps(law, *reads))
@@ -255,8 +266,8 @@ def is_linear(law: Expr, reads: Sequence[Symbol]) -> bool:
 def _read(group: _TemplateInputs, y: Array, x: Array, parameters: tuple[Any, ...]) -> tuple[Any, ...]:
     """What the laws of a group read: across variables, integrals, what is of other branches, parameters."""
     across = y[group.outputs] if group.outputs.size else 0.0
-    known = group.integrals.size and group.integrals[-1] < len(x)  # not the waves, where none are given
-    integral = x[group.integrals] if known else 0.0
+    is_there = group.integrals.size and group.integrals[-1] < len(x)  # not the waves, where none are given
+    integral = x[group.integrals] if is_there else 0.0
     if x.ndim > 1:
         parameters = tuple(row[:, None] for row in parameters)
     if not len(group.reads):
@@ -273,5 +284,5 @@ def _matrix(entries: Sequence[tuple[Array, Index, Index]], shape: tuple[int, int
     """A scipy.sparse.csr_array of (values, rows, columns)."""
     if not entries:
         return sparse.csr_array(shape)
-    values, rows, columns = (np.concatenate(made) for made in zip(*entries, strict=True))
+    values, rows, columns = (np.concatenate(each) for each in zip(*entries, strict=True))
     return sparse.csr_array((values, (rows, columns)), shape=shape)

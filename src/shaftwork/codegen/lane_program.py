@@ -9,18 +9,16 @@ from typing import Any
 
 import heyoka
 import numpy as np
-from numpy.typing import NDArray
 from sympy import Expr, Symbol
 
-from shaftwork.codegen.fixed import Fixed
+from shaftwork.codegen.elements import Array
 from shaftwork.codegen.hermite import JET
 from shaftwork.codegen.heyoka import HeyokaProgram
 from shaftwork.codegen.heyoka_expressions import Translator
+from shaftwork.codegen.heyoka_parameters import Fixed
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError
 from shaftwork.reduction.rows import Rows
-
-Array = NDArray[np.float64]
 
 FREE_TIME = heyoka.expression("time")
 """By its own time heyoka does not differentiate."""
@@ -46,29 +44,29 @@ class LaneFunction:
         read = heyoka.get_params(list(self.expressions))
         used = sorted(int(str(parameter)[1:]) for parameter in read)
         renamed = {heyoka.par[number]: heyoka.par[k] for k, number in enumerate(used)}
-        made = heyoka.subs(list(self.expressions), renamed) if used else list(self.expressions)
+        expressions = heyoka.subs(list(self.expressions), renamed) if used else list(self.expressions)
         # fast_math: a quarter faster; what is not finite is found by whoever asks
-        return heyoka.cfunc(made, vars=list(self.variables), opt_level=1, fast_math=True), used
+        return heyoka.cfunc(expressions, vars=list(self.variables), opt_level=1, fast_math=True), used
 
     def __call__(self, t: Array, x: Array, p: Array) -> Array:
         """Values (expressions, k) at times (k,) in s, states (n, k), parameters (parameters, k)."""
-        made = np.empty((len(self.expressions), t.size))
+        values = np.empty((len(self.expressions), t.size))
         if self.expressions and t.size:
             function, _ = self._compiled
-            given: dict[str, Any] = {"time": np.ascontiguousarray(t)} if function.is_time_dependent else {}
-            self.into(made, np.ascontiguousarray(x), self.taken(p), **given)
-        return made
+            time: dict[str, Any] = {"time": np.ascontiguousarray(t)} if function.is_time_dependent else {}
+            self.into(values, np.ascontiguousarray(x), self.taken(p), **time)
+        return values
 
     def taken(self, p: Array) -> Array:
         """Of the parameters (parameters, k) those that are read."""
         return np.ascontiguousarray(p[self._compiled[1]])
 
-    def into(self, made: Array, x: Array, taken: Array, **given: Any) -> None:
+    def into(self, values: Array, x: Array, taken: Array, **options: Any) -> None:
         """Write values (expressions, k) for variables (n, k) and what is `taken` of the parameters, all contiguous."""
         function, used = self._compiled
         if used:
-            given["pars"] = taken
-        function(x, outputs=made, batch_parallel=False, **given)  # to hand out so few costs more than it brings
+            options["pars"] = taken
+        function(x, outputs=values, batch_parallel=False, **options)  # to hand out so few costs more than it brings
 
 
 @dataclass(frozen=True)
@@ -97,12 +95,12 @@ class LaneProgram:
 
     def jet(self, quantity: Any) -> tuple[Any, ...]:
         """A heyoka expression and its first two derivatives by time along the motion."""
-        made = [quantity]
+        jet = [quantity]
         for _ in range(JET - 1):
-            free = at(made[-1], FREE_TIME)
-            moved = [slope * rate for slope, rate in zip(self.gradient(made[-1]), self.rates, strict=True)]
-            made += heyoka.subs([heyoka.sum([heyoka.diff(free, FREE_TIME), *moved])], {FREE_TIME: heyoka.time})
-        return tuple(made)
+            free = at(jet[-1], FREE_TIME)
+            moved = [slope * rate for slope, rate in zip(self.gradient(jet[-1]), self.rates, strict=True)]
+            jet += heyoka.subs([heyoka.sum([heyoka.diff(free, FREE_TIME), *moved])], {FREE_TIME: heyoka.time})
+        return tuple(jet)
 
     def gradient(self, quantity: Any) -> list[Any]:
         """The derivatives of a heyoka expression by the states."""
@@ -118,8 +116,7 @@ def lane_function(expressions: tuple[Any, ...], variables: tuple[Any, ...]) -> L
 
 def at(expression: Any, time: Any) -> Any:
     """A heyoka expression at a time."""
-    (made,) = heyoka.subs([expression], {heyoka.time: time})
-    return made
+    return heyoka.subs([expression], {heyoka.time: time})[0]
 
 
 def lane_program(program: HeyokaProgram, rows: Rows, quantities: Sequence[Expr]) -> LaneProgram:
@@ -134,13 +131,13 @@ def lane_program(program: HeyokaProgram, rows: Rows, quantities: Sequence[Expr])
         CompileError: a law or a quantity switches by a condition, which ends a step in each lane at a time of its own.
     """
     expressions = (*rows.rates, *quantities)
-    fixed = Fixed(rows.parameters, (*rows.states, TIME), expressions, before=program.fixed.found)
+    fixed = Fixed(rows.parameters, (*rows.states, TIME), expressions, before=program.fixed.places)
     translator = Translator(rows.states, TIME, rows.parameters, fixed=fixed)
-    made = tuple(translator.expression(expression) for expression in expressions)
+    translated = tuple(translator.expression(expression) for expression in expressions)
     if program.switches or program.fading or program.held is not None or translator.switches or translator.fading:
         raise CompileError("A law or a quantity switches by a condition, which variants side by side do not follow.")
-    rates, measured = made[: len(rows.rates)], made[len(rows.rates) :]
-    count = len(rows.parameters) + len(fixed.found)
+    rates, measured = translated[: len(rows.rates)], translated[len(rows.rates) :]
+    count = len(rows.parameters) + len(fixed.places)
     return LaneProgram(program.variables, rates, program.guards, measured, count, fixed)
 
 
@@ -151,7 +148,7 @@ def lane_expressions(rows: Rows, expressions: Sequence[Expr]) -> tuple[Any, ...]
         CompileError: one has no counterpart in heyoka.
     """
     translator = Translator(rows.states, TIME, tuple(Symbol(p.name, real=True) for p in rows.parameters))
-    made = tuple(translator.expression(expression) for expression in expressions)
+    translated = tuple(translator.expression(expression) for expression in expressions)
     if translator.switches or translator.held:
         raise CompileError("A store switches by a condition, which variants side by side do not follow.")
-    return made
+    return translated

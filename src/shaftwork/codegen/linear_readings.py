@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,8 +12,7 @@ from scipy import sparse
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.products import Factor
-from shaftwork.codegen.recovery import BranchHistory
-from shaftwork.codegen.state_transfer import StateTransfer
+from shaftwork.codegen.recovery import BranchHistory, GivenHistory
 
 LARGEST_BLOCK = 2_000_000
 """Values, branches by columns, that are made at once."""
@@ -55,26 +53,6 @@ class LinearRow:
     moved: bool
 
 
-class _Columns(BranchHistory):
-    """Branch quantities where states, inputs and rates are given, each column for itself.
-
-    Args:
-        bound: the array program.
-        x: (n, k) states.
-        u: (m, k) inputs.
-        rate: (n, k) rates of the states.
-        slopes: (m, k) rates of the inputs.
-    """
-
-    def __init__(self, bound: BoundArrays, x: Array, u: Array, rate: Array, slopes: Array) -> None:
-        super().__init__(bound, np.zeros(x.shape[1]), x.T)
-        self._given = u, slopes, rate
-
-    @cached_property
-    def inputs(self) -> tuple[Array, Array, Array]:
-        return self._given
-
-
 class ReadingMatrices:
     """Quantities as matrices of states and inputs, for who reads them again and again, at few times at once.
 
@@ -87,43 +65,40 @@ class ReadingMatrices:
 
     def __init__(self, bound: BoundArrays, reads: Sequence[Read]) -> None:
         states, inputs = len(bound.program.form.states), bound.part.B.shape[1]
-        self._sizes = states, inputs, states, inputs
-        width = max(1, LARGEST_BLOCK // max(1, len(bound.program.form.graph.branches)))
+        self._sizes = states, inputs, inputs, states
         self._matrices = [
-            Factor(
-                sparse.hstack(
-                    [
-                        sparse.csr_array(np.array([read(columns) for read in reads]))
-                        for columns in self._columns(bound, place, width)
-                    ]
-                )
-            )
-            for place in range(4)
+            Factor(sparse.hstack([sparse.csr_array(np.array([read(one) for read in reads])) for one in histories]))
+            for histories in (self._unit_histories(bound, place) for place in range(4))
         ]
 
     @property
     def plain(self) -> tuple[Any, Any] | None:
         """X and U of scipy.sparse; None where rates are read as well."""
-        by_state, by_input, by_rate, by_slope = self._matrices
+        by_state, by_input, by_slope, by_rate = self._matrices
         return (by_state.sparse, by_input.sparse) if by_rate.is_zero and by_slope.is_zero else None
 
-    def _columns(self, bound: BoundArrays, place: int, width: int) -> Iterator[_Columns]:
-        """One column for each of what is given at a place: states, inputs, rates of states, rates of inputs."""
-        for first in range(0, max(self._sizes[place], 1), width):
-            one = np.eye(self._sizes[place])[:, first : first + width]
-            x, u, rate, slopes = (
-                one if k == place else np.zeros((size, one.shape[1])) for k, size in enumerate(self._sizes)
+    def _unit_histories(self, bound: BoundArrays, place: int) -> Iterator[GivenHistory]:
+        """One column for each of what is given at a place: states, inputs, rates of inputs, rates of states."""
+        for one in _units(bound, self._sizes[place]):
+            yield GivenHistory(
+                bound, *(one if k == place else np.zeros((size, one.shape[1])) for k, size in enumerate(self._sizes))
             )
-            yield _Columns(bound, x, u, rate, slopes)
 
     def __call__(self, history: BranchHistory) -> Array:
         """(quantities, k) the quantities along a history."""
-        by_state, by_input, by_rate, by_slope = self._matrices
+        by_state, by_input, by_slope, by_rate = self._matrices
         read = by_state @ history.x[: self._sizes[0]] + by_input @ history.values[1]
         if not (by_rate.is_zero and by_slope.is_zero):
             _, slopes, rate = history.inputs
             read = read + by_rate @ rate + by_slope @ slopes
         return read
+
+
+def _units(bound: BoundArrays, size: int) -> Iterator[Array]:
+    """The columns of a unit matrix, in blocks of which all branch quantities may be made at once."""
+    width = max(1, LARGEST_BLOCK // max(1, len(bound.program.form.graph.branches)))
+    for first in range(0, max(size, 1), width):
+        yield np.eye(size)[:, first : first + width]
 
 
 @dataclass(frozen=True)
@@ -182,7 +157,7 @@ class LinearReadings:
     def __init__(self, bound: BoundArrays, t: float) -> None:
         self._bound = bound
         self._size = len(bound.program.form.states)
-        self._prescribed = StateTransfer(bound.program.form).sources(bound, t)
+        self._prescribed = bound.sources(t)
 
     def rows(self, quantities: Sequence[LinearQuantity]) -> list[LinearRow]:
         """How each quantity follows from the states."""
@@ -217,7 +192,7 @@ class LinearReadings:
         states = np.stack([is_given * x, x - rest, is_given * anything, ~is_given * anything], axis=1)
         u, zero = np.zeros((self._prescribed.size, 4)), np.zeros_like(states)
         u[:, 2] = self._are_behind(prescribed) * _any_numbers(self._prescribed.size)
-        return GivenSpeeds(_Columns(self._bound, states, u, zero, np.zeros_like(u)), self._others())
+        return GivenSpeeds(GivenHistory(self._bound, states, u, np.zeros_like(u), zero), self._others())
 
     def _are_behind(self, quantities: Sequence[LinearQuantity]) -> Any:
         """(m,) which of the inputs are sources of time that have a part in quantities."""
@@ -225,29 +200,26 @@ class LinearReadings:
         behind = np.zeros(self._prescribed.size, dtype=bool)
         if quantities:
             u, x = np.eye(self._prescribed.size)[:, sources], np.zeros((self._size, sources.size))
-            values = self._values(quantities, _Columns(self._bound, x, u, x, np.zeros_like(u)))
+            values = self._values(quantities, GivenHistory(self._bound, x, u, np.zeros_like(u), x))
             behind[sources] = (values != 0).any(axis=0)
         return behind
 
-    def _values(self, quantities: Sequence[LinearQuantity], columns: _Columns) -> Array:
+    def _values(self, quantities: Sequence[LinearQuantity], columns: GivenHistory) -> Array:
         return np.array([quantity.read(columns) for quantity in quantities])
 
-    def _by_states(self, *, moving: bool) -> list[_Columns]:
+    def _by_states(self, *, moving: bool) -> list[GivenHistory]:
         """One column for each state, in blocks; with the rates that the states alone cause where they move."""
-        bound, inputs = self._bound, self._prescribed.size
-        width = max(1, LARGEST_BLOCK // max(1, len(bound.program.form.graph.branches)))
-        made = []
-        for first in range(0, max(self._size, 1), width):
-            x = np.eye(self._size)[:, first : first + width]
-            zero = np.zeros((inputs, x.shape[1]))
-            made.append(_Columns(bound, x, zero, bound.part.A @ x if moving else np.zeros_like(x), zero))
-        return made
+        bound, histories = self._bound, list[GivenHistory]()
+        for x in _units(bound, self._size):
+            zero = np.zeros((self._prescribed.size, x.shape[1]))
+            histories.append(GivenHistory(bound, x, zero, zero, bound.part.A @ x if moving else np.zeros_like(x)))
+        return histories
 
-    def _others(self) -> _Columns:
+    def _others(self) -> GivenHistory:
         """Three columns: what sources prescribe, laws, accelerations; of the last two any numbers."""
         of_time, size = self._bound.program.inputs.of_time, self._size
         any_input, any_rate = _any_numbers(of_time.size), _any_numbers(size)
         zero, still = np.zeros(of_time.size), np.zeros(size)
         u = np.stack([self._prescribed, np.where(of_time, 0.0, any_input), zero], axis=1)
         rate = np.stack([still, still, any_rate], axis=1)
-        return _Columns(self._bound, np.zeros((size, 3)), u, rate, np.stack([zero, zero, any_input], axis=1))
+        return GivenHistory(self._bound, np.zeros((size, 3)), u, np.stack([zero, zero, any_input], axis=1), rate)

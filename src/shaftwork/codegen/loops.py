@@ -92,13 +92,13 @@ class LoopSolver:
         """Outputs y and inputs u at states x, (n,) or (n, k) with t (k,)."""
         if not self._linear:
             return self.inputs_at(t, x, self.solve(t, x))[:2]
-        own = self._D[:, self.places]
+        by_unknowns = self._D[:, self.places]
         y, _, u = self.inputs_at(t, x, np.zeros((len(self.places), *x.shape[1:])))
-        slope = self._inputs.along(t, y, x, self._p, own)[self.places]
+        slope = self._inputs.along(t, y, x, self._p, by_unknowns)[self.places]
         matrix = np.eye(len(slope)).reshape(*slope.shape[:2], *(1,) * (x.ndim - 1)) - slope
         a = _solved(matrix, u[self.places])
         u[self.places] = a
-        return y + own @ a, u
+        return y + by_unknowns @ a, u
 
     @property
     def last(self) -> Array:
@@ -118,9 +118,9 @@ class LoopSolver:
             self._last = a[:, 0] if np.isfinite(a).all() else last
             return a
         while True:
-            known = np.column_stack([last, a])
-            found = np.where(np.isfinite(known).all(axis=0), np.arange(known.shape[1]), 0)
-            ends = known[:, np.maximum.accumulate(found)]  # where there is no solution, the last one that there was
+            solutions = np.column_stack([last, a])
+            solved = np.where(np.isfinite(solutions).all(axis=0), np.arange(solutions.shape[1]), 0)
+            ends = solutions[:, np.maximum.accumulate(solved)]  # where there is none, the last one that there was
             least = SAME * np.abs(ends).max(axis=1, keepdims=True)
             other = np.flatnonzero((np.abs(ends[:, :-1] - starts) > least).any(axis=0))
             if not other.size:
@@ -161,28 +161,27 @@ class LoopSolver:
             SimulationError: beside waves, several solutions are near.
         """
         slope = np.moveaxis(self._by_loops(t, x, a)[0], -1, 0)
-        known = np.isfinite(slope).all(axis=(1, 2))
-        if self._sign and (self._sign * np.linalg.det(slope[known]) <= 0).any():
+        finite = np.isfinite(slope).all(axis=(1, 2))
+        if self._sign and (self._sign * np.linalg.det(slope[finite]) <= 0).any():
             names = " and ".join(map(repr, self._beside_waves))
             raise SimulationError(
                 f"{names}: the torque falls faster with the speed than the impedances of the waves at its node, which "
                 "are all that resists there, so several speeds go with it. Give the node an inertia, however small."
             )
         step = np.full_like(residual, np.nan)
-        inverse = np.linalg.pinv(slope[known], rcond=len(a) * np.finfo(float).eps)
-        step[:, known] = -np.einsum("kij,jk->ik", inverse, residual[:, known])
+        inverse = np.linalg.pinv(slope[finite], rcond=len(a) * np.finfo(float).eps)
+        step[:, finite] = -np.einsum("kij,jk->ik", inverse, residual[:, finite])
         left = residual + np.einsum("kij,jk->ik", slope, step)
         return step, np.linalg.norm(left, axis=0) < 0.5 * np.linalg.norm(residual, axis=0)
 
     def inputs_at(self, t: Any, x: Array, a: Array) -> tuple[Array, Array, Array]:
         """Outputs y, inputs u and law values g for given unknowns, at one instant or at k."""
         inputs, part = self._inputs, self._part
-        known = inputs.values(t, np.zeros((inputs.outputs, *x.shape[1:])), x, self._p)
-        known[~inputs.of_time] = 0.0
-        known[self.places] = a
-        y = part.C @ x[: inputs.states] + self._D @ known
+        sources = inputs.sources(t, x, self._p)
+        sources[self.places] = a
+        y = part.C @ x[: inputs.states] + self._D @ sources
         if self._D1 is not None:
-            y = y + self._D1 @ (inputs.time_slopes(t, y, x, self._p).T * inputs.of_time).T
+            y = y + self._D1 @ inputs.source_rates(t, y, x, self._p)
         if self._controls.size:  # they read nothing that depends on others of their kind
             y = y + self._D[:, self._controls] @ inputs.values(t, y, x, self._p)[self._controls]
         if self._rates.size:  # of speeds, to which the laws contribute that are no loops
@@ -205,32 +204,32 @@ class LoopSolver:
 
     def _by_loops(self, t: Any, x: Array, a: Array) -> tuple[Array, Array]:
         """The residual (loops, loops) and the inputs (m, loops) by the unknowns; at k instants with a last axis k."""
-        own = np.eye(len(self.places))
-        return self._total(own, self._slopes(t, x, a, self._D[:, self.places]))
+        unknowns = np.eye(len(self.places))
+        return self._total(unknowns, self._slopes(t, x, a, self._D[:, self.places]))
 
     def _slopes(self, t: Any, x: Array, a: Array, through_y: Array, through_x: Array | None = None) -> Array:
         """Of all laws by q variables that move the outputs and the states; (m, q), or at k instants (m, q, k)."""
         y, _, _ = self.inputs_at(t, x, a)
-        made = self._inputs.along(t, y, x, self._p, through_y, through_x)
+        slopes = self._inputs.along(t, y, x, self._p, through_y, through_x)
         for rows, laws in ((np.arange(len(y)), self._controls), (self._rates, self._free)):
             if laws.size and rows.size:
                 through = np.zeros((len(y), laws.size))
                 through[rows] = self._D[np.ix_(rows, laws)]
                 by_laws = self._inputs.along(t, y, x, self._p, through)
-                made = made + np.einsum("mc...,cq...->mq...", by_laws, made[laws])
-        return np.asarray(made)
+                slopes = slopes + np.einsum("mc...,cq...->mq...", by_laws, slopes[laws])
+        return np.asarray(slopes)
 
-    def _total(self, own: Array, by: Array, states: Array | None = None) -> tuple[Array, Array]:
+    def _total(self, unknowns: Array, by: Array, states: Array | None = None) -> tuple[Array, Array]:
         """The residual and the inputs by q variables.
 
         Args:
-            own: (loops, q) the unknowns by them.
+            unknowns: (loops, q) the unknowns by them.
             by: (m, q) or (m, q, k) the laws by them.
             states: (n, q) the states by them; None where they do not move them.
         """
-        own = own.reshape(*own.shape, *(1,) * (by.ndim - 2))
-        u, left = by.copy(), own - by[self.places]
-        u[self.places] = own
+        unknowns = unknowns.reshape(*unknowns.shape, *(1,) * (by.ndim - 2))
+        u, left = by.copy(), unknowns - by[self.places]
+        u[self.places] = unknowns
         if self._tree.any():
             left[self._tree] = np.tensordot(self._Q, u, 1) - by[self.places[self._tree]]
             left[self._tree] += 0.0 if states is None else self._P @ states
@@ -253,7 +252,7 @@ def _solved(matrix: Array, right: Array) -> Array:
     if len(right) == 1:
         return np.asarray(right / matrix[0])
     many = np.moveaxis(matrix, 2, 0) if matrix.ndim == 3 else matrix[None]
-    known = np.isfinite(many).all(axis=(1, 2))
-    made = np.full((len(many), len(right)), np.nan)
-    made[known] = np.einsum("kij,jk->ki", np.linalg.pinv(many[known]), right.reshape(len(right), -1)[:, known])
-    return made.T.reshape(right.shape)
+    finite = np.isfinite(many).all(axis=(1, 2))
+    solution = np.full((len(many), len(right)), np.nan)
+    solution[finite] = np.einsum("kij,jk->ki", np.linalg.pinv(many[finite]), right.reshape(len(right), -1)[:, finite])
+    return solution.T.reshape(right.shape)

@@ -102,7 +102,7 @@ class MatrixAssembly:
         part = self._assembled(loops, cutsets, self.coefficients(p), potentials)
         fields = {field.name: getattr(part, field.name) for field in dataclasses.fields(part)}
         return LinearPart(
-            **{name: made if name == "coefficients" else sparse.csr_array(made) for name, made in fields.items()}
+            **{name: matrix if name == "coefficients" else sparse.csr_array(matrix) for name, matrix in fields.items()}
         )
 
     def rational(self, p: Array) -> LinearPart:
@@ -285,8 +285,8 @@ class _MatrixBlocks:
     def output_rows(self, outputs: NDArray[np.intp], g_x: Any, g_u: Any) -> tuple[Any, Any]:
         """C and D: the across variables of the output branches, each a link or a tree branch."""
         links = self._loops[:, outputs].T
-        own = self._selection(outputs, self._loops.shape[0])
-        return self._of_tree(links + own, g_x, g_u)  # a tree branch has no loop: its own column stands for it
+        columns = self._selection(outputs, self._loops.shape[0])
+        return self._of_tree(links + columns, g_x, g_u)  # a tree branch has no loop: its own column stands for it
 
     def _of_tree(self, rows: Any, g_x: Any, g_u: Any) -> tuple[Any, Any]:
         """Sums of across variables of tree branches, from states and inputs."""
@@ -304,9 +304,9 @@ class _MatrixBlocks:
         carried = self._selection(stores, self._loops.shape[0]) - self._cutsets[stores]  # -Q in a tree
         through_x, through_u = carried[:, self.L] @ self.pick("L"), carried[:, self.W] @ self.input("W")
         place = {branch: len(self.C) + len(self.L) + k for k, branch in enumerate(self._integrals)}
-        own = self._selection(np.array([place[int(branch)] for branch in integrals], dtype=np.intp), self._states)
+        angles = self._selection(np.array([place[int(branch)] for branch in integrals], dtype=np.intp), self._states)
         none = self.nothing(len(integrals), self._inputs)
-        return self.stack([C, across_x, through_x, own]), self.stack([D, across_u, through_u, none])
+        return self.stack([C, across_x, through_x, angles]), self.stack([D, across_u, through_u, none])
 
     def rate_rows(self, c_x: Any, c_u: Any, c_du: Any) -> tuple[Any, Any, Any]:
         """The rates of what is across links that laws read, from those of the states and of the prescribed speeds."""

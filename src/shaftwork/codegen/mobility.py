@@ -110,9 +110,9 @@ def complementary(W: Array, q: Array) -> Array | None:
 def _pressed(V: Array, b: Array) -> NDArray[np.bool_] | None:
     """(m,) where lambda > 0, for a positive definite matrix; None where rounding hides it."""
     least = ROUNDING * np.abs(b).max(initial=0.0)
-    found, active = np.zeros(len(b)), np.zeros(len(b), dtype=bool)
+    impulses, active = np.zeros(len(b)), np.zeros(len(b), dtype=bool)
     for _ in range(3 * len(b) + 1):
-        w = np.where(active, 0.0, V @ found + b)
+        w = np.where(active, 0.0, V @ impulses + b)
         if not (w < -least).any():
             return active
         active[np.argmin(w)] = True
@@ -122,9 +122,9 @@ def _pressed(V: Array, b: Array) -> NDArray[np.bool_] | None:
             pulls = active & (wanted <= 0)
             if not pulls.any():
                 break
-            shares = found[pulls] / (found[pulls] - wanted[pulls])
-            found += shares.min() * (wanted - found)
-            active &= ~(pulls & (found <= ROUNDING * np.abs(found).max(initial=0.0)))
-            found[~active] = 0.0
-        found = wanted
+            shares = impulses[pulls] / (impulses[pulls] - wanted[pulls])
+            impulses += shares.min() * (wanted - impulses)
+            active &= ~(pulls & (impulses <= ROUNDING * np.abs(impulses).max(initial=0.0)))
+            impulses[~active] = 0.0
+        impulses = wanted
     return None

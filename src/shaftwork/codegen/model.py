@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import reprlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.util import find_spec
@@ -12,11 +12,13 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from sympy import Symbol, count_ops, cse
 
 from shaftwork.codegen.arrays import ArrayProgram, BoundArrays
+from shaftwork.codegen.code import branchwise, scalar
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.runs import MachineCode, RunProgram
-from shaftwork.codegen.scalar import ScalarProgram
+from shaftwork.components.laws import t as TIME
 from shaftwork.components.pieces import pieces_degree
 from shaftwork.core.errors import CompileError, MissingExtraError, ParameterError
 from shaftwork.core.kept import Kept
@@ -53,6 +55,55 @@ class Cost:
     def total(self) -> int:
         """All operations together."""
         return sum(self.operations.values())
+
+
+class ScalarProgram:
+    """`rhs(t, x, p)` of explicit rows.
+
+    Args:
+        rows: the explicit state equations.
+    """
+
+    def __init__(self, rows: Rows) -> None:
+        self._rows, self._rates = rows, rows.rates
+
+    @cached_property
+    def function(self) -> Callable[..., list[float]]:
+        """(t, states, parameters) to the list of rates, in Python floats."""
+        return scalar(self._arguments, self._rates)
+
+    @cached_property
+    def _slow(self) -> Callable[..., list[float]]:
+        return branchwise(self._arguments, self._rates)
+
+    @property
+    def _arguments(self) -> dict[str, Symbol | Sequence[Symbol]]:
+        return {"t": TIME, "x": self._rows.states, "p": self._rows.parameters}
+
+    @property
+    def source(self) -> str:
+        """The generated code."""
+        return str(self.function.__doc__)
+
+    def bind(self, p: Array) -> Callable[[float, Array], Array]:
+        """The right-hand side for one parameter vector; NaN where a law cannot be evaluated."""
+        function, values = self.function, p.tolist()
+
+        def rhs(t: float, x: Array) -> Array:
+            try:
+                return np.array(function(t, x.tolist(), values))
+            except (ArithmeticError, ValueError):
+                return np.array(self._slow(t, x, p))
+
+        return rhs
+
+    @cached_property
+    def operations(self) -> dict[str, int]:
+        """Operations of one evaluation after common subexpressions are taken out, by name; signs cost nothing."""
+        shared, reduced = cse(self._rates)
+        total = sum((count_ops(term, visual=True) for term in (*(e for _, e in shared), *reduced)), start=0)
+        counts = total.as_coefficients_dict() if total else {}
+        return {str(name).lower(): int(count) for name, count in sorted(counts.items(), key=str) if str(name) != "NEG"}
 
 
 class CompiledModel:
@@ -97,8 +148,8 @@ class CompiledModel:
         """The largest degree in time of the laws of time between their breakpoints; None where one is no polynomial."""
         kinds = (Kind.LAW, Kind.THROUGH_SOURCE, Kind.ACROSS_SOURCE)
         laws = [b.template.law for b in self.form.graph.branches if b.template.kind in kinds]
-        found = [pieces_degree(law) for law in laws]
-        return None if None in found else max((degree for degree in found if degree is not None), default=0)
+        degrees = [pieces_degree(law) for law in laws]
+        return None if None in degrees else max((degree for degree in degrees if degree is not None), default=0)
 
     @cached_property
     def scalar(self) -> ScalarProgram | None:
@@ -168,12 +219,12 @@ class CompiledModel:
         return in_si("t", t, "s") if is_quantity(t) else t, states, values
 
     @staticmethod
-    def _vector(name: str, given: Any, size: int, what: str) -> Array:
-        numbers = np.asarray(without_unit(name, given, f"of each {what}"))
+    def _vector(name: str, value: Any, size: int, what: str) -> Array:
+        numbers = np.asarray(without_unit(name, value, f"of each {what}"))
         try:
             vector = numbers.astype(float, casting="same_kind" if numbers.dtype.kind == "c" else "unsafe", copy=False)
         except (TypeError, ValueError):
-            shown = reprlib.repr(given)
+            shown = reprlib.repr(value)
             raise ParameterError(f"{name} = {shown} must be {size} real numbers, one for each {what}.") from None
         if vector.shape != (size,):
             raise ParameterError(f"{name} has the shape {vector.shape}: give {size} numbers, one for each {what}.")

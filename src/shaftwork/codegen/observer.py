@@ -126,25 +126,25 @@ class ModelObserver:
         """
         if not self._lines:
             return {}
-        held: dict[str, Array] = {}
+        energies: dict[str, Array] = {}
         for part, column in zip(self._lines, _carrying(dense).held(t).T, strict=True):
-            held[part.name] = held.get(part.name, 0.0) + column
-        return held
+            energies[part.name] = energies.get(part.name, 0.0) + column
+        return energies
 
     @cached_property
     def _profiles(self) -> dict[str, tuple[GraphPart, Profile]]:
         parts = self._graph.parts
-        return {f"{p.name}.{name}": (p, made) for p in parts for name, made in p.component.profiles().items()}
+        return {f"{p.name}.{name}": (p, profile) for p in parts for name, profile in p.component.profiles().items()}
 
     @cached_property
     def profiles(self) -> Mapping[str, tuple[str, tuple[float, ...]]]:
         """Every quantity that can be read along a part: its unit, and the places in m from the part's first end."""
         return {
             name: (
-                made.domain.across.unit if made.kind == "across" else made.domain.through.unit,
-                tuple(float(self._bind().p[part.parameters[made.length]]) * share for share in made.places),
+                profile.domain.across.unit if profile.kind == "across" else profile.domain.through.unit,
+                tuple(float(self._bind().p[part.parameters[profile.length]]) * share for share in profile.places),
             )
-            for name, (part, made) in self._profiles.items()
+            for name, (part, profile) in self._profiles.items()
         }
 
     def profile(self, name: str, t: Array, x: Array, dense: DenseWaves) -> Array:
@@ -169,17 +169,18 @@ class ModelObserver:
             if sides[0] == sides[1]:
                 continue
             x = dense(np.array([np.nextafter(time, -np.inf), time]))
-            held = dict(zip(stores.names, np.diff(stores.of(lambda: bound, sides, x), axis=0)[0].tolist(), strict=True))
+            gains = np.diff(stores.of(lambda: bound, sides, x), axis=0)[0].tolist()
+            gained = dict(zip(stores.names, gains, strict=True))
             sources = [bound.values(t, states)[1] for t, states in zip(sides.tolist(), x, strict=True)]
-            if given := stores.given(bound, (sources[0] + sources[1]) / 2, held):
-                yield Impact(time, "", given, {})
+            if energies := stores.given(bound, (sources[0] + sources[1]) / 2, gained):
+                yield Impact(time, "", energies, {})
 
     def stored(self, t: Array, x: Array, dense: DenseWaves) -> dict[str, Array]:
         """Stored energy by part; of sources those that have stores of their own, such as windings."""
         history = BranchHistory(self._bind(), self._instants.one_sided(t), x)
         parts = (part for part in self._graph.parts if part.component.role != "source" or self._stores(part))
         stored = {part.name: history.stored(part) for part in parts}
-        return stored | {name: stored[name] + held for name, held in self._in_waves(t, dense).items()}
+        return stored | {name: stored[name] + energy for name, energy in self._in_waves(t, dense).items()}
 
     def held(self, t: float, x: Array) -> dict[str, float]:
         """All that is stored at a time in s with the states (n,), by name."""
@@ -196,7 +197,7 @@ class ModelObserver:
 
     def _stores(self, part: GraphPart) -> bool:
         templates = (self._graph.branches[k].template for k in branches_with_power(self._graph, part))
-        return any(made.kind in (Kind.ACROSS_STORE, Kind.THROUGH_STORE) or made.stored != 0 for made in templates)
+        return any(one.kind in (Kind.ACROSS_STORE, Kind.THROUGH_STORE) or one.stored != 0 for one in templates)
 
     def _gives_back(self, part: GraphPart) -> bool:
         return any(self._graph.branches[k].template.conservative for k in part.branches)
@@ -224,12 +225,12 @@ class ModelObserver:
         Raises:
             SignalError: there is none of this name.
         """
-        known = {part.name: part for part in self._graph.parts}
-        if name not in known:
-            raise SignalError(f"There is no part '{name}' in '{self._graph.name}'. There are: {', '.join(known)}.")
-        made, p = known[name].component, self._bind().p
-        places = known[name].parameters
-        return made.changed(**{key: float(p[places[key]]) for key in made.declared if key in places})
+        parts = {part.name: part for part in self._graph.parts}
+        if name not in parts:
+            raise SignalError(f"There is no part '{name}' in '{self._graph.name}'. There are: {', '.join(parts)}.")
+        component, p = parts[name].component, self._bind().p
+        places = parts[name].parameters
+        return component.changed(**{key: float(p[places[key]]) for key in component.declared if key in places})
 
 
 def _carrying(dense: DenseWaves | None) -> WaveReadings:

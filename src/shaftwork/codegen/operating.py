@@ -98,17 +98,17 @@ def _rate_sizes(bound: BoundArrays, t: float, x: Array, slopes: sparse.csc_array
 
 def _still_changing(form: StateForm, x: Array, rate: Array, worst: int) -> SimulationError:
     """What is said where no steady state was found, of the state that changes most."""
-    found = (
+    message = (
         f"No steady state was found: '{form.states[worst].name}' still changes by {rate[worst]:.3g} per second at "
         f"{x[worst]:.6g}."
     )
     if worst >= len(x) - len(form.integrals):
         return SimulationError(
-            f"{found} A law reads it, so nothing is steady while it changes. Where a torque pulsates with the angle of "
-            "what turns, write its mean over a turn; or run simulate(...) until it repeats itself, and take means."
+            f"{message} A law reads it, so nothing is steady while it changes. Where a torque pulsates with the angle "
+            "of what turns, write its mean over a turn; or run simulate(...) until it repeats itself, and take means."
         )
     return SimulationError(
-        f"{found} Does something hold the speed (a load, a damper, a motor's curve)? {another_start(form)}"
+        f"{message} Does something hold the speed (a load, a damper, a motor's curve)? {another_start(form)}"
     )
 
 
@@ -127,11 +127,11 @@ def another_start(form: StateForm) -> str:
 def _slopes(bound: BoundArrays, t: float, x: Array, rate: Array) -> sparse.csc_array:
     """The Jacobian; where a law has no finite slope, as |omega|^0.5 at rest, that a little farther on the way."""
     for step in (0.0, *NEARBY):
-        made = sparse.csc_array(bound.jacobian(t, x + step * rate))
-        if np.isfinite(made.data).all():
-            return made
-    made.data[~np.isfinite(made.data)] = 0.0  # an explicit step of Euler, which the defect judges
-    return made
+        jacobian = sparse.csc_array(bound.jacobian(t, x + step * rate))
+        if np.isfinite(jacobian.data).all():
+            return jacobian
+    jacobian.data[~np.isfinite(jacobian.data)] = 0.0  # an explicit step of Euler, which the defect judges
+    return jacobian
 
 
 def _just_beyond(x: Array, step: Array, ends: Callable[[Array], bool]) -> Array:

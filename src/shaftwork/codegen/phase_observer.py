@@ -86,15 +86,15 @@ class Stretches:
         """(k, stores) all that is stored at times (k,), and behind it what arrives by waves."""
         t = np.atleast_1d(np.asarray(t, dtype=float))
         count = len(self[0].stores.names)
-        made = np.empty((t.size, count + self[0].ends))
+        stored = np.empty((t.size, count + self[0].ends))
         index = np.clip(np.searchsorted(self.starts, t, side="right") - 1, 0, None)
         for number in np.unique(index).tolist():
             stretch, places = self[number], np.flatnonzero(index == number)
             read_at = stretch.instants.one_sided(t[places])
             x = stretch.dense(t[places])
-            made[places, :count] = stretch.stores.of(stretch.bind, read_at, x)
-            made[places, count:] = x[:, len(stretch.states) :]
-        return made
+            stored[places, :count] = stretch.stores.of(stretch.bind, read_at, x)
+            stored[places, count:] = x[:, len(stretch.states) :]
+        return stored
 
 
 class PhaseObserver:
@@ -147,32 +147,32 @@ class PhaseObserver:
 
     def signal(self, name: str, t: Array, x: Array, dense: DenseWaves | None = None) -> Array:
         """(k,) a quantity by its name in `units`."""
-        made = np.empty(len(t))
+        values = np.empty(len(t))
         for observer, places, times, states in self._pieces(t, x):
-            made[places] = observer.signal(name, times, states, dense)
-        return made
+            values[places] = observer.signal(name, times, states, dense)
+        return values
 
     def profile(self, name: str, t: Array, x: Array, dense: DenseWaves) -> Array:
         """(k, places) a quantity along a part by its name in `profiles`."""
-        made = np.empty((len(t), len(self.profiles[name][1])))
+        values = np.empty((len(t), len(self.profiles[name][1])))
         for observer, places, times, states in self._pieces(t, x):
-            made[places] = observer.profile(name, times, states, dense)
-        return made
+            values[places] = observer.profile(name, times, states, dense)
+        return values
 
     def stored(self, t: Array, x: Array, dense: DenseWaves) -> dict[str, Array]:
         """Stored energy by part."""
-        made: dict[str, Array] = {}
+        energies: dict[str, Array] = {}
         for observer, places, times, states in self._pieces(t, x):
-            _fill(made, observer.stored(times, states, dense), places, len(t))
-        return made
+            _fill(energies, observer.stored(times, states, dense), places, len(t))
+        return energies
 
     def powers(self, t: Array, x: Array) -> tuple[dict[str, Array], dict[str, Array]]:
         """Lost power and supplied power by part."""
         lost: dict[str, Array] = {}
         supplied: dict[str, Array] = {}
         for observer, places, times, states in self._pieces(t, x):
-            for made, powers in zip((lost, supplied), observer.powers(times, states), strict=True):
-                _fill(made, powers, places, len(t))
+            for totals, powers in zip((lost, supplied), observer.powers(times, states), strict=True):
+                _fill(totals, powers, places, len(t))
         return lost, supplied
 
     def held(self, t: float, x: Array) -> dict[str, float]:  # noqa: ARG002
@@ -208,7 +208,7 @@ class PhaseObserver:
         return times
 
 
-def _fill(made: dict[str, Array], found: Mapping[str, Array], places: Index, count: int) -> None:
+def _fill(totals: dict[str, Array], values_of: Mapping[str, Array], places: Index, count: int) -> None:
     """Put what is known of parts at some places of `count` times to the rest of it."""
-    for name, values in found.items():
-        made.setdefault(name, np.zeros(count))[places] = values
+    for name, values in values_of.items():
+        totals.setdefault(name, np.zeros(count))[places] = values

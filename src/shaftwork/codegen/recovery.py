@@ -11,7 +11,7 @@ from sympy import Expr
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.valueless import of_law, without_value
+from shaftwork.codegen.valueless import without_value
 from shaftwork.components.base import Profile, Signal
 from shaftwork.components.branches import INTEGRAL, RATE, End
 from shaftwork.components.laws import t as TIME
@@ -55,8 +55,8 @@ class BranchHistory:
         Raises:
             SimulationError: a law has no value.
         """
-        (y, u), inputs = self.values, self.bound.program.inputs
-        slopes = inputs.of_time[:, None] * inputs.time_slopes(self.t, y, self.x, self.bound.p)
+        y, u = self.values
+        slopes = self.bound.program.inputs.source_rates(self.t, y, self.x, self.bound.p)
         return u, slopes, self.bound.rates(self.t, self.x, y, u)
 
     @cached_property
@@ -139,7 +139,7 @@ class BranchHistory:
 
     def of_law(self, index: int, law: Expr) -> Array:
         """(k,) an expression of time, of what is across a branch, its integral and its template's symbols."""
-        return of_law(self.bound, index, law, self.t, self.x, self.across[index])
+        return self.bound.law_values(index, law, self.t, self.x, self.across[index])
 
     def absorbed(self, part: GraphPart) -> Array:
         """(k,) power that goes into a part at its ports, W."""
@@ -218,14 +218,35 @@ class BranchHistory:
 
     def _store(self, part: GraphPart, label: str) -> int:
         templates = ((k, self.form.graph.branches[k].template) for k in part.branches)
-        stores = ((k, made) for k, made in templates if made.kind is Kind.THROUGH_STORE)
-        return next(k for k, made in stores if label in ("", made.label))
+        stores = ((k, template) for k, template in templates if template.kind is Kind.THROUGH_STORE)
+        return next(k for k, template in stores if label in ("", template.label))
 
     def _through_port(self, part: GraphPart, port: str) -> Array:
         return into(part, port, self.through, self.form, self.bound.p)
 
     def _factors(self, part: GraphPart, index: int, port: str) -> Iterator[float]:
         return _factors(part, self.form.graph.branches[index].template, port, self.bound.p)
+
+
+class GivenHistory(BranchHistory):
+    """All branch quantities where states, inputs and rates are given, each column for itself.
+
+    Args:
+        bound: the array program.
+        x: (n, k) states.
+        u: (m, k) inputs.
+        slopes: (m, k) derivatives of the inputs by time alone.
+        rate: (n, k) rates of the states.
+    """
+
+    def __init__(self, bound: BoundArrays, x: Array, u: Array, slopes: Array, rate: Array) -> None:
+        super().__init__(bound, np.zeros(x.shape[1]), x.T)
+        self._inputs = u, slopes, rate
+
+    @property
+    def inputs(self) -> tuple[Array, Array, Array]:
+        """u, its derivative by time alone, and x', each (., k)."""
+        return self._inputs
 
 
 def branches_with_power(graph: CircuitGraph, part: GraphPart) -> tuple[int, ...]:

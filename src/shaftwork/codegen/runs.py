@@ -7,18 +7,19 @@ What parameters alone tell is computed before the loops. The same loops are writ
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from sympy import Add, Basic, Expr, Function, Integer, Mul, Rational, S, Symbol
+from sympy import Add, Basic, Expr, Function, Integer, Mul, Rational, Symbol
 from sympy.printing.c import C99CodePrinter
 from sympy.printing.str import StrPrinter
 
 from shaftwork.codegen.code import ArrayPrinter, FloatPrinter, RealNumbers, executed
 from shaftwork.codegen.elements import Array
+from shaftwork.codegen.heyoka_parameters import Fixed
 from shaftwork.components.laws import NUMERICAL
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError, ParameterError
@@ -51,15 +52,14 @@ def near(distance: int) -> Symbol:
 def runs_of(rows: Rows) -> tuple[Stencil, ...]:
     """The rows of all states, equal ones together."""
     place = {symbol: k for k, symbol in enumerate(rows.states)}
-    found: list[Stencil] = []
+    runs: list[Stencil] = []
     for i, rate in enumerate(rows.rates):
-        read = {symbol: near(place[symbol] - i) for symbol in rate.free_symbols if symbol in place}
-        made = rate.xreplace(read)
-        if found and found[-1].rate == made:
-            found[-1] = Stencil(found[-1].first, found[-1].count + 1, made)
+        relative = rate.xreplace({s: near(place[s] - i) for s in rate.free_symbols if s in place})
+        if runs and runs[-1].rate == relative:
+            runs[-1] = replace(runs[-1], count=runs[-1].count + 1)
         else:
-            found.append(Stencil(i, 1, made))
-    return tuple(one for run in found for one in ([run] if run.count >= SHORTEST else _apart(run)))
+            runs.append(Stencil(i, 1, relative))
+    return tuple(one for run in runs for one in ([run] if run.count >= SHORTEST else _apart(run)))
 
 
 def _apart(run: Stencil) -> Iterator[Stencil]:
@@ -71,13 +71,10 @@ class _C(RealNumbers, C99CodePrinter):  # type: ignore[misc]
 
     settings = MappingProxyType({"order": "none", "math_macros": {}})  # M_PI is not in the standard
 
+    power = "pow"
+
     def _print_NumberSymbol(self, number: Expr) -> str:
         return repr(float(number))
-
-    def _print_Pow(self, power: Expr, *_: Any) -> str:
-        if abs(power.exp) == S.Half or power.exp.is_integer:
-            return str(C99CodePrinter._print_Pow(self, power))  # noqa: SLF001 (its own)
-        return f"pow({self._print(power.base)}, {self._print(power.exp)})"
 
     def _print_Rational(self, number: Rational) -> str:
         return f"{number.p}.0/{number.q}.0"
@@ -256,12 +253,11 @@ class RunProgram:
         self._rows, self._title = rows, title
 
     @cached_property
-    def _runs(self) -> tuple[tuple[Stencil, ...], dict[Symbol, Expr]]:
+    def _runs(self) -> tuple[tuple[Stencil, ...], dict[Symbol, Basic]]:
         """The runs in terms of what parameters alone tell, and that by symbols."""
-        constants = _Constants(self._rows.parameters)
-        found = ((run, constants.taken_out(_by_coefficient(run))) for run in runs_of(self._rows))
-        runs = tuple(Stencil(run.first, run.count, rate) for run, rate in found)
-        return runs, constants.symbols
+        runs = [replace(run, rate=_by_coefficient(run)) for run in runs_of(self._rows)]
+        constants = _Constants(self._rows.parameters, [run.rate for run in runs])
+        return tuple(replace(run, rate=constants.taken_out(run.rate)) for run in runs), constants.values
 
     def source(self, language: str) -> str:
         """The code in a language.
@@ -272,88 +268,82 @@ class RunProgram:
         """
         if not isinstance(language, str) or language not in _LANGUAGES:
             raise ParameterError(f"There is no source in {language!r}. Take one of: {', '.join(map(repr, LANGUAGES))}.")
-        made, (runs, constants) = _LANGUAGES[language], self._runs
-        known: dict[Basic, str] = {TIME: "t"}
-        known |= {symbol: f"p[{k}]" for k, symbol in enumerate(self._rows.parameters)}
-        known |= {symbol: str(symbol.name) for symbol in constants}
-        head = made.head.replace("{states}", str(len(self._rows.rates)))
+        form, (runs, constants) = _LANGUAGES[language], self._runs
+        names: dict[Basic, str] = {TIME: "t"}
+        names |= {symbol: f"p[{k}]" for k, symbol in enumerate(self._rows.parameters)}
+        names |= {symbol: str(symbol.name) for symbol in constants}
+        head = form.head.replace("{states}", str(len(self._rows.rates)))
         lines = [head.replace("{parameters}", str(len(self._rows.parameters)))]
-        values = made.printer(known)
+        values = form.printer(names)
         lines += [
-            made.constant.format(name=symbol.name, value=self._printed(values, value))
+            form.constant.format(name=symbol.name, value=self._printed(values, value))
             for symbol, value in constants.items()
         ]
         for run in runs:
-            read = {symbol: made.state(run, distance) for symbol, distance in _read(run.rate)}
-            rate = self._printed(made.printer({**known, **read}), run.rate)
-            written = (made.single,) if run.count == 1 else made.loop
-            begins = [run.first + distance for _, distance in _read(run.rate)] if made.view and run.count > 1 else []
-            lines += [made.view.format(first=begin, last=begin + run.count) for begin in begins]
+            read = {symbol: form.state(run, distance) for symbol, distance in _read(run.rate)}
+            rate = self._printed(form.printer({**names, **read}), run.rate)
+            written = (form.single,) if run.count == 1 else form.loop
+            begins = [run.first + distance for _, distance in _read(run.rate)] if form.view and run.count > 1 else []
+            lines += [form.view.format(first=begin, last=begin + run.count) for begin in begins]
             span = {"first": run.first, "last": run.first + run.count, "count": run.count}
             lines += [line.format(rate=rate, **span) for line in written]
-        return "\n".join((*lines, *made.foot, ""))
+        return "\n".join((*lines, *form.foot, ""))
 
-    def _printed(self, printer: Any, expression: Expr) -> str:
-        own = sorted({str(f.func) for f in expression.atoms(Function)} & NUMERICAL.keys())
-        if own:
+    def _printed(self, printer: Any, expression: Any) -> str:
+        special = sorted({str(f.func) for f in expression.atoms(Function)} & NUMERICAL.keys())
+        if special:
             raise CompileError(
-                f"'{self._title}' has a law with a table or noise, {', '.join(own)}, of which there is no code. Take "
-                "model.rhs, or a formula in place of it."
+                f"'{self._title}' has a law with a table or noise, {', '.join(special)}, of which there is no code. "
+                "Take model.rhs, or a formula in place of it."
             )
         return str(printer.doprint(expression))
 
 
 class _Constants:
-    """Names for what parameters alone tell."""
+    """Symbols for what parameters alone tell in rates.
 
-    def __init__(self, parameters: Sequence[Symbol]) -> None:
-        self._parameters = frozenset(parameters)
-        self.symbols: dict[Symbol, Expr] = {}
-        self._named: dict[Expr, Symbol] = {}
+    Args:
+        parameters: symbols.
+        rates: of all runs.
+    """
 
-    def taken_out(self, expression: Any) -> Any:
+    def __init__(self, parameters: Sequence[Symbol], rates: Sequence[Expr]) -> None:
+        free = dict.fromkeys(symbol for rate in rates for symbol in rate.free_symbols)
+        self._fixed = Fixed(parameters, [symbol for symbol in free if symbol not in parameters], rates)
+        self._symbols: dict[Basic, Symbol] = {}
+
+    @property
+    def values(self) -> dict[Symbol, Basic]:
+        """What each symbol stands for, in the order in which they were taken out."""
+        return {symbol: part for part, symbol in self._symbols.items()}
+
+    def taken_out(self, node: Any) -> Any:
         """An expression with symbols in place of its largest parts of parameters alone."""
-        if not expression.args or not expression.free_symbols:
-            return expression
-        if not isinstance(expression, Expr):  # a condition, or a piece with its own
-            return expression.func(*map(self.taken_out, expression.args))
-        if expression.free_symbols <= self._parameters:
-            return self._name(expression)
-        if isinstance(expression, Add | Mul):  # what belongs together is one number
-            own = [part for part in expression.args if part.free_symbols and part.free_symbols <= self._parameters]
-            numbers = [part for part in expression.args if not part.free_symbols] if own else []
-            rest = [part for part in expression.args if part not in own and part not in numbers]
-            one = [self._name(expression.func(*numbers, *own))] if own else []
-            return expression.func(*one, *map(self.taken_out, rest))
-        return expression.func(*map(self.taken_out, expression.args))
-
-    def _name(self, expression: Expr) -> Symbol:
-        if expression.is_Symbol:
-            return expression
-        if expression not in self._named:
-            symbol = Symbol(f"c{len(self._named)}", real=True)
-            self._named[expression], self.symbols[symbol] = symbol, expression
-        return self._named[expression]
+        if node in self._fixed.places:
+            return self._symbols.setdefault(node, Symbol(f"c{len(self._symbols)}", real=True))
+        if not node.args or not node.free_symbols:
+            return node
+        return node.func(*map(self.taken_out, self._fixed.arguments(node)))
 
 
 def _read(rate: Expr) -> list[tuple[Symbol, int]]:
     """The states that a rate reads, and their distances."""
-    found = ((symbol, symbol.name) for symbol in rate.free_symbols if symbol.name.startswith("x[i"))
-    return sorted(((symbol, int(name[3:-1])) for symbol, name in found), key=lambda pair: pair[1])
+    states = (symbol for symbol in rate.free_symbols if symbol.name.startswith("x[i"))
+    return sorted(((symbol, int(symbol.name[3:-1])) for symbol in states), key=lambda pair: pair[1])
 
 
 def _by_coefficient(run: Stencil) -> Expr:
     """A rate that is linear in the states with what has the same coefficient together; others as they are."""
     states = [symbol for symbol, _ in _read(run.rate)]
     slopes = {symbol: run.rate.diff(symbol) for symbol in states}
-    if any(made.has(*states) for made in slopes.values()):
+    if any(slope.has(*states) for slope in slopes.values()):
         return run.rate
     sums: dict[Expr, list[Expr]] = {}
-    for symbol, made in slopes.items():
-        number, factor = made.as_coeff_Mul()
+    for symbol, slope in slopes.items():
+        number, factor = slope.as_coeff_Mul()
         sums.setdefault(factor, []).append(number * symbol)
     rest = run.rate.xreplace(dict.fromkeys(states, Integer(0)))
-    total = Add(rest, *(symbol * made for symbol, made in slopes.items()))
+    total = Add(rest, *(symbol * slope for symbol, slope in slopes.items()))
     if (run.rate - total).expand() != 0:  # of other pieces of a law, which may have the same slopes
         return run.rate
     terms = []

@@ -60,28 +60,28 @@ class StartNames:
         springs = {
             f"{part.name}.{name}": part
             for part in self._form.graph.parts
-            for name, made in part.component.profiles().items()
-            if made.kind == "through" and not made.lines and len(made.of) == 2
+            for name, profile in part.component.profiles().items()
+            if profile.kind == "through" and not profile.lines and len(profile.of) == 2
         }
         return springs | {name: shaft.part for name, shaft in self.shafts.items()}
 
-    def checked(self, given: Mapping[str, float]) -> dict[str, float]:
+    def checked(self, values: Mapping[str, float]) -> dict[str, float]:
         """Values in SI by name.
 
         Raises:
             SignalError: there is no such quantity.
             ParameterError: a value is not finite or of another unit.
         """
-        for name in map(str, given):
+        for name in map(str, values):
             if name in self.units or name in self.tied:
                 continue
             owner = name.rpartition(".")[0]
-            own = (other for other in self.units if other.rpartition(".")[0] == owner)
-            near = [other for other in own if other in self.places or self.quantity(other)] or [*self.places]
+            siblings = (other for other in self.units if other.rpartition(".")[0] == owner)
+            near = [other for other in siblings if other in self.places or self.quantity(other)] or [*self.places]
             raise SignalError(f"There is no speed, twist or torque '{name}' to start from. Near it: {', '.join(near)}.")
         return {
             str(name): in_si(f"the start value of '{name}'", value, self.units.get(str(name), "1"))
-            for name, value in given.items()
+            for name, value in values.items()
         }
 
     def quantity(self, name: str) -> LinearQuantity | None:
@@ -112,7 +112,7 @@ class StartNames:
         """(tied stores, n) what each of them is of the states, sparse, in the order of `tied`."""
         form, part, n = self._form, self._bound.part, len(self.places)
         first = len(form.across_states)
-        made = sparse.lil_array((len(self.tied), n))
+        ties = sparse.lil_array((len(self.tied), n))
         blocks = (
             (part.loops.T, form.dependent_across, form.across_states, slice(0, first), 0),
             (
@@ -125,8 +125,8 @@ class StartNames:
         )
         for matrix, rows, columns, states, above in blocks:
             if rows and columns:
-                made[above : above + len(rows), states] = sparse.csr_array(matrix)[list(rows)][:, list(columns)]
-        return sparse.csr_array(made)
+                ties[above : above + len(rows), states] = sparse.csr_array(matrix)[list(rows)][:, list(columns)]
+        return sparse.csr_array(ties)
 
     def advice(self, name: str) -> str:
         """The start values to give instead of one, in words."""
@@ -163,11 +163,11 @@ class StartNames:
         names = [state.name for state in form.states if state.branch in part.branches and state.kind in kinds]
         tied = form.dependent_across if is_across else form.dependent_through
         names += [name for name, branch in self.tied.items() if branch in part.branches and branch in tied]
-        found: dict[str, None] = {}
+        names_to_give: dict[str, None] = {}
         for name in names:
             states = self._states_together(self._states_of(name))
-            found |= dict.fromkeys([name] if len(states) == 1 else states)
-        return [*found]
+            names_to_give |= dict.fromkeys([name] if len(states) == 1 else states)
+        return [*names_to_give]
 
     def _states_of(self, name: str) -> list[int]:
         """The states that a store is made of."""
@@ -177,12 +177,12 @@ class StartNames:
 
     def _states_together(self, states: Iterable[int]) -> list[str]:
         """States, with those beside which they are in a tied store: given all at once, they leave none open."""
-        found = np.zeros(len(self.places), dtype=bool)
-        found[list(states)] = True
+        together = np.zeros(len(self.places), dtype=bool)
+        together[list(states)] = True
         entries, count = abs(self.ties), 0
-        while count < (count := int(np.count_nonzero(found))):
-            found |= ((entries @ found.astype(float) > 0).astype(float) @ entries) > 0
-        return [name for name, place in self.places.items() if found[place]]
+        while count < (count := int(np.count_nonzero(together))):
+            together |= ((entries @ together.astype(float) > 0).astype(float) @ entries) > 0
+        return [name for name, place in self.places.items() if together[place]]
 
 
 def _potential(node: int, history: BranchHistory) -> Array:

@@ -154,7 +154,7 @@ class Start:
         self._prescribed += [quantity for quantity, row in pairs if quantity.is_across and not row.moved]
         self._fill_shafts()
         for name, shaft in shafts.items():
-            shaft.wind(self._bound, self._t, self._x, values[name], kept=self._fixed)
+            shaft.wind(self._bound, self._t, self._x, values[name], fixed=self._fixed)
         for shaft in shafts.values():
             self._fixed[list(shaft.states)] = True
         self._meet([pair for pair in pairs if not pair[0].is_across], is_across=False)
@@ -217,18 +217,18 @@ class Start:
         cannot be, several stores would have to share the motion, and the start is refused.
         """
         stores = self._stores(movable, is_across=is_across)
-        ways: Array = np.eye(rows.shape[1])
+        free: Array = np.eye(rows.shape[1])
         changes: Array = np.zeros(rows.shape[1])
         if rows.size:
             scaled = rows / np.abs(rows).max(axis=1, keepdims=True).clip(np.finfo(float).tiny)
-            ways = np.asarray(linalg.null_space(scaled, rcond=INDEPENDENT))
+            free = np.asarray(linalg.null_space(scaled, rcond=INDEPENDENT))
             changes = np.asarray(np.linalg.lstsq(rows, gaps, rcond=None)[0])
-        along = stores.slopes @ ways
+        along = stores.slopes @ free
         moves = np.abs(along).max(axis=1, initial=0.0) > INDEPENDENT * np.abs(stores.slopes).max(axis=1, initial=0.0)
         rests = stores.is_free | moves
-        if ways.size:
+        if free.size:
             moved = stores.slopes[rests] @ changes + stores.offsets[rests]
-            changes = changes - ways @ np.linalg.lstsq(along[rests], moved, rcond=None)[0]
+            changes = changes - free @ np.linalg.lstsq(along[rests], moved, rcond=None)[0]
         size = np.abs(np.append(changes, stores.offsets)).max(initial=0.0)
         left = rests & (np.abs(stores.slopes @ changes + stores.offsets) > CONSISTENT * size)
         if left.any():
@@ -258,8 +258,8 @@ class Start:
 
     def _fill_shafts(self) -> None:
         """Let the speeds inside a shaft run straight between those of its ends, where nothing else is given."""
-        given = self._names.readings.given_speeds(self._x, self._rest, self._fixed, self._prescribed)
-        for place, speed in speeds_inside(self._bound.program.form, EndSpeeds(given)).items():
+        speeds = self._names.readings.given_speeds(self._x, self._rest, self._fixed, self._prescribed)
+        for place, speed in speeds_inside(self._bound.program.form, EndSpeeds(speeds)).items():
             if not self._fixed[place]:
                 self._x[place], self._fixed[place] = speed, True
 

@@ -36,19 +36,17 @@ class StateTransfer:
     def __init__(self, form: StateForm) -> None:
         self._form = form
         kinds = (Kind.ACROSS_STORE, Kind.THROUGH_STORE)
-        made = {store_name(form.graph, b): b.index for b in form.graph.branches if b.template.kind in kinds}
-        self.branches = made
+        stores = (branch for branch in form.graph.branches if branch.template.kind in kinds)
+        self.branches = {store_name(form.graph, store): store.index for store in stores}
         """The branch of every store."""
         angles = tuple(state.name for state in form.states if state.kind == "integral")
-        self.names = (*made, *angles)
+        self.names = (*self.branches, *angles)
         """Every store and angle, named as a state whether it is one or not."""
-        kind = Kind.THROUGH_STORE
-        self.through = tuple(name for name, k in made.items() if form.graph.branches[k].template.kind is kind)
+        templates = ((name, form.graph.branches[k].template) for name, k in self.branches.items())
+        self.through = tuple(name for name, template in templates if template.kind is Kind.THROUGH_STORE)
         """Those of the names that are torques of springs or currents of inductors."""
         self._states = [state.name for state in form.states]
-        self._map: tuple[LinearPart, Array] | None = None
-        self._dense: tuple[LinearPart, Array, Array] | None = None
-        self._maps: tuple[LinearPart, Array, Array] | None = None
+        self._maps: _Maps | None = None
 
     @cached_property
     def _columns(self) -> list[int]:
@@ -71,30 +69,18 @@ class StateTransfer:
         if -1 not in self._columns:
             return x[:, self._columns]
         states = x[:, : len(self._states)]  # waves may follow them
-        return states @ self._loop_map(bind().part) if self.by_loops else self._recovered(bind(), t, x)
+        return states @ self._maps_of(bind().part).to_stores if self.by_loops else self._recovered(bind(), t, x)
 
     def at_once(self, bind: Callable[[], BoundArrays], t: float, x: Array) -> dict[str, float]:
         """All that is stored at one time in s with the states (n,), by name; without full matrices."""
         values = x[self._columns] if -1 not in self._columns else self._recovered(bind(), np.array([t]), x[None, :])[0]
         return dict(zip(self.names, values.tolist(), strict=True))
 
-    def _loop_map(self, part: LinearPart) -> Array:
-        """(n, stores) what the states are multiplied by; the last one is kept."""
-        if self._map is None or self._map[0] is not part:
-            loops, cutsets = self._matrices(part)
-            made = np.zeros((len(self._states), len(self.names)))
-            for column, name in enumerate(self.names):
-                if name in self._states:
-                    made[self._states.index(name), column] = 1.0
-                    continue
-                branch, across = self.branches[name], len(self._form.across_states)
-                if branch in self._form.tree.loops:
-                    made[:across, column] = loops[list(self._form.across_states), branch]
-                else:
-                    through = list(self._form.through_states)
-                    made[across : across + len(through), column] = -cutsets[branch, through]
-            self._map = part, made
-        return self._map[1]
+    def _maps_of(self, part: LinearPart) -> _Maps:
+        """The maps between states and stores; the last ones are kept."""
+        if self._maps is None or self._maps.part is not part:
+            self._maps = _Maps(self._form, part, tuple(self.branches.values()), self._columns)
+        return self._maps
 
     def _recovered(self, bound: BoundArrays, t: Array, x: Array) -> Array:
         history, columns = BranchHistory(bound, t, x), []
@@ -107,37 +93,34 @@ class StateTransfer:
             columns.append((history.across if is_across else history.through)[branch])
         return np.array(columns).T
 
-    def states(self, bound: BoundArrays, t: float, held: Mapping[str, float]) -> Array:
+    def states(self, bound: BoundArrays, t: float, stored: Mapping[str, float]) -> Array:
         """(n,) the states that the equations start with.
 
         Args:
             bound: the equations with their parameters.
             t: time in s at which inputs are read.
-            held: all that was stored, by name.
+            stored: all that was stored, by name.
         """
         if not (self._form.dependent_across or self._form.dependent_through):
-            return np.array([held[name] for name in self._states])
-        by_stores, by_inputs = self._state_maps(bound.part)
-        x = by_stores @ np.array([held[name] for name in self.names])
+            return np.array([stored[name] for name in self._states])
+        by_stores, by_inputs = self._maps_of(bound.part).to_states
+        x = by_stores @ np.array([stored[name] for name in self.names])
         if by_inputs.any():
-            inputs = bound.program.inputs
-            # sources of time alone act on what is stored, and no other law need have a value here
-            u = inputs.values(t, np.zeros(inputs.outputs), x, bound.p)
-            x += by_inputs @ np.where(inputs.of_time, u, 0.0)
+            x += by_inputs @ bound.program.inputs.sources(t, x, bound.p)
         return np.asarray(x)
 
-    def energy(self, bound: BoundArrays, held: Mapping[str, float]) -> float:
+    def energy(self, bound: BoundArrays, stored: Mapping[str, float]) -> float:
         """What is stored, in J: k v^2 / 2 in inertias and masses, tau^2 / 2 c in springs."""
         energy = 0.0
         for name, branch in self.branches.items():
             coefficient = float(bound.part.coefficients[branch])
-            energy += 0.5 * held[name] ** 2 * (1 / coefficient if name in self.through else coefficient)
+            energy += 0.5 * stored[name] ** 2 * (1 / coefficient if name in self.through else coefficient)
         return energy
 
-    def momentum(self, bound: BoundArrays, held: Mapping[str, float]) -> float:
+    def momentum(self, bound: BoundArrays, stored: Mapping[str, float]) -> float:
         """The largest momentum of an inertia or mass: by what part of it an impulse is uncertain."""
         inertias = (pair for pair in self.branches.items() if pair[0] not in self.through)
-        return max((abs(float(bound.part.coefficients[k]) * held[name]) for name, k in inertias), default=0.0)
+        return max((abs(float(bound.part.coefficients[k]) * stored[name]) for name, k in inertias), default=0.0)
 
     def mobility(self, bound: BoundArrays, pairs: Sequence[tuple[int, int]]) -> Mobility:
         """The answer to impulses at pairs of nodes.
@@ -177,12 +160,6 @@ class StateTransfer:
                 tree[branch] = gained[name] / bound.part.coefficients[branch]
         return np.asarray(tree + bound.part.loops.T @ tree)
 
-    def sources(self, bound: BoundArrays, t: float) -> Array:
-        """(inputs,) what sources of time alone give at a time in s; zero for others, whose laws may have no value."""
-        inputs = bound.program.inputs
-        values = inputs.values(t, np.zeros(inputs.outputs), np.zeros(len(self._states)), bound.p)
-        return np.where(inputs.of_time, values, 0.0)
-
     def given(
         self, bound: BoundArrays, u: Array, gained: Mapping[str, float], further: Array | float = 0.0
     ) -> dict[str, float]:
@@ -197,7 +174,7 @@ class StateTransfer:
             gained: by every store, by name.
             further: (branches,) impulses that pass beside those that stores take.
         """
-        form, found = self._form, dict[str, float]()
+        form, energies = self._form, dict[str, float]()
         laws, speeds = np.split(u, [len(form.laws)])
         pairs: list[tuple[int, float]] = []
         if form.dependent_through:
@@ -207,41 +184,65 @@ class StateTransfer:
             pairs += zip(form.across_inputs, speeds * impulses[list(form.across_inputs)], strict=True)
         for branch, taken in pairs:
             part = form.graph.part_of(branch).name
-            found[part] = found.get(part, 0.0) - float(taken)
-        return {part: energy for part, energy in found.items() if energy}
+            energies[part] = energies.get(part, 0.0) - float(taken)
+        return {part: energy for part, energy in energies.items() if energy}
 
-    def _state_maps(self, part: LinearPart) -> tuple[Array, Array]:
-        """What stores and inputs are multiplied by in the states that new equations start with; the last are kept."""
-        if self._maps is None or self._maps[0] is not part:
-            form, k, laws = self._form, part.coefficients, len(self._form.laws)
-            made = np.zeros((len(self._states), len(form.graph.branches)))
-            by_inputs = np.zeros((len(self._states), laws + len(form.across_inputs)))
-            loops, cutsets = self._matrices(part)
-            across, through = list(form.across_states), list(form.through_states)
-            rows, twists = slice(len(across)), slice(len(across), len(across) + len(through))
-            made[rows, across], made[twists, through] = np.eye(len(across)), np.eye(len(through))
-            if other := list(form.dependent_across):
-                F, Q = (matrix[np.ix_(across, other)] for matrix in (loops, cutsets))
-                taken_up = np.linalg.inv(np.diag(k[across]) + Q * k[other] @ F.T)
-                made[rows, across], made[rows, other] = taken_up * k[across], taken_up @ Q * k[other]
-                by_inputs[rows, laws:] = -made[rows, other] @ loops[np.ix_(list(form.across_inputs), other)].T
-            if other := list(form.dependent_through):
-                F, Q = (matrix[np.ix_(other, through)] for matrix in (loops, cutsets))
-                taken_up = np.linalg.inv(np.diag(1 / k[through]) + F.T / k[other] @ Q)
-                made[twists, through], made[twists, other] = taken_up / k[through], -taken_up @ F.T / k[other]
-                by_inputs[twists, :laws] = made[twists, other] @ cutsets[np.ix_(other, list(form.laws))]
-            by_stores = np.zeros((len(self._states), len(self.names)))
-            for column, name in enumerate(self.names):
-                if name in self.branches:
-                    by_stores[:, column] = made[:, self.branches[name]]
-                else:
-                    by_stores[self._states.index(name), column] = 1.0
-            self._maps = part, by_stores, by_inputs
-        return self._maps[1:]
 
-    def _matrices(self, part: LinearPart) -> tuple[Array, Array]:
-        """The matrices of loops and cutsets in full; the last ones are kept."""
-        if self._dense is None or self._dense[0] is not part:
-            loops = part.loops.toarray()
-            self._dense = part, loops, loops if part.cutsets is part.loops else part.cutsets.toarray()
-        return self._dense[1:]
+class _Maps:
+    """The maps between states and stores with the matrices of one parameter vector.
+
+    Args:
+        form: the state form.
+        part: the matrices.
+        branches: of the stores.
+        columns: of every store and angle its place among the states, or -1.
+    """
+
+    def __init__(self, form: StateForm, part: LinearPart, branches: Sequence[int], columns: Sequence[int]) -> None:
+        self.part, self._form, self._branches, self._columns = part, form, branches, columns
+        self._loops: Array = part.loops.toarray()
+        self._cutsets: Array = self._loops if part.cutsets is part.loops else part.cutsets.toarray()
+        across, through = len(form.across_states), len(form.through_states)
+        self._speeds, self._torques = slice(across), slice(across, across + through)
+
+    @cached_property
+    def to_stores(self) -> Array:
+        """(n, stores) what states are multiplied by, where stores follow from loops and cutsets alone."""
+        form, matrix = self._form, np.zeros((len(self._form.states), len(self._columns)))
+        for column, state in enumerate(self._columns):
+            if state >= 0:
+                matrix[state, column] = 1.0
+                continue
+            branch = self._branches[column]
+            if branch in form.tree.loops:
+                matrix[self._speeds, column] = self._loops[list(form.across_states), branch]
+            else:
+                matrix[self._torques, column] = -self._cutsets[branch, list(form.through_states)]
+        return matrix
+
+    @cached_property
+    def to_states(self) -> tuple[Array, Array]:
+        """(n, stores) and (n, m) what stores and inputs are multiplied by in the states that equations start with."""
+        form, k, laws = self._form, self.part.coefficients, len(self._form.laws)
+        size, angles, stores = len(form.states), len(form.integrals), len(self._branches)
+        by_branches, by_inputs = np.zeros((size, len(k))), np.zeros((size, laws + len(form.across_inputs)))
+        across, through = list(form.across_states), list(form.through_states)
+        speeds, torques = self._speeds, self._torques
+        by_branches[speeds, across], by_branches[torques, through] = np.eye(len(across)), np.eye(len(through))
+        if other := list(form.dependent_across):
+            F, Q = (matrix[np.ix_(across, other)] for matrix in (self._loops, self._cutsets))
+            taken_up = np.linalg.inv(np.diag(k[across]) + Q * k[other] @ F.T)
+            by_branches[speeds, across], by_branches[speeds, other] = taken_up * k[across], taken_up @ Q * k[other]
+            by_inputs[speeds, laws:] = (
+                -by_branches[speeds, other] @ self._loops[np.ix_(list(form.across_inputs), other)].T
+            )
+        if other := list(form.dependent_through):
+            F, Q = (matrix[np.ix_(other, through)] for matrix in (self._loops, self._cutsets))
+            taken_up = np.linalg.inv(np.diag(1 / k[through]) + F.T / k[other] @ Q)
+            by_branches[torques, through] = taken_up / k[through]
+            by_branches[torques, other] = -taken_up @ F.T / k[other]
+            by_inputs[torques, :laws] = by_branches[torques, other] @ self._cutsets[np.ix_(other, list(form.laws))]
+        by_stores = np.zeros((size, len(self._columns)))
+        by_stores[:, :stores] = by_branches[:, list(self._branches)]
+        by_stores[size - angles :, stores:] = np.eye(angles)
+        return by_stores, by_inputs

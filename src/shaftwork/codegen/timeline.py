@@ -62,20 +62,20 @@ class Timeline:
         return np.array(self.times), np.array(self.before), np.array(self.after)
 
 
-def timeline(found: Iterable[tuple[float, float]], t0: float, t_end: float, narrow: Iterable[float] = ()) -> Timeline:
+def timeline(places: Iterable[tuple[float, float]], t0: float, t_end: float, narrow: Iterable[float] = ()) -> Timeline:
     """The instants of a run from t0 to t_end.
 
     Those that rounding does not tell apart are one, at the earliest of their times; at a rounding from the start or the
     end they are there.
 
     Args:
-        found: time and reach in s of everything that jumps or bends; farther away than its reach it certainly does not.
+        places: time and reach in s of everything that jumps or bends; farther away than its reach it does not.
         t0: start of the run, s.
         t_end: its end, s.
         narrow: times in s at which nothing jumps and yet a step is to end.
     """
     clearance = CLEARANCE * math.ulp(max(abs(t0), abs(t_end)))
-    spans = ((time, max(reach, clearance)) for time, reach in found)
+    spans = ((time, max(reach, clearance)) for time, reach in places)
     merged: list[tuple[float, float, float]] = []
     for low, time, high in sorted((time - reach, time, time + reach) for time, reach in spans):
         if high < t0 or low > t_end:

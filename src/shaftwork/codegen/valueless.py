@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 from sympy import Basic, Expr
 
 from shaftwork.codegen.arrays import BoundArrays
-from shaftwork.codegen.code import vectorised
 from shaftwork.codegen.elements import Array
-from shaftwork.components.branches import ACROSS, INTEGRAL, RATE
+from shaftwork.components.branches import RATE
 from shaftwork.components.laws import as_expression
-from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import slope
 from shaftwork.components.tables import Table
 from shaftwork.core.errors import SimulationError, no_value
@@ -39,16 +36,14 @@ def without_value(bound: BoundArrays, times: Array, states: Array) -> Simulation
     if (error := vanishing(bound, times, states)) is not None:
         return error
     inputs = bound.program.inputs
-    if bound.loops is None:
-        u = bound.values(times, states.T)[1]
-    else:  # the loop of a law without value has no solution, and then none of its laws has a value
-        u = inputs.values(times, np.zeros((inputs.outputs, times.size)), states.T, bound.p)
-        u[~inputs.of_time] = 0.0
+    # the loop of a law without value has no solution, and then none of its laws has a value
+    has_loops = bound.loops is not None
+    u = inputs.sources(times, states.T, bound.p) if has_loops else bound.values(times, states.T)[1]
     # what depends on the time alone comes first: it may be what others read
     order = np.argsort(~inputs.of_time, kind="stable")
-    if (found := first_missing(times, u[order].T)) is None:
+    if (missing := first_missing(times, u[order].T)) is None:
         return None
-    return no_value(found[0], _law_of(bound, int(order[found[1]])))
+    return no_value(missing[0], _law_of(bound, int(order[missing[1]])))
 
 
 def refuse_vanishing(
@@ -90,7 +85,7 @@ def _capacity(bound: BoundArrays, change: int, times: Array, states: Array) -> A
     """(k,) an inertia at times (k,) and states (k, n), by the law of what it has beyond a constant."""
     graph = bound.program.form.graph
     with np.errstate(all="ignore"):
-        beyond = of_law(bound, change, slope(graph.branches[change].template.law, RATE), times, states.T)
+        beyond = bound.law_values(change, slope(graph.branches[change].template.law, RATE), times, states.T)
     return np.broadcast_to(bound.part.coefficients[graph.constant_of(change)] + beyond, times.shape)
 
 
@@ -103,11 +98,11 @@ def _with_lowest(course: Callable[[Array], Array], steps: Array) -> Array:
     values = course(times)
     before, here, after = values[:-2], values[1:-1], values[2:]
     lowest = (here <= before) & (here <= after) & (here <= np.maximum(before, after) - here)
-    found = [
+    lowest_times = [
         minimize_scalar(lambda t: course(np.array([t]))[0], bounds=(times[k], times[k + 2]), method="bounded").x
         for k in np.flatnonzero(lowest)
     ]
-    return np.union1d(times, found)
+    return np.union1d(times, lowest_times)
 
 
 def _objection(
@@ -131,27 +126,6 @@ def _objection(
     return SimulationError(
         f"At t = {t:.9g} s {name} {says}. It must be above zero, and finite, at all times and angles of the motion."
     )
-
-
-def of_law(bound: BoundArrays, index: int, law: Expr, t: Array, x: Array, across: Any = 0.0) -> Array:
-    """(k,) an expression of time, of what is across a branch, its integral and its template's symbols.
-
-    Args:
-        bound: the equations.
-        index: of the branch.
-        law: the expression.
-        t: (k,) times, s.
-        x: (n, k) states.
-        across: (k,) what is across the branch, where the expression reads it.
-    """
-    form = bound.program.form
-    branch, integrals = form.graph.branches[index], form.integrals
-    angle: Any = 0.0
-    if index in integrals:
-        angle = x[len(form.states) - len(integrals) + integrals.index(index)]
-    symbols, names = branch.template.symbols, form.graph.parts[branch.part].parameters
-    values = bound.p[[names[symbol.name] for symbol in symbols]]
-    return np.asarray(vectorised((TIME, ACROSS, INTEGRAL, *symbols), law)(t, across, angle, *values))
 
 
 def rough(bound: BoundArrays, times: Array, states: Array) -> tuple[float, str] | None:
@@ -185,10 +159,10 @@ def first_missing(times: Array, values: Array) -> tuple[float, int] | None:
 def in_words(part: GraphPart, law: Basic) -> str:
     """What stands in a law of a part, as it was given: "tau = sqrt(1 - t) of TorqueSource 'pull'"."""
     component = part.component
-    given = {name: value for name, value in component.values.items() if isinstance(value, Expr | Table)}
+    laws = {name: value for name, value in component.values.items() if isinstance(value, Expr | Table)}
     names = substitution(component)
-    read = {name: as_expression(value).xreplace(names) for name, value in given.items()}
+    read = {name: as_expression(value).xreplace(names) for name, value in laws.items()}
     inside = [name for name, value in read.items() if law.has(value) or law.has(-value)]
-    texts = [f"{name} = {given[name]}" for name in inside or given]
+    texts = [f"{name} = {laws[name]}" for name in inside or laws]
     shown = [text if len(text) <= LONGEST else f"{text[:LONGEST]}..." for text in texts]
     return f"{' or '.join(shown) or 'the law'} of {title(component)}"

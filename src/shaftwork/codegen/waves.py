@@ -80,11 +80,11 @@ class WaveSystem:
     def lines(self) -> tuple[Array, Array]:
         """Impedances in N m s and delays in s (q / 2,)."""
         graph, p = self._form.graph, self._bound.p
-        made = []
+        pairs = []
         for branch in self._form.waves[::2]:
             template, places = graph.branches[branch].template, graph.part_of(branch).parameters
-            made.append(_line(template)(*(float(p[places[symbol.name]]) for symbol in template.symbols)))
-        impedances, delays = np.array(made).T
+            pairs.append(_line(template)(*(float(p[places[symbol.name]]) for symbol in template.symbols)))
+        impedances, delays = np.array(pairs).T
         return impedances, delays
 
 
@@ -101,11 +101,11 @@ def along_lines(bound: BoundArrays, part: GraphPart, profile: Profile, t: Array,
     """
     ends, (impedances, delays) = bound.program.form.waves, WaveSystem(bound).lines
     labels = {bound.program.form.graph.branches[k].template.label: k for k in part.branches}
-    made = np.empty((len(t), len(profile.lines)))
+    values = np.empty((len(t), len(profile.lines)))
     for place, (label, share) in enumerate(profile.lines):
         first = ends.index(labels[f"{label}_a" if f"{label}_a" in labels else f"{label}_middle"])
         impedance, delay = float(impedances[first // 2]), float(delays[first // 2])
         f = dense.leaving(t - share * delay)[:, first]
         g = dense.leaving(t - (1 - share) * delay)[:, first + 1]
-        made[:, place] = (f - g) / 2 if profile.kind == "through" else (f + g) / (2 * impedance)
-    return made
+        values[:, place] = (f - g) / 2 if profile.kind == "through" else (f + g) / (2 * impedance)
+    return values

@@ -32,11 +32,11 @@ class WoundShaft:
     profile: Profile
     states: tuple[int, ...]
 
-    def wind(self, bound: BoundArrays, t: float, x: Array, torque: float, kept: Any) -> None:
+    def wind(self, bound: BoundArrays, t: float, x: Array, torque: float, fixed: Any) -> None:
         """Give each store what the damper beside it leaves of a torque, but where (n,) states keep their values."""
         states = list(self.states)
         beside = self.along(bound, t, x) - x[states]
-        x[states] = np.where(kept[states], x[states], torque - beside)
+        x[states] = np.where(fixed[states], x[states], torque - beside)
 
     def along(self, bound: BoundArrays, t: float, x: Array) -> Array:
         """(stores,) the torque at each store with the damper beside it.
@@ -91,13 +91,13 @@ def _potentials(history: BranchHistory) -> Array:
 def speeds_inside(form: StateForm, ends: EndSpeeds) -> dict[int, float]:
     """For each state that is a speed inside a shaft, what lies on the straight line between those of its ends."""
     owner = {form.graph.branches[branch].plus: k for k, branch in enumerate(form.across_states)}
-    found: dict[int, float] = {}
+    speeds: dict[int, float] = {}
     for nodes, places in _along(form):
         first, last = ends.of(nodes[0], nodes[-1])
         for node, share in zip(nodes[1:-1], places[1:-1], strict=True):
             if node in owner:
-                found[owner[node]] = first + share * (last - first)
-    return found
+                speeds[owner[node]] = first + share * (last - first)
+    return speeds
 
 
 def inner_nodes(form: StateForm) -> frozenset[int]:

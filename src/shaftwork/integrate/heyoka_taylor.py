@@ -129,9 +129,8 @@ class _TaylorRun:
         integrator.reset_cooldowns() if integrator.with_events else None
         if self.problem.guards is not None:
             self._sizes = np.fmax(self.problem.guards.sizes, 1.0).tolist()
-            first, last = self.program.parameter_count + len(self.program.switches), self.program.first_weight
-            middle = (first + last) // 2
-            self._sides, self._offsets = integrator.pars[first:middle], integrator.pars[middle:last]
+            self._sides = integrator.pars[self.program.sides]
+            self._offsets = integrator.pars[self.program.offsets]
             self._guard([*enumerate(self.problem.guards.sides.tolist())], self.problem.guards.offsets.tolist())
         self.program.weigh(integrator)
         watch = self._watch(piece)
@@ -269,10 +268,9 @@ class _TaylorRun:
         program = self.program
         if not program.switches:
             return None
-        first = program.parameter_count
-        self.integrator.pars[first : first + len(program.switches)] = 0.0
+        self.integrator.pars[program.signs] = 0.0
         settle(program, self.integrator, piece.end - piece.start)
-        if np.isnan(self.integrator.pars[first : first + len(program.switches)]).any():
+        if np.isnan(self.integrator.pars[program.signs]).any():
             raise self._failure(piece, "err_nf_state", None)
         if program.all_timed:
             return None

@@ -37,8 +37,7 @@ def settle(program: Any, integrator: Any, horizon: float) -> None:
         integrator: its integrator; time and state are left as they were.
         horizon: length of the piece, or of the rest of it, in s.
     """
-    first = program.parameter_count
-    parameters, signs = integrator.pars[:first], integrator.pars[first : first + len(program.switches)]
+    parameters, signs = integrator.pars[: program.parameter_count], integrator.pars[program.signs]
     timed = signs * program.timed
     if program.timed.any():
         timed = program.switch_signs(integrator.time + SOMEWHERE * horizon, integrator.state, parameters, timed)
@@ -121,7 +120,7 @@ def keeps_sides(program: Any, integrator: Any, parameters: Array, start: float) 
     """
     if program.all_timed:
         return True
-    signs = parameters[program.parameter_count :][: len(program.switches)]
+    signs = parameters[program.signs]
     values = _in_step(program, integrator, start + INSIDE * (integrator.time - start), parameters)
     return bool((signs[:, None] * values >= -WRONG_SIDE * np.abs(values).max(axis=1)[:, None]).all())
 
@@ -144,7 +143,7 @@ class SwitchWatch:
         self.last_good: tuple[float, Array] | None = None
         """Time in s and state (n,) at the start of the step that stopped the run or failed."""
         self._largest: Array = size
-        self._signs = slice(program.parameter_count, program.parameter_count + len(program.switches))
+        self._signs = program.signs
         self._moving: NDArray[np.bool_] = ~program.timed
         counting = () if program.held is None else tuple(program.held.by_switch)
         self._turns = self._moving & ~np.isin(np.arange(size.size), counting)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.linear import Linearization
+from shaftwork.codegen.linearization import Linearization
 from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.start_values import Start, initial_state
 from shaftwork.components.laws import t as TIME

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.linear import Linearization
+from shaftwork.codegen.linearization import Linearization
 from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.recovery import BranchHistory
 from shaftwork.codegen.start_values import initial_state

@@ -11,7 +11,7 @@ import numpy as np
 
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.lane_program import LaneProgram, lane_expressions, lane_function, lane_program
-from shaftwork.codegen.lanes import LaneStep, Use
+from shaftwork.codegen.lane_step import LaneStep, Use
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.core.errors import CompileError
 from shaftwork.pipeline.arguments import NOMINAL

@@ -15,10 +15,10 @@ from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.code import Moves, around, bindable, is_rough, vectorised
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.linear_readings import ReadingMatrices
-from shaftwork.codegen.many import ManyExpressions
 from shaftwork.codegen.matrices import LinearPart
+from shaftwork.codegen.model import ScalarProgram
+from shaftwork.codegen.products import ManyExpressions
 from shaftwork.codegen.recovery import BranchHistory
-from shaftwork.codegen.scalar import ScalarProgram
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.codegen.timeline import Timeline
 from shaftwork.codegen.valueless import first_missing, in_words, rough, without_value

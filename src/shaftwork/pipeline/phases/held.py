@@ -2,7 +2,7 @@
 
 A network of k frictions has 2^k combinations of what is stuck. Here all have the equations in which everything slips,
 and what holds adds reactions: as numbers in explicit rows where each part holds inertias of its own (`HeldRows`), so
-that an engine goes on past a change of what holds; else as matrices (`codegen.held`), which are worth it for many.
+that an engine goes on past a change of what holds; else as matrices (`codegen.joints`), which are worth it for many.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ import numpy as np
 from sympy import Float
 
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.held import HeldArrays, HeldStores, Joints
+from shaftwork.codegen.joints import HeldArrays, HeldStores, Joints
 from shaftwork.codegen.linear_readings import ReadingMatrices
 from shaftwork.codegen.matrices import LinearPart
+from shaftwork.codegen.model import ScalarProgram
 from shaftwork.codegen.products import Factor
-from shaftwork.codegen.scalar import ScalarProgram
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.components.pieces import parts
 from shaftwork.core.kept import Kept

@@ -251,9 +251,7 @@ class Impulses:
             for time, weight in ((t, late), (before, 1.0 - late)):
                 if time is None:
                     continue
-                for part, energy in stores.given(
-                    bound, stores.sources(bound, time), gained, stage.blow.through
-                ).items():
+                for part, energy in stores.given(bound, bound.sources(time), gained, stage.blow.through).items():
                     found[part] = found.get(part, 0.0) + stage.share * weight * energy
             jumped = then
         return found

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.scalar import ScalarProgram
+from shaftwork.codegen.model import ScalarProgram
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.phases.assemblies import Motion

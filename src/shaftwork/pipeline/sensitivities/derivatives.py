@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eig, matrix_balance
 from sympy import Symbol
 
-from shaftwork.codegen.derivatives import Derivatives
+from shaftwork.codegen.differentiation import Derivatives
 from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import ParameterError, SimulationError
 from shaftwork.pipeline.analysis import Given, Point, Time, operating_point

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import brentq
 from sympy import Expr
 
-from shaftwork.codegen.differentiated import Differentiated
+from shaftwork.codegen.differentiation import Differentiated
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.timeline import Timeline
 from shaftwork.core.errors import SimulationError

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import brentq
 from sympy import Expr, Symbol
 
-from shaftwork.codegen.differentiated import Differentiated, ValueWithSlopes
+from shaftwork.codegen.differentiation import Differentiated, ValueWithSlopes
 from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import AccuracyWarning, ParameterError, SimulationError
 from shaftwork.core.notices import warn

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from sympy import Expr
 
-from shaftwork.codegen.differentiated import Differentiated
+from shaftwork.codegen.differentiation import Differentiated
 from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import SimulationError
 from shaftwork.pipeline.model import Model

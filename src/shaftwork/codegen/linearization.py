@@ -18,20 +18,24 @@ from scipy import sparse
 
 from shaftwork.codegen.arrays import ArrayProgram, BoundArrays
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.law_slopes import input_slopes
 from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.observer import ModelObserver
-from shaftwork.codegen.recovery import BranchHistory, branches_with_power
+from shaftwork.codegen.recovery import BranchHistory, GivenHistory, branches_with_power
 from shaftwork.codegen.waves import DenseWaves
 from shaftwork.components.branches import ACROSS, INTEGRAL
-from shaftwork.components.slopes import slope
+from shaftwork.components.slopes import jumps, slope
 from shaftwork.core.errors import SimulationError
+from shaftwork.core.hints import hint
 from shaftwork.network.graph import GROUND, GraphPart
 from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.inputs import places_of, with_inputs
 
 Complex = NDArray[np.complexfloating[Any, Any]]
+NEARBY = 1e-9
+"""A law is looked at so far to both sides of the point, as a fraction of it, to see whether it jumps there."""
+JUMP = 1e-3
+"""A law jumps where its two values differ by more than this fraction of them, its slope taken into account."""
 
 
 def refuse_waves(form: StateForm) -> None:
@@ -88,7 +92,7 @@ class Linearization:
             (rows, range(len(rows))),
         )
         self._enter = sparse.csr_array(entries, shape=(len(order), len(rows)))
-        self._by_state, self._by_input = input_slopes(self._bound, t, x, self._enter)
+        self._by_state, self._by_input = _input_slopes(self._bound, t, x, self._enter)
         self.A = sparse.csr_array(part.A + part.B @ self._by_state)
         self.B = (part.B @ self._by_input).toarray()
         self.B1 = (part.B1 @ self._enter).toarray()
@@ -122,26 +126,28 @@ class Linearization:
         """
         graph, form = self._form.graph, self._form
         stores = {graph.branches[k].plus for k in (*form.across_states, *form.dependent_across)}
-        found: dict[int, float] = {}
+        place_of: dict[int, float] = {}
         place = -1.0
         for part in graph.parts:
             for node, step in _in_a_row(part, stores):
-                if node not in found and node != GROUND:
+                if node not in place_of and node != GROUND:
                     place += step
-                    found[node] = place
-        across = {node: graph.domains[node].across for node in found}
-        return {f"{graph.nodes[node]}.{made.name}": (made.unit, found[node]) for node, made in across.items()}
+                    place_of[node] = place
+        across = {node: graph.domains[node].across for node in place_of}
+        return {
+            f"{graph.nodes[node]}.{variable.name}": (variable.unit, place_of[node]) for node, variable in across.items()
+        }
 
     @cached_property
     def masses(self) -> tuple[tuple[str, str], ...]:
         """(part, across variable of its node) for every across store, also those that are no states."""
         graph, form = self._form.graph, self._form
-        found = []
+        masses = []
         for k in sorted((*form.across_states, *form.dependent_across)):
             node = graph.branches[k].plus if graph.branches[k].plus != GROUND else graph.branches[k].minus
             if node != GROUND:  # the end of a shaft that is held
-                found.append((graph.part_of(k).name, f"{graph.nodes[node]}.{graph.domains[node].across.name}"))
-        return tuple(found)
+                masses.append((graph.part_of(k).name, f"{graph.nodes[node]}.{graph.domains[node].across.name}"))
+        return tuple(masses)
 
     def swinging(self, s: Complex, x: Complex, v: Complex) -> Callable[[str], Complex]:
         """`motion` where everything goes as exp(s t), s (k,)."""
@@ -155,10 +161,10 @@ class Linearization:
             v: (m, k) those of the inputs.
             v_rate: (m, k) their derivatives by time.
         """
-        state, given, rate = (np.hstack([each.real, each.imag]) for each in (x, v, v_rate))
-        u = self._by_state @ state + self._by_input @ given
-        change = self.A @ state + self.B @ given + self.B1 @ rate
-        history = _Deviations(self._bound, state, (u, self._enter @ rate, change), self._nominal)
+        state, entering, rate = (np.hstack([each.real, each.imag]) for each in (x, v, v_rate))
+        u = self._by_state @ state + self._by_input @ entering
+        change = self.A @ state + self.B @ entering + self.B1 @ rate
+        history = _Deviations(self._nominal, state, u, self._enter @ rate, change)
         count = x.shape[1]
 
         def read(name: str) -> Complex:
@@ -175,10 +181,82 @@ class Linearization:
         return BranchHistory(self._bound, np.array([t]), x[None, :])
 
 
+def _input_slopes(bound: BoundArrays, t: float, x: Array, enter: Any) -> tuple[Any, Any]:
+    """The inputs u of the linear part by the states (m, n) and by the inputs from outside (m, k).
+
+    Law: K du = S dx + E v with the slopes of the laws in S, and in K what reaches the laws through other inputs.
+
+    Args:
+        bound: the array program for one parameter vector.
+        t: time at which the laws are read, s.
+        x: (n,) states at the point.
+        enter: (m, k) sparse, E: where the inputs from outside enter.
+
+    Raises:
+        SimulationError: a law has no finite slope at the point, or an algebraic loop turns over there.
+    """
+    program, part = bound.program, bound.part
+    inputs = program.inputs
+    y, _ = bound.values(t, x)
+    _refuse_jumps(bound, t, y, x)
+    reads, integral = inputs.slopes(t, y, x, bound.p)
+    if bad := [row for matrix in (reads, integral) for row in matrix.tocoo().row[~np.isfinite(matrix.tocoo().data)]]:
+        raise SimulationError(f"{_laws_of(bound, bad)} no finite slope at this point. {_elsewhere(t)}")
+    slopes, through = reads @ part.C + integral, sparse.csr_array(reads @ part.D)
+    if bound.loops is None:  # through D a law reads sources alone, and of those the controlled ones others
+        passed = sparse.eye_array(inputs.size, format="csr") + through + through @ through
+        return sparse.csr_array(passed @ slopes), sparse.csr_array(passed @ enter)
+    return _through_loops(bound, slopes, through, enter)
+
+
+def _through_loops(bound: BoundArrays, slopes: Any, through: Any, enter: Any) -> tuple[Any, Any]:
+    """The same with algebraic loops, of which there are few: dense."""
+    program, part = bound.program, bound.part
+    K, S = np.eye(through.shape[0]) - through.toarray(), slopes.toarray()
+    tree = program.loop_places[program.loop_in_tree]
+    K[tree] = part.tree_law_u.toarray() - through.toarray()[tree]
+    S[tree] -= part.tree_law_x.toarray()
+    if not np.linalg.cond(K) * np.finfo(float).eps < 1:
+        raise SimulationError(
+            f"{_laws_of(bound, program.loop_places)} no slope at this point: speed and torque of the algebraic loop "
+            f"turn over there. Linearise elsewhere, or give the massless node an inertia."
+        )
+    solved = np.linalg.solve(K, np.hstack([S, enter.toarray()]))
+    return sparse.csr_array(solved[:, : S.shape[1]]), sparse.csr_array(solved[:, S.shape[1] :])
+
+
+def _refuse_jumps(bound: BoundArrays, t: float, y: Array, x: Array) -> None:
+    """Raise where a law that switches with its speed or angle does so at the point itself."""
+    inputs, graph, p = bound.program.inputs, bound.program.form.graph, bound.p
+    templates = [graph.branches[int(k)].template for k in bound.program.assembly.inputs]
+    switching = np.array([jumps(template.law, ACROSS, INTEGRAL, *template.reads) for template in templates], dtype=bool)
+    if not switching.any():
+        return
+    step_y, step_x = (NEARBY * np.maximum(np.abs(values), 1.0) for values in (y, x))
+    above, below = (inputs.values(t, y + side * step_y, x + side * step_x, p) for side in (1.0, -1.0))
+    by_y, by_x = inputs.slopes(t, y, x, p)
+    expected = 2 * (by_y @ step_y + by_x @ step_x[: inputs.states])
+    gap = np.abs(above - below - expected)
+    if (bad := np.flatnonzero(switching & (gap > JUMP * np.maximum(np.abs(above), np.abs(below))))).size:
+        raise SimulationError(f"{_laws_of(bound, bad)} a jump at this point and so no slope. {_elsewhere(t)}")
+
+
+def _laws_of(bound: BoundArrays, places: Sequence[int] | NDArray[np.intp]) -> str:
+    graph = bound.program.form.graph
+    parts = (graph.part_of(int(bound.program.assembly.inputs[k])) for k in places)
+    names = dict.fromkeys(f"{type(part.component).__name__} '{part.name}'" for part in parts)
+    return f"The law of {', '.join(names)} has"
+
+
+def _elsewhere(t: float) -> str:
+    another, time = hint("at=model.steady_state()", "--steady"), hint("t=...", "--t S")
+    return f"Name another point, such as {another} (the laws are read at t = {t:g} s; {time} names a time)."
+
+
 def _in_a_row(part: GraphPart, stores: set[int]) -> list[tuple[int, float]]:
     """The nodes of a part from its first end to its last, each with its distance from the one before, on average 1."""
     first, *others = (part.nodes[port.name] for port in part.component.ports)
-    along = next((made for made in part.component.profiles().values() if made.kind == "across"), None)
+    along = next((profile for profile in part.component.profiles().values() if profile.kind == "across"), None)
     if along is None or along.lines:
         inside = (node for node in part.nodes.values() if node in stores and node not in (first, *others))
         return [(node, 1.0) for node in (first, *inside, *others)]
@@ -187,16 +265,12 @@ def _in_a_row(part: GraphPart, stores: set[int]) -> list[tuple[int, float]]:
     return [(nodes[0], 1.0), *zip(nodes[1:], (steps / steps.mean()).tolist(), strict=True)]
 
 
-class _Deviations(BranchHistory):
-    """All branch quantities of a small motion about a point."""
+class _Deviations(GivenHistory):
+    """All branch quantities of a small motion about a point; for the arguments after that see `GivenHistory`."""
 
-    def __init__(self, bound: BoundArrays, x: Any, given: tuple[Any, Any, Any], nominal: BranchHistory) -> None:
-        super().__init__(bound, np.zeros(x.shape[1]), x.T)
-        self._given, self._nominal = given, nominal
-
-    @property
-    def inputs(self) -> tuple[Array, Array, Array]:
-        return self._given
+    def __init__(self, nominal: BranchHistory, x: Any, u: Any, slopes: Any, rate: Any) -> None:
+        super().__init__(nominal.bound, x, u, slopes, rate)
+        self._nominal = nominal
 
     def stored(self, part: GraphPart) -> Array:
         energy = np.zeros(len(self.t))

@@ -83,12 +83,16 @@ class Joints:
 
     def entries(self, rows: HeldRows) -> Array:
         """(k,) the numbers of the symbols in rows: those of P and of R."""
-        held = {branch: k for k, branch in enumerate(self._branches)}
-        made = np.zeros(len(rows.symbols))
-        made[: len(rows.joins)] = _at(self._joined, [*rows.joins])
-        found = [(k, (held[branch], place)) for k, (branch, place) in enumerate(rows.reactions) if branch in held]
-        made[[len(rows.joins) + k for k, _ in found]] = _at(self._reactions.sparse, [place for _, place in found])
-        return made
+        number = {branch: k for k, branch in enumerate(self._branches)}
+        entries = np.zeros(len(rows.symbols))
+        entries[: len(rows.joins)] = _at(self._joined, [*rows.joins])
+        reactions = [
+            (k, (number[branch], place)) for k, (branch, place) in enumerate(rows.reactions) if branch in number
+        ]
+        entries[[len(rows.joins) + k for k, _ in reactions]] = _at(
+            self._reactions.sparse, [place for _, place in reactions]
+        )
+        return entries
 
     def met(self, x: Array) -> Array:
         """(n,) the states after an inelastic impact that joins what is held: every momentum is kept."""
@@ -120,13 +124,13 @@ def _alike(followers: Mapping[int, Mapping[int, float]], size: int) -> Any:
 
 def _followers(G: Any) -> Mapping[int, Mapping[int, float]] | None:
     """For each row of G x = 0 a state that follows from others, and its gains; None where rows depend on each other."""
-    found: dict[int, dict[int, float]] = {}
+    rows: dict[int, dict[int, float]] = {}
     followed: dict[int, dict[int, None]] = {}  # by state, those that follow it
     starts, columns, gains_of = G.indptr.tolist(), G.indices.tolist(), G.data.tolist()
     for first, last in pairwise(starts):
         row: dict[int, float] = {}
         for column, gain in zip(columns[first:last], gains_of[first:last], strict=True):
-            for place, share in found[column].items() if column in found else ((column, 1.0),):
+            for place, share in rows[column].items() if column in rows else ((column, 1.0),):
                 row[place] = row.get(place, 0.0) + gain * share
         size = max(map(abs, gains_of[first:last]), default=0.0)
         row = {column: gain for column, gain in row.items() if abs(gain) > SMALL * size}
@@ -136,13 +140,13 @@ def _followers(G: Any) -> Mapping[int, Mapping[int, float]] | None:
         gains = {column: -gain / row[pivot] for column, gain in row.items() if column != pivot}
         followers = [*followed.pop(pivot, ())]
         for place in followers:
-            share = found[place].pop(pivot)
+            share = rows[place].pop(pivot)
             for column, gain in gains.items():
-                found[place][column] = found[place].get(column, 0.0) + share * gain
-        found[pivot] = gains
+                rows[place][column] = rows[place].get(column, 0.0) + share * gain
+        rows[pivot] = gains
         for column in gains:
             followed.setdefault(column, {}).update(dict.fromkeys((*followers, pivot)))
-    return found
+    return rows
 
 
 class HeldArrays(BoundArrays):
@@ -191,7 +195,7 @@ class HeldArrays(BoundArrays):
 class HeldStores(StateTransfer):
     """What is stored where inertias are held together, and each is a state all the same."""
 
-    def states(self, bound: BoundArrays, t: float, held: Mapping[str, float]) -> Array:
+    def states(self, bound: BoundArrays, t: float, stored: Mapping[str, float]) -> Array:
         """(n,) the states that the equations start with: those of what is held come to one speed."""
         assert isinstance(bound, HeldArrays)  # noqa: S101 (equations of this kind are made with it)
-        return bound.joints.met(super().states(bound, t, held))
+        return bound.joints.met(super().states(bound, t, stored))

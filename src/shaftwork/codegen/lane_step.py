@@ -3,6 +3,10 @@
 The step is one function of heyoka's, straight through all stages of the method, with the control of the step size in
 it: a lane that is not accurate enough stays where it is and gets a smaller step. So no lane waits for another, and what
 comes out for one does not depend on those beside it.
+
+Dormand and Prince's method of order 8(5,3) compares its result with two of lower order: Hairer, Norsett, Wanner,
+Solving Ordinary Differential Equations I, II.10. What a step misses counts for the states, and for what is measured as
+well: a stiff damper's torque may be wrong where the speeds are right, and what a source gives may swing without them.
 """
 
 from __future__ import annotations
@@ -15,14 +19,11 @@ from typing import Any
 
 import heyoka
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import DOP853
 
+from shaftwork.codegen.elements import Array
 from shaftwork.codegen.hermite import BEYOND, JET, apart, inner
-from shaftwork.codegen.lane_errors import TINY, LaneStart, step_error, weighted
 from shaftwork.codegen.lane_program import FREE_TIME, KEPT, LaneFunction, LaneProgram, at
-
-Array = NDArray[np.float64]
 
 SAFETY, LEAST_FACTOR, MOST_FACTOR = 0.85, 0.2, 5.0
 """Of the next step by the error of this one."""
@@ -30,6 +31,11 @@ NOWHERE = -1e300
 """So far comes what has not been seen yet."""
 BOTH = (1.0, -1.0)
 """The signs of what may matter on both sides."""
+OF_A_QUANTITY, CANCELLED = 10.0, 1e-4
+"""What is measured may be wrong by so many times as much as a state, and by the error of so small a part of what it is
+the difference of: of a stiff damper's torque more would be lost in rounding."""
+TINY = 1e-30
+"""Beside an error."""
 
 
 @dataclass(frozen=True)
@@ -47,11 +53,10 @@ class Use:
 
 @dataclass(frozen=True)
 class LaneStep:
-    """One step of a lane, with its error and the size of the next one; Dormand and Prince's method of order 8(5,3).
+    """One step of a lane, with its error and the size of the next one.
 
-    Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.10. The tolerance is a part of the size of a
-    state: of its value, of its change in the step and of its nominal size together. What is measured counts as well: a
-    stiff damper's torque may be wrong where the speeds are right, and a source may swing without them.
+    The tolerance is a part of the size of a state: of its value, of its change in the step and of its nominal size
+    together.
 
     A lane is a column: first its *rows*, which are states, integrals, time, and the size of the next step; then what
     has been seen, which is the time at the start of the step that led here, jets at that time, and how far each
@@ -131,9 +136,9 @@ class LaneStep:
         first = -(3 + self.states)
         taken[first], taken[first + 1], taken[first + 2] = tolerance, end, longest
 
-    def __call__(self, columns: Array, taken: Array, made: Array) -> None:
+    def __call__(self, columns: Array, taken: Array, after: Array) -> None:
         """Write what a step makes of columns (height, k), both contiguous."""
-        self._function.into(made, columns, taken)
+        self._function.into(after, columns, taken)
 
     def written(self) -> LaneFunction:
         """The step as a function."""
@@ -151,7 +156,7 @@ class LaneStep:
         stages = _stages(program.variables, [*program.rates, *integrands, *blind], time, size)
         new = [_moved(x, size, DOP853.B, slopes) for x, slopes in zip(old, stages, strict=False)]
         begun = [(x, *of) for x, of in zip(integrals, self._integrals, strict=True)]
-        error = step_error(LaneStart(program, time, size, sizes), begun, blind, stages) / tolerance
+        error = _step_error(_LaneStart(program, time, size, sizes), begun, blind, stages) / tolerance
         factor = SAFETY / heyoka.sqrt(heyoka.sqrt(heyoka.sqrt(error + TINY)))  # the error is of order 8
         factor = _higher(_lower(factor, heyoka.expression(MOST_FACTOR)), heyoka.expression(LEAST_FACTOR))
         good = heyoka.lte(error, 1.0)
@@ -160,21 +165,21 @@ class LaneStep:
         here = [at(one, time) for quantity in quantities for one in program.jet(quantity)]
         last = [heyoka.expression(f"seen{k}") for k in range(len(here))]
         come = {pair: heyoka.expression(f"reach{k}") for k, pair in enumerate(self._reaches)}
-        made = (*after, size * factor, time, *here, *self._come(time - before, last, here, come))
-        return LaneFunction(made, (*old, time, step, before, *last, *come.values()))
+        column = (*after, size * factor, time, *here, *self._come(time - before, last, here, come))
+        return LaneFunction(column, (*old, time, step, before, *last, *come.values()))
 
     def _come(
         self, length: Any, last: Sequence[Any], here: Sequence[Any], come: Mapping[tuple[int, float], Any]
     ) -> list[Any]:
         """How far quantities can have come by now, from where they have come before the last interval."""
-        made = []
+        reaches = []
         for (number, sign), before in come.items():
             jets = last[self.jet(number)], here[self.jet(number)]
             missed = apart(length, *jets)
             between = reduce(_higher, [sign * value for value in inner(length, *jets)])
             beyond = BEYOND * _higher(missed, -missed)
-            made.append(reduce(_higher, [before, sign * jets[1][0], between + beyond]))
-        return made
+            reaches.append(reduce(_higher, [before, sign * jets[1][0], between + beyond]))
+        return reaches
 
 
 @lru_cache(maxsize=KEPT)
@@ -195,15 +200,91 @@ def _higher(a: Any, b: Any) -> Any:
 
 def _stages(states: Sequence[Any], slopes: Sequence[Any], time: Any, size: Any) -> list[list[Any]]:
     """Values of slopes, first those of the states, at the stages of a step."""
-    found: list[list[Any]] = [[] for _ in slopes]
+    stages: list[list[Any]] = [[] for _ in slopes]
     for weights, part in zip(DOP853.A, DOP853.C, strict=True):
-        there = {x: _moved(x, size, weights, before) for x, before in zip(states, found, strict=False)}
-        made = heyoka.subs(list(slopes), {**there, heyoka.time: time + part * size})
-        for before, slope in zip(found, made, strict=True):
+        there = {x: _moved(x, size, weights, before) for x, before in zip(states, stages, strict=False)}
+        values = heyoka.subs(list(slopes), {**there, heyoka.time: time + part * size})
+        for before, slope in zip(stages, values, strict=True):
             before.append(slope)
-    return found
+    return stages
 
 
 def _moved(x: Any, size: Any, weights: Array, slopes: Sequence[Any]) -> Any:
     """A state moved along slopes."""
-    return x + size * weighted(weights, slopes)
+    return x + size * _weighted(weights, slopes)
+
+
+@dataclass(frozen=True, eq=False)
+class _LaneStart:
+    """Where a step starts, as heyoka's expressions.
+
+    Args:
+        program: of the lanes.
+        time: s.
+        size: of the step, s.
+        nominal: sizes of the states.
+    """
+
+    program: LaneProgram
+    time: Any
+    size: Any
+    nominal: Sequence[Any]
+
+    def gradient(self, quantity: Any) -> list[Any]:
+        """Derivatives of a quantity by the states."""
+        return [at(slope, self.time) for slope in self.program.gradient(quantity)]
+
+    def least(self, quantity: Any) -> Any:
+        """The square of what matters of a quantity whatever its value."""
+        states = zip(self.gradient(quantity), self.nominal, self.program.variables, strict=True)
+        return TINY + _squares([slope * part for slope, least, x in states for part in (least, CANCELLED * x)])
+
+
+def _step_error(
+    start: _LaneStart, integrals: Sequence[tuple[Any, Any, int]], blind: Sequence[Any], stages: Sequence[Sequence[Any]]
+) -> Any:
+    """The error of a step in units of the tolerance.
+
+    Args:
+        start: of the step.
+        integrals: the value at the start, the quantity, and its power that is integrated.
+        blind: quantities that may change without the states.
+        stages: slopes at the stages of the step: of states, of integrals, and what is blind.
+    """
+    program, size = start.program, start.size
+    states, first = program.variables, [slopes[0] for slopes in stages]
+    allowed = [
+        _squares([x, least, size * slope]) for x, least, slope in zip(states, start.nominal, first, strict=False)
+    ]
+    means = [_squares(slopes) * (1 / len(slopes)) for slopes in stages[len(states) :]]
+    for (value, quantity, power), mean in zip(integrals, means, strict=False):
+        allowed.append(_squares([value]) + size * size * (mean + start.least(quantity) ** float(power)))
+    for quantity, mean in zip(blind, means[len(integrals) :], strict=True):
+        allowed.append(OF_A_QUANTITY**2 * size * size * (mean + start.least(quantity)))
+    gradients = {quantity: start.gradient(quantity) for quantity in program.quantities}
+    for quantity, slopes in gradients.items():
+        value, change = at(quantity, start.time), size * _inner(slopes, first)
+        allowed.append(OF_A_QUANTITY**2 * (_squares([value, change]) + start.least(quantity)))
+    squares = []
+    for weights in (DOP853.E5, DOP853.E3):
+        missed = [_weighted(weights, slopes) for slopes in stages]
+        missed += [_inner(slopes, missed) for slopes in gradients.values()]
+        squares.append(heyoka.sum([one * one / most for one, most in zip(missed, allowed, strict=True)]))
+    fifth, third = squares
+    return size * fifth / heyoka.sqrt(fifth + 0.01 * third + TINY * TINY)
+
+
+def _squares(parts: Sequence[Any]) -> Any:
+    """The sum of their squares."""
+    return heyoka.sum([part * part for part in parts])
+
+
+def _inner(slopes: Sequence[Any], changes: Sequence[Any]) -> Any:
+    """The sum of their products, of as many as there are slopes."""
+    return heyoka.sum([slope * change for slope, change in zip(slopes, changes, strict=False)])
+
+
+def _weighted(weights: Array, slopes: Sequence[Any]) -> Any:
+    """The sum of slopes with weights."""
+    terms = [weight * slope for weight, slope in zip(weights.tolist(), slopes, strict=False) if weight]
+    return heyoka.sum(terms) if terms else heyoka.expression(0.0)
