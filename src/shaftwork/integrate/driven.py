@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.polynomial import chebyshev
 
 from shaftwork.integrate.modal import Complex, Eigensystem, phi
 from shaftwork.integrate.problem import Array
+from shaftwork.numerics.polynomials import chebyshev_nodes, to_chebyshev, to_powers
 
 # Degree of a panel's polynomials, the part of an input that they may leave out, and that which rounding may take.
 DEGREE, LEFT_OUT, ROUNDED = 8, 1e-13, 1e-10
@@ -17,10 +17,10 @@ DEGREE, LEFT_OUT, ROUNDED = 8, 1e-13, 1e-10
 FEWEST = 512
 # Inputs of more values in a run, states by nodes, are left to engines that step.
 MOST_VALUES = 10_000_000
-_NODES = (1 - np.cos(np.pi * np.arange(DEGREE + 1) / DEGREE)) / 2
+_NODES = (1 + chebyshev_nodes(DEGREE)) / 2
 # Values at the nodes of [0, 1] to the coefficients of the powers.
-_POWERS = np.linalg.inv(np.vander(_NODES, increasing=True))
-_CHEBYSHEV = np.linalg.inv(chebyshev.chebvander(2 * _NODES - 1, DEGREE))
+_POWERS = to_powers(_NODES)
+_CHEBYSHEV = to_chebyshev(chebyshev_nodes(DEGREE))
 _FACTORIALS = np.cumprod([1.0, *range(1, DEGREE + 1)])
 # Values at a time in one evaluation of the motion: the functions phi of so many stay in a cache.
 BLOCK = 10_000

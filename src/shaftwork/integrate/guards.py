@@ -8,9 +8,9 @@ from typing import Protocol
 import numpy as np
 from scipy.optimize import brentq
 
-from shaftwork.integrate.chebyshev import Polynomial, points
 from shaftwork.integrate.crossings import FIRST, LOOKS, Look, tolerance
 from shaftwork.integrate.problem import Array, DaeProblem, Explain, Guards, Problem
+from shaftwork.numerics.polynomials import Interpolant, chebyshev_nodes
 
 Dense = Callable[[Array], Array]
 
@@ -174,7 +174,8 @@ class GuardWatch:
         polynomial through their values at some times, where their values beside it agree.
         """
         low, high, ulp = float(look.times[before]), float(look.times[row]), float(np.spacing(look.times[-1]))
-        course = Polynomial(low, high, look.at(np.minimum(low + (high - low) * points(DEGREE), high))[:, [column]])
+        times = np.minimum(low + (high - low) * (1 + chebyshev_nodes(DEGREE)) / 2, high)
+        course = Interpolant(low, high, look.at(times)[:, [column]])
         root = _zero(lambda t: float(course(np.array([t]))[0, 0]), low, high, ulp)
         beside = look.at(root + BESIDE * ulp * np.array([-1.0, 1.0]))[:, column]
         if root == high or beside[0] < 0 < beside[1]:

@@ -9,15 +9,14 @@ from fractions import Fraction
 from functools import cached_property
 
 import numpy as np
-from numpy.polynomial import chebyshev
 
-from shaftwork.integrate.chebyshev import Polynomial, points
 from shaftwork.integrate.fixed_point import FixedPoint, Integers
 from shaftwork.integrate.linear_system import are_even
 from shaftwork.integrate.pieces import PiecewiseDense, SmoothInterval, pieces
 from shaftwork.integrate.problem import Array, Fractions, LinearInputs, Problem
 from shaftwork.integrate.stiffness import balance, scale_by
 from shaftwork.integrate.straight import straight_line
+from shaftwork.numerics.polynomials import Interpolant, chebyshev_nodes, to_chebyshev
 
 # A product of two such numbers takes about this long on one core, s.
 PRODUCT = 3e-7
@@ -30,7 +29,8 @@ MOST_PANELS, FEW = 200, 64
 INTERVALS = 500
 """Steps of a motion that rings."""
 Nearby = Callable[[Array, Array, Array], Array]
-_COEFFICIENTS = np.linalg.inv(chebyshev.chebvander(2 * points(DEGREE) - 1, DEGREE))
+_SHARES = (1 + chebyshev_nodes(DEGREE)) / 2
+_COEFFICIENTS = to_chebyshev(chebyshev_nodes(DEGREE))
 
 
 class PreciseSystem:
@@ -119,21 +119,21 @@ class PrecisePiece:
 
         The last panel comes first: what still moves fast there does so all the time.
         """
-        starts, found = [self.piece.start], list[Polynomial]()
+        starts, found = [self.piece.start], list[Interpolant]()
         end, largest = self.piece.end, np.zeros(len(self.system.scale) - 2 * len(self.system.active))
         while starts:
             start = starts[-1]
             shares = (self.piece.end - self.piece.start) / (end - start)
             if len(found) > MOST_PANELS or (not found and shares > MOST_PANELS):
                 return None
-            states = self.exactly(start + (end - start) * points(DEGREE))
+            states = self.exactly(start + (end - start) * _SHARES)
             largest = np.maximum(largest, np.abs(states).max(axis=0))
             missing = np.abs(_COEFFICIENTS @ states)[-2:].max(axis=0)
             middle = (start + end) / 2
             if (missing > LEFT_OUT * largest).any() and start < middle < end:
                 starts.append(middle)
                 continue
-            found.append(Polynomial(start, end, states))
+            found.append(Interpolant(start, end, states))
             end = starts.pop()
         found.reverse()
         steps = np.array([*(each.start for each in found), self.piece.end])

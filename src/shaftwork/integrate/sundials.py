@@ -14,7 +14,6 @@ import numpy as np
 from shaftwork.core.errors import MissingExtraError
 from shaftwork.core.notices import FILTERS
 from shaftwork.core.quiet import unprinted
-from shaftwork.integrate.chebyshev import Polynomial, points
 from shaftwork.integrate.crossings import Crossings
 from shaftwork.integrate.engines import ENGINES
 from shaftwork.integrate.guards import CLEARANCE, LEAST, SHORTER, GuardWatch, share_of_tolerance
@@ -32,6 +31,7 @@ from shaftwork.integrate.pieces import (
 )
 from shaftwork.integrate.problem import Array, DaeProblem, Problem, Trajectory, tightened
 from shaftwork.integrate.sparsity import Pattern
+from shaftwork.numerics.polynomials import Interpolant, chebyshev_nodes
 
 Method = Literal["BDF", "Adams"]
 
@@ -84,16 +84,21 @@ class _Inside:
 
     def __init__(self, opened: _Opened, start: float, x: Array, end: float, y: Array) -> None:
         self._opened, self._ends, self._states = opened, (start, end), (x, y)
-        self._made: Polynomial | None = None
+        self._made: Interpolant | None = None
 
     def __call__(self, times: Array) -> Array:
         if self._made is None:
             if times.size < self._opened.degree - 1:
                 return self._opened.inside(times)
             (start, end), (x, y) = self._ends, self._states
-            inner = self._opened.inside(start + (end - start) * points(self._opened.degree)[1:-1])
-            self._made = Polynomial(start, end, np.vstack([x, inner, y]))
+            inner = self._opened.inside(start + (end - start) * _inner_shares(self._opened.degree))
+            self._made = Interpolant(start, end, np.vstack([x, inner, y]))
         return self._made(times)
+
+
+def _inner_shares(degree: int) -> Array:
+    """(degree - 1,) places inside a step, from 0 to 1, at which it is read to become a polynomial."""
+    return np.asarray((1 + chebyshev_nodes(degree)[1:-1]) / 2)
 
 
 Opener = Callable[[SmoothInterval, Array], _Opened]
@@ -350,7 +355,7 @@ class _CvodeReplay:
     def __init__(self, problem: Problem | DaeProblem, opening: Opening, degree: int) -> None:
         self._problem = problem
         self._opening = opening
-        self._shares = points(degree)[1:-1]
+        self._shares = _inner_shares(degree)
         self.ends: tuple[Array, ...] = ()
         """Times and states at the step ends of an earlier run: who asks for these alone needs no further one."""
 
@@ -370,7 +375,7 @@ class _CvodeReplay:
     @cached_property
     def _dense(self) -> PiecewiseDense:
         parts = [
-            Polynomial(step.start, step.end, np.vstack([before, step.inside, step.state]))
+            Interpolant(step.start, step.end, np.vstack([before, step.inside, step.state]))
             for (_, steps), states in zip(self._found, self.step_ends[1], strict=True)
             for before, step in zip(states, steps, strict=False)
         ]

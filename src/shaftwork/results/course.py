@@ -11,9 +11,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
+from shaftwork.numerics.polynomials import chebyshev_nodes, to_chebyshev, to_powers
 from shaftwork.results.observer import Array, blocks
 from shaftwork.results.quadrature import NODES, SHARE, LobattoPanels
 
@@ -36,14 +36,14 @@ SHORTEST = 16
 """Rounding units of time: a panel so short holds a jump, and its ends are the two sides of it."""
 MOST = 2_000_000
 """Panels of a course, which take 128 MB; where a motion asks for more, as mere noise does, the rest stays rough."""
-LOOKS = np.cos(np.pi * np.arange(32, -1, -1) / 32)
+LOOKS = chebyshev_nodes(32)
 """Where in a panel, from -1 to 1, its polynomial is looked at."""
 NEWTON = 5
 """Steps to a turn between two looks."""
 
 _DEGREE = len(NODES) - 1
-_TAILS = np.linalg.inv(chebyshev.chebvander(NODES, _DEGREE))[-TAIL:]
-_POWERS = np.linalg.inv(np.vander(NODES, increasing=True))
+_TAILS = to_chebyshev(NODES)[-TAIL:]
+_POWERS = to_powers(NODES)
 _SLOPES = _POWERS[1:] * np.arange(1, _DEGREE + 1)[:, None]
 _BENDS = _SLOPES[1:] * np.arange(1, _DEGREE)[:, None]
 _VALUES_THERE = np.vander(LOOKS, _DEGREE + 1, increasing=True) @ _POWERS

@@ -7,8 +7,8 @@ from functools import cache
 
 import numpy as np
 from numpy.polynomial import legendre
-from scipy.special import roots_jacobi
 
+from shaftwork.numerics.polynomials import radau_nodes, to_integrals, to_legendre
 from shaftwork.shafts.line import Array
 
 
@@ -34,14 +34,10 @@ class Basis:
 @cache
 def radau_basis(order: int) -> Basis:
     """Collocation at so many Radau points."""
-    points = np.append(roots_jacobi(order - 1, 1, 0)[0], 1.0)
-    coefficients = np.linalg.inv(legendre.legvander(points, order - 1))
-    antiderivatives = np.column_stack([legendre.legval(points, legendre.legint(row, lbnd=-1)) for row in np.eye(order)])
+    points = radau_nodes(order)
+    coefficients, integrals = to_legendre(points), to_integrals(points) / 2
     first, second = (legendre.legvander((points + shift) / 2, order - 1) @ coefficients for shift in (-1, 1))
-    integrals: Array = antiderivatives @ coefficients / 2
-    return Basis(
-        (points + 1) / 2, integrals, np.asarray(np.linalg.inv(integrals), dtype=float), coefficients, (first, second)
-    )
+    return Basis((points + 1) / 2, integrals, np.asarray(np.linalg.inv(integrals)), coefficients, (first, second))
 
 
 @dataclass(frozen=True)
