@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from sympy import Expr, Symbol
 
 from shaftwork.codegen.fixed import Fixed
-from shaftwork.codegen.hermite import JET
 from shaftwork.codegen.heyoka import HeyokaProgram
 from shaftwork.codegen.heyoka_expressions import Translator
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError
+from shaftwork.numerics.hermite import JET
 from shaftwork.reduction.rows import Rows
 
 Array = NDArray[np.float64]

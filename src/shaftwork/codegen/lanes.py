@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DOP853
 
-from shaftwork.codegen.hermite import BEYOND, JET, apart, inner
 from shaftwork.codegen.lane_errors import TINY, LaneStart, step_error, weighted
 from shaftwork.codegen.lane_program import FREE_TIME, KEPT, LaneFunction, LaneProgram, at
+from shaftwork.numerics.hermite import BEYOND, JET, apart, inner
 
 Array = NDArray[np.float64]
 

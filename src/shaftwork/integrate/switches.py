@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.integrate.problem import Array
+from shaftwork.numerics.zeros import LOOKS
 
 # So many steps in a row, each shorter than this part of the whole time, are chatter and not motion.
 CHATTER_STEPS, CHATTER_SPAN = 200, 1e-9
@@ -22,8 +23,8 @@ EARLY = (1e-4, 1e-2, 1e-1)
 
 # Where in a piece switches of the time are read: a law that touches its threshold does so in the middle, if anywhere.
 SOMEWHERE = 0.381966
-# Where in a step the sides of the switches are looked at: at no regular places, which a wave might share.
-INSIDE = np.array([0.07, 0.19, 0.31, 0.42, 0.53, 0.61, 0.74, 0.83, 0.91, 1.0])
+# Where in a step the sides of the switches are looked at, its end included.
+INSIDE = np.append(LOOKS[1:-1], 1.0)
 
 
 def settle(program: Any, integrator: Any, horizon: float) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.numerics.polynomials import chebyshev_nodes, to_chebyshev, to_powers
+from shaftwork.numerics.zeros import Chosen, zeros
 from shaftwork.results.observer import Array, blocks
 from shaftwork.results.quadrature import NODES, SHARE, LobattoPanels
 
@@ -165,18 +166,13 @@ def _may_hold_extremes(values: Array, low: float | None = None, high: float | No
 
 
 def _turns(values: Array, low: Array, high: Array) -> Array:
-    """Where in their panels polynomials through values (k, 8) turn between two places: Newton's steps, or halves."""
+    """Where in their panels polynomials through values (k, 8) turn between two places."""
     slope, bend = values @ _SLOPES.T, values @ _BENDS.T
-    rising = _at(slope, low) > 0
-    middle = 0.5 * (low + high)
-    for _ in range(NEWTON):
-        value = _at(slope, middle)
-        ahead = (value > 0) == rising
-        low, high = np.where(ahead, middle, low), np.where(ahead, high, middle)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            new = middle - value / _at(bend, middle)
-        middle = np.where((new >= low) & (new <= high), new, 0.5 * (low + high))
-    return middle
+
+    def slopes(chosen: Chosen, places: Array) -> tuple[Array, Array]:
+        return _at(slope[chosen], places), _at(bend[chosen], places)
+
+    return zeros(slopes, low, high, rising=_at(slope, low) <= 0, iterations=NEWTON)
 
 
 def _at(powers: Array, places: Array) -> Array:

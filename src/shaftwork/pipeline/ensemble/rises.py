@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shaftwork.codegen.elements import Array
+from shaftwork.numerics.zeros import Chosen, zeros
 from shaftwork.pipeline.ensemble.extremes import NEARLY, Index, There, beyond, likely, peak
 
 NEAR = 1e-9
@@ -79,20 +80,11 @@ def _hidden(t: Array, jets: Array, until: Index, there: There) -> tuple[list[int
 
 
 def _rise(low: Array, high: Array, at: Index, own: Index, there: There) -> Array:
-    """Times (c,) of a rise between two times (c,): Newton's steps, halves where they leave."""
-    u, on = low + (high - low) / 2, np.ones(low.size, dtype=bool)
-    nothing, low, high = ROUNDING * (np.abs(high) + ROUNDINGS * (high - low)), low.copy(), high.copy()
-    for _ in range(MOST_ITERATIONS):
-        value, slope, _ = there(at[on], own[on], u[on])
-        low[on] = np.where(value <= 0.0, u[on], low[on])
-        high[on] = np.where(value > 0.0, u[on], high[on])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            new = u[on] - value / slope
-        inside = (new >= low[on]) & (new <= high[on]) & (slope > 0)
-        new = np.where(inside, new, low[on] + (high[on] - low[on]) / 2)
-        moved = np.abs(new - u[on])
-        u[on] = new
-        on[on] = np.minimum(moved, high[on] - low[on]) > nothing[on]
-        if not on.any():
-            break
-    return np.asarray(u)
+    """Times (c,) of a rise between two times (c,)."""
+
+    def course(chosen: Chosen, times: Array) -> tuple[Array, Array]:
+        value, slope, _ = there(at[chosen], own[chosen], times)
+        return value, slope
+
+    nothing = ROUNDING * (np.abs(high) + ROUNDINGS * (high - low))
+    return zeros(course, low, high, iterations=MOST_ITERATIONS, xtol=nothing)
