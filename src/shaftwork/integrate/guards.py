@@ -9,7 +9,7 @@ import numpy as np
 
 from shaftwork.integrate.crossings import FIRST, Look, tolerance
 from shaftwork.integrate.problem import Array, DaeProblem, Explain, Guards, Problem
-from shaftwork.numerics.polynomials import Interpolant, chebyshev_nodes
+from shaftwork.numerics.polynomials import Interpolant, interpolation_times
 from shaftwork.numerics.zeros import LOOKS, zero
 
 Dense = Callable[[Array], Array]
@@ -174,7 +174,7 @@ class GuardWatch:
         polynomial through their values at some times, where their values beside it agree.
         """
         low, high, ulp = float(look.times[before]), float(look.times[row]), float(np.spacing(look.times[-1]))
-        times = np.minimum(low + (high - low) * (1 + chebyshev_nodes(DEGREE)) / 2, high)
+        times = np.minimum(interpolation_times(low, high, DEGREE), high)
         course = Interpolant(low, high, look.at(times)[:, [column]])
         root = _zero(lambda t: course(t)[:, 0], low, high, ulp)
         beside = look.at(root + BESIDE * ulp * np.array([-1.0, 1.0]))[:, column]

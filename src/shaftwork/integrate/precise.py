@@ -16,7 +16,7 @@ from shaftwork.integrate.pieces import PiecewiseDense, SmoothInterval, pieces
 from shaftwork.integrate.problem import Array, Fractions, LinearInputs, Problem
 from shaftwork.integrate.stiffness import balance, scale_by
 from shaftwork.integrate.straight import straight_line
-from shaftwork.numerics.polynomials import Interpolant, chebyshev_nodes, to_chebyshev
+from shaftwork.numerics.polynomials import Interpolant, chebyshev_nodes, interpolation_times, to_chebyshev
 
 # A product of two such numbers takes about this long on one core, s.
 PRODUCT = 3e-7
@@ -29,7 +29,6 @@ MOST_PANELS, FEW = 200, 64
 INTERVALS = 500
 """Steps of a motion that rings."""
 Nearby = Callable[[Array, Array, Array], Array]
-_SHARES = (1 + chebyshev_nodes(DEGREE)) / 2
 _COEFFICIENTS = to_chebyshev(chebyshev_nodes(DEGREE))
 
 
@@ -126,7 +125,7 @@ class PrecisePiece:
             shares = (self.piece.end - self.piece.start) / (end - start)
             if len(found) > MOST_PANELS or (not found and shares > MOST_PANELS):
                 return None
-            states = self.exactly(start + (end - start) * _SHARES)
+            states = self.exactly(interpolation_times(start, end, DEGREE))
             largest = np.maximum(largest, np.abs(states).max(axis=0))
             missing = np.abs(_COEFFICIENTS @ states)[-2:].max(axis=0)
             middle = (start + end) / 2

@@ -76,6 +76,11 @@ def to_slopes(nodes: Array, places: Array) -> Array:
     return np.asarray(matrix - matrix.sum(axis=1, keepdims=True) / (degree + 1))
 
 
+def interpolation_times(start: float, end: float, degree: int) -> Array:
+    """(degree + 1,) times in s of a span at which the values of an `Interpolant` are wanted."""
+    return np.asarray(start + (end - start) * (1 + chebyshev_nodes(degree)) / 2)
+
+
 @dataclass(frozen=True)
 class Interpolant:
     """Functions of time by their values at the Chebyshev points of a span, with the barycentric formula.
@@ -83,7 +88,7 @@ class Interpolant:
     Args:
         start: of the span, s.
         end: of the span, s.
-        values: (degree + 1, n) at its Chebyshev points.
+        values: (degree + 1, n) at its `interpolation_times`.
 
     Source: Berrut and Trefethen, Barycentric Lagrange interpolation, 2004, equations (4.2) and (5.4).
     """
