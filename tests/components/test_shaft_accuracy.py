@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import shaftwork as sw
-from shaftwork.shafts.exact_modes import natural_frequencies
 from shaftwork.shafts.line import Section, SectionLine
 from tests.components.test_shafts import INERTIA, STEEL, STIFFNESS, TRUE, train
+from tests.reference.line_modes import natural_frequencies
 
 
 def eigenvalues(model: object, load: float = 0.11, **shaft: float) -> np.ndarray:

@@ -11,11 +11,10 @@ from scipy import sparse
 from scipy.integrate import solve_ivp
 
 from shaftwork.core.errors import AccuracyWarning, SimulationError
-from shaftwork.integrate.lossless import commensurate
 from shaftwork.integrate.lossless import engine as delay
 from shaftwork.integrate.lossless.collocation import POINTS
 from shaftwork.integrate.lossless.lines import DelayProblem, Lines, Past
-from shaftwork.integrate.lossless.panels import WaveHistory
+from shaftwork.integrate.lossless.wave_history import WaveHistory
 
 # The steel shaft of Popenda (8)-(23): 1 m long, 20 mm thick.
 DENSITY, MODULUS = 7900.0, 77.5e9
@@ -232,7 +231,7 @@ def test_a_long_motion_is_leapt_through_as_it_is_marched(monkeypatch):
     times = np.sort(np.random.default_rng(2).uniform(0, 3000 * T, 10))
     problem = two_inertias(step, 3000 * T, t_eval=times, steady=True)
     whole = delay.solve(problem)
-    monkeypatch.setattr(commensurate, "LONG", 1000)
+    monkeypatch.setattr(delay, "LONG", 1000)
     leapt = delay.solve(problem)
     assert leapt.statistics["steps"] < whole.statistics["steps"]
     assert np.abs(leapt.x - whole.x).max() < 1e-11 * np.abs(whole.x).max()
@@ -474,7 +473,7 @@ def test_a_layer_that_is_too_narrow_so_late_is_named():
 
 def test_a_long_motion_that_its_panels_cannot_resolve_says_so(monkeypatch):
     # Ends that start with a jump of their speed excite all modes alike, and these run out of step.
-    monkeypatch.setattr(commensurate, "MOST_PANELS_FAR", 4)
+    monkeypatch.setattr(delay, "MOST_PANELS_FAR", 4)
     times = np.array([1e5, 2e5]) * T
     problem = replace(two_inertias(step, 2e5 * T, rtol=1e-7, t_eval=times, steady=True), x0=np.array([1.0, -1.0]))
     with pytest.warns(AccuracyWarning, match="wrinkles finer than [34] panels in a delay"):

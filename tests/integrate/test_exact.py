@@ -12,8 +12,8 @@ from scipy import sparse
 
 import shaftwork as sw
 from shaftwork.integrate import exact, linear_system
-from shaftwork.integrate.fixed_point import FixedPoint
 from shaftwork.integrate.modal import find_modes
+from shaftwork.integrate.precise import FixedPoint
 from shaftwork.integrate.problem import LinearInputs, Problem
 
 

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 import shaftwork as sw
 from shaftwork.results import exact_modes
-from shaftwork.shafts.exact_modes import modes as line_modes
-from shaftwork.shafts.exact_modes import natural_frequencies
 from shaftwork.shafts.exact_response import frequency_response
 from shaftwork.shafts.line import Section, SectionLine
 from tests.properties.examples import share_of_examples
+from tests.reference.line_modes import modes as line_modes
+from tests.reference.line_modes import natural_frequencies
 
 STEEL = {"density": 7900.0, "shear_modulus": 77.5e9}
 SECTION = Section.of_geometry(1.0, 0.02, **STEEL)

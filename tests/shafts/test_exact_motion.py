@@ -10,10 +10,10 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eigh_tridiagonal
 
 from shaftwork.core.errors import ParameterError, SimulationError
-from shaftwork.shafts.exact_modes import modes
 from shaftwork.shafts.exact_motion import JunctionTorque, LineMotion, common_step, motion
 from shaftwork.shafts.exact_response import laplace_response
 from shaftwork.shafts.line import Array, End, Section, SectionLine
+from tests.reference.line_modes import modes
 
 SHAFT = Section.of_geometry(1.0, 0.02)
 POPENDA = SectionLine((SHAFT,), (0.025, 0.11))

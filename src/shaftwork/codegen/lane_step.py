@@ -23,7 +23,9 @@ from scipy.integrate import DOP853
 
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.hermite import BEYOND, JET, apart, inner
+from shaftwork.codegen.lane_errors import TINY
 from shaftwork.codegen.lane_program import FREE_TIME, KEPT, LaneFunction, LaneProgram, at
+from shaftwork.numerics.hermite import BEYOND, JET, apart, inner
 
 SAFETY, LEAST_FACTOR, MOST_FACTOR = 0.85, 0.2, 5.0
 """Of the next step by the error of this one."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import minimize_scalar
 from sympy import Basic, Expr
 
 from shaftwork.codegen.arrays import BoundArrays
@@ -18,6 +18,7 @@ from shaftwork.core.errors import SimulationError, no_value
 from shaftwork.network.graph import GraphPart
 from shaftwork.network.templates import substitution
 from shaftwork.network.wording import title
+from shaftwork.numerics.zeros import zero
 from shaftwork.reduction.form import StateForm
 
 LONGEST = 60
@@ -120,7 +121,7 @@ def _objection(
         place = int(np.argmax(values <= 0))
         t, says = float(times[place]), f"is {values[place]:.6g}"
         if course is not None and place > 0:
-            t, says = brentq(lambda t: course(np.array([t]))[0], times[place - 1], t), "falls to zero"
+            t, says = zero(course, float(times[place - 1]), t), "falls to zero"
     else:
         t, says = times[large], f"is {values[large]:.3g}, and {values[small]:.3g} at t = {times[small]:.9g} s"
     return SimulationError(

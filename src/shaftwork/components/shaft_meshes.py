@@ -14,11 +14,10 @@ neighbouring speeds.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any
 
-import numpy as np
-from numpy.polynomial.legendre import Legendre, leggauss, legvander
+from numpy.polynomial.legendre import leggauss
+
+from shaftwork.numerics.polynomials import lobatto_rule, to_slopes
 
 Row = tuple[tuple[int, float], ...]
 
@@ -117,9 +116,10 @@ def central_as_printed(m: int, damper: float) -> Mesh:
 
 def spectral(degree: int) -> Mesh:
     """Speeds at the nodes of Gauss and Lobatto, torques at those of Gauss."""
-    nodes, inertias = lobatto(degree)
+    nodes, inertias = lobatto_rule(degree)
     stations, lengths = leggauss(degree)
-    slopes = -_derivative(nodes, stations) * lengths[:, None]
+    # a rigid rotation twists nothing, to the last bit
+    slopes = -to_slopes(nodes, stations) * lengths[:, None]
     return Mesh(
         intervals=1,
         nodes=tuple(((nodes + 1) / 2).tolist()),
@@ -128,23 +128,3 @@ def spectral(degree: int) -> Mesh:
         lengths=tuple((lengths / 2).tolist()),
         weights=tuple(tuple(enumerate(row)) for row in slopes.tolist()),
     )
-
-
-@lru_cache(maxsize=32)
-def lobatto(degree: int) -> tuple[Any, Any]:
-    """Nodes of [-1, 1] and weights (degree + 1,) of the quadrature of Gauss and Lobatto."""
-    polynomial = Legendre.basis(degree)
-    inner = polynomial.deriv().roots().real if degree > 1 else np.empty(0)
-    for _ in range(2):  # the roots of a series are good to some ten digits, Newton's method does the rest
-        inner = inner - polynomial.deriv()(inner) / polynomial.deriv(2)(inner) if degree > 1 else inner
-    nodes = np.concatenate([[-1.0], np.sort(inner.real), [1.0]])
-    nodes = (nodes - nodes[::-1]) / 2
-    return nodes, 2 / (degree * (degree + 1) * polynomial(nodes) ** 2)
-
-
-def _derivative(nodes: Any, places: Any) -> Any:
-    """Matrix (places, nodes) from values at nodes to the slopes of their polynomial at other places."""
-    degree = len(nodes) - 1
-    slopes = np.stack([Legendre.basis(k).deriv()(places) for k in range(degree + 1)], axis=1)
-    matrix: Any = np.linalg.solve(legvander(nodes, degree).T, slopes.T).T
-    return matrix - matrix.sum(axis=1, keepdims=True) / (degree + 1)  # a rigid rotation twists nothing, to the last bit

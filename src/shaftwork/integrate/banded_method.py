@@ -11,6 +11,7 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from shaftwork.integrate.problem import Array
+from shaftwork.numerics.polynomials import legendre_integrals, radau_nodes, to_integrals, to_legendre
 
 Complex = NDArray[np.complex128]
 Family = Literal["radau", "gauss"]
@@ -52,7 +53,7 @@ class ShiftedCollocation:
 
     def increments(self, theta: Any) -> Array:
         """(k, s) what the modes add to the state at parts theta (k,) of the step."""
-        return _integrals(theta, np.eye(self.order)) @ self.spread
+        return legendre_integrals(self.spread, _centred(theta)) / 2
 
     def slopes(self, theta: Any) -> Array:
         """(k, s) the slope h u' from the modes at parts theta (k,) of the step."""
@@ -63,7 +64,7 @@ class ShiftedCollocation:
 
         Added to u it gives one order more and, with Radau's nodes, a slope without jumps between the steps.
         """
-        return _integrals(theta, self.nodal[:, None])[:, 0]
+        return legendre_integrals(self.nodal[:, None], _centred(theta))[:, 0] / 2
 
     @cached_property
     def quieting(self) -> complex:
@@ -103,19 +104,15 @@ def shifted_collocation(family: Family, stages: int) -> ShiftedCollocation:
     nodal = np.zeros(stages + 1)
     nodal[stages] = 1.0
     if family == "radau":
-        nodal[stages - 1] = -1.0
-    nodes = np.sort(legendre.legroots(nodal).real)
-    if family == "radau":
-        nodes[-1] = 1.0
-    nodes = (nodes + 1) / 2
-    to_coefficients = np.linalg.inv(legendre.legvander(_centred(nodes), stages - 1))
-    matrix = _integrals(nodes, np.eye(stages)) @ to_coefficients
-    poles, vectors = np.linalg.eig(np.linalg.inv(matrix))
+        points, nodal[stages - 1] = radau_nodes(stages), -1.0
+    else:
+        points = legendre.leggauss(stages)[0]
+    poles, vectors = np.linalg.eig(np.linalg.inv(to_integrals(points) / 2))
     upper = np.flatnonzero(poles.imag > 0)
     rows, pole = np.linalg.inv(vectors)[upper], np.diag(poles[upper])
-    shapes = to_coefficients @ (vectors * poles)[:, upper]
+    shapes = to_legendre(points) @ (vectors * poles)[:, upper]
     return ShiftedCollocation(
-        nodes=nodes,
+        nodes=(points + 1) / 2,
         poles=poles[upper],
         to_modes=np.vstack([rows.real, rows.imag]),
         turn=np.block([[pole.real, -pole.imag], [pole.imag, pole.real]]),
@@ -126,9 +123,3 @@ def shifted_collocation(family: Family, stages: int) -> ShiftedCollocation:
 
 def _centred(theta: Any) -> Array:
     return 2 * np.atleast_1d(np.asarray(theta, dtype=float)) - 1
-
-
-def _integrals(theta: Any, coefficients: Array) -> Array:
-    """(k, m) integrals from 0 to theta (k,) of m polynomials, columns of Legendre coefficients."""
-    primitive = legendre.legint(coefficients, lbnd=-1, axis=0) / 2
-    return np.asarray(legendre.legvander(_centred(theta), len(primitive) - 1) @ primitive)

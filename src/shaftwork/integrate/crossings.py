@@ -6,16 +6,15 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from shaftwork.integrate.pieces import SmoothInterval
 from shaftwork.integrate.problem import Array, DaeProblem, Problem
+from shaftwork.numerics.zeros import LOOKS, zero
 
 Dense = Callable[[Array], Array]
 
-# Where in a step the switches are looked at, beside its ends: at no regular places, which a motion might share. The
-# outermost tell where a switch goes from the ends.
-FIRST, LOOKS = np.array([0.47]), np.array([0.004, 0.07, 0.19, 0.31, 0.42, 0.53, 0.61, 0.74, 0.83, 0.91, 0.996])
+# Where in a step the switches are looked at before `LOOKS`.
+FIRST = np.array([0.47])
 # More than the first look is not needed where all switches are so many times as far from zero as they move in a step.
 FAR = 2.0
 # A switch that comes near to zero between the looks is followed to its least value so many times.
@@ -226,12 +225,12 @@ class Look:
         if side == 0:
             return float(self.times[0])
         before = int(np.flatnonzero(self.values[:row, column] * side >= 0)[-1])
-        known = {float(self.times[k]): float(self.values[k, column]) for k in (before, row)}
-
-        def value(t: float) -> float:
-            if t not in known:
-                known[t] = float(self.at(np.array([t]))[0, column])
-            return known[t]
-
+        low, high = float(self.times[before]), float(self.times[row])
         tolerance = max(near, float(np.spacing(self.times[-1])))
-        return float(brentq(value, *known, xtol=tolerance))
+        ends = {low: self.values[[before], column], high: self.values[[row], column]}
+
+        def value(times: Array) -> Array:
+            t = float(times[0])
+            return ends[t] if t in ends else self.at(times)[:, column]
+
+        return zero(value, low, high, xtol=tolerance)

@@ -11,13 +11,12 @@ from itertools import pairwise
 import numpy as np
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.integrate.driven import FEWEST, MOST_VALUES, driven, polynomials
-from shaftwork.integrate.linear_system import LinearSystem, are_even, propagator_of, system_of
+from shaftwork.integrate.linear_system import LinearSystem, are_even, propagator_of, straight_line, system_of
+from shaftwork.integrate.modal import FEWEST, MOST_VALUES, driven, polynomials
 from shaftwork.integrate.observation import difference, doubt
 from shaftwork.integrate.pieces import SmoothInterval, both_sides, failure, pieces, piecewise, start_of_piece
 from shaftwork.integrate.precise import Nearby, PrecisePiece, PreciseSystem, precise_piece, precise_system, seconds
 from shaftwork.integrate.problem import Array, LinearInputs, Problem, Trajectory
-from shaftwork.integrate.straight import straight_line
 
 # Intervals of the engine's own output grid, which no accuracy depends on.
 OWN_INTERVALS = 500

@@ -6,11 +6,11 @@ from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
-from scipy.optimize import brentq
 
-from shaftwork.integrate.chebyshev import Polynomial, points
-from shaftwork.integrate.crossings import FIRST, LOOKS, Look, tolerance
+from shaftwork.integrate.crossings import FIRST, Look, tolerance
 from shaftwork.integrate.problem import Array, DaeProblem, Explain, Guards, Problem
+from shaftwork.numerics.polynomials import Interpolant, interpolation_times
+from shaftwork.numerics.zeros import LOOKS, zero
 
 Dense = Callable[[Array], Array]
 
@@ -174,17 +174,19 @@ class GuardWatch:
         polynomial through their values at some times, where their values beside it agree.
         """
         low, high, ulp = float(look.times[before]), float(look.times[row]), float(np.spacing(look.times[-1]))
-        course = Polynomial(low, high, look.at(np.minimum(low + (high - low) * points(DEGREE), high))[:, [column]])
-        root = _zero(lambda t: float(course(np.array([t]))[0, 0]), low, high, ulp)
+        times = np.minimum(interpolation_times(low, high, DEGREE), high)
+        course = Interpolant(low, high, look.at(times)[:, [column]])
+        root = _zero(lambda t: course(t)[:, 0], low, high, ulp)
         beside = look.at(root + BESIDE * ulp * np.array([-1.0, 1.0]))[:, column]
         if root == high or beside[0] < 0 < beside[1]:
             return root
-        return _zero(lambda t: float(look.at(np.array([t]))[0, column]), low, high, ulp)
+        return _zero(lambda t: look.at(t)[:, column], low, high, ulp)
 
 
-def _zero(value: Callable[[float], float], low: float, high: float, ulp: float) -> float:
+def _zero(value: Callable[[Array], Array], low: float, high: float, ulp: float) -> float:
     """Where a function passes through zero; its end where it does not, as that is rounding away from others."""
-    return high if value(low) * value(high) > 0 else float(brentq(value, low, high, xtol=ulp))
+    first, last = value(np.array([low])), value(np.array([high]))
+    return high if first[0] * last[0] > 0 else zero(value, low, high, xtol=ulp)
 
 
 def share_of_tolerance(problem: Problem | DaeProblem, times: Array, states: Array) -> float:

@@ -1,7 +1,8 @@
-"""The matrix of a linear system in scaled coordinates: its modes and its exponential."""
+"""A linear system in scaled coordinates: its modes, its exponential, and its inputs that are straight lines."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -11,13 +12,17 @@ from scipy import sparse
 from scipy.linalg import expm
 from scipy.sparse.linalg import expm_multiply
 
+from shaftwork.core.errors import ParameterError
 from shaftwork.core.interruption import interruptible
 from shaftwork.integrate.modal import Eigensystem, find_modes
-from shaftwork.integrate.problem import Array, LinearInputs
+from shaftwork.integrate.pieces import SmoothInterval
+from shaftwork.integrate.problem import Array, LinearInputs, Problem
 from shaftwork.integrate.stiffness import balance, norm, scale_by
 
 # From so many states on LAPACK may take so long for the modes that Ctrl-C must not wait for it.
 LONG_WAIT = 100
+# A forcing may differ from a straight line by this part of its size before it is refused.
+STRAIGHT = 1e-7
 
 
 class LinearSystem:
@@ -116,3 +121,24 @@ def propagator_of(system: LinearSystem, level: Array, slope: Array, *, dense_for
     clock = sparse.csr_array(np.array([[0.0, 1.0], [0.0, 0.0]]))
     augmented = sparse.block_array([[matrix, sparse.csr_array(forcing)], [None, clock]], format="csr")
     return Propagator(augmented.toarray() if dense_form else augmented, scale, dense_form)
+
+
+def straight_line(problem: Problem, forcing: Callable[[float], Array], piece: SmoothInterval) -> tuple[Array, Array]:
+    """Level at the start of a piece and slope of u, from values strictly inside the piece.
+
+    Raises:
+        ParameterError: u is no straight line.
+    """
+    length = piece.high - piece.low
+    times = [piece.low + part * length for part in (0.25, 0.5, 0.75)]
+    early, middle, late = (np.asarray(forcing(time), dtype=float) for time in times)
+    slope = (late - early) / (times[2] - times[0])
+    bend = np.abs(middle - (early + late) / 2) - np.abs(slope) * np.spacing(piece.high)  # a short piece's times round
+    if (bend > STRAIGHT * (np.abs(early) + np.abs(late)).max(initial=0.0)).any():
+        name = problem.names[int(np.argmax(bend))]
+        raise ParameterError(
+            f"The exact engine needs an input that is a straight line between breakpoints; the one of {name!r} bends "
+            f"between t = {piece.start:.6g} s and {piece.end:.6g} s. Take the engine 'auto'."
+        )
+    slope[np.abs(slope) * length <= 8 * np.finfo(float).eps * np.abs(early)] = 0.0
+    return early - (times[0] - piece.start) * slope, slope

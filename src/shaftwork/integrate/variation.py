@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.problem import Array
+from shaftwork.numerics.polynomials import to_integrals
 
 STAGES = 6
 """Of a step: order 12, and no stage on its ends, where laws jump."""
@@ -29,13 +30,10 @@ MOST_AT_ONCE = 4_000_000
 Coefficients = Callable[[Array], tuple[Array, Array]]
 """From times (k,) to A (k, N, n) and B (k, N, m) of Y' = A Y[:n] + B; rows behind the first n are mere integrals."""
 
-_ROOTS, _WEIGHTS = np.polynomial.legendre.leggauss(STAGES)
-NODES = (_ROOTS + 1) / 2
-_POWERS = np.arange(STAGES)
-# of the polynomials that are one at one node and zero at the others: integrals up to each node, and over the step
-_LAGRANGE = np.linalg.inv(NODES[:, None] ** _POWERS)
-_TO_NODES = (NODES[:, None] ** (_POWERS + 1) / (_POWERS + 1)) @ _LAGRANGE
-_TO_END = _WEIGHTS / 2
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(STAGES)
+NODES = (_POINTS + 1) / 2
+# integrals from the start of a step to each node and to its end, from values at the nodes
+_TO_NODES, _TO_END = to_integrals(_POINTS) / 2, _WEIGHTS / 2
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,9 +11,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
+from shaftwork.numerics.polynomials import chebyshev_nodes, to_chebyshev, to_powers
+from shaftwork.numerics.zeros import Chosen, zeros
 from shaftwork.results.observer import Array, blocks
 from shaftwork.results.quadrature import NODES, SHARE, LobattoPanels
 
@@ -36,14 +37,14 @@ SHORTEST = 16
 """Rounding units of time: a panel so short holds a jump, and its ends are the two sides of it."""
 MOST = 2_000_000
 """Panels of a course, which take 128 MB; where a motion asks for more, as mere noise does, the rest stays rough."""
-LOOKS = np.cos(np.pi * np.arange(32, -1, -1) / 32)
+LOOKS = chebyshev_nodes(32)
 """Where in a panel, from -1 to 1, its polynomial is looked at."""
 NEWTON = 5
 """Steps to a turn between two looks."""
 
 _DEGREE = len(NODES) - 1
-_TAILS = np.linalg.inv(chebyshev.chebvander(NODES, _DEGREE))[-TAIL:]
-_POWERS = np.linalg.inv(np.vander(NODES, increasing=True))
+_TAILS = to_chebyshev(NODES)[-TAIL:]
+_POWERS = to_powers(NODES)
 _SLOPES = _POWERS[1:] * np.arange(1, _DEGREE + 1)[:, None]
 _BENDS = _SLOPES[1:] * np.arange(1, _DEGREE)[:, None]
 _VALUES_THERE = np.vander(LOOKS, _DEGREE + 1, increasing=True) @ _POWERS
@@ -165,18 +166,13 @@ def _may_hold_extremes(values: Array, low: float | None = None, high: float | No
 
 
 def _turns(values: Array, low: Array, high: Array) -> Array:
-    """Where in their panels polynomials through values (k, 8) turn between two places: Newton's steps, or halves."""
+    """Where in their panels polynomials through values (k, 8) turn between two places."""
     slope, bend = values @ _SLOPES.T, values @ _BENDS.T
-    rising = _at(slope, low) > 0
-    middle = 0.5 * (low + high)
-    for _ in range(NEWTON):
-        value = _at(slope, middle)
-        ahead = (value > 0) == rising
-        low, high = np.where(ahead, middle, low), np.where(ahead, high, middle)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            new = middle - value / _at(bend, middle)
-        middle = np.where((new >= low) & (new <= high), new, 0.5 * (low + high))
-    return middle
+
+    def slopes(chosen: Chosen, places: Array) -> tuple[Array, Array]:
+        return _at(slope[chosen], places), _at(bend[chosen], places)
+
+    return zeros(slopes, low, high, rising=_at(slope, low) <= 0, iterations=NEWTON)
 
 
 def _at(powers: Array, places: Array) -> Array:

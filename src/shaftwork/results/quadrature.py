@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from shaftwork.numerics.polynomials import lobatto_rule, to_slopes
 from shaftwork.results.observer import Array
 
-_INNER = np.polynomial.legendre.Legendre.basis(7).deriv().roots().real
-NODES = np.concatenate([[-1.0], np.sort(_INNER), [1.0]])
+NODES, WEIGHTS = lobatto_rule(7)
 """Of Lobatto's rule, which reads both ends: there peaks are, and a jump close to an end is not overlooked."""
-WEIGHTS = 2 / (56 * np.polynomial.legendre.Legendre.basis(7)(NODES) ** 2)
 LEAST = 64
 """Panels of a run at least: an exact engine has few steps."""
 TIGHT = 1e-13
@@ -28,9 +27,7 @@ SHARE = 0.41
 NOISE, FALLS, GROWS = 1e-9, 0.75, 1.5
 """Changes below the first fraction are noise where parting leaves this share of them, and so many times the panels."""
 
-_SLOPES = np.stack(
-    [np.polynomial.Polynomial.fit(NODES, row, 7, domain=[-1, 1]).deriv()(NODES) for row in np.eye(len(NODES))], axis=1
-)
+_SLOPES = to_slopes(NODES, NODES)
 
 
 @dataclass(frozen=True, eq=False)

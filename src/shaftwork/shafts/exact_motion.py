@@ -11,8 +11,8 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from shaftwork.core.errors import ParameterError, SimulationError
+from shaftwork.numerics.polynomials import radau_nodes, to_integrals, to_legendre
 from shaftwork.shafts.line import Array, SectionLine, Side
-from shaftwork.shafts.panels import Period, radau_basis
 
 # Delays are multiples of a common step where their ratios are such fractions, up to this relative difference.
 LARGEST_DENOMINATOR = 1000
@@ -190,6 +190,55 @@ def common_step(line: SectionLine) -> tuple[float, tuple[int, ...]]:
     return math.fsum(delays) / sum(multiples), multiples
 
 
+class _Basis:
+    """Collocation at so many Radau points (q,) of [0, 1], the end included: (q, q) matrices of values at the nodes."""
+
+    def __init__(self, order: int) -> None:
+        points = radau_nodes(order)
+        self.nodes: Array = (points + 1) / 2
+        self.integrals: Array = to_integrals(points) / 2
+        """From 0 to each node."""
+        self.derivatives = np.asarray(np.linalg.inv(self.integrals))
+        """At the nodes, of polynomials that are 0 at the start."""
+        self.coefficients = to_legendre(points)
+        """Of Legendre polynomials."""
+        first, second = (legendre.legvander((points + shift) / 2, order - 1) for shift in (-1, 1))
+        self.halves: tuple[Array, Array] = (first @ self.coefficients, second @ self.coefficients)
+        """Values at the nodes of the first and of the second half."""
+
+
+@dataclass(frozen=True)
+class _Period:
+    """One common step: values at the nodes of its P panels.
+
+    Args:
+        edges: ends of the panels within the period in s, shape (P + 1,).
+        rightward: waves that leave the left ends of the sections, shape (P, n, q).
+        leftward: waves that leave the right ends, shape (P, n, q).
+        speeds: of the junctions, shape (P, n + 1, q).
+    """
+
+    edges: Array
+    rightward: Array
+    leftward: Array
+    speeds: Array
+
+    def halved(self, chosen: Array, halves: tuple[Array, Array]) -> _Period:
+        """The same period with the chosen panels cut into two, its polynomials unchanged."""
+        middles = (self.edges[:-1] + np.diff(self.edges) / 2)[chosen]
+        count = np.where(chosen, 2, 1)
+        first = np.cumsum(count) - count
+
+        def cut(values: Array) -> Array:
+            new = np.repeat(values, count, axis=0)
+            for half, matrix in enumerate(halves):
+                new[first[chosen] + half] = values[chosen] @ matrix.T
+            return new
+
+        edges = np.sort(np.concatenate([self.edges, middles]))
+        return _Period(edges, cut(self.rightward), cut(self.leftward), cut(self.speeds))
+
+
 class _March:
     """The periods of a motion, one after the other; the first ones are the rest before t = 0."""
 
@@ -198,14 +247,14 @@ class _March:
     ) -> None:
         self.line, self.torques, self.initial_speed, self.tolerance = line, torques, initial_speed, tolerance
         self.step, self.multiples = common_step(line)
-        self.basis = radau_basis(order)
+        self.basis = _Basis(order)
         impedances = np.array([section.impedance for section in line.sections])
         self.impedance = impedances[:, None]
         self.load = np.array(line.dampers) + np.append(0.0, impedances) + np.append(impedances, 0.0)
         edges = self._edges()
         sections, panels = len(line.sections), edges.size - 1
         waves = np.full((panels, sections, order), initial_speed / 2)
-        rest = Period(edges, waves, waves, np.full((panels, sections + 1, order), initial_speed))
+        rest = _Period(edges, waves, waves, np.full((panels, sections + 1, order), initial_speed))
         self.periods = [rest] * max(self.multiples)
         self.scale = abs(initial_speed)
         self.error = 0.0
@@ -271,7 +320,7 @@ class _March:
     def _start(self) -> float:
         return (len(self.periods) - max(self.multiples)) * self.step
 
-    def _solve(self) -> Period:
+    def _solve(self) -> _Period:
         """The next period on the present panels."""
         last = self.periods[-1]
         arriving = [self.periods[-multiple] for multiple in self.multiples]
@@ -288,7 +337,7 @@ class _March:
             speeds[panel] = self.from_start[panel] * speed[:, None] + answer
             self._add_speed_torques(panel, times[panel], speeds[panel])
             speed = speeds[panel, :, -1]
-        return Period(self.edges, speeds[:, :-1] - from_right, speeds[:, 1:] - from_left, speeds)
+        return _Period(self.edges, speeds[:, :-1] - from_right, speeds[:, 1:] - from_left, speeds)
 
     def _times(self) -> Array:
         """Times of the nodes, shape (P, q), clearly inside their panels: a torque may jump at both ends."""

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import brentq
 
+from shaftwork.numerics.zeros import zero
 from shaftwork.results.observer import Array
 from shaftwork.results.turning import turning_points
 from shaftwork.sizing.motor_shaft import REST, SMALLEST, MotorShaft
 
-SAMPLES, FINE = 4001, 4 * float(np.finfo(float).eps)
-"""Times among which a speed is looked for, and how exactly its time is found."""
+SAMPLES = 4001
+"""Times among which a speed is looked for."""
 FLAT = 1e-14
 """A step in which the speed changes by no more than this part of the highest one is part of a plateau."""
 
@@ -29,17 +29,13 @@ def run_up(shaft: MotorShaft, share: float) -> float:
     return reached - _start(shaft, times[times <= reached])
 
 
-def _speed(shaft: MotorShaft, time: float) -> float:
-    return float(shaft.read(np.array([time]))[1][0])
-
-
 def _first(shaft: MotorShaft, times: Array, goal: float) -> float:
     """The first time at a speed in size."""
     after = int(np.argmax(np.abs(shaft.read(times)[1]) >= goal))
     if after == 0:
         return float(times[0])
     bracket = times[after - 1 : after + 1].tolist()
-    return float(brentq(lambda time: abs(_speed(shaft, time)) - goal, *bracket, xtol=1e-300, rtol=FINE))
+    return zero(lambda time: np.abs(shaft.read(time)[1]) - goal, *bracket)
 
 
 def _top(shaft: MotorShaft, marks: Array) -> float:
@@ -70,5 +66,5 @@ def _start(shaft: MotorShaft, times: Array) -> float:
     turned = np.flatnonzero(speeds[:-1] * speeds[1:] < 0)
     if turned.size:
         bracket = times[turned[-1] : turned[-1] + 2].tolist()
-        found.append(float(brentq(lambda time: _speed(shaft, time), *bracket, xtol=1e-300, rtol=FINE)))
+        found.append(zero(lambda time: shaft.read(time)[1], *bracket))
     return max(found)

@@ -8,17 +8,18 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from shaftwork.integrate.problem import Array
+from shaftwork.numerics.polynomials import radau_nodes, to_integrals, to_legendre, to_powers
 
 STAGES = 8
 
 # Gauss points of [-1, 1], where the values of all waves and states are kept, and their weights.
 POINTS, WEIGHTS = legendre.leggauss(STAGES)
 # Values at the points (k, s) times this are the coefficients (k, s) of the Legendre polynomials.
-LEGENDRE = np.linalg.inv(legendre.legvander(POINTS, STAGES - 1)).T
+LEGENDRE = to_legendre(POINTS).T
 # Values at the points to powers of xi. The powers of a polynomial of Legendre coefficients that decay are harmless.
-POWERS = np.linalg.inv(np.vander(POINTS, increasing=True)).T
+POWERS = to_powers(POINTS).T
 # Value at the panel's start and at the points to powers of xi: the collocation polynomial of a state.
-STATE_POWERS = np.linalg.inv(np.vander(np.append(-1.0, POINTS), increasing=True)).T
+STATE_POWERS = to_powers(np.append(-1.0, POINTS)).T
 # Value, slope and curvature in xi at both ends of a panel, from the values at the points.
 _DERIVATIVES = np.array([[1.0, 0.0, 0.0], *([1.0, k, k * (k - 1.0)] for k in range(1, STAGES))])
 RIGHT = POWERS @ _DERIVATIVES
@@ -45,18 +46,15 @@ class Scheme:
 
 
 def _scheme(points: Array) -> Scheme:
-    basis = legendre.legvander(points, STAGES - 1)
-    integrals = np.column_stack([legendre.legval(points, legendre.legint(row, lbnd=-1)) for row in np.eye(STAGES)])
-    whole = np.append(2.0, np.zeros(STAGES - 1))
-    inverse = np.linalg.inv(basis)
-    matrix = integrals @ inverse / 2
-    bring = (basis @ LEGENDRE.T).T
-    return Scheme((1 + points) / 2, matrix, whole @ inverse / 2 @ np.linalg.inv(matrix), bring, np.linalg.inv(bring))
+    matrix = to_integrals(points) / 2
+    over_panel = to_legendre(points)[0]  # half the integral of a Legendre series is its first coefficient
+    bring = (legendre.legvander(points, STAGES - 1) @ LEGENDRE.T).T
+    return Scheme((1 + points) / 2, matrix, over_panel @ np.linalg.inv(matrix), bring, np.asarray(np.linalg.inv(bring)))
 
 
 # Gauss keeps quadratic energies; Radau IIA forgets what is infinitely fast within one panel.
 GAUSS = _scheme(POINTS)
-RADAU = _scheme(np.append(legendre.legroots([*np.zeros(STAGES - 1), -1.0, 1.0]).real[:-1], 1.0))
+RADAU = _scheme(radau_nodes(STAGES))
 
 
 def squared(powers: Array, to: Array) -> Array:

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.lossless.collocation import GAUSS, POWERS, STAGES, STATE_POWERS, WEIGHTS
 from shaftwork.integrate.lossless.lines import DelayProblem, DelayTrajectory, Past, past_of
-from shaftwork.integrate.lossless.panel_maps import PanelMap
 from shaftwork.integrate.lossless.scales import RESOLVED, Scales, left_out
 from shaftwork.integrate.lossless.waveforms import WavePanels, trajectory
 from shaftwork.integrate.pieces import SmoothInterval, failure, pieces, start_of_piece
@@ -25,6 +24,76 @@ Numbers = NDArray[np.intp]
 LARGEST_BLOCK = 300
 # Times are the same up to this part of the period.
 ROUNDING = 1e-12
+# Numbers of so large a size show the matrices of an affine function without the rounding of its constant.
+PROBE = 2.0**40
+# They are seen so early in the first piece, at a share of it: later a law may have lost its value.
+EARLY = 1 / 1024
+
+
+@dataclass(frozen=True)
+class Matrices:
+    """A linear network between its delays: x' = A x + B h + u(t), v = C x + D h + e(t).
+
+    Args:
+        A: (n, n).
+        B: (n, q).
+        C: (q, n).
+        D: (q, q).
+    """
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+
+    @classmethod
+    def of(cls, problem: DelayProblem) -> Matrices:
+        """The matrices of a linear problem."""
+        n, q = problem.x0.size, 2 * problem.delays.size
+        piece = pieces(problem)[0]
+        t = np.full(2 * (n + q), piece.low + EARLY * (piece.high - piece.low))
+        both = PROBE * np.hstack([np.eye(n + q), -np.eye(n + q)])
+        slopes, speeds = (np.asarray(f(t, both[:n], both[n:])) for f in (problem.rhs, problem.speeds))
+        slopes, speeds = ((f[:, : n + q] - f[:, n + q :]) / (2 * PROBE) for f in (slopes, speeds))
+        return cls(slopes[:, :n], slopes[:, n:], speeds[:, :n], speeds[:, n:])
+
+
+@dataclass(frozen=True)
+class PanelMap:
+    """One panel: from start state and arriving waves, and from inputs at the nodes, to what they change.
+
+    Args:
+        step: (n + q s, n + q s) to the increment of the state over the panel and to 2 Z v at the nodes.
+        drive: (n + q s, (n + q) s) the same from u and e at the nodes.
+        inner: (n s, n + q s) to the increments of the state at the nodes.
+        inner_drive: (n s, (n + q) s).
+    """
+
+    step: Array
+    drive: Array
+    inner: Array
+    inner_drive: Array
+
+
+def panel_map(matrices: Matrices, twice: Array, length: float) -> PanelMap:
+    """The map of panels of a length in s, for ends of 2 Z = `twice` (q,) in N m s."""
+    n, q = len(matrices.A), len(twice)
+    a, stages = length * GAUSS.matrix, np.eye(STAGES)
+    inverse = np.linalg.inv(np.eye(n * STAGES) - np.kron(matrices.A, a))
+    from_state = np.kron(matrices.A, a.sum(axis=1)[:, None])
+    states = inverse @ np.hstack([from_state, np.kron(matrices.B, a)])
+    drives = inverse @ np.hstack([np.kron(np.eye(n), a), np.zeros((n * STAGES, q * STAGES))])
+    close = np.kron(np.eye(n), GAUSS.close[None, :])
+    to_speed = np.kron(matrices.C, stages)
+    doubled = np.repeat(twice, STAGES)[:, None]
+    direct = np.hstack([np.kron(matrices.C, np.ones((STAGES, 1))), np.kron(matrices.D, stages)])
+    direct_drive = np.hstack([np.zeros((q * STAGES, n * STAGES)), np.eye(q * STAGES)])
+    return PanelMap(
+        step=np.vstack([close @ states, doubled * (to_speed @ states + direct)]),
+        drive=np.vstack([close @ drives, doubled * (to_speed @ drives + direct_drive)]),
+        inner=states,
+        inner_drive=drives,
+    )
 
 
 @dataclass(frozen=True)
@@ -133,9 +202,9 @@ class Lattice:
             x = start_of_piece(self.problem, piece, x)
             inputs[low:high] = self.inputs(piece, low, high)
             drive = self.applied(inputs[low:high], np.arange(low, high), "drive")
-            found = self._blocks(low, x, waves[low : low + self.reach], drive)
-            starts[low:high], x = found[0][:-1], found[0][-1]
-            waves[low + self.reach : high + self.reach] = found[1]
+            solved, left = self._blocks(low, x, waves[low : low + self.reach], drive)
+            starts[low:high], x = solved[:-1], solved[-1]
+            waves[low + self.reach : high + self.reach] = left
             ends.append(x)
         arrived = -waves[np.arange(count)[:, None] + self.reach - self.lags, self.partners]
         numbers = np.arange(count)
@@ -167,8 +236,8 @@ class Lattice:
 
     def inside(self, panels: Numbers, starts: Array, arrived: Array, inputs: Array) -> Array:
         """States (m, n, s) at the Gauss points of some panels, from start states, history torques and inputs."""
-        known = np.hstack([starts, arrived.reshape(len(panels), -1)])
-        inner = self.applied(known, panels, "inner") + self.applied(inputs, panels, "inner_drive")
+        incoming = np.hstack([starts, arrived.reshape(len(panels), -1)])
+        inner = self.applied(incoming, panels, "inner") + self.applied(inputs, panels, "inner_drive")
         return np.asarray(starts[:, :, None] + inner.reshape(len(panels), -1, STAGES))
 
     def _blocks(self, first: int, x: Array, window: Array, drive: Array) -> tuple[Array, Array]:
@@ -219,14 +288,14 @@ class Lattice:
         waves = np.concatenate([window, np.empty((count, *window.shape[1:]))])
         states[0] = x
         lags = self.reach - self.lags
-        known = np.empty((self._n + self._q * STAGES, columns))
+        incoming = np.empty((self._n + self._q * STAGES, columns))
         for panel in range(count):
             arrived = waves[panel + lags, self.partners]
-            known[: self._n] = x
-            np.negative(arrived.reshape(-1, columns), out=known[self._n :])
-            change = self._maps[(first + panel) % self.size].step @ known
+            incoming[: self._n] = x
+            np.negative(arrived.reshape(-1, columns), out=incoming[self._n :])
+            change = self._maps[(first + panel) % self.size].step @ incoming
             change += drive[panel]
-            change += known
+            change += incoming
             # The wave that arrived leaves again but for what the end's motion adds, so little is rounded.
             x = states[panel + 1] = change[: self._n]
             waves[panel + self.reach] = change[self._n :].reshape(arrived.shape)

@@ -13,12 +13,11 @@ from shaftwork.integrate.engines import WAVE
 from shaftwork.integrate.guards import GuardWatch
 from shaftwork.integrate.lossless.collocation import GAUSS, LEFT, POWERS, RADAU, RIGHT, STATE_POWERS, Scheme
 from shaftwork.integrate.lossless.lines import DelayProblem, Lines, past_of
-from shaftwork.integrate.lossless.panels import WaveHistory
-from shaftwork.integrate.lossless.restriction import Restriction
 from shaftwork.integrate.lossless.scales import RESOLVED, Scales, left_out
 from shaftwork.integrate.lossless.stages import CollocationStages
-from shaftwork.integrate.lossless.waveforms import Polynomials, StatesDense, Still, WavePanels
-from shaftwork.integrate.pieces import failure, pieces, reached, start_of_piece
+from shaftwork.integrate.lossless.wave_history import WaveHistory
+from shaftwork.integrate.lossless.waveforms import Polynomials, Restriction, StatesDense, WavePanels
+from shaftwork.integrate.pieces import PiecewiseDense, failure, pieces, reached, start_of_piece
 from shaftwork.integrate.problem import Array, Trajectory
 
 # The shortest panel takes this part of rtol times the shortest delay.
@@ -171,17 +170,17 @@ class March:
         arrived, cut = self._history.arriving(start, length, RESOLVED * tolerance)
         if cut is not None and not short:
             return cut
-        found = self._solve(GAUSS, start, length, arrived)
-        if found is None or not self._resolves(found):
+        panel = self._solve(GAUSS, start, length, arrived)
+        if panel is None or not self._resolves(panel):
             if not short:
                 return start + length / 2
             if self._floor > self._rtol * self._shortest:
                 raise self._failure(start, "a layer is too narrow to be resolved so late in so long a run")
-            found = self._solve(RADAU, start, length, arrived)
+            panel = self._solve(RADAU, start, length, arrived)
             self._layers += 1
-        if found is None:
+        if panel is None:
             raise self._failure(start, self._equations.stages.reason)
-        return self._guarded(found, short=short)
+        return self._guarded(panel, short=short)
 
     def _resolves(self, panel: _Panel) -> bool:
         """Whether a panel leaves out less than the tolerance, between the Gauss points and before the first one."""
@@ -199,10 +198,10 @@ class March:
     def _solve(self, scheme: Scheme, start: float, length: float, arrived: Array) -> _Panel | None:
         """A panel; None where there is no solution or it is not finite."""
         h, stages = arrived if scheme is GAUSS else arrived @ scheme.bring, self._equations.stages
-        found = stages.solve(scheme, start, length, self._x, self._equations.scales.states, h, self._trend)
-        if found is None:
+        solution = stages.solve(scheme, start, length, self._x, self._equations.scales.states, h, self._trend)
+        if solution is None:
             return None
-        x, v = found
+        x, v = solution
         rows = np.concatenate([self._twice * v + h, x])
         if not math.isfinite(rows.sum()):
             stages.reason = "the speed of a line's end is not finite"
@@ -278,7 +277,7 @@ class March:
     def panels(self) -> tuple[WavePanels, dict[str, int]]:
         """All panels since the start, and their statistics."""
         history = self._history
-        found = WavePanels(
+        panels = WavePanels(
             np.array(history.starts[self._past :]),
             np.array(history.lengths[self._past :]),
             np.array(self._states),
@@ -286,7 +285,7 @@ class March:
             tuple(self._span.passed),
             self._merge,
         )
-        return found, {"steps": len(self._states), **self._equations.stages.counts, "layers": self._layers}
+        return panels, {"steps": len(self._states), **self._equations.stages.counts, "layers": self._layers}
 
     def left(self) -> Polynomials:
         """(q,) polynomials of all waves that have left the ends, also before the start."""
@@ -301,7 +300,8 @@ class March:
         end = np.concatenate([self._x, self.arriving(span.t)])
         count, size = len(self._states) - span.first, self._x.size
         if not count:
-            steps, still = np.array([span.t]), Still(end[: size + self._ends], span.t)
+            instant, row = np.array([span.t]), end[: size + self._ends]
+            still = PiecewiseDense(instant, (lambda times: np.tile(row, (times.size, 1)),), instant, row.size)
             return Trajectory(np.empty(0), np.empty((0, size + self._ends)), still, {}, met=span.met, end=(span.t, end))
         first = self._past + span.first
         starts, lengths = (np.array(each[first:]) for each in (self._history.starts, self._history.lengths))

@@ -13,7 +13,7 @@ from shaftwork.integrate.problem import Array
 
 # Periods of the first leap. It is marched, since every rounding of it is doubled with every power.
 LEAP = 256
-# Motions that are marched side by side, from their leaps' ends to the panels asked.
+# Motions that are marched side by side, from their leaps' ends to the panels to be read.
 SIDE_BY_SIDE = 64
 
 
@@ -103,15 +103,15 @@ class Far:
         """Integrals (k, q) over the last delay of the squared wave that leaves each end, up to times (k,)."""
         panels = self._lattice.panels(times)
         late = panels >= self._leaps.first
-        found = np.empty((times.size, self._lattice.partners.size))
-        found[~late] = self._near.squares(times[~late])
+        squares = np.empty((times.size, self._lattice.partners.size))
+        squares[~late] = self._near.squares(times[~late])
         if late.any():
             run, index, place = self._panels_at(times[late], panels[late])
             lengths = self._lattice.lengths[run.numbers[index] % self._lattice.size]
             left, came = (squared((rows @ POWERS)[index], place) for rows in (run.waves, run.arrived))
             # What arrives at an end is what left its partner a delay before.
-            found[late] = run.squares[index] + (left - came[:, self._lattice.partners]) * lengths[:, None] / 2
-        return found
+            squares[late] = run.squares[index] + (left - came[:, self._lattice.partners]) * lengths[:, None] / 2
+        return squares
 
     def all(self, times: Array) -> tuple[Array, Array, Array]:
         """States (k, n), history torques (k, q) and speeds (k, q) at times (k,)."""

@@ -75,7 +75,7 @@ def left_out(rows: Array, starts: Array) -> Array:
     """
     sizes = np.abs(rows @ LEGENDRE)
     last, before = sizes[..., -2:].max(axis=-1), sizes[..., -4:-2].max(axis=-1)
-    found = last * np.minimum(last, before) / np.maximum(before, np.finfo(float).tiny)
+    rest = last * np.minimum(last, before) / np.maximum(before, np.finfo(float).tiny)
     ends = rows.shape[-2] - starts.shape[-1]
-    found[..., ends:] = np.maximum(found[..., ends:], np.abs(rows[..., ends:, :] @ LEFT[:, 0] - starts))
-    return np.asarray(found)
+    rest[..., ends:] = np.maximum(rest[..., ends:], np.abs(rows[..., ends:, :] @ LEFT[:, 0] - starts))
+    return np.asarray(rest)

@@ -80,9 +80,9 @@ class CollocationStages:
         """
         rates = (stages - x[:, None]) @ _TO_RATES / length
         times = np.clip([start, start + length], self._low, self._high)
-        found = self._problem.rhs(times, np.column_stack([x, end]), h @ _ENDS)
+        slopes = self._problem.rhs(times, np.column_stack([x, end]), h @ _ENDS)
         self.counts["rhs"] += 2
-        return np.asarray(np.abs(found - rates @ _ENDS).max(axis=1) * length * UNSEEN)
+        return np.asarray(np.abs(slopes - rates @ _ENDS).max(axis=1) * length * UNSEEN)
 
     def _newton(
         self, scheme: Scheme, times: Array, length: float, x: Array, largest: Array, h: Array, trend: Array

@@ -1,4 +1,4 @@
-"""Dense output: states and waves that are polynomials in each panel."""
+"""States and waves as polynomials in each panel: dense output, and the part of a panel before a guard."""
 
 from __future__ import annotations
 
@@ -40,6 +40,43 @@ class Polynomials:
         return np.asarray(np.einsum("krp,kp->kr", self.powers[index], powers))
 
 
+class Restriction:
+    """States, and behind them what arrives, in one panel: times (k,) in s to (k, n + q).
+
+    Args:
+        start: of the panel in s.
+        length: of the panel in s.
+        x: (n,) state at its start.
+        rows: (q + n, s) waves that leave, then states at the Gauss points.
+        arrived: (q, s) history torques there.
+    """
+
+    def __init__(self, start: float, length: float, x: Array, rows: Array, arrived: Array) -> None:
+        self._start, self._length, ends = start, length, len(arrived)
+        self._waves, self._arrived = rows[:ends] @ POWERS, arrived @ POWERS
+        self._states = np.column_stack([x, rows[ends:]]) @ STATE_POWERS
+
+    def __call__(self, times: Array) -> Array:
+        places = 2 * (np.atleast_1d(times) - self._start) / self._length - 1
+        powers = np.vander(places, STAGES + 1, increasing=True)
+        return np.hstack([powers @ self._states.T, powers[:, :STAGES] @ self._arrived.T])
+
+    def at(self, time: float) -> Array:
+        """(n + q,) at one time in s."""
+        return np.asarray(self(np.array([time]))[0])
+
+    def arriving(self, place: float) -> Array:
+        """(q,) what arrives at a place of [-1, 1]."""
+        return np.asarray(self._arrived @ place ** np.arange(STAGES))
+
+    def up_to(self, length: float) -> tuple[Array, Array, Array]:
+        """The part of the panel of a length in s: the state (n,) at its end, rows and what arrives as in the panel."""
+        share = length / self._length
+        powers = np.vander(np.append((1 + POINTS) * share - 1, 2 * share - 1), STAGES + 1, increasing=True).T
+        states, waves = self._states @ powers, self._waves @ powers[:STAGES, :-1]
+        return states[:, -1], np.concatenate([waves, states[:, :-1]]), self._arrived @ powers[:STAGES, :-1]
+
+
 @dataclass(frozen=True)
 class StatesDense:
     """Dense output of the states.
@@ -54,27 +91,6 @@ class StatesDense:
 
     def __call__(self, times: Array) -> Array:
         return self.states(np.atleast_1d(np.asarray(times, dtype=float)))
-
-
-@dataclass(frozen=True)
-class Still:
-    """Dense output of a span without any length, whose end is its start.
-
-    Args:
-        x: (n,) the states.
-        t: s.
-    """
-
-    x: Array
-    t: float
-
-    @property
-    def steps(self) -> Array:
-        """The one time."""
-        return np.array([self.t])
-
-    def __call__(self, times: Array) -> Array:
-        return np.tile(self.x, (np.atleast_1d(times).size, 1))
 
 
 @dataclass(frozen=True)
@@ -96,13 +112,13 @@ class Left:
         """
         waves = self.waves
         whole = squared(waves.powers, np.ones(len(waves.starts))) * waves.lengths[:, None] / 2
-        found = np.empty((times.size, waves.powers.shape[1]))
+        integrals = np.empty((times.size, waves.powers.shape[1]))
         last, late = self._begun(times)
         for delay, ends in zip(self.lines.delays, self.lines.ends, strict=True):
             first, early = self._begun(times - delay)
             rows = np.array([whole[low:high, ends].sum(axis=0) for low, high in zip(first, last, strict=True)])
-            found[:, ends] = rows + (late - early)[:, ends]
-        return found
+            integrals[:, ends] = rows + (late - early)[:, ends]
+        return integrals
 
     def _begun(self, times: Array) -> tuple[NDArray[np.intp], Array]:
         """The panels (k,) in which times lie, and the integrals (k, q) of squares from their starts up to the times."""

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.hermite import BEYOND, apart, inner
+from shaftwork.numerics.hermite import BEYOND, apart, inner, quintic
+from shaftwork.numerics.zeros import Chosen, zeros
 
 NEARLY = 0.1
 """Of the range: so near to the top a peak and a dip between the same two samples are looked for."""
@@ -108,38 +109,20 @@ def peak(left: Array, right: Array) -> tuple[Array, Array]:
         right: likewise, later.
     """
     length = right[0] - left[0]
-    y0, y1 = left[1], right[1]
-    v0, v1 = left[2] * length, right[2] * length
-    a0, a1 = left[3] * length**2, right[3] * length**2
-    rise = y1 - y0
-    quintic = (
-        6 * rise - 3 * (v0 + v1) - (a0 - a1) / 2,
-        -15 * rise + 8 * v0 + 7 * v1 + (3 * a0 - 2 * a1) / 2,
-        10 * rise - 6 * v0 - 4 * v1 - (3 * a0 - a1) / 2,
-        a0 / 2,
-        v0,
-        y0,
-    )
-    slope = [power * c for power, c in zip(range(5, 0, -1), quintic, strict=False)]
+    powers = quintic(length, left[1:], right[1:])
+    slope = [power * c for power, c in zip(range(5, 0, -1), powers, strict=False)]
     bend = [power * c for power, c in zip(range(4, 0, -1), slope, strict=False)]
     places = np.linspace(0.0, 1.0, PLACES)[:, None]
-    heights, slopes = _horner(quintic, places), _horner(slope, places)
+    heights, slopes = _horner(powers, places), _horner(slope, places)
     turns = (slopes[:-1] > 0) & (slopes[1:] < 0)
     first = np.where(turns, np.maximum(heights[:-1], heights[1:]), -np.inf).argmax(axis=0)
-    u = _falling(slope, bend, places[first, 0], places[first + 1, 0])
-    height = np.where(turns.any(axis=0), _horner(quintic, u), -np.inf)
+
+    def slopes_at(chosen: Chosen, u: Array) -> tuple[Array, Array]:
+        return _horner([c[chosen] for c in slope], u), _horner([c[chosen] for c in bend], u)
+
+    u = zeros(slopes_at, places[first, 0], places[first + 1, 0], rising=False, iterations=NEWTON)
+    height = np.where(turns.any(axis=0), _horner(powers, u), -np.inf)
     return left[0] + np.clip(u, INSIDE, 1.0 - INSIDE) * length, height
-
-
-def _falling(slope: list[Array], bend: list[Array], low: Array, high: Array) -> Array:
-    """Where a polynomial falls through zero between two places (c,): Newton's steps, halves where they leave."""
-    u = low + (high - low) / 2
-    for _ in range(NEWTON):
-        value, bends = _horner(slope, u), _horner(bend, u)
-        low, high = np.where(value > 0, u, low), np.where(value > 0, high, u)
-        new = u - value / np.where(bends < 0, bends, -np.inf)
-        u = np.where((bends < 0) & (new >= low) & (new <= high), new, low + (high - low) / 2)
-    return u
 
 
 def _horner(coefficients: tuple[Array, ...] | list[Array], u: Array) -> Array:
@@ -213,20 +196,11 @@ def _hidden(t: Array, jets: Array, until: Index, there: There) -> tuple[list[int
 
 
 def _rise(low: Array, high: Array, at: Index, own: Index, there: There) -> Array:
-    """Times (c,) of a rise between two times (c,): Newton's steps, halves where they leave."""
-    u, on = low + (high - low) / 2, np.ones(low.size, dtype=bool)
-    nothing, low, high = ROUNDING * (np.abs(high) + ROUNDINGS * (high - low)), low.copy(), high.copy()
-    for _ in range(MOST_ITERATIONS):
-        value, slope, _ = there(at[on], own[on], u[on])
-        low[on] = np.where(value <= 0.0, u[on], low[on])
-        high[on] = np.where(value > 0.0, u[on], high[on])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            new = u[on] - value / slope
-        inside = (new >= low[on]) & (new <= high[on]) & (slope > 0)
-        new = np.where(inside, new, low[on] + (high[on] - low[on]) / 2)
-        moved = np.abs(new - u[on])
-        u[on] = new
-        on[on] = np.minimum(moved, high[on] - low[on]) > nothing[on]
-        if not on.any():
-            break
-    return np.asarray(u)
+    """Times (c,) of a rise between two times (c,)."""
+
+    def course(chosen: Chosen, times: Array) -> tuple[Array, Array]:
+        value, slope, _ = there(at[chosen], own[chosen], times)
+        return value, slope
+
+    nothing = ROUNDING * (np.abs(high) + ROUNDINGS * (high - low))
+    return zeros(course, low, high, iterations=MOST_ITERATIONS, xtol=nothing)

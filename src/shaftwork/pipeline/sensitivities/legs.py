@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import brentq
 from sympy import Expr
 
 from shaftwork.codegen.differentiation import Differentiated
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.timeline import Timeline
 from shaftwork.core.errors import SimulationError
+from shaftwork.numerics.zeros import LOOKS, zero
 from shaftwork.pipeline.analysis import Given
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.model import Model
@@ -27,8 +27,6 @@ from shaftwork.pipeline.phases.solution import solution
 from shaftwork.pipeline.start import start_of
 from shaftwork.results.solution import Solution
 
-LOOKS = np.array([0.0, 0.004, 0.07, 0.19, 0.31, 0.42, 0.53, 0.61, 0.74, 0.83, 0.91, 0.996])
-"""Where in a step switches of laws are looked at: at no regular places, which a motion might share."""
 SILENT = 1e-12
 """What stays within this part of its largest size is on no side: it has not changed it."""
 ASIDE = 4
@@ -97,21 +95,16 @@ def _turned(leg: Leg, equations: Differentiated) -> Iterator[tuple[float, int]]:
     """Time and number of every switch of a law because of the motion."""
     if not equations.turns:
         return
-    times = np.append((leg.steps[:-1, None] + np.diff(leg.steps)[:, None] * LOOKS).ravel(), leg.end)
+    times = np.append((leg.steps[:-1, None] + np.diff(leg.steps)[:, None] * np.append(0.0, LOOKS)).ravel(), leg.end)
     values = equations.turning(*leg.read(times), leg.p)
     for number, column in enumerate(values.T):
         sided = np.flatnonzero(np.abs(column) > SILENT * np.abs(column).max(initial=0.0))
         for k in np.flatnonzero(np.diff(np.sign(column[sided]))).tolist():
-            yield _root(leg, equations, number, times[sided[k : k + 2]]), number
 
+            def course(t: Array, number: int = number) -> Array:
+                return np.asarray(equations.turning(*leg.read(t), leg.p)[:, number])
 
-def _root(leg: Leg, equations: Differentiated, number: int, between: Array) -> float:
-    """The time of a switch between two times (2,), in s."""
-
-    def value(t: float) -> float:
-        return float(equations.turning(*leg.read(np.array([t])), leg.p)[0, number])
-
-    return float(brentq(value, *between, xtol=np.finfo(float).tiny, rtol=4 * np.finfo(float).eps))
+            yield zero(course, *times[sided[k : k + 2]].tolist()), number
 
 
 def _beside(

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import brentq
 from sympy import Expr, Symbol
 
 from shaftwork.codegen.differentiation import Differentiated, ValueWithSlopes
@@ -14,6 +13,7 @@ from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import AccuracyWarning, ParameterError, SimulationError
 from shaftwork.core.notices import warn
 from shaftwork.integrate.variation import Coefficients, Variation, variation
+from shaftwork.numerics.zeros import zero
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.hybrid_state import Change
 from shaftwork.pipeline.sensitivities.carrying import End, SensitivityTransfer
@@ -206,7 +206,7 @@ class MotionSlopes:
         aside = BESIDE * (leg.steps[k] - leg.steps[k - 1])
         low, high = max(t - aside, leg.low), min(t + aside, leg.high)
         if self._rate(quantity, leg, low) * self._rate(quantity, leg, high) < 0:
-            return float(brentq(lambda time: self._rate(quantity, leg, time), low, high, xtol=aside * ON_IT))
+            return zero(lambda time: np.array([self._rate(quantity, leg, time[0])]), low, high, xtol=aside * ON_IT)
         return t
 
     def _shown(self, quantity: str, leg: Leg) -> ValueWithSlopes:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.shafts.exact_modes import LineModes, modes, modes_below, natural_frequencies
 from shaftwork.shafts.line import Array, End, Section, SectionLine
+from tests.reference.line_modes import LineModes, modes, modes_below, natural_frequencies
 
 SHAFT = Section.of_geometry(1.0, 0.02)
 STEPPED = tuple(Section.of_geometry(0.1 + 0.2 * i, 0.02 + 0.03 * (i % 2)) for i in range(4))

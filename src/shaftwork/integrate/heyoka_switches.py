@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.integrate.problem import Array
+from shaftwork.numerics.zeros import LOOKS
 
 # So many steps in a row, each shorter than this part of the whole time, are chatter and not motion.
 CHATTER_STEPS, CHATTER_SPAN = 200, 1e-9
@@ -22,8 +23,8 @@ EARLY = (1e-4, 1e-2, 1e-1)
 
 # Where in a piece switches of the time are read: a law that touches its threshold does so in the middle, if anywhere.
 SOMEWHERE = 0.381966
-# Where in a step the sides of the switches are looked at: at no regular places, which a wave might share.
-INSIDE = np.array([0.07, 0.19, 0.31, 0.42, 0.53, 0.61, 0.74, 0.83, 0.91, 1.0])
+# Where in a step the sides of the switches are looked at, its end included.
+INSIDE = np.append(LOOKS[1:-1], 1.0)
 
 
 def settle(program: Any, integrator: Any, horizon: float) -> None:
@@ -46,19 +47,19 @@ def settle(program: Any, integrator: Any, horizon: float) -> None:
         return
     signs[:] = program.switch_signs(integrator.time, integrator.state, parameters, timed * program.timed)
     if (near := _within_rounding(program, integrator) & ~program.timed).any():
-        kept = signs.copy()
+        before = signs.copy()
         signs[near] = 0.0
-        found = _early_signs(program, integrator, horizon)
-        signs[:] = np.where(near & (found != 0.0), found, kept)
+        early = _early_signs(program, integrator, horizon)
+        signs[:] = np.where(near & (early != 0.0), early, before)
         _enter(program, integrator, signs)
     for _ in range(signs.size):
         zero = (signs == 0.0) & ~program.timed
         if not zero.any():
             return
-        found = np.where(zero, _early_signs(program, integrator, horizon), signs)
-        if np.array_equal(found, signs):
+        settled = np.where(zero, _early_signs(program, integrator, horizon), signs)
+        if np.array_equal(settled, signs):
             return
-        signs[:] = found
+        signs[:] = settled
         _enter(program, integrator, signs)
 
 
@@ -87,8 +88,8 @@ def _early_signs(program: Any, integrator: Any, horizon: float) -> Array:
     step = integrator.time - start
     signs = np.zeros(len(program.switches))
     times = start + np.outer(EARLY, (0.5, 1.0)).ravel() * step
-    found = np.sign(_in_step(program, integrator, times, parameters))
-    for first, second in zip(found.T[::2], found.T[1::2], strict=True):
+    sides = np.sign(_in_step(program, integrator, times, parameters))
+    for first, second in zip(sides.T[::2], sides.T[1::2], strict=True):
         signs = np.where((signs == 0.0) & (first == second), second, signs)  # rounding would have no steady sign
     integrator.time = start
     integrator.state[:] = state
@@ -100,9 +101,9 @@ def _early_signs(program: Any, integrator: Any, horizon: float) -> Array:
 def _in_step(program: Any, integrator: Any, times: Array, parameters: Array) -> Array:
     """Values of the switches (switches, k) at times (k,) in s within the last step."""
     states = [integrator.update_d_output(time).copy() for time in times.tolist()]
-    given = np.empty((parameters.size, times.size))
-    given[:] = parameters[:, None]
-    return np.asarray(program.switch_values(times, np.ascontiguousarray(np.transpose(states)), given))
+    columns = np.empty((parameters.size, times.size))
+    columns[:] = parameters[:, None]
+    return np.asarray(program.switch_values(times, np.ascontiguousarray(np.transpose(states)), columns))
 
 
 def keeps_sides(program: Any, integrator: Any, parameters: Array, start: float) -> bool:
@@ -179,12 +180,13 @@ class SwitchWatch:
         past = inside < 0.0
         cooling = integrator.te_cooldowns[: past.size]
         cooled: list[int] = np.flatnonzero(self._cooled > self._last).tolist()
-        for number in (k for k, found in enumerate(cooling) if found is not None):
-            passed, whole = cooling[number]
-            self._cooled[number] = integrator.time - passed + whole
+        for number, cooldown in enumerate(cooling):
+            if cooldown is not None:
+                passed, whole = cooldown
+                self._cooled[number] = integrator.time - passed + whole
         if past.any():
             # Right at its event (heyoka still "cools" it down) a switch may be on the wrong side by rounding.
-            past &= [found is None for found in cooling]
+            past &= [cooldown is None for cooldown in cooling]
             # In a step too short for heyoka to see an event a switch is past it by that step, and has just turned too.
             wrong &= past & (integrator.time - self._last >= self._short)
             # A speed that dies away turns while heyoka still cools its last turn down: wrong only where it matters.
@@ -233,19 +235,17 @@ class SwitchWatch:
     def _is_held(self, integrator: Any, number: int) -> bool:
         """Whether the motion on either side of a switch comes back to it: neither as a touch, nor along it."""
         time, state, program = integrator.time, integrator.state, self._program
-        ways = []
+        speeds = []
         for side in (1.0, -1.0):
             pars = integrator.pars.copy()
             pars[self._signs.start + number] = side
             later = state + self._short * program.slopes(time, state, pars)
-            values = (
-                program.switch_values(t, x, pars)[number] for t, x in ((time, state), (time + self._short, later))
-            )
-            here, there = values
-            ways.append(side * (there - here))
-        return bool(max(ways) < -BACK * max(map(abs, ways)) < 0.0)
+            here = program.switch_values(time, state, pars)[number]
+            there = program.switch_values(time + self._short, later, pars)[number]
+            speeds.append(side * (there - here))
+        return bool(max(speeds) < -BACK * max(map(abs, speeds)) < 0.0)
 
     def _ended_at_a_switch(self, integrator: Any) -> bool:
         """Whether the last step ended where a switch passed through zero."""
-        cooling = (found for found in integrator.te_cooldowns[: len(self._program.switches)] if found is not None)
-        return any(passed == 0.0 for passed, _ in cooling)
+        cooldowns = integrator.te_cooldowns[: len(self._program.switches)]
+        return any(cooldown is not None and cooldown[0] == 0.0 for cooldown in cooldowns)

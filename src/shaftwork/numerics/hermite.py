@@ -27,3 +27,17 @@ def inner(length: Any, left: Any, right: Any) -> tuple[Any, Any, Any, Any]:
 def apart(length: Any, left: Any, right: Any) -> Any:
     """So much it is above the cubic through the values and the first derivatives, in the middle; for `BEYOND`."""
     return (left[1] - right[1]) * (length * (1 / 32)) + (left[2] + right[2]) * (length * length * (1 / 64))
+
+
+def quintic(length: Any, left: Any, right: Any) -> tuple[Any, ...]:
+    """Its coefficients, the highest power first, of the share of the interval; arguments as for `inner`."""
+    (y0, v0, a0), (y1, v1, a1) = ((y, v * length, a * length**2) for y, v, a in (left, right))
+    rise = y1 - y0
+    return (
+        6 * rise - 3 * (v0 + v1) - (a0 - a1) / 2,
+        -15 * rise + 8 * v0 + 7 * v1 + (3 * a0 - 2 * a1) / 2,
+        10 * rise - 6 * v0 - 4 * v1 - (3 * a0 - a1) / 2,
+        a0 / 2,
+        v0,
+        y0,
+    )

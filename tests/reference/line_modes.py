@@ -1,4 +1,7 @@
-"""Natural frequencies and mode shapes of lossless lines, from the transcendental equation: exact, and none missed."""
+"""An independent reference: modes of lossless lines from the transcendental equation, exact, and none missed.
+
+It shares only the description of a line with the library, whose `modes(exact=True)` searches the complex plane instead.
+"""
 
 from __future__ import annotations
 

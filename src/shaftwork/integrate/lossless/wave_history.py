@@ -85,10 +85,10 @@ class WaveHistory:
             chosen = index == number
             points = 2 * (times[chosen] - starts[number]) / lengths[number] - 1
             arrived[:, chosen] = -_values(self.waves[panels[number]][rows], points)
-        known = (np.array(starts)[:, None] + np.multiply.outer(lengths, (1 + POINTS) / 2)).ravel()
+        nodes = (np.array(starts)[:, None] + np.multiply.outer(lengths, (1 + POINTS) / 2)).ravel()
         values = np.concatenate([self.waves[k][rows] for k in panels], axis=1)
-        inside = (known >= low) & (known <= high)
-        points = 2 * (known[inside] - low) / (high - low) - 1
+        inside = (nodes >= low) & (nodes <= high)
+        points = 2 * (nodes[inside] - low) / (high - low) - 1
         return arrived, np.abs(_values(arrived, points) + values[:, inside])
 
     def _divide(self, low: float, high: float, span: tuple[int, int]) -> float:

@@ -1,0 +1,1 @@
+"""Polynomials, collocation tables and searches for zeros that all stages share; nothing here knows a drive train."""
