@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from shaftwork.core.kept import Kept
 from shaftwork.core.notices import PulsationWarning, muted
 from shaftwork.core.parameters import in_si
 from shaftwork.integrate import choice
-from shaftwork.integrate.engines import available
+from shaftwork.integrate.engines import EngineName, available
 from shaftwork.integrate.problem import Fractions, LinearInputs, Problem, Trajectory
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.accuracy import with_accuracy
@@ -59,7 +59,6 @@ VARIANTS = 8
 """Models of other structure, and choices of an engine, that are kept for later calls."""
 SIMILAR = 5.0
 """An engine suits parameters that differ by less than this factor too: looking anew would cost more than the run."""
-EngineName = Literal["auto", "scipy", "scipy-radau", "heyoka", "sundials", "exact", "banded", "wave"]
 
 
 class Model(CompiledModel):
