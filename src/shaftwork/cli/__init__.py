@@ -16,7 +16,7 @@ from typing import Any
 from shaftwork.cli import frequencies, inspection, run, studies
 from shaftwork.cli.command import Command
 from shaftwork.core.errors import ShaftworkError, SimulationError
-from shaftwork.core.hints import VALUES, on_the_command_line
+from shaftwork.core.notices import VALUES, on_the_command_line
 
 DONE, FAILED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 COMMANDS: tuple[Command, ...] = (

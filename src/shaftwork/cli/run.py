@@ -19,8 +19,7 @@ from shaftwork.cli.command import (
 )
 from shaftwork.cli.folder import Folder, write_picture, write_rows
 from shaftwork.core.domains import DOMAINS
-from shaftwork.core.progress import progress
-from shaftwork.core.screen import counted
+from shaftwork.core.screen import counted, progress
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

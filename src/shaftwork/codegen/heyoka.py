@@ -18,8 +18,8 @@ from shaftwork.codegen.fixed import Fixed
 from shaftwork.codegen.heyoka_held import HeldParameters
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.components.pieces import parts
+from shaftwork.core.calls import interruptible
 from shaftwork.core.errors import MissingExtraError
-from shaftwork.core.interruption import interruptible
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from shaftwork.codegen.elements import Array
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.slopes import jumps
 from shaftwork.core.errors import SimulationError
-from shaftwork.core.hints import hint
+from shaftwork.core.notices import hint
 
 NEARBY = 1e-9
 """A law is looked at so far to both sides of the point, as a fraction of it, to see whether it jumps there."""

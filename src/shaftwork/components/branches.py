@@ -14,7 +14,7 @@ from typing import Any
 
 from sympy import Expr, Function, Integer, S, Symbol
 
-from shaftwork.core.declarations import is_label, is_pair, refuse_fields
+from shaftwork.core.parameters import is_label, refuse_fields
 
 ACROSS = Symbol("across", real=True)
 """The across variable of the branch in whose law it stands."""
@@ -69,6 +69,16 @@ def readings_in(law: Expr) -> tuple[Symbol, ...]:
 
 End = str | None
 """A port or an inner node of the component; None is the reference of the domain (speed zero)."""
+
+
+def is_end(value: Any) -> bool:
+    """Whether it can be an end of a branch: the name of a port, or None for the reference."""
+    return value is None or is_label(value)
+
+
+def is_pair(value: Any) -> bool:
+    """Whether it can be the two ends of a branch."""
+    return isinstance(value, tuple | list) and len(value) == 2 and all(map(is_end, value))
 
 
 _PAIR = "None for the first two ports, or a pair of ports such as ('a', 'b'), where None is the reference"

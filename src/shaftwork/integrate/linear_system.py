@@ -11,7 +11,7 @@ from scipy import sparse
 from scipy.linalg import expm
 from scipy.sparse.linalg import expm_multiply
 
-from shaftwork.core.interruption import interruptible
+from shaftwork.core.calls import interruptible
 from shaftwork.integrate.modal import Eigensystem, find_modes
 from shaftwork.integrate.problem import Array, LinearInputs
 from shaftwork.integrate.stiffness import balance, norm, scale_by

@@ -11,9 +11,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from shaftwork.core.calls import unprinted
 from shaftwork.core.errors import MissingExtraError
 from shaftwork.core.notices import FILTERS
-from shaftwork.core.quiet import unprinted
 from shaftwork.integrate.chebyshev import Polynomial, points
 from shaftwork.integrate.crossings import Crossings
 from shaftwork.integrate.engines import ENGINES

@@ -9,8 +9,8 @@ from shaftwork.components.base import Component, Port, Profile, Signal
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, End, named_in
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import ANEW, Modes
-from shaftwork.core.declarations import is_label
 from shaftwork.core.domains import ROTATION
+from shaftwork.core.parameters import is_label
 from shaftwork.network.kinds import Kind
 from shaftwork.network.templates import BranchTemplate, Template
 

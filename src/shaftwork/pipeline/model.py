@@ -18,7 +18,7 @@ from shaftwork.codegen.operating import steady_state
 from shaftwork.codegen.start_values import initial_state
 from shaftwork.codegen.switching import Switching
 from shaftwork.codegen.valueless import refuse_vanishing, rough, without_value
-from shaftwork.core.callbacks import Callback
+from shaftwork.core.calls import Callback
 from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.core.kept import Kept
 from shaftwork.core.notices import PulsationWarning, muted
