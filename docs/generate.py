@@ -37,7 +37,7 @@ from typing import Any
 from unittest import mock
 
 from shaftwork.cli import main as command_line
-from shaftwork.components import REGISTRY, Component, Port
+from shaftwork.components import FAMILIES, REGISTRY, Component, Port
 from shaftwork.core.parameters import Parameter
 from shaftwork.scenes import SCENES
 from shaftwork.studies.stability import Stability, stability
@@ -52,25 +52,6 @@ HIDDEN = re.compile(r"<!-- python\n(?P<code>.*?)-->|<!--=(?P<expression>.*?)-->(
 """Code that runs, and figures that are computed, between the blocks."""
 OUTPUT = ("text", "toml", "latex", "c")
 """Languages of the blocks that hold what the block before them printed."""
-FAMILIES = (
-    "rotation",
-    "lossy_gear",
-    "contacts",
-    "friction",
-    "shafts",
-    "translation",
-    "sources",
-    "loads",
-    "bucket_wheel",
-    "machines",
-    "motors",
-    "drives",
-    "controllers",
-    "induction_machine",
-    "bldc",
-    "electrical",
-)
-"""The modules of components in the order in which they are shown."""
 ROUNDING = 1e-8
 """Errors below this are not told apart: they are rounding, which differs from one machine to the next."""
 MACHINE = re.compile(r"^\d+(?= steps[,;])|(?<=; energy residual )\S+(?= of the work done)", re.MULTILINE)
