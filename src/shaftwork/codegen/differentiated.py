@@ -12,7 +12,7 @@ from sympy import Expr, Symbol
 from shaftwork.codegen.derivatives import SlopeMatrix, Values
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.state_transfer_jacobian import StateTransferJacobian
-from shaftwork.components.laws import switches, switches_of
+from shaftwork.components.discontinuities import switches, switches_of
 from shaftwork.components.laws import t as TIME
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.rows import Rows

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from shaftwork.codegen.fixed import Fixed
 from shaftwork.codegen.heyoka_held import HeldParameters
+from shaftwork.components.discontinuities import parts
 from shaftwork.components.noise import HeldNoise, SmoothNoise
-from shaftwork.components.pieces import parts
 from shaftwork.core.calls import interruptible
 from shaftwork.core.errors import MissingExtraError
 

@@ -17,7 +17,7 @@ from shaftwork.codegen.fixed import Fixed
 from shaftwork.codegen.heyoka_cache import keep_apart
 from shaftwork.codegen.heyoka_held import Held
 from shaftwork.components import noise
-from shaftwork.components.laws import between_steps
+from shaftwork.components.discontinuities import between_steps
 from shaftwork.components.noise import HeldNoise
 from shaftwork.components.slopes import wraps
 from shaftwork.components.tables import Interpolation, InterpolationSlope

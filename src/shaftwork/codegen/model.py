@@ -17,7 +17,7 @@ from shaftwork.codegen.arrays import ArrayProgram, BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.runs import MachineCode, RunProgram
 from shaftwork.codegen.scalar import ScalarProgram
-from shaftwork.components.pieces import pieces_degree
+from shaftwork.components.discontinuities import pieces_degree
 from shaftwork.core.errors import CompileError, MissingExtraError, ParameterError
 from shaftwork.core.kept import Kept
 from shaftwork.core.parameters import in_si, is_quantity, without_unit

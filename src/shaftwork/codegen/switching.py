@@ -16,7 +16,7 @@ from shaftwork.codegen.bumps import GOLDEN, bumps, irregular
 from shaftwork.codegen.code import scalar, vectorised
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.timeline import CLEARANCE, NOTHING, Timeline, timeline
-from shaftwork.components.laws import line, narrow_places, switches, unsolved_places
+from shaftwork.components.discontinuities import line, narrow_places, switches, unsolved_places
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.kept import Kept

@@ -1,4 +1,4 @@
-"""Motors by their torque-speed curve: the torques of a catalogue, or a table."""
+"""Motors by their torque-speed curve: Kloss' formula, the torques of a catalogue, or a table."""
 
 from __future__ import annotations
 
