@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 import shaftwork as sw
-from shaftwork.scenes.shaft_chain import LOAD_INERTIA, MOTOR_INERTIA, RATED_TORQUE
+from shaftwork.scenes.long_shafts import LOAD_INERTIA, MOTOR_INERTIA, RATED_TORQUE
 from shaftwork.shafts.exact_motion import JunctionTorque, motion
 from shaftwork.shafts.line import Section, SectionLine
 

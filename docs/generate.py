@@ -42,7 +42,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from shaftwork.cli import main as command_line
-from shaftwork.components import REGISTRY, Component, Port
+from shaftwork.components import FAMILIES, REGISTRY, Component, Port
 from shaftwork.core.parameters import Parameter
 from shaftwork.scenes import SCENES
 from shaftwork.studies.stability import Stability, stability
@@ -63,25 +63,6 @@ RESOLUTION = 100
 """Pixels per inch of a picture: a small file that is sharp in a column of text."""
 OUTPUT = ("text", "toml", "latex", "c")
 """Languages of the blocks that hold what the block before them printed."""
-FAMILIES = (
-    "rotation",
-    "lossy_gear",
-    "contacts",
-    "friction",
-    "shafts",
-    "translation",
-    "sources",
-    "loads",
-    "bucket_wheel",
-    "machines",
-    "motors",
-    "drives",
-    "controllers",
-    "induction_machine",
-    "bldc",
-    "electrical",
-)
-"""The modules of components in the order in which they are shown."""
 ROUNDING = 1e-8
 """Errors below this are not told apart: they are rounding, which differs from one machine to the next."""
 MACHINE = re.compile(r"^\d+(?= steps[,;])|(?<=; energy residual )\S+(?= of the work done)", re.MULTILINE)

@@ -38,7 +38,6 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
     from shaftwork.components.drives import *
     from shaftwork.components.electrical import *
     from shaftwork.components.friction import *
-    from shaftwork.components.induction_machine import *
     from shaftwork.components.laws import (
         PWM as PWM,
         Ramp as Ramp,
@@ -52,7 +51,6 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
         v as v,
     )
     from shaftwork.components.loads import *
-    from shaftwork.components.lossy_gear import *
     from shaftwork.components.machines import *
     from shaftwork.components.modes import Leave as Leave, Mode as Mode, Modes as Modes
     from shaftwork.components.motor_catalogue import motors as motors

@@ -17,18 +17,8 @@ from hypothesis import strategies as st
 
 from shaftwork.components import laws
 from shaftwork.components.branches import ACROSS, HISTORY, INTEGRAL, THROUGH
-from shaftwork.components.laws import (
-    SYMBOLS,
-    Ramp,
-    Step,
-    Table,
-    as_expression,
-    breakpoints,
-    omega,
-    phi,
-    t,
-)
-from shaftwork.components.pieces import pieces_degree
+from shaftwork.components.discontinuities import breakpoints, pieces_degree
+from shaftwork.components.laws import SYMBOLS, Ramp, Step, Table, as_expression, omega, phi, t
 from shaftwork.core.errors import ParameterError
 
 TABLE = Table([0, 1, 3], [0.0, 5.0, -1.0])

@@ -18,7 +18,7 @@ from scipy.integrate import solve_ivp
 import shaftwork as sw
 from shaftwork.components import Component
 from shaftwork.components.branches import ACROSS
-from shaftwork.components.torque_curves import pull_out_slip, pull_up_share
+from shaftwork.components.motors import pull_out_slip, pull_up_share
 
 EXCAVATOR: dict[str, float] = {
     "tau_a": 5310.0,

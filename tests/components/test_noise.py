@@ -16,8 +16,7 @@ import sympy
 
 import shaftwork as sw
 from shaftwork.components import noise
-from shaftwork.components.laws import breakpoints
-from shaftwork.components.pieces import pieces_degree
+from shaftwork.components.discontinuities import breakpoints, pieces_degree
 from shaftwork.components.slopes import slope
 from shaftwork.network import expressions
 

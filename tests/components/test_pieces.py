@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 import sympy
 
-from shaftwork.components.laws import line, t
-from shaftwork.components.pieces import parts, pieces_degree
+from shaftwork.components.discontinuities import line, parts, pieces_degree
+from shaftwork.components.laws import t
 
 K, L = sympy.symbols("K L", real=True)
 

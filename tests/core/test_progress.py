@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from shaftwork.core.progress import progress
+from shaftwork.core.screen import progress
 
 
 class Terminal(io.StringIO):

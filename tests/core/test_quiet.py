@@ -8,7 +8,7 @@ import threading
 
 import pytest
 
-from shaftwork.core.quiet import unprinted
+from shaftwork.core.calls import unprinted
 
 
 def test_only_the_thread_that_is_kept_from_printing_is_silent_and_only_meanwhile(

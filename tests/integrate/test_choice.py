@@ -11,7 +11,7 @@ import pytest
 from scipy import sparse
 
 from shaftwork.integrate import choice
-from shaftwork.integrate.engines import ENGINES
+from shaftwork.integrate.engines import ENGINE_NAMES, ENGINES
 from shaftwork.integrate.stiffness import norm
 
 
@@ -123,3 +123,7 @@ def test_the_bound_of_the_eigenvalues_of_a_slow_system_is_as_slow() -> None:
     matrix = sparse.csc_array(np.array([[0.0, 2e-6], [-1e-6, 3e-6]]))
     assert norm(matrix) == pytest.approx(5e-6, rel=1e-12)
     assert norm(sparse.csc_array((3, 3))) == 0.0
+
+
+def test_every_engine_can_be_asked_for() -> None:
+    assert set(ENGINE_NAMES) == {"auto", *ENGINES, "wave"}

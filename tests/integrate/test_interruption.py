@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import shaftwork as sw
-from shaftwork.core.interruption import interruptible
+from shaftwork.core.calls import interruptible
 
 RUNS = {
     "scipy": ("pump", 1e3),

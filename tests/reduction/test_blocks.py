@@ -81,7 +81,7 @@ def test_many_that_are_carried_by_many_are_left_to_the_matrices() -> None:
 
 def test_the_formulas_of_a_large_sum_stay_short() -> None:
     """Each rate has the one reaction in it: what is written once does not grow with the square of the inertias."""
-    from shaftwork.components.pieces import parts
+    from shaftwork.components.discontinuities import parts
     from shaftwork.network.graph import build_graph
     from shaftwork.reduction.form import state_form
 

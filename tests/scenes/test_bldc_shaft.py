@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import shaftwork as sw
-from shaftwork.scenes.shaft_chain import RATED_TORQUE
+from shaftwork.scenes.long_shafts import RATED_TORQUE
 
 T_END = sw.scenes.SCENES["bldc-shaft"].t_end
 INERTIAS = (0.11, 0.025)

@@ -11,7 +11,7 @@ import sympy
 
 import shaftwork as sw
 from shaftwork.scenes.crane import MOTOR, WHEEL_RADIUS
-from shaftwork.scenes.shaft_chain import PRINTED_SHEAR_MODULUS
+from shaftwork.scenes.long_shafts import PRINTED_SHEAR_MODULUS
 from tests.reference.mna import Piece, spectrum
 
 

@@ -1,4 +1,4 @@
-"""What a command is, and the options that several have."""
+"""What a command is, the options that several have, and what they stand for."""
 
 from __future__ import annotations
 
@@ -6,7 +6,16 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+from shaftwork.cli.settings import point, with_settings
+from shaftwork.core.errors import ModelFileError, ParameterError
+from shaftwork.integrate.engines import ENGINE_NAMES
+
+if TYPE_CHECKING:
+    from shaftwork.pipeline.model import Model
+    from shaftwork.pipeline.network import Network
+    from shaftwork.scenes.catalog import Scene
 
 Say = Callable[[str], None]
 """Prints a line for people; with `--json` nothing."""
@@ -15,28 +24,37 @@ Data = Mapping[str, Any]
 
 FALLBACK_END = 10.0
 """End time of a model file when none is given, s."""
-ENGINES = ("auto", "scipy", "scipy-radau", "heyoka", "sundials", "exact", "banded", "wave")
 
 
 @dataclass(frozen=True)
 class Command:
-    """One of the commands of `shaftwork`.
+    """One of the commands of `shaftwork`, under the name of the function that does it.
 
     Args:
-        name: as it is written.
-        text: what it does, one line.
         run: does it; says lines for people and returns the same for machines.
-        arguments: declares its options.
+        text: what it does, one line.
+        declare: declares its options.
         model: whether it is about a scene or a model file.
         machines: whether it takes `--json`.
     """
 
-    name: str
-    text: str
     run: Callable[[Namespace, Say], Data]
-    arguments: Callable[[ArgumentParser], None] = lambda _: None
-    model: bool = True
-    machines: bool = False
+    text: str
+    declare: Callable[[ArgumentParser], None] | None
+    model: bool
+    machines: bool
+
+    @property
+    def name(self) -> str:
+        """The name under which it is called."""
+        return self.run.__name__
+
+
+def command(
+    text: str, declare: Callable[[ArgumentParser], None] | None = None, *, model: bool = True, machines: bool = False
+) -> Callable[[Callable[[Namespace, Say], Data]], Command]:
+    """Make a function a command; arguments as of `Command`."""
+    return lambda run: Command(run, text, declare, model, machines)
 
 
 def folder_option(parser: ArgumentParser, what: str) -> None:
@@ -53,7 +71,7 @@ def solver_options(parser: ArgumentParser) -> None:
     """The options `--rtol` and `--engine`."""
     parser.add_argument("--rtol", type=float, default=1e-8, help="relative tolerance (default %(default)g)")
     parser.add_argument(
-        "--engine", default="auto", choices=ENGINES, metavar="NAME", help=f"one of {', '.join(ENGINES)}"
+        "--engine", default="auto", choices=ENGINE_NAMES, metavar="NAME", help=f"one of {', '.join(ENGINE_NAMES)}"
     )
 
 
@@ -96,3 +114,60 @@ def _folder(text: str) -> Path:
     if not text.strip():
         raise ArgumentTypeError("'' names no folder. Write --out . for this one.")
     return Path(text)
+
+
+def load(options: Namespace) -> tuple[Network, Scene | None]:
+    """The network of a scene or a model file with the values that were set, and the scene if it is one.
+
+    Raises:
+        ModelFileError: it is neither.
+        ParameterError: a value cannot be set.
+    """
+    from shaftwork.pipeline.network import Network
+    from shaftwork.scenes import SCENES
+
+    name = options.model
+    scene = SCENES.get(name)
+    if scene is None and not name.endswith(".toml"):
+        raise ModelFileError(f"'{name}' is neither a scene nor a .toml file. The scenes are: {', '.join(SCENES)}.")
+    return with_settings(Network.load(name) if scene is None else scene(), options.set), scene
+
+
+def end_of(options: Namespace, scene: Scene | None) -> float:
+    """The end of the motion in s: as given, of the scene, or `FALLBACK_END`.
+
+    Raises:
+        ParameterError: no motion can end then.
+    """
+    from shaftwork.pipeline.arguments import time_span
+
+    end = options.t_end if options.t_end is not None else scene.t_end if scene else FALLBACK_END
+    return time_span(0.0, end)[1]
+
+
+def start_of(options: Namespace, model: Model) -> dict[str, float] | None:
+    """The start values of a motion: of the steady state at t = 0 where that is wanted, with those given; None for rest.
+
+    Raises:
+        ParameterError: a start value is none.
+        SimulationError: there is no steady state.
+    """
+    from shaftwork.pipeline.start import steady_start
+
+    given = point(options.initial, option="--initial")
+    return steady_start(model, given) if options.steady else given or None
+
+
+def point_of(options: Namespace, net: Network) -> dict[str, float] | None:
+    """The point about which a network is linearised: as named, the steady operation, or None for rest.
+
+    Raises:
+        ParameterError: both are asked for.
+        SimulationError: there is no steady operation.
+    """
+    if options.steady and options.at:
+        raise ParameterError("--steady and --at both name a point. Leave out one of them.")
+    if options.steady:
+        model = net.compile()
+        return model.steady_state() if options.t is None else model.steady_state(t=options.t)
+    return point(options.at) or None

@@ -1,16 +1,25 @@
-"""`shaftwork run`."""
+"""One motion: `shaftwork run`."""
 
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from shaftwork.cli.command import Command, Data, Say, end_option, folder_option, solver_options, start_options
+from shaftwork.cli.command import (
+    Data,
+    Say,
+    command,
+    end_of,
+    end_option,
+    folder_option,
+    load,
+    solver_options,
+    start_of,
+    start_options,
+)
 from shaftwork.cli.folder import Folder, write_picture, write_rows
-from shaftwork.cli.models import end_of, load, start_of
 from shaftwork.core.domains import DOMAINS
-from shaftwork.core.progress import progress
-from shaftwork.core.screen import counted
+from shaftwork.core.screen import counted, progress
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,8 +36,8 @@ LISTED = 12
 """Phases shown of the beginning, and as many of the end, of a motion that has more."""
 
 
-def arguments(parser: ArgumentParser) -> None:
-    """The options of the command."""
+def run_options(parser: ArgumentParser) -> None:
+    """The options of `shaftwork run`."""
     folder_option(parser, "plots and CSV")
     end_option(parser, "that of the scene, else 10")
     solver_options(parser)
@@ -38,6 +47,7 @@ def arguments(parser: ArgumentParser) -> None:
     )
 
 
+@command("simulate: a table on the screen, plots and CSV in DIR", run_options, machines=True)
 def run(options: Namespace, say: Say) -> Data:
     """The motion as a table, and as curves and CSV in a folder."""
     net, scene = load(options)
@@ -91,8 +101,8 @@ def _motion(net: Network, t_end: float, wanted: tuple[str, ...], options: Namesp
 def _angles(net: Network, wanted: tuple[str, ...]) -> tuple[str, ...]:
     """The parts whose angle, position or flux linkage is wanted."""
     parts = {part.name for part in net.parts}
-    asked = (name.rpartition(".") for name in wanted)
-    owners = (owner for owner, _, name in asked if name.partition("_")[0] in INTEGRALS and not name.endswith("_rel"))
+    pairs = (name.rpartition(".") for name in wanted)
+    owners = (owner for owner, _, name in pairs if name.partition("_")[0] in INTEGRALS and not name.endswith("_rel"))
     return tuple(dict.fromkeys(owner for owner in owners if owner in parts))
 
 
@@ -175,6 +185,3 @@ def _data(solution: Solution, signals: Sequence[str]) -> Data:
         "phases": [row._asdict() for row in solution.phases],
         "events": [dict(zip(("t", "part", "from", "to"), event, strict=True)) for event in solution.events],
     }
-
-
-COMMAND = Command("run", "simulate: a table on the screen, plots and CSV in DIR", run, arguments, machines=True)

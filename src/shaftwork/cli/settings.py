@@ -177,7 +177,7 @@ def parameter_of(net: Network, name: str) -> tuple[Component, Parameter]:
     owner, _, parameter = name.rpartition(".")
     part = next((part for part in net.parts if part.name == owner), None)
     if part is None:
-        raise ParameterError(f"There is no part '{owner}'. The parts are: {_some([made.name for made in net.parts])}.")
+        raise ParameterError(f"There is no part '{owner}'. The parts are: {_some([part.name for part in net.parts])}.")
     if parameter not in part.declared:
         listed = _some([f"{owner}.{key}" for key in part.declared])
         there = f"has: {listed}" if part.declared else "has no parameters"

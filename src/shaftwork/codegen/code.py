@@ -14,8 +14,8 @@ from sympy import ITE, And, Basic, Expr, Float, Integer, Or, Piecewise, Pow, S, 
 from sympy.printing.numpy import NumPyPrinter
 from sympy.printing.pycode import PythonCodePrinter
 
+from shaftwork.components.discontinuities import parts
 from shaftwork.components.laws import NUMERICAL
-from shaftwork.components.pieces import parts
 from shaftwork.core.errors import CompileError
 
 # Terms are printed as sympy keeps them, the same in every process; to sort them would take longer than the rest.

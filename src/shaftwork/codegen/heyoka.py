@@ -16,10 +16,12 @@ from numpy.typing import NDArray
 
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.heyoka_parameters import Fixed, HeldParameters
+from shaftwork.codegen.fixed import Fixed
+from shaftwork.codegen.heyoka_held import HeldParameters
+from shaftwork.components.discontinuities import parts
 from shaftwork.components.noise import HeldNoise, SmoothNoise
-from shaftwork.components.pieces import parts
+from shaftwork.core.calls import interruptible
 from shaftwork.core.errors import MissingExtraError
-from shaftwork.core.interruption import interruptible
 
 # From about this number of states on, unrolled code takes seconds to compile and is hardly faster.
 LARGEST_UNROLLED = 100

@@ -16,7 +16,7 @@ from sympy.logic.boolalg import ITE, And, BooleanFalse, BooleanTrue, Not, Or, Xo
 from shaftwork.codegen.heyoka_cache import keep_apart
 from shaftwork.codegen.heyoka_parameters import Fixed, Held
 from shaftwork.components import noise
-from shaftwork.components.laws import between_steps
+from shaftwork.components.discontinuities import between_steps
 from shaftwork.components.noise import HeldNoise
 from shaftwork.components.slopes import wraps
 from shaftwork.components.tables import Interpolation, InterpolationSlope

@@ -14,7 +14,7 @@ from sympy import Expr, I, Integer, Symbol, nan
 from shaftwork.codegen.code import is_rough, vectorised
 from shaftwork.codegen.elements import Array, Index, TemplateGroup, groups_of
 from shaftwork.components.branches import ACROSS, INTEGRAL
-from shaftwork.components.laws import bells, switches
+from shaftwork.components.discontinuities import bells, switches
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import jumps, slope
 from shaftwork.network.controlled import Reading, readings_of

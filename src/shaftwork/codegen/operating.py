@@ -12,7 +12,7 @@ from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.wound_shafts import inner_nodes, node_of, speed_at
 from shaftwork.core.errors import SimulationError
-from shaftwork.core.hints import hint
+from shaftwork.core.notices import hint
 from shaftwork.reduction.form import StateForm
 
 ROUNDING, TINY = float(np.finfo(float).eps), float(np.finfo(float).tiny)

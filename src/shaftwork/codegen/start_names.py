@@ -16,7 +16,7 @@ from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.recovery import BranchHistory
 from shaftwork.codegen.wound_shafts import wound_shafts
 from shaftwork.core.errors import SignalError
-from shaftwork.core.hints import hint
+from shaftwork.core.notices import hint
 from shaftwork.core.parameters import in_si
 from shaftwork.network.graph import GraphPart
 from shaftwork.reduction.form import store_name

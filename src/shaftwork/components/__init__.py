@@ -2,48 +2,29 @@
 
 from __future__ import annotations
 
-from shaftwork.components import (
-    bldc,
-    bucket_wheel,
-    contacts,
-    controllers,
-    drives,
-    electrical,
-    friction,
-    induction_machine,
-    loads,
-    lossy_gear,
-    machines,
-    motors,
-    rotation,
-    shafts,
-    sources,
-    translation,
-)
+from importlib import import_module
+
 from shaftwork.components.base import REGISTRY, Component, Port, Signal, component
 from shaftwork.components.tables import Table
 
-__all__ = [
-    "REGISTRY",
-    "Component",
-    "Port",
-    "Signal",
-    "Table",
-    "bldc",
-    "bucket_wheel",
-    "component",
-    "contacts",
-    "controllers",
-    "drives",
-    "electrical",
-    "friction",
-    "induction_machine",
-    "loads",
-    "lossy_gear",
-    "machines",
-    "motors",
+FAMILIES = (
     "rotation",
+    "contacts",
+    "friction",
     "shafts",
-    "sources",
     "translation",
-]
+    "sources",
+    "loads",
+    "bucket_wheel",
+    "motors",
+    "drives",
+    "controllers",
+    "machines",
+    "bldc",
+    "electrical",
+)
+"""The modules of components, in the order in which they are shown."""
+for family in FAMILIES:
+    import_module(f"{__name__}.{family}")
+
+__all__ = ["FAMILIES", "REGISTRY", "Component", "Port", "Signal", "Table", "component"]

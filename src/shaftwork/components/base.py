@@ -12,13 +12,12 @@ from typing import Any, ClassVar, Literal, Self, TypeVar, dataclass_transform, g
 
 from sympy import Expr
 
-from shaftwork.components.branches import Branch, End
+from shaftwork.components.branches import Branch, End, is_pair
 from shaftwork.components.modes import Modes
-from shaftwork.core.declarations import is_label, is_pair, refuse_fields
 from shaftwork.core.domains import DOMAIN_NAMES, DOMAINS, ELECTRICAL, ROTATION, Domain
 from shaftwork.core.errors import NetworkWarning, ParameterError, ShaftworkError
 from shaftwork.core.notices import muted
-from shaftwork.core.parameters import Parameter, parameter
+from shaftwork.core.parameters import Parameter, is_label, parameter, refuse_fields
 
 Role = Literal["store", "loss", "source", "coupling"]
 SignalKind = Literal["through", "across", "twist", "store"]

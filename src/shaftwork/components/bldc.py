@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 from sympy import Abs, Expr, Integer, Max, Min, Rational, asin, cos, pi, sin
 
 from shaftwork.components.base import Component, Port, Role, Signal, component
-from shaftwork.components.bounds import no_less
 from shaftwork.components.branches import (
     ACROSS,
     INTEGRAL,
@@ -22,7 +21,7 @@ from shaftwork.components.branches import (
     integral_of,
     through_of,
 )
-from shaftwork.components.clips import larger, smaller
+from shaftwork.components.clips import larger, no_less, smaller
 from shaftwork.components.laws import PWM, as_expression
 from shaftwork.components.modes import ANEW, Leave, Mode, Modes
 from shaftwork.core.domains import ELECTRICAL, ROTATION

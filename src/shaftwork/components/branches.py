@@ -14,7 +14,7 @@ from typing import Any
 
 from sympy import Expr, Function, Integer, S, Symbol
 
-from shaftwork.core.declarations import is_label, is_pair, refuse_fields
+from shaftwork.core.parameters import is_label, refuse_fields
 
 ACROSS = Symbol("across", real=True)
 """The across variable of the branch in whose law it stands."""
@@ -63,40 +63,60 @@ def named_in(symbol: Symbol) -> tuple[str, str]:
 
 def readings_in(law: Expr) -> tuple[Symbol, ...]:
     """The symbols of a law that stand for other branches and ports of its part, in the order of their names."""
-    found = (symbol for symbol in law.free_symbols if named_in(symbol)[0])
-    return tuple(sorted(found, key=lambda symbol: str(symbol.name)))
+    readings = (symbol for symbol in law.free_symbols if named_in(symbol)[0])
+    return tuple(sorted(readings, key=lambda symbol: str(symbol.name)))
 
 
 End = str | None
 """A port or an inner node of the component; None is the reference of the domain (speed zero)."""
 
 
+def is_end(value: Any) -> bool:
+    """Whether it can be an end of a branch: the name of a port, or None for the reference."""
+    return value is None or is_label(value)
+
+
+def is_pair(value: Any) -> bool:
+    """Whether it can be the two ends of a branch."""
+    return isinstance(value, tuple | list) and len(value) == 2 and all(map(is_end, value))
+
+
 _PAIR = "None for the first two ports, or a pair of ports such as ('a', 'b'), where None is the reference"
 
 
-def _refuse_wiring(branch: Any) -> None:
-    """Refuse ends and labels that are none. Laws are looked at where the branch is used, with its part's name."""
-    refuse_fields(
-        branch,
-        ends=(branch.ends is None or is_pair(branch.ends), _PAIR),
-        label=(branch.label == "" or is_label(branch.label), "a text without dots"),
-    )
+class _Wired:
+    """Base of branches between two ends. Laws are looked at where the branch is used, with its part's name."""
+
+    ends: tuple[End, End] | None
+    label: str
+
+    def __post_init__(self) -> None:
+        refuse_fields(
+            self,
+            ends=(self.ends is None or is_pair(self.ends), _PAIR),
+            label=(self.label == "" or is_label(self.label), "a text without dots"),
+        )
 
 
-def _refuse_terms(coupling: Any) -> None:
-    """Refuse terms of a coupling that are none."""
-    terms = coupling.terms
-    right = isinstance(terms, tuple | list) and len(terms) > 0
-    right = right and all(isinstance(term, tuple | list) and len(term) == 3 and is_pair(term[1:]) for term in terms)
-    refuse_fields(
-        coupling,
-        terms=(right, "one or more triples (coefficient, first port, second port), such as ((1, 'a', None),)"),
-        label=(coupling.label == "" or is_label(coupling.label), "a text without dots"),
-    )
+class _Coupled:
+    """Base of couplings of several pairs of ends."""
+
+    terms: tuple[tuple[Expr, End, End], ...]
+    label: str
+
+    def __post_init__(self) -> None:
+        terms = self.terms
+        right = isinstance(terms, tuple | list) and len(terms) > 0
+        right = right and all(isinstance(term, tuple | list) and len(term) == 3 and is_pair(term[1:]) for term in terms)
+        refuse_fields(
+            self,
+            terms=(right, "one or more triples (coefficient, first port, second port), such as ((1, 'a', None),)"),
+            label=(self.label == "" or is_label(self.label), "a text without dots"),
+        )
 
 
 @dataclass(frozen=True)
-class AcrossStore:
+class AcrossStore(_Wired):
     """Through = capacity * d(across)/dt: inertia, mass, capacitor.
 
     A capacity may depend on INTEGRAL and t, the across variable then is against the reference: d(C v)/dt - C_s v^2 / 2.
@@ -106,12 +126,9 @@ class AcrossStore:
     ends: tuple[End, End] | None = None
     label: str = ""
 
-    def __post_init__(self) -> None:
-        _refuse_wiring(self)
-
 
 @dataclass(frozen=True)
-class ThroughStore:
+class ThroughStore(_Wired):
     """d(through)/dt = stiffness * across: shaft compliance, spring, inductor (stiffness 1/L).
 
     A stiffness may depend on INTEGRAL and t: through = stiffness * INTEGRAL.
@@ -121,12 +138,9 @@ class ThroughStore:
     ends: tuple[End, End] | None = None
     label: str = ""
 
-    def __post_init__(self) -> None:
-        _refuse_wiring(self)
-
 
 @dataclass(frozen=True)
-class ThroughLaw:
+class ThroughLaw(_Wired):
     """Through = f(across, integral of across, t): damper, friction, motor curve, load, resistor, source of torque.
 
     It may read other ports and branches of its part besides, and is then a controlled source. A `conservative` one, as
@@ -141,12 +155,12 @@ class ThroughLaw:
     stored: Expr = S.Zero
 
     def __post_init__(self) -> None:
-        _refuse_wiring(self)
+        super().__post_init__()
         refuse_fields(self, conservative=(isinstance(self.conservative, bool), "True or False"))
 
 
 @dataclass(frozen=True)
-class AcrossLaw:
+class AcrossLaw(_Wired):
     """Across = f(t): prescribed speed, voltage source; a controlled one where it reads other branches of its part.
 
     What it reads then must follow from states and from sources that depend on time alone.
@@ -156,12 +170,9 @@ class AcrossLaw:
     ends: tuple[End, End] | None = None
     label: str = ""
 
-    def __post_init__(self) -> None:
-        _refuse_wiring(self)
-
 
 @dataclass(frozen=True)
-class IdealCoupling:
+class IdealCoupling(_Coupled):
     """Sum of coefficient * across over the terms is zero, power conserving: gear, drum, machine, rigid joint.
 
     Every term is (coefficient, first end, second end); the through variable of a term is coefficient * lambda with one
@@ -171,12 +182,9 @@ class IdealCoupling:
     terms: tuple[tuple[Expr, End, End], ...]
     label: str = ""
 
-    def __post_init__(self) -> None:
-        _refuse_terms(self)
-
 
 @dataclass(frozen=True)
-class LossyCoupling:
+class LossyCoupling(_Coupled):
     """The speeds of an `IdealCoupling`, but other ratios of the through variables: a mesh of gears that rub.
 
     Sum of coefficient * across over the terms is zero; the through variable of a term is its own number of `through`
@@ -188,13 +196,13 @@ class LossyCoupling:
     label: str = ""
 
     def __post_init__(self) -> None:
-        _refuse_terms(self)
+        super().__post_init__()
         right = isinstance(self.through, tuple | list) and len(self.through) == len(self.terms)
         refuse_fields(self, through=(right, "a tuple of numbers or expressions, one for each term"))
 
 
 @dataclass(frozen=True)
-class DelayLine:
+class DelayLine(_Wired):
     """A lossless line between two ends, each against the reference: what leaves the one arrives at the other later.
 
     Law: at each end through = impedance * across + history, and the history of an end at time t is minus
@@ -205,9 +213,6 @@ class DelayLine:
     delay: Expr
     ends: tuple[str, str] | None = None
     label: str = "h"
-
-    def __post_init__(self) -> None:
-        _refuse_wiring(self)
 
 
 Branch = AcrossStore | ThroughStore | ThroughLaw | AcrossLaw | IdealCoupling | LossyCoupling | DelayLine

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import ast
+import contextlib
 import math
 import reprlib
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from shaftwork.components.laws import t
 from shaftwork.components.loads import rounding
 from shaftwork.components.noise import HeldNoise
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.parameters import in_si, parameter
+from shaftwork.core.parameters import call_in, in_si, parameter
 
 
 @dataclass(frozen=True)
@@ -48,13 +48,10 @@ class Soil:
         """
         if isinstance(text, str) and (name := " ".join(text.lower().split()).replace("gray", "grey")) in SOILS:
             return SOILS[name]
-        try:
-            call = ast.parse(text, mode="eval").body
-            if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == cls.__name__:
-                named = {str(item.arg): ast.literal_eval(item.value) for item in call.keywords}
-                return cls(*(ast.literal_eval(value) for value in call.args), **named)
-        except (SyntaxError, ValueError, TypeError, RecursionError, MemoryError):
-            pass
+        match call_in(text):
+            case (cls.__name__, values, options):
+                with contextlib.suppress(TypeError, ValueError):
+                    return cls(*values, **options)
         raise ParameterError(
             f"{reprlib.repr(text)} is no soil. The soils are: {', '.join(SOILS)}; another is Soil(mean, std) in N/m."
         )

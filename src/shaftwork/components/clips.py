@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from sympy import Basic, Expr, Max, Min
+from sympy import Basic, Expr, Max, Min, Piecewise, Symbol
+
+from shaftwork.components.tables import Interpolation
 
 
 def larger(*args: Any) -> Expr:
@@ -48,3 +50,25 @@ def _made(function: type[Basic], args: Any) -> Any:
     """A limit of the arguments, which are compared where all of them are numbers."""
     compared = all(getattr(one, "is_number", True) for one in args)
     return function(*args) if compared else function(*args, evaluate=False)
+
+
+def no_less(p: Any, name: str, least: int) -> Expr:
+    """The law of a parameter, and `least` where that falls below; a number is checked against its declared bound.
+
+    Args:
+        p: what `Component.branches` is given.
+        name: of the parameter.
+        least: the lowest value that makes sense.
+    """
+    law: Expr = getattr(p, name)
+    if law == Symbol(name, real=True):
+        return law
+    if isinstance(law, Piecewise):  # the times of a ramp stay as they are given
+        return Piecewise(*((_no_less(value, least), condition) for value, condition in law.args))
+    return _no_less(law, least)
+
+
+def _no_less(law: Expr, least: int) -> Expr:
+    if isinstance(law, Interpolation) and min(law.ys) >= least:
+        return law
+    return larger(least, law)

@@ -35,74 +35,68 @@ def _rest(unit: str = "rad/s", latex: str = r"\omega_r") -> Any:
     return parameter(unit, meaning, at_least=0, default=0.0, latex=latex)
 
 
-def _refuse_mixed(part: Any) -> None:
-    if part.c is None and part.d:
-        raise ParameterError(f"{type(part).__name__} '{part.name}': a damping d needs a stiffness c beside it.")
-    if part.c is not None and part.restitution:
-        raise ParameterError(
-            f"{type(part).__name__} '{part.name}': restitution is for rigid flanks. Leave out c, or take d instead."
-        )
+class Contact(Component):
+    """Base of parts that touch where the twist between their nodes is beyond a limit, and are apart elsewhere.
 
+    In contact a flank of stiffness `c` springs back and never pulls. Without `c` flanks are rigid: they rebound, and
+    below a small speed they stay together until they would pull.
+    """
 
-def _torques(upper: Any, lower: Any, p: Any) -> tuple[Any, Any]:
-    """Torques of a flank beyond each limit, None where there is no limit."""
-    made = (None if limit is None else p.c * (INTEGRAL - limit) + p.d * ACROSS for limit in (upper, lower))
-    forward, backward = made
-    return forward, backward
+    c: float | None
+    d: float
+    role: ClassVar[Role] = "loss"
+    words: ClassVar[tuple[str, str]] = ("open", "in contact")
+    twist: ClassVar[str] = "phi"
+    """Label of the branch that carries the twist of rigid flanks."""
+    rest: ClassVar[str] = "omega_rest"
+    """Name of the parameter that is the speed up to which rigid flanks stay together."""
 
+    def limits(self, p: Any) -> tuple[Any, Any]:
+        """Upper and lower limit of the twist; None where there is none."""
+        raise NotImplementedError
 
-def _modes(upper: Any, lower: Any, p: Any, rest: Any, twist: str = "phi") -> Modes:
-    """Open between two limits of the twist, either of which may be None, and in contact beyond."""
-    above = None if upper is None else INTEGRAL - upper
-    below = None if lower is None else lower - INTEGRAL
-    if p.c is None:
-        return _rigid(above, below, (p.restitution, rest), twist)
-    return _elastic(above, below, _torques(upper, lower, p))
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.c is None and self.d:
+            raise ParameterError(f"{type(self).__name__} '{self.name}': a damping d needs a stiffness c beside it.")
+        if self.c is not None and getattr(self, "restitution", 0):
+            raise ParameterError(
+                f"{type(self).__name__} '{self.name}': restitution is for rigid flanks. Leave out c, or take d instead."
+            )
 
+    def modes(self, p: Any) -> Iterator[Modes]:
+        free, contact = self.words
+        closes, modes, inside = [], [], true
+        for side, sign, limit in (("forward", 1, self.limits(p)[0]), ("backward", -1, self.limits(p)[1])):
+            if limit is None:
+                continue
+            beyond, says = sign * (INTEGRAL - limit), contact if sign > 0 else f"{contact} {side}"
+            if p.c is None:
+                closes.append(Leave(beyond, side, p.restitution, getattr(p, self.rest)))
+                modes.append(Mode(side, (Leave(-sign * THROUGH, "open"),), float(sign), CLOSED, NEVER, says))
+                continue
+            closes.append(Leave(beyond, side))
+            inside &= beyond <= 0
+            push, parted = sign * (p.c * (INTEGRAL - limit) + p.d * ACROSS), f"parted {side}"
+            modes += [
+                Mode(side, (Leave(-push, parted),), float(sign), starts=beyond > 0, says=says),
+                # beyond the limit, but the flank springs back more slowly than the other moves away
+                Mode(parted, (Leave(push, side), Leave(-beyond, "open")), starts=NEVER, says=free),
+            ]
+        angle = self.twist if p.c is None else ""
+        yield Modes((Mode("open", tuple(closes), starts=inside, says=free), *modes), angle=angle)
 
-def _elastic(
-    above: Any, below: Any, torques: tuple[Any, Any], contact: str = "in contact", free: str = "open"
-) -> Modes:
-    """In contact the flank springs back; it never pulls. The last two are the words for the modes."""
-    forward, backward = torques
-    begins, modes, inside = [], [], true
-    if above is not None:
-        begins.append(Leave(above, "forward"))
-        inside &= above <= 0
-        modes += [
-            Mode("forward", (Leave(-forward, "parted forward"),), 1.0, starts=above > 0, says=contact),
-            # beyond the limit, but the flank springs back more slowly than the other moves away
-            Mode("parted forward", (Leave(forward, "forward"), Leave(-above, "open")), starts=NEVER, says=free),
-        ]
-    if below is not None:
-        begins.append(Leave(below, "backward"))
-        inside &= below <= 0
-        modes += [
-            Mode("backward", (Leave(backward, "parted backward"),), -1.0, starts=below > 0, says=f"{contact} backward"),
-            Mode("parted backward", (Leave(-backward, "backward"), Leave(-below, "open")), starts=NEVER, says=free),
-        ]
-    return Modes((Mode("open", tuple(begins), starts=inside, says=free), *modes))
-
-
-def _rigid(above: Any, below: Any, rebound: tuple[Any, Any], twist: str) -> Modes:
-    """At a limit a rebound, and below a small speed a rigid contact; it never pulls."""
-    begins, modes = [], []
-    if above is not None:
-        begins.append(Leave(above, "forward", *rebound))
-        modes.append(Mode("forward", (Leave(-THROUGH, "open"),), 1.0, CLOSED, NEVER, "in contact"))
-    if below is not None:
-        begins.append(Leave(below, "backward", *rebound))
-        modes.append(Mode("backward", (Leave(THROUGH, "open"),), -1.0, CLOSED, NEVER, "in contact backward"))
-    return Modes((Mode("open", tuple(begins)), *modes), angle=twist)
-
-
-def _branches(upper: Any, lower: Any, p: Any, twist: str = "phi") -> Iterator[Branch]:
-    if p.c is not None:
-        yield ThroughLaw(_law(upper, lower, p), stored=_stored(upper, lower, p))
-        return
-    if p.form == CLOSED:
-        yield rigid(("a", "b"))
-    yield ThroughLaw(p.mode * (1 - p.mode**2) * INTEGRAL, ("a", "b"), twist)  # no torque: it carries the twist
+    def branches(self, p: Any) -> Iterator[Branch]:
+        upper, lower = self.limits(p)
+        if p.c is not None:
+            one, other = upper if upper is not None else lower, lower if lower is not None else upper
+            limit = (one + other) / 2 + p.mode * (one - other) / 2
+            torque = p.mode**2 * (p.c * (INTEGRAL - limit) + p.d * ACROSS)
+            yield ThroughLaw(torque, stored=_stored(upper, lower, p))
+            return
+        if p.form == CLOSED:
+            yield rigid(("a", "b"))
+        yield ThroughLaw(p.mode * (1 - p.mode**2) * INTEGRAL, ("a", "b"), self.twist)  # no torque: it carries the twist
 
 
 def _stored(upper: Any, lower: Any, p: Any) -> Expr:
@@ -112,15 +106,8 @@ def _stored(upper: Any, lower: Any, p: Any) -> Expr:
     return Piecewise(*pieces, (Integer(0), True))
 
 
-def _law(upper: Any, lower: Any, p: Any) -> Expr:
-    """The torque in a mode."""
-    one, other = upper if upper is not None else lower, lower if lower is not None else upper
-    limit = (one + other) / 2 + p.mode * (one - other) / 2
-    return p.mode**2 * (p.c * (INTEGRAL - limit) + p.d * ACROSS)
-
-
 @component
-class Backlash(Component):
+class Backlash(Contact):
     """A gap between two nodes, with the stiffness and damping of the flanks that close it: teeth, claws, splines.
 
     Law: tau = max(0, c (phi - gap/2) + d omega) where phi > gap/2, min(0, c (phi + gap/2) + d omega) where
@@ -138,20 +125,12 @@ class Backlash(Component):
     restitution: float = _restitution()
     omega_rest: float = _rest()
 
-    role: ClassVar[Role] = "loss"
-
-    def __post_init__(self) -> None:
-        _refuse_mixed(self)
-
-    def modes(self, p: Any) -> Iterator[Modes]:
-        yield _modes(p.gap / 2, -p.gap / 2, p, p.omega_rest)
-
-    def branches(self, p: Any) -> Iterator[Branch]:
-        yield from _branches(p.gap / 2, -p.gap / 2, p)
+    def limits(self, p: Any) -> tuple[Any, Any]:
+        return p.gap / 2, -p.gap / 2
 
 
 @component
-class TranslationalBacklash(Component):
+class TranslationalBacklash(Contact):
     """A gap between two nodes that move along a line: couplings of wagons, claws and pins with play.
 
     Law: that of a `Backlash`, with the force f, the way s and the speed v of node a against node b in place of torque,
@@ -164,21 +143,16 @@ class TranslationalBacklash(Component):
     restitution: float = _restitution()
     v_rest: float = _rest("m/s", "v_r")
 
-    role: ClassVar[Role] = "loss"
     ports: ClassVar = (Port("a", TRANSLATION), Port("b", TRANSLATION))
+    twist: ClassVar[str] = "s"
+    rest: ClassVar[str] = "v_rest"
 
-    def __post_init__(self) -> None:
-        _refuse_mixed(self)
-
-    def modes(self, p: Any) -> Iterator[Modes]:
-        yield _modes(p.gap / 2, -p.gap / 2, p, p.v_rest, "s")
-
-    def branches(self, p: Any) -> Iterator[Branch]:
-        yield from _branches(p.gap / 2, -p.gap / 2, p, "s")
+    def limits(self, p: Any) -> tuple[Any, Any]:
+        return p.gap / 2, -p.gap / 2
 
 
 @component
-class Rope(Component):
+class Rope(Contact):
     """A massless rope, chain or belt between two nodes: it pulls, and hangs slack instead of pushing.
 
     Law: f = max(0, c s + d v) where s > 0, and 0 else, with s the way and v the speed of node a against node b: s is
@@ -190,18 +164,15 @@ class Rope(Component):
     c: float = parameter("N/m", "stiffness", above=0)
     d: float = _damping("N*s/m", "internal damping, while taut")
 
-    role: ClassVar[Role] = "loss"
     ports: ClassVar = (Port("a", TRANSLATION), Port("b", TRANSLATION))
+    words: ClassVar[tuple[str, str]] = ("slack", "taut")
 
-    def modes(self, p: Any) -> Iterator[Modes]:
-        yield _elastic(INTEGRAL, None, _torques(Integer(0), None, p), "taut", "slack")
-
-    def branches(self, p: Any) -> Iterator[Branch]:
-        yield from _branches(Integer(0), None, p)
+    def limits(self, p: Any) -> tuple[Any, Any]:  # noqa: ARG002
+        return Integer(0), None
 
 
 @component
-class HardStop(Component):
+class HardStop(Contact):
     """A stop at a limit of the twist of node a against node b, or against the frame, counted from the start.
 
     Law: as of a `Backlash`, with limits of its own, of which one may be left out. Without c the stop is rigid, and the
@@ -217,18 +188,14 @@ class HardStop(Component):
     restitution: float = _restitution()
     omega_rest: float = _rest()
 
-    role: ClassVar[Role] = "loss"
     ports: ClassVar = (Port("a"), Port("b", optional=True))
 
     def __post_init__(self) -> None:
-        _refuse_mixed(self)
+        super().__post_init__()
         if self.upper is None and self.lower is None:
             raise ParameterError(f"HardStop '{self.name}': give upper, lower or both, in rad.")
         if self.upper is not None and self.lower is not None and not self.lower < self.upper:
             raise ParameterError(f"HardStop '{self.name}': lower = {self.lower} must be below upper = {self.upper}.")
 
-    def modes(self, p: Any) -> Iterator[Modes]:
-        yield _modes(p.upper, p.lower, p, p.omega_rest)
-
-    def branches(self, p: Any) -> Iterator[Branch]:
-        yield from _branches(p.upper, p.lower, p)
+    def limits(self, p: Any) -> tuple[Any, Any]:
+        return p.upper, p.lower

@@ -10,7 +10,7 @@ from sympy import Expr
 from shaftwork.components.base import Component, Port, Role, Signal, component
 from shaftwork.components.branches import ACROSS, AcrossLaw, Branch, ThroughLaw, ThroughStore, across_of, through_of
 from shaftwork.components.clips import larger, smaller
-from shaftwork.components.switching import number_of, off_time, on_time, refuse_no_time_on, while_on
+from shaftwork.components.timing import number_of, off_time, on_time, refuse_no_time_on, while_on
 from shaftwork.core.domains import ROTATION
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any, ClassVar
+from typing import Any
 
 from sympy import Abs, Expr, Float, Integer, Max, Piecewise, pi
 
-from shaftwork.components.base import Component, Derived, Note, Port, Role, component, symbols_of
-from shaftwork.components.branches import ACROSS, Branch, ThroughLaw
+from shaftwork.components.base import Derived, Note, component, symbols_of
+from shaftwork.components.branches import ACROSS
 from shaftwork.components.laws import Ramp, as_expression, t
-from shaftwork.components.switching import number_of, off_time, on_time, refuse_no_time_on, while_on
-from shaftwork.components.torque_curves import kloss
+from shaftwork.components.motors import CurveMotor, kloss
+from shaftwork.components.timing import number_of, off_time, on_time
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter
 
 
 @component
-class FrequencyDrive(Component):
+class FrequencyDrive(CurveMotor):
     """An induction motor fed with a frequency that follows a law, such as the ramp of a soft start.
 
     Law: tau = ratio efficiency 2 tau_k flux^2 D D_k / (D^2 + D_k^2), with D = omega_0 f / f_n - ratio omega the speed
@@ -55,11 +55,8 @@ class FrequencyDrive(Component):
     t_on: float | None = on_time()
     t_off: float | None = off_time()
 
-    role: ClassVar[Role] = "source"
-    ports: ClassVar = (Port("a"),)
-
     def __post_init__(self) -> None:
-        refuse_no_time_on(self)
+        super().__post_init__()
         if self.f is not None and self.f_end is not None:
             raise ParameterError(
                 f"FrequencyDrive '{self.name}': f is the whole course of the frequency, and f_end the end of a ramp "
@@ -94,11 +91,10 @@ class FrequencyDrive(Component):
         message = f"has {torque:.4g} N*m at standstill at {f:g} Hz, of a pull-out torque of {most:.4g} N*m"
         yield Note("weak start", message, f"{hint}, for a start with all of it.", torque)
 
-    def branches(self, p: Any) -> Iterator[Branch]:
+    def torque(self, p: Any) -> Expr:
         f = _ramp(p) if p.f is None else p.f
         lag = p.omega_0 * f / p.f_n - p.ratio * ACROSS
-        torque = kloss(p.tau_k * _flux(f, p) ** 2, lag, p.lag_k * (f / p.f_n) ** p.slip_exponent)
-        yield ThroughLaw(-while_on(p.ratio * p.efficiency * torque, p))
+        return kloss(p.tau_k * _flux(f, p) ** 2, lag, p.lag_k * (f / p.f_n) ** p.slip_exponent)
 
 
 def _value_at(law: Any, time: float) -> float | None:
@@ -121,7 +117,7 @@ def _flux(f: Expr, p: Any) -> Expr:
 
 
 @component
-class PullOutDrive(Component):
+class PullOutDrive(CurveMotor):
     """A frequency drive that always leads its motor to the pull-out point, as a curve over speed.
 
     Law: with the motor's speed n and n_k = n_sync (1 - s_k) it is tau_k for n < n_k, then Kloss' formula; with an
@@ -140,23 +136,19 @@ class PullOutDrive(Component):
     t_on: float | None = on_time()
     t_off: float | None = off_time()
 
-    role: ClassVar[Role] = "source"
-    ports: ClassVar = (Port("a"),)
-
     def __post_init__(self) -> None:
-        refuse_no_time_on(self)
+        super().__post_init__()
         if (number_of(self, "s_k") or 0.0) >= 1:
             raise ParameterError(
                 f"PullOutDrive '{self.name}': s_k = {self.s_k} must be below 1, or the motor pulls out at standstill. "
                 "Take a FrequencyDrive."
             )
 
-    def branches(self, p: Any) -> Iterator[Branch]:
+    def torque(self, p: Any) -> Expr:
         speed, synchronous = p.ratio * ACROSS, 2 * pi * p.n_sync / 60
         pull_out = synchronous * (1 - p.s_k)
-        most, held = Integer(1), p.tau_k
+        most, strongest = Integer(1), p.tau_k
         if p.overspeed is not None:
-            most, held = p.overspeed, p.tau_k * (pull_out / Max(pull_out, speed)) ** 2
+            most, strongest = p.overspeed, p.tau_k * (pull_out / Max(pull_out, speed)) ** 2
         running = kloss(p.tau_k / most**2, 1 - speed / (most * synchronous), p.s_k)
-        torque = Piecewise((held, speed < most * pull_out), (running, True))
-        yield ThroughLaw(-while_on(p.ratio * p.efficiency * torque, p))
+        return Piecewise((strongest, speed < most * pull_out), (running, True))

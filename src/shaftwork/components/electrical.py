@@ -21,7 +21,7 @@ from shaftwork.components.branches import (
 from shaftwork.components.friction import STUCK, conducting
 from shaftwork.components.laws import t
 from shaftwork.components.modes import ANEW, Leave, Mode, Modes
-from shaftwork.components.switching import refuse_no_time_on
+from shaftwork.components.timing import refuse_no_time_on
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.parameters import parameter
 

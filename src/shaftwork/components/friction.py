@@ -9,11 +9,11 @@ from typing import Any, ClassVar
 from sympy import And, Expr, Min, Ne, Not, exp, false
 
 from shaftwork.components.base import Component, Port, Role, component
-from shaftwork.components.bounds import no_less
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, Branch, End, ThroughLaw, rigid
+from shaftwork.components.clips import no_less
 from shaftwork.components.laws import as_expression, t
 from shaftwork.components.modes import ANEW, Leave, Mode, Modes
-from shaftwork.components.switching import number_of, refuse_no_time_on
+from shaftwork.components.timing import number_of, refuse_no_time_on
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter
 

@@ -11,7 +11,7 @@ from sympy import Abs, Expr, Float, Integer, Max, Symbol, cos, pi, sin, tanh
 
 from shaftwork.components.base import Component, Derived, Port, Role, component
 from shaftwork.components.branches import ACROSS, THROUGH, Branch, ThroughLaw
-from shaftwork.components.friction import rubbing, rubs, slips
+from shaftwork.components.friction import rubbing, slips
 from shaftwork.components.laws import t
 from shaftwork.components.modes import Leave, Modes
 from shaftwork.components.noise import HeldNoise, SmoothNoise
@@ -38,8 +38,8 @@ class Resistance(Component):
     role: ClassVar[Role] = "loss"
     ports: ClassVar = (Port("a"),)
 
-    def against(self, p: Any, way: Any) -> Expr:
-        """The torque against the motion, in parameters and time; `way` is 1 forward, -1 backward, 0 at rest."""
+    def against(self, p: Any, direction: Any) -> Expr:
+        """The torque against the motion, in parameters and time; `direction` is 1 forward, -1 backward, 0 at rest."""
         raise NotImplementedError
 
     def weight(self, p: Any) -> Expr:  # noqa: ARG002
@@ -53,8 +53,8 @@ class Resistance(Component):
     def modes(self, p: Any) -> Iterator[Modes]:
         if p.omega_s != 0 or self.against(p, 1) == 0:
             return
-        letters = {Symbol(made.name, real=True): made.law for made in self.derived(p)}
-        ahead, back = (way * self.against(p, way) for way in (1, -1))
+        letters = {Symbol(letter.name, real=True): letter.law for letter in self.derived(p)}
+        ahead, back = (direction * self.against(p, direction) for direction in (1, -1))
         others = self.weight(p) + self.besides(p).subs(ACROSS, 0)
         yield _loaded(rubbing(ahead.xreplace(letters), back.xreplace(letters)), others.xreplace(letters))
 
@@ -64,24 +64,23 @@ class Resistance(Component):
         if self.against(p, 1) == 0:
             return
         if p.omega_s == 0:
-            yield from slips(lambda way: self.against(p, way), p, None)
+            yield from slips(lambda direction: self.against(p, direction), p, None)
         else:
             yield ThroughLaw(self.against(p, tanh(ACROSS / p.omega_s)))
 
 
 def _loaded(modes: Modes, besides: Expr) -> Modes:
     """Modes of what rubs beside another torque, which is no part of the torque that it holds."""
-    own = {THROUGH: THROUGH - besides}
 
     def loaded(leave: Leave) -> Leave:
-        return dataclasses.replace(leave, when=leave.when.xreplace(own))
+        return dataclasses.replace(leave, when=leave.when.xreplace({THROUGH: THROUGH - besides}))
 
     options = (dataclasses.replace(mode, leaves=tuple(map(loaded, mode.leaves))) for mode in modes.options)
     return dataclasses.replace(modes, options=tuple(options))
 
 
 @component
-class CoulombLoad(Component):
+class CoulombLoad(Resistance):
     """A travel resistance of constant size, always against the motion, with true stick.
 
     Law: torque on the node -sign(omega) tau while it slips, whatever holds up to tau in size while it is stuck; with
@@ -89,24 +88,10 @@ class CoulombLoad(Component):
     """
 
     tau: float = parameter("N*m", "size of the resistance", at_least=0, latex=r"\tau_0")
-    omega_s: float = parameter(
-        "rad/s", "speed below which it is rounded; zero for true stick", at_least=0, default=0.0, latex=r"\omega_s"
-    )
+    omega_s: float = rounding()
 
-    role: ClassVar[Role] = "loss"
-    ports: ClassVar = (Port("a"),)
-
-    def modes(self, p: Any) -> Iterator[Modes]:
-        if p.omega_s == 0 and p.tau != 0:
-            yield rubbing(p.tau)
-
-    def branches(self, p: Any) -> Iterator[Branch]:
-        if p.tau == 0:
-            yield ThroughLaw(Integer(0))  # a load left out by its value: nothing sticks
-        elif p.omega_s == 0:
-            yield from rubs(p.tau, p, None)
-        else:
-            yield ThroughLaw(p.tau * tanh(ACROSS / p.omega_s))
+    def against(self, p: Any, direction: Any) -> Expr:
+        return direction * p.tau
 
 
 @component
@@ -141,8 +126,8 @@ class CraneTravel(Resistance):
         size = p.m * GRAVITY * (p.w + p.kappa) * p.diameter / 2
         yield Derived("tau_w", size, "N*m", "travel resistance", r"\tau_w")
 
-    def against(self, p: Any, way: Any) -> Expr:
-        return way * p.tau_w
+    def against(self, p: Any, direction: Any) -> Expr:
+        return direction * p.tau_w
 
     @staticmethod
     def wheel_friction(diameter: float, lever_arm: float, bearing_friction: float, bearing_diameter: float) -> float:
@@ -187,21 +172,26 @@ class Hoist(Resistance):
     def derived(self, p: Any) -> Iterator[Derived]:
         yield Derived("tau_h", p.m * GRAVITY * p.radius / p.ratio, "N*m", "weight at the shaft", r"\tau_h")
 
-    def against(self, p: Any, way: Any) -> Expr:
-        return p.tau_h * (p.efficiency**-way - 1)
+    def against(self, p: Any, direction: Any) -> Expr:
+        return p.tau_h * (p.efficiency**-direction - 1)
 
     def weight(self, p: Any) -> Expr:
         return p.tau_h
 
 
-def _rising(p: Any) -> Expr:
-    """A torque that rises with the square of the speed up to the nominal point, above a static share."""
-    speed = ACROSS / (2 * pi * p.n_n / 60)
-    return (1 - p.static) * p.tau_n * speed * Abs(speed)
+class RisingResistance(Resistance):
+    """Base of machines for gases and liquids: a static torque, and one that rises with the square of the speed."""
+
+    def against(self, p: Any, direction: Any) -> Expr:
+        return direction * p.static * p.tau_n
+
+    def besides(self, p: Any) -> Expr:
+        speed = ACROSS / (2 * pi * p.n_n / 60)
+        return (1 - p.static) * p.tau_n * speed * Abs(speed)
 
 
 @component
-class FanLoad(Resistance):
+class FanLoad(RisingResistance):
     """A fan: a torque that rises with the square of the speed, and the friction of its bearings.
 
     Law: torque on the node -tau_n ((1 - static) w |w| + static sign(w)), w = omega / (2 pi n_n / 60).
@@ -212,15 +202,9 @@ class FanLoad(Resistance):
     static: float = parameter("1", "share of friction in it", at_least=0, at_most=1, default=0.0, latex=r"\sigma")
     omega_s: float = rounding()
 
-    def against(self, p: Any, way: Any) -> Expr:
-        return way * p.static * p.tau_n
-
-    def besides(self, p: Any) -> Expr:
-        return _rising(p)
-
 
 @component
-class PumpLoad(Resistance):
+class PumpLoad(RisingResistance):
     """A pump that lifts a liquid behind a check valve: a static share for the height, the rest as the square of speed.
 
     Law: torque on the node -tau_n ((1 - static) w |w| + static sign(w)), w = omega / (2 pi n_n / 60). The valve holds
@@ -231,12 +215,6 @@ class PumpLoad(Resistance):
     n_n: float = parameter("1/min", "nominal speed", above=0)
     static: float = parameter("1", "share of the height in it", at_least=0, at_most=1, default=0.5, latex=r"\sigma")
     omega_s: float = rounding()
-
-    def against(self, p: Any, way: Any) -> Expr:
-        return way * p.static * p.tau_n
-
-    def besides(self, p: Any) -> Expr:
-        return _rising(p)
 
 
 @component
@@ -256,8 +234,8 @@ class Conveyor(Resistance):
     d: float = parameter("N*s/m", "drag per belt speed", at_least=0, default=0.0)
     omega_s: float = rounding()
 
-    def against(self, p: Any, way: Any) -> Expr:
-        return way * p.friction * p.m * GRAVITY * p.radius * cos(p.incline)
+    def against(self, p: Any, direction: Any) -> Expr:
+        return direction * p.friction * p.m * GRAVITY * p.radius * cos(p.incline)
 
     def weight(self, p: Any) -> Expr:
         return p.m * GRAVITY * p.radius * sin(p.incline)
@@ -306,6 +284,6 @@ class RandomLoad(Resistance):
     kind: NoiseKind | str = parameter("1", "held or band-limited", default=NoiseKind.HELD, record=NoiseKind)
     omega_s: float = rounding()
 
-    def against(self, p: Any, way: Any) -> Expr:
+    def against(self, p: Any, direction: Any) -> Expr:
         noise = HeldNoise if p.kind is NoiseKind.HELD else SmoothNoise
-        return way * (Max(0, p.mean + p.std * noise(t / p.interval, p.seed)) if p.std != 0 else p.mean)
+        return direction * (Max(0, p.mean + p.std * noise(t / p.interval, p.seed)) if p.std != 0 else p.mean)

@@ -1,46 +1,31 @@
-"""Electrical machines: torque-speed curve and armature circuit."""
+"""Electrical machines as circuits: direct current and induction."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
-from sympy import Integer, pi
+from sympy import Expr, Integer, Piecewise, Rational, cos, pi, sin, sqrt
 
 from shaftwork.components.base import Component, Port, Role, Signal, component
-from shaftwork.components.branches import ACROSS, Branch, IdealCoupling, ThroughLaw, ThroughStore
-from shaftwork.components.switching import off_time, on_time, refuse_no_time_on, while_on
-from shaftwork.components.torque_curves import kloss
+from shaftwork.components.branches import (
+    ACROSS,
+    AcrossLaw,
+    Branch,
+    IdealCoupling,
+    ThroughLaw,
+    ThroughStore,
+    across_of,
+    through_of,
+)
+from shaftwork.components.laws import t
+from shaftwork.components.timing import on_time
 from shaftwork.core.domains import ELECTRICAL, ROTATION
 from shaftwork.core.parameters import parameter
 
-
-@component
-class KlossMotor(Component):
-    """An induction motor by Kloss' formula, seen through a gear of given ratio and efficiency.
-
-    Law: tau = ratio efficiency 2 tau_k s s_k / (s^2 + s_k^2), slip s = 1 - ratio omega / (2 pi n_sync / 60).
-    Analogue: a voltage-controlled current source. Source: Marinkovic 2012, (2), (18).
-    The efficiency multiplies the torque in both directions of power flow, as the source prints it.
-    """
-
-    tau_k: float = parameter("N*m", "pull-out torque at the motor shaft", above=0, latex=r"\tau_k")
-    s_k: float = parameter("1", "slip at the pull-out torque", above=0)
-    n_sync: float = parameter("1/min", "synchronous speed", above=0, latex=r"n_{sync}")
-    ratio: float = parameter("1", "motor speed over node speed", nonzero=True, default=1.0, latex="i")
-    efficiency: float = parameter("1", "efficiency of the gear", above=0, at_most=1, default=1.0, latex=r"\eta")
-    t_on: float | None = on_time()
-    t_off: float | None = off_time()
-
-    role: ClassVar[Role] = "source"
-    ports: ClassVar = (Port("a"),)
-
-    def __post_init__(self) -> None:
-        refuse_no_time_on(self)
-
-    def branches(self, p: Any) -> Iterator[Branch]:
-        slip = 1 - p.ratio * ACROSS / (2 * pi * p.n_sync / 60)
-        yield ThroughLaw(-while_on(p.ratio * p.efficiency * kloss(p.tau_k, slip, p.s_k), p))
+AXES = ("alpha", "beta")
+PHASES = Rational(3, 2)
+"""How many phases an axis stands for."""
 
 
 @component
@@ -72,3 +57,70 @@ class DCMachine(Component):
             "omega": Signal("across", ("rotor", None), ROTATION),
             "tau": Signal("through", ("rotor", None), ROTATION, -1),
         }
+
+
+@component
+class InductionMachine(Component):
+    """A three-phase induction machine at a balanced sinusoidal supply, in stationary axes alpha and beta.
+
+    Law: in each axis u = R_s i + d psi_s/dt, 0 = R_r i_r + d psi_r/dt - j p omega psi_r with alpha + j beta,
+    psi_s = L_s_sigma i + L_m (i + i_r), psi_r = L_r_sigma i_r + L_m (i + i_r), and
+    tau = 3/2 p L_m (i_m_alpha i_beta - i_m_beta i_alpha) with i_m = i + i_r. From t_on the phase voltage is
+    sqrt(2/3) U (cos, sin)(2 pi f t); before it the windings are short-circuited. Rotor quantities are referred to the
+    stator. Source: Park 1929; the axes are those of Clarke 1943, with the amplitude kept: i_alpha is the current of
+    phase a. In the circuit an axis has 3/2 times the impedance and voltage of a phase, so that its power is that of the
+    machine. With R_s = 0 its steady torque is exactly Kloss' curve.
+    Analogue: a transformer whose secondary carries a back EMF.
+    """
+
+    U: float = parameter("V", "voltage between two lines, effective", above=0)
+    f: float = parameter("Hz", "frequency of the supply", above=0)
+    L_m: float = parameter("H", "magnetising inductance", above=0)
+    L_s_sigma: float = parameter("H", "leakage inductance of the stator", above=0, latex=r"L_{s\sigma}")
+    L_r_sigma: float = parameter("H", "leakage inductance of the rotor", at_least=0, latex=r"L_{r\sigma}")
+    R_r: float = parameter("ohm", "rotor resistance", above=0)
+    R_s: float = parameter("ohm", "stator resistance", at_least=0, default=0.0)
+    pole_pairs: float = parameter("1", "number of pole pairs", above=0, whole=True, default=1.0, latex="p")
+    t_on: float | None = on_time()
+
+    role: ClassVar[Role] = "source"
+    ports: ClassVar = (Port("rotor"),)
+    inner: ClassVar = tuple(
+        Port(f"{place}_{axis}", ELECTRICAL) for axis in AXES for place in ("supply", "stator", "gap", "rotor", "emf")
+    )
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        speed, linked = p.pole_pairs * across_of("rotor"), {axis: _rotor_flux(p, axis) for axis in AXES}
+        phase = 2 * pi * p.f * t
+        yield from self._axis(p, "alpha", cos(phase), -speed * linked["beta"])
+        yield from self._axis(p, "beta", sin(phase), speed * linked["alpha"])
+        (i_a, i_b), (m_a, m_b) = ([through_of(f"{name}_{axis}") for axis in AXES] for name in ("i", "i_m"))
+        yield ThroughLaw(-PHASES * p.pole_pairs * p.L_m * (m_a * i_b - m_b * i_a), ("rotor", None), "e")
+
+    def _axis(self, p: Any, axis: str, supply: Expr, emf: Expr) -> Iterator[Branch]:
+        voltage = PHASES * sqrt(Rational(2, 3)) * p.U * supply
+        switched = voltage if p.t_on is None else Piecewise((0, t < p.t_on), (voltage, True))
+        names = ("supply", "stator", "gap", "rotor", "emf")
+        supplied, stator, gap, rotor, moved = (f"{name}_{axis}" for name in names)
+        yield AcrossLaw(switched, (supplied, None), f"u_{axis}")
+        yield ThroughLaw(ACROSS / (PHASES * p.R_s), (supplied, stator), f"R_{axis}")
+        yield AcrossLaw(PHASES * emf, (moved, None), f"u_r_{axis}")
+        yield ThroughLaw(ACROSS / (PHASES * p.R_r), (moved, rotor), f"R_r_{axis}")
+        yield ThroughStore(1 / (PHASES * p.L_r_sigma), (rotor, gap), f"i_r_{axis}")
+        yield ThroughStore(1 / (PHASES * p.L_s_sigma), (stator, gap), f"i_{axis}")
+        yield ThroughStore(1 / (PHASES * p.L_m), (gap, None), f"i_m_{axis}")
+
+    def signals(self) -> dict[str, Signal]:
+        """Speed and torque of the rotor, the currents of the stator, and those that magnetise."""
+        labels = [(f"{name}_{axis}", f"gap_{axis}") for name in ("i", "i_m") for axis in AXES]
+        return {
+            "omega": Signal("across", ("rotor", None), ROTATION),
+            "tau": Signal("through", ("rotor", None), ROTATION, -1),
+            **{label: Signal("store", (gap, None), ELECTRICAL, 1, label) for label, gap in labels},
+        }
+
+
+def _rotor_flux(p: Any, axis: str) -> Expr:
+    """Flux linkage of the rotor winding in the current of the stator and in that which magnetises."""
+    stator, magnetising = through_of(f"i_{axis}"), through_of(f"i_m_{axis}")
+    return p.L_m * magnetising + p.L_r_sigma * (magnetising - stator)

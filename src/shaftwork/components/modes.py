@@ -18,8 +18,8 @@ from math import isfinite
 from sympy import Expr, Symbol, false, true
 from sympy.logic.boolalg import Boolean
 
-from shaftwork.components.branches import ACROSS, THROUGH, End, named_in
-from shaftwork.core.declarations import is_label, is_pair, refuse_fields
+from shaftwork.components.branches import ACROSS, THROUGH, End, is_pair, named_in
+from shaftwork.core.parameters import is_label, refuse_fields
 
 ANEW = ""
 """Of a `Leave`: to whichever mode a motion would start in, other than the one that ends."""

@@ -8,9 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 from shaftwork.components.drives import FrequencyDrive
-from shaftwork.components.machines import KlossMotor
-from shaftwork.components.motors import CageMotor
-from shaftwork.components.torque_curves import pull_out_slip, refuse_rated_point
+from shaftwork.components.motors import CageMotor, KlossMotor, pull_out_slip, refuse_rated_point
 
 
 @dataclass(frozen=True)
@@ -65,8 +63,8 @@ class Nameplate:
 
     def cage(self, name: str, **values: Any) -> CageMotor:
         """The motor with the torques of its catalogue; `values` are further parameters, such as ratio and t_off."""
-        own = {key: getattr(self, key) for key in ("tau_a", "tau_s", "tau_k", "n_sync", "tau_n", "n_n")}
-        return CageMotor(name, **{**own, **values})
+        printed = {key: getattr(self, key) for key in ("tau_a", "tau_s", "tau_k", "n_sync", "tau_n", "n_n")}
+        return CageMotor(name, **{**printed, **values})
 
     def kloss(self, name: str, **values: Any) -> KlossMotor:
         """The motor by Kloss' formula alone, from standstill on."""
@@ -74,8 +72,8 @@ class Nameplate:
 
     def drive(self, name: str, **values: Any) -> FrequencyDrive:
         """The motor on a frequency drive."""
-        own = {"tau_k": self.tau_k, "s_k": self.s_k, "n_sync": self.n_sync, "f_n": self.f_n}
-        return FrequencyDrive(name, **{**own, **values})
+        printed = {"tau_k": self.tau_k, "s_k": self.s_k, "n_sync": self.n_sync, "f_n": self.f_n}
+        return FrequencyDrive(name, **{**printed, **values})
 
 
 _UNITS = {
@@ -125,5 +123,5 @@ _EXCAVATOR = Nameplate(
     },
 )
 
-motors: Mapping[str, Nameplate] = MappingProxyType({made.name: made for made in (_CRANE, _EXCAVATOR)})
+motors: Mapping[str, Nameplate] = MappingProxyType({plate.name: plate for plate in (_CRANE, _EXCAVATOR)})
 """The motors of the sources by name."""

@@ -1,4 +1,4 @@
-"""Motors by their torque-speed curve: the torques of a catalogue, or a table."""
+"""Motors by their torque-speed curve: Kloss' formula, the torques of a catalogue, or a table."""
 
 from __future__ import annotations
 
@@ -6,21 +6,59 @@ import math
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
-from sympy import Expr, Piecewise, pi
+from sympy import Expr, Piecewise, pi, sqrt
 
 from shaftwork.components.base import Component, Derived, Port, Role, component
-from shaftwork.components.bounds import no_less
 from shaftwork.components.branches import ACROSS, Branch, ThroughLaw
-from shaftwork.components.switching import number_of, off_time, on_time, refuse_no_time_on, while_on
+from shaftwork.components.clips import no_less
 from shaftwork.components.tables import Interpolation, Table
-from shaftwork.components.torque_curves import bend, kloss, pull_out_slip, pull_up_share, refuse_rated_point
+from shaftwork.components.timing import number_of, off_time, on_time, refuse_no_time_on, while_on
 from shaftwork.core.errors import NetworkWarning, ParameterError
 from shaftwork.core.notices import warn
 from shaftwork.core.parameters import parameter
 
 
+class CurveMotor(Component):
+    """Base of motors by a torque-speed curve, seen through a gear of `ratio` and `efficiency`."""
+
+    role: ClassVar[Role] = "source"
+    ports: ClassVar = (Port("a"),)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        refuse_no_time_on(self)
+
+    def torque(self, p: Any) -> Expr:
+        """The torque at the motor shaft, in parameters and the speed ACROSS of the node."""
+        raise NotImplementedError
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        yield ThroughLaw(-while_on(p.ratio * p.efficiency * self.torque(p), p))
+
+
 @component
-class CageMotor(Component):
+class KlossMotor(CurveMotor):
+    """An induction motor by Kloss' formula, seen through a gear of given ratio and efficiency.
+
+    Law: tau = ratio efficiency 2 tau_k s s_k / (s^2 + s_k^2), slip s = 1 - ratio omega / (2 pi n_sync / 60).
+    Analogue: a voltage-controlled current source. Source: Marinkovic 2012, (2), (18).
+    The efficiency multiplies the torque in both directions of power flow, as the source prints it.
+    """
+
+    tau_k: float = parameter("N*m", "pull-out torque at the motor shaft", above=0, latex=r"\tau_k")
+    s_k: float = parameter("1", "slip at the pull-out torque", above=0)
+    n_sync: float = parameter("1/min", "synchronous speed", above=0, latex=r"n_{sync}")
+    ratio: float = parameter("1", "motor speed over node speed", nonzero=True, default=1.0, latex="i")
+    efficiency: float = parameter("1", "efficiency of the gear", above=0, at_most=1, default=1.0, latex=r"\eta")
+    t_on: float | None = on_time()
+    t_off: float | None = off_time()
+
+    def torque(self, p: Any) -> Expr:
+        return kloss(p.tau_k, _slip(p), p.s_k)
+
+
+@component
+class CageMotor(CurveMotor):
     """A squirrel-cage motor by the torques of its catalogue, seen through a gear of given ratio and efficiency.
 
     Law: with the motor's speed n, the quartic through (0, tau_a), (n_s, tau_s) with slope 0 and (n_k, tau_k) with slope
@@ -45,11 +83,8 @@ class CageMotor(Component):
     t_on: float | None = on_time()
     t_off: float | None = off_time()
 
-    role: ClassVar[Role] = "source"
-    ports: ClassVar = (Port("a"),)
-
     def __post_init__(self) -> None:
-        refuse_no_time_on(self)
+        super().__post_init__()
         _check_curve(self)
 
     def derived(self, p: Any) -> Iterator[Derived]:
@@ -65,17 +100,16 @@ class CageMotor(Component):
         curved = free if p.n_s is None else bend(p.tau_a, p.tau_s, p.tau_k, p.share)
         yield Derived("bend", curved, "N*m", "bends the cubic to the quartic", "B")
 
-    def branches(self, p: Any) -> Iterator[Branch]:
+    def torque(self, p: Any) -> Expr:
         speed = p.ratio * ACROSS
-        way = (speed - p.omega_k * p.share) / p.width
-        quartic = p.tau_s + (p.tau_k - p.tau_s) * way**2 * (3 - 2 * way) + p.bend * way**2 * (1 - way) ** 2
-        running = kloss(p.tau_k, 1 - speed / (2 * pi * p.n_sync / 60), p.slip_k)
-        torque = Piecewise((p.tau_a, speed < 0), (quartic, speed < p.omega_k), (running, True))
-        yield ThroughLaw(-while_on(p.ratio * p.efficiency * torque, p))
+        x = (speed - p.omega_k * p.share) / p.width
+        quartic = p.tau_s + (p.tau_k - p.tau_s) * x**2 * (3 - 2 * x) + p.bend * x**2 * (1 - x) ** 2
+        running = kloss(p.tau_k, _slip(p), p.slip_k)
+        return Piecewise((p.tau_a, speed < 0), (quartic, speed < p.omega_k), (running, True))
 
 
 @component
-class WoundRotorMotor(Component):
+class WoundRotorMotor(CurveMotor):
     """A slip-ring motor that starts over resistors in its rotor circuit, which are taken out step by step.
 
     Law: Kloss' tau = ratio efficiency 2 tau_k s S / (s^2 + S^2), with the slip s = 1 - ratio omega / (2 pi n_sync / 60)
@@ -96,21 +130,12 @@ class WoundRotorMotor(Component):
     t_on: float | None = on_time()
     t_off: float | None = off_time()
 
-    role: ClassVar[Role] = "source"
-    ports: ClassVar = (Port("a"),)
-
-    def __post_init__(self) -> None:
-        refuse_no_time_on(self)
-
-    def branches(self, p: Any) -> Iterator[Branch]:
-        slip = 1 - p.ratio * ACROSS / (2 * pi * p.n_sync / 60)
-        yield ThroughLaw(
-            -while_on(p.ratio * p.efficiency * kloss(p.tau_k, slip, p.s_k * no_less(p, "resistance", 1)), p)
-        )
+    def torque(self, p: Any) -> Expr:
+        return kloss(p.tau_k, _slip(p), p.s_k * no_less(p, "resistance", 1))
 
 
 @component
-class TableMotor(Component):
+class TableMotor(CurveMotor):
     """A motor by its measured torque over speed, seen through a gear of given ratio and efficiency.
 
     Law: tau = ratio efficiency curve(n), with n the speed of the motor in 1/min: straight lines between the points of
@@ -124,22 +149,23 @@ class TableMotor(Component):
     t_on: float | None = on_time()
     t_off: float | None = off_time()
 
-    role: ClassVar[Role] = "source"
-    ports: ClassVar = (Port("a"),)
-
     def __post_init__(self) -> None:
-        refuse_no_time_on(self)
+        super().__post_init__()
         if isinstance(self.curve, Expr) and not isinstance(self.curve, Table) and not self.curve.is_number:
             raise ParameterError(
                 f"TableMotor '{self.name}': curve = {self.curve} is an expression. Give Table(speeds, torques) with "
                 "speeds in 1/min, or take a TorqueSource, whose law reads omega."
             )
 
-    def branches(self, p: Any) -> Iterator[Branch]:
+    def torque(self, p: Any) -> Expr:
         speed = 60 * p.ratio * ACROSS / (2 * pi)
         # a table alone becomes a law of time wherever a law is given; here its argument is the speed
-        torque = p.curve.table(speed) if isinstance(p.curve, Interpolation) else p.curve
-        yield ThroughLaw(-while_on(p.ratio * p.efficiency * torque, p))
+        return p.curve.table(speed) if isinstance(p.curve, Interpolation) else p.curve
+
+
+def _slip(p: Any) -> Expr:
+    """The slip at a speed of the node."""
+    return 1 - p.ratio * ACROSS / (2 * pi * p.n_sync / 60)
 
 
 def _share(p: Any) -> Expr:
@@ -153,10 +179,10 @@ def _check_curve(motor: CageMotor) -> None:
     Raises:
         ParameterError: they give no curve.
     """
-    given = {name: number_of(motor, name) for name in _CURVE}
-    if any(value is None and getattr(motor, name) is not None for name, value in given.items()):
+    numbers = {name: number_of(motor, name) for name in _CURVE}
+    if any(value is None and getattr(motor, name) is not None for name, value in numbers.items()):
         return  # the checks of the network name what is no admissible number
-    tau_a, tau_s, tau_k, n_sync, n_n, tau_n, n_k, n_s = (given[name] or 0.0 for name in _CURVE)
+    tau_a, tau_s, tau_k, n_sync, n_n, tau_n, n_k, n_s = (numbers[name] or 0.0 for name in _CURVE)
     title = f"CageMotor '{motor.name}'"
     if not tau_s < tau_k or tau_s > tau_a:
         raise ParameterError(
@@ -201,3 +227,75 @@ def _warn_of_turns(title: str, torques: tuple[float, float, float], n_k: float, 
             f"does not fall to tau_s and rise to tau_k as it should. Give {other}.",
             NetworkWarning,
         )
+
+
+def pull_out_slip(tau_k: Any, tau_n: Any, n_n: Any, n_sync: Any) -> Any:
+    """The slip at the pull-out torque for which Kloss' curve passes through the rated point.
+
+    Law: s_k = s_n (u + sqrt(u^2 - 1)), u = tau_k / tau_n, s_n = 1 - n_n / n_sync: the larger root of
+    tau_n / tau_k = 2 / (s_n/s_k + s_k/s_n), so that the rated point lies on the stable branch. Source: Marinkovic
+    2012, (2).
+
+    Args:
+        tau_k: pull-out torque, N m; a number or an expression, as are the others.
+        tau_n: rated torque, N m, less than tau_k.
+        n_n: rated speed, 1/min.
+        n_sync: synchronous speed, 1/min.
+    """
+    overload = tau_k / tau_n
+    return (1 - n_n / n_sync) * (overload + sqrt(overload**2 - 1))
+
+
+def refuse_rated_point(title: str, tau_k: float, tau_n: float, n_n: float, n_sync: float) -> None:
+    """Refuse a rated point that Kloss' curve does not pass through; arguments as for `pull_out_slip`.
+
+    Raises:
+        ParameterError: its torque is not less than the pull-out torque, or its speed not less than the synchronous one.
+    """
+    if tau_n >= tau_k:
+        raise ParameterError(
+            f"{title}: the rated torque tau_n = {tau_n:g} N m is not less than the pull-out torque tau_k = {tau_k:g} "
+            "N m, so that the curve never reaches the rated point. Give tau_k in N m at the motor shaft; a catalogue "
+            "that prints tau_k / tau_n means that many times tau_n."
+        )
+    if n_n >= n_sync:
+        raise ParameterError(
+            f"{title}: the rated speed n_n = {n_n:g} 1/min is not less than the synchronous speed n_sync = {n_sync:g} "
+            "1/min, so that there is no slip. Give n_sync = 60 f / pole pairs, the next of these speeds above n_n."
+        )
+
+
+def pull_up_share(tau_a: Any, tau_s: Any, tau_k: Any) -> Any:
+    """Pull-up speed over pull-out speed where a catalogue does not give it.
+
+    Law: w / (1 + w), w = sqrt((tau_a - tau_s) / (3 (tau_k - tau_s))). Chosen: the source leaves it open. With it the
+    quartic falls and rises as it should for any three torques with tau_a - tau_s < 64 (tau_k - tau_s), and the pull-up
+    point goes to standstill where tau_a goes to tau_s.
+
+    Args:
+        tau_a: locked-rotor torque, N m; a number or an expression, as are the others.
+        tau_s: pull-up torque, N m.
+        tau_k: pull-out torque, N m.
+    """
+    ratio = sqrt((tau_a - tau_s) / (3 * (tau_k - tau_s)))
+    return ratio / (1 + ratio)
+
+
+def bend(tau_a: Any, tau_s: Any, tau_k: Any, share: Any) -> Any:
+    """How far the quartic through the three torques of a cage motor bends away from a cubic, N m.
+
+    Law: with x = (n - n_s) / (n_k - n_s) the quartic is tau_s + (tau_k - tau_s) x^2 (3 - 2 x) + B x^2 (1 - x)^2, whose
+    values and slopes at x = 0 and x = 1 are those asked for whatever B is; B makes it tau_a at standstill.
+
+    Args:
+        tau_a: locked-rotor torque, N m; a number or an expression, as are the others.
+        tau_s: pull-up torque, N m.
+        tau_k: pull-out torque, N m.
+        share: n_s / n_k, between 0 and 1.
+    """
+    return (1 - share) ** 4 / share**2 * (tau_a - tau_s) - (tau_k - tau_s) * (1 - share) * (3 - share)
+
+
+def kloss(tau_k: Any, slip: Any, s_k: Any) -> Any:
+    """Kloss' formula 2 tau_k s s_k / (s^2 + s_k^2). Source: Marinkovic 2012, (2)."""
+    return 2 * tau_k * slip * s_k / (slip**2 + s_k**2)

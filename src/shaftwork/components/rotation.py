@@ -8,8 +8,22 @@ from typing import Any, ClassVar
 from sympy import Integer
 
 from shaftwork.components.base import Component, Port, Role, component
-from shaftwork.components.branches import ACROSS, AcrossStore, Branch, IdealCoupling, ThroughLaw, ThroughStore
+from shaftwork.components.branches import (
+    ACROSS,
+    AcrossStore,
+    Branch,
+    IdealCoupling,
+    LossyCoupling,
+    ThroughLaw,
+    ThroughStore,
+    rigid,
+    through_of,
+)
+from shaftwork.components.modes import Leave, Mode, Modes
 from shaftwork.core.parameters import parameter
+
+DRIVING, DRIVEN, STUCK = "driving", "driven", "stuck"
+MESH, AT_A, AT_B = "mesh", "a", "b"
 
 
 @component
@@ -110,3 +124,85 @@ class PlanetaryGear(Component):
 
     def branches(self, p: Any) -> Iterator[Branch]:
         yield IdealCoupling(((Integer(1), "sun", None), (p.ratio, "ring", None), (-(1 + p.ratio), "carrier", None)))
+
+
+@component
+class LossyGear(Component):
+    """A gear between shafts a and b whose teeth rub: a part of the power is lost, and at rest it may hold.
+
+    Law: omega_a = ratio omega_b. While a drives, tau_b = -ratio efficiency tau_a; while b drives,
+    tau_a = -efficiency_back tau_b / ratio. At rest both are held as long as neither side overcomes the loss: it starts
+    where efficiency tau_a + tau_b / ratio and tau_a + efficiency_back tau_b / ratio have the same sign, with the
+    torques that the held nodes give to it. An efficiency_back of zero or less locks the gear: b alone cannot turn it,
+    and a must drive along so that it turns the way b pushes. Modes: driving, driven (each forward, where omega_a > 0,
+    or backward), stuck.
+
+    A self-locking gear that would have to brake more inertia than there is on the side of a has no motion with b
+    driving: it stops at once. Behind a bare spring, with no inertia at node a, it would stop and start without end;
+    a run refuses that. A rigid impact turns the gear as torques would, on, to rest and round, and what the gear loses
+    then is its own.
+    Analogue: a transformer with different ratios of voltages and currents. Source: Pelchen, Schweiger and Otter 2002.
+    """
+
+    ratio: float = parameter(
+        "1", "speed of a over speed of b; negative for a pair that reverses", nonzero=True, latex="i"
+    )
+    efficiency: float = parameter(
+        "1", "share of the power that b gets while a drives", above=0, at_most=1, latex=r"\eta"
+    )
+    efficiency_back: float | None = parameter(
+        "1",
+        "that share while b drives, by default the same; zero or less where b cannot drive",
+        at_most=1,
+        default=None,
+        latex=r"\eta_b",
+    )
+
+    role: ClassVar[Role] = "coupling"
+
+    def modes(self, p: Any) -> Iterator[Modes]:
+        at_a, at_b = through_of(AT_A), through_of(AT_B) / p.ratio
+        ahead, back = p.efficiency * at_a + at_b, at_a + _back(p) * at_b
+        yield Modes((*_moving(1), *_moving(-1), *_held(ahead, back)), ends=("a", None))
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        terms = ((Integer(1), "a", None), (-p.ratio, "b", None))
+        if p.form == STUCK:
+            yield rigid(("a", None), AT_A)
+            yield rigid(("b", None), AT_B)
+        elif p.form == DRIVEN:
+            yield LossyCoupling(terms, (_back(p), -p.ratio), MESH)
+        else:
+            yield LossyCoupling(terms, (Integer(1), -p.ratio * p.efficiency), MESH)
+
+
+def _back(p: Any) -> Any:
+    return p.efficiency if p.efficiency_back is None else p.efficiency_back
+
+
+def _moving(way: int) -> Iterator[Mode]:
+    """Turning one way: power goes from a to b while the torque in the mesh has the sign of the speed."""
+    torque, word = way * through_of(MESH), "forward" if way > 0 else "backward"
+    stops, turns = -way * ACROSS, way * ACROSS > 0
+    driving, driven = f"{DRIVING} {word}", f"{DRIVEN} {word}"
+    yield Mode(driving, (Leave(-torque, driven), Leave(stops, _flank(way))), way, DRIVING, turns)
+    yield Mode(driven, (Leave(torque, driving), Leave(stops, _flank(-way))), way, DRIVEN, turns)
+
+
+def _flank(side: int) -> str:
+    """At rest teeth are pressed on one flank or the other, a pushing forward or backward."""
+    return "stuck" if side > 0 else "stuck on the other flank"
+
+
+def _held(ahead: Any, back: Any) -> Iterator[Mode]:
+    """At rest, with the flank that carries the load: from there it turns on, gives way, or the load changes sides.
+
+    The last is beyond both other limits, by more than either.
+    """
+    for side, (on, off) in ((1, ("forward", "backward")), (-1, ("backward", "forward"))):
+        leaves = (
+            Leave(side * ahead, f"{DRIVING} {on}"),
+            Leave(-side * back, f"{DRIVEN} {off}"),
+            Leave(side * (ahead - back), _flank(-side)),
+        )
+        yield Mode(_flank(side), leaves, float(side), STUCK, says="stuck")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import ast
+import contextlib
 import reprlib
 from dataclasses import dataclass
 from functools import lru_cache
@@ -19,7 +19,7 @@ from shaftwork.components.shaft_meshes import (
     spectral,
 )
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.parameters import numbers_in_si, whole
+from shaftwork.core.parameters import call_in, numbers_in_si, whole
 
 MOST_ELEMENTS = 100_000
 """Elements of a model; more is a typing error."""
@@ -40,15 +40,15 @@ class ShaftModel:
         Raises:
             ParameterError: it is no model.
         """
-        known = {model.__name__: model for model in MODELS}
-        listed = f"The models are: {', '.join(known)}; write for example Lumped(20)."
-        match _call(text):
-            case (name, values, named) if name in known:
-                try:
-                    return known[name](*values, **named)
-                except TypeError:
-                    pass
-        raise ParameterError(f"{reprlib.repr(text)} is no shaft model. {listed}")
+        models = {model.__name__: model for model in MODELS}
+        match call_in(text):
+            case (name, values, options) if name in models:
+                with contextlib.suppress(TypeError):
+                    return models[name](*values, **options)
+        raise ParameterError(
+            f"{reprlib.repr(text)} is no shaft model. The models are: {', '.join(models)}; write for example "
+            "Lumped(20)."
+        )
 
     def mesh(self) -> Mesh:
         """The nodes, stations and weights."""
@@ -56,18 +56,6 @@ class ShaftModel:
 
     def _mesh(self) -> Mesh:
         raise ParameterError(f"{self!r} has no mesh.")
-
-
-def _call(text: Any) -> tuple[str, list[Any], dict[str, Any]] | None:
-    """A call such as "Lumped(20)" as name, values and named values, None where it is not one of plain values."""
-    try:
-        call = ast.parse(text, mode="eval").body
-        if isinstance(call, ast.Call) and isinstance(call.func, ast.Name):
-            named = {str(item.arg): ast.literal_eval(item.value) for item in call.keywords}
-            return call.func.id, [ast.literal_eval(value) for value in call.args], named
-    except (SyntaxError, ValueError, TypeError, RecursionError, MemoryError):
-        pass
-    return None
 
 
 @lru_cache(maxsize=32)

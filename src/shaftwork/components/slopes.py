@@ -1,4 +1,7 @@
-"""Slopes of laws that jump: the derivative between the jumps, without an impulse at them."""
+"""Slopes of laws that jump: the derivative between the jumps, without an impulse at them.
+
+Square roots and inverse sines at corners are written so that their slopes have no 0/0 where the root is zero.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +9,19 @@ from functools import lru_cache
 
 from sympy import (
     Abs,
+    Add,
     Basic,
     Dummy,
     Expr,
+    Float,
     Heaviside,
+    Integer,
     Max,
     Min,
     Mul,
+    Poly,
     Pow,
+    Rational,
     Symbol,
     acos,
     acot,
@@ -27,24 +35,30 @@ from sympy import (
     cosh,
     cot,
     csc,
+    expand_trig,
     floor,
     preorder_traversal,
     sec,
     sign,
     sin,
     sinh,
+    sqrt,
     tan,
     tanh,
 )
 from sympy.core.relational import Relational
+from sympy.polys.polyerrors import BasePolynomialError
+from sympy.simplify.fu import TR8
 
-from shaftwork.components import roots
 from shaftwork.components.clips import replaced
 from shaftwork.components.tables import InterpolationSlope
 
 STEPS = (sign, Heaviside, Relational, InterpolationSlope, floor, ceiling)
 """What is constant but for jumps."""
 TURNING = (sin, cos, tan, cot, sec, csc)
+MOST_SYMBOLS, MOST_DEGREE = 4, 8
+"""Of more symbols, or of a higher degree, a square is not looked for: it would take longer than the run."""
+KEPT = 4096
 
 
 def wraps(node: Basic) -> bool:
@@ -70,9 +84,9 @@ def slope(expression: Expr, symbol: Symbol) -> Expr:
         expression: a law.
         symbol: what to differentiate by.
     """
-    expression = roots.unrooted(expression)
+    expression = unrooted(expression)
     kinks = expression.atoms(sign, Heaviside, Abs, floor) | {
-        node for node in expression.atoms(asin, acos) if roots.folded(node)
+        node for node in expression.atoms(asin, acos) if folded(node)
     }
     # whether one is real sympy finds out by expanding an argument of which it does not know it: for ever, of a power
     doubtful = {node for node in expression.atoms(sinh, cosh, tanh) if not node.args[0].is_extended_real}
@@ -95,9 +109,9 @@ def _slope_of_kink(node: Expr, symbol: Symbol) -> Expr:
     inner = node.args[0]
     if isinstance(node, Abs):
         return sign(inner) * slope(inner, symbol)
-    by = roots.complement(node)
+    by = complement(node)
     assert by is not None  # noqa: S101 (only such nodes are asked for)
-    return sign(by) * roots.turning(node, by, slope(inner, symbol), slope(by, symbol))
+    return sign(by) * turning(node, by, slope(inner, symbol), slope(by, symbol))
 
 
 def _is_at_rest(node: Expr) -> bool:
@@ -122,3 +136,116 @@ def jumps(expression: Expr, *symbols: Symbol) -> bool:
     """Whether a law may jump in one of the symbols, so that it is not linear in it even where its slope is constant."""
     found = (node for node in preorder_traversal(expression) if isinstance(node, STEPS) or wraps(node))
     return any(not node.free_symbols.isdisjoint(symbols) for node in found)
+
+
+def is_root(node: Expr) -> bool:
+    """Whether a node is a square root, or an odd power of one, of a sum."""
+    return isinstance(node, Pow) and isinstance(node.exp, Rational) and node.exp.q == 2 and node.base.has(Add)
+
+
+def unrooted(expression: Expr) -> Expr:
+    """The same where roots of perfect squares are sizes: sqrt(2 - 2 cos x) is 2 |sin(x/2)|, whose slope is known."""
+    if not any(is_root(node) for node in expression.atoms(Pow)):
+        return expression
+    made: Expr = expression.replace(is_root, lambda node: _size(node, square_root(node.base)))
+    return made
+
+
+def complement(node: Expr) -> Expr | None:
+    """What is zero where an inverse sine or cosine has a corner: w with w^2 = 1 - g^2; None where there is no such w.
+
+    Args:
+        node: asin(g) or acos(g).
+    """
+    inner = node.args[0]
+    if not inner.free_symbols:
+        return None
+    if isinstance(inner, sin):
+        return cos(inner.args[0])
+    return sin(inner.args[0]) if isinstance(inner, cos) else square_root(1 - inner**2)
+
+
+def turning(node: Expr, by: Expr, inner_slope: Expr, complement_slope: Expr) -> Expr:
+    """The derivative of asin(g) or acos(g) without a division: that of the angle whose sine is g and cosine w.
+
+    Law: d asin(g) = sign(w) (w dg - g dw) = -d acos(g) with w^2 + g^2 = 1; this gives what stands behind sign(w).
+
+    Args:
+        node: asin(g) or acos(g).
+        by: w.
+        inner_slope: dg.
+        complement_slope: dw.
+    """
+    inner = node.args[0]
+    plain = TR8((by * inner_slope - inner * complement_slope).expand()).expand()
+    return -plain if isinstance(node, acos) else plain
+
+
+def folded(node: Expr) -> bool:
+    """Whether a node is an inverse sine or cosine with corners where its argument touches 1 or -1."""
+    return isinstance(node, asin | acos) and complement(node) is not None
+
+
+@lru_cache(maxsize=KEPT)
+def square_root(square: Expr) -> Expr | None:
+    """An expression without roots whose square this is, or None.
+
+    Law: with s = sin(a/2) and c = cos(a/2) every polynomial of sin(a) and cos(a) is a homogeneous one of s and c, where
+    1 = s^2 + c^2; its factors, but for those that are 1, say whether it is a square.
+    """
+    numbers = {number: Rational(str(number)) for number in square.atoms(Float)}
+    plain = square.xreplace(numbers)
+    if len({wave.args[0] for wave in plain.atoms(sin, cos)}) > 1:
+        plain = expand_trig(plain)
+    angles = dict.fromkeys(wave.args[0] for wave in sorted(plain.atoms(sin, cos), key=str))
+    halves = {angle: (Dummy("s"), Dummy("c")) for angle in angles}
+    if len(square.free_symbols) > MOST_SYMBOLS or any(angle.has(sin, cos) for angle in angles):
+        return None
+    try:
+        root = _root_of_factors(_homogeneous(plain, halves), [s**2 + c**2 for s, c in halves.values()])
+    except BasePolynomialError:
+        return None
+    if root is None or not angles:
+        return root
+    back = {half: f(angle / 2) for angle, pair in halves.items() for half, f in zip(pair, (sin, cos), strict=True)}
+    made: Expr = TR8(root.xreplace(back).expand())
+    return made
+
+
+def _homogeneous(square: Expr, halves: dict[Expr, tuple[Dummy, Dummy]]) -> Expr:
+    """A polynomial of sines and cosines in those of half their angles, with all terms of one degree."""
+    for angle, (s, c) in halves.items():
+        waves = Poly(square, sin(angle), cos(angle))
+        degree = waves.total_degree()
+        if degree > MOST_DEGREE:
+            raise BasePolynomialError
+        square = Add(
+            *(
+                factor * (2 * s * c) ** i * (c**2 - s**2) ** j * (s**2 + c**2) ** (degree - i - j)
+                for (i, j), factor in waves.terms()
+            )
+        )
+    return square
+
+
+def _root_of_factors(square: Expr, ones: list[Expr]) -> Expr | None:
+    polynomial = Poly(square)
+    if len(polynomial.gens) > MOST_SYMBOLS + 2 * len(ones) or polynomial.total_degree() > 2 * MOST_DEGREE + 2:
+        return None
+    for one in ones:
+        while True:
+            quotient, rest = polynomial.div(Poly(one, *polynomial.gens))
+            if not rest.is_zero or polynomial.is_zero:
+                break
+            polynomial = quotient
+    number, factors = polynomial.sqf_list()
+    if not number.is_positive or any(power % 2 for _, power in factors):
+        return None
+    root: Expr = sqrt(number)
+    for factor, power in factors:
+        root *= factor.as_expr() ** (power // 2)
+    return root
+
+
+def _size(node: Pow, root: Expr | None) -> Expr:
+    return node if root is None else Abs(root) ** Integer(2 * node.exp)

@@ -1,4 +1,4 @@
-"""What is costly to make and asked for again: the last few are kept, whichever threads ask."""
+"""A cache of the last few results of something costly, for any number of threads."""
 
 from __future__ import annotations
 
@@ -7,31 +7,30 @@ from collections.abc import Callable, Hashable
 from typing import Any, Generic, TypeVar
 
 Key = TypeVar("Key", bound=Hashable)
-Made = TypeVar("Made")
+Value = TypeVar("Value")
 
 
-class Kept(Generic[Key, Made]):
-    """The last few of what was made, by what it was made for.
+class Kept(Generic[Key, Value]):
+    """The last few values, by key.
 
-    Threads that ask for the same at once may make it twice, and all get the first. What one thread has asked for is
-    its own, whatever others ask for meanwhile.
+    Threads that need the same key at once may compute it twice, and all get the first value.
 
     Args:
         most: how many are kept.
     """
 
     def __init__(self, most: int) -> None:
-        self._most, self._made, self._lock = most, dict[Key, Made](), threading.Lock()
+        self._most, self._values, self._lock = most, dict[Key, Value](), threading.Lock()
 
-    def __call__(self, key: Key, make: Callable[[], Made]) -> Made:
-        """What belongs to a key, made where it is not there."""
-        if (found := self._made.get(key)) is not None:
-            return found
-        made = make()  # may take long, and ask for others of its kind
+    def __call__(self, key: Key, make: Callable[[], Value]) -> Value:
+        """The value of a key, computed where it is not there."""
+        if (value := self._values.get(key)) is not None:
+            return value
+        value = make()  # may take long, and ask for others of its kind
         with self._lock:
-            while key not in self._made and len(self._made) >= self._most:
-                del self._made[next(iter(self._made))]
-            return self._made.setdefault(key, made)
+            while key not in self._values and len(self._values) >= self._most:
+                del self._values[next(iter(self._values))]
+            return self._values.setdefault(key, value)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Kept, (self._most,)  # locks cannot be stored

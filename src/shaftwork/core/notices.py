@@ -1,4 +1,4 @@
-"""Warnings that point at the line of the user that led to them."""
+"""What a user is told: warnings that point at the line that led to them, and next steps in the words of the caller."""
 
 from __future__ import annotations
 
@@ -22,6 +22,10 @@ class PulsationWarning(AccuracyWarning):
 
 _muted: ContextVar[tuple[type[Warning], ...]] = ContextVar("muted", default=())
 _said: ContextVar[set[str] | None] = ContextVar("said", default=None)
+_option: ContextVar[str] = ContextVar("option", default="")
+"""The option of a command that gives values by name; none in Python."""
+VALUES = "--at"
+"""How such an option is written in `hint`."""
 
 
 def warn(message: str, category: type[Warning]) -> None:
@@ -64,3 +68,23 @@ def once() -> Iterator[None]:
         yield
     finally:
         _said.reset(before)
+
+
+def hint(call: str, options: str) -> str:
+    """The next step that a message names.
+
+    Args:
+        call: as it is written in Python.
+        options: as it is written on the command line, with `--at` for values by name.
+    """
+    return options.replace(f"{VALUES} ", f"{_option.get()} ") if _option.get() else call
+
+
+@contextmanager
+def on_the_command_line(option: str = VALUES) -> Iterator[None]:
+    """Meanwhile messages name options instead of calls; `option` is that which gives values by name."""
+    before = _option.set(option)
+    try:
+        yield
+    finally:
+        _option.reset(before)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import math
 from collections.abc import Callable
@@ -10,7 +11,6 @@ from functools import lru_cache
 from operator import index
 from typing import Any
 
-from shaftwork.core.declarations import refuse_fields
 from shaftwork.core.errors import ParameterError
 
 REQUIRED: Any = object()
@@ -25,6 +25,28 @@ RATES = ("minute", "hour", "hertz")
 """In units of speeds that are given in revolutions as a rule."""
 BOUNDS = ("above", "at_least", "at_most", "nonzero", "whole", "law", "record")
 """Fields of `Parameter` that say which values are admissible."""
+
+
+def refuse_fields(record: Any, /, **fields: tuple[bool, str]) -> None:
+    """Refuse a record with a field that is not what it must be.
+
+    Args:
+        record: a dataclass.
+        **fields: by name of a field, whether it is right, and in words what would be.
+
+    Raises:
+        ParameterError: a field is not right; names the first.
+    """
+    for name, (right, words) in fields.items():
+        if not right:
+            value = repr(getattr(record, name))
+            shown = value if len(value) <= 80 else f"{value[:77]}..."
+            raise ParameterError(f"{type(record).__name__}: {name} = {shown} must be {words}.")
+
+
+def is_label(value: Any) -> bool:
+    """Whether a text can stand behind the dot of a quantity's name: printable, without dots."""
+    return isinstance(value, str) and bool(value.strip()) and value.isprintable() and "." not in value
 
 
 @dataclass(frozen=True)
@@ -60,18 +82,24 @@ class Parameter:
     record: Any = None
 
     def __post_init__(self) -> None:
-        for bound in ("above", "at_least", "at_most"):
-            value = getattr(self, bound)
-            number = value is None or (isinstance(value, int | float) and not math.isnan(value))
-            refuse_fields(self, **{bound: (number, "a number, or None")})
-        for field in ("unit", "meaning", "latex"):
-            refuse_fields(self, **{field: (isinstance(getattr(self, field), str), "a text")})
-        for field in ("nonzero", "whole", "law"):
-            refuse_fields(self, **{field: (isinstance(getattr(self, field), bool), "True or False")})
+        def is_bound(value: Any) -> bool:
+            return value is None or (isinstance(value, int | float) and not math.isnan(value))
+
         readable = self.record is None or (
             isinstance(self.record, type) and callable(getattr(self.record, "read", None))
         )
-        refuse_fields(self, record=(readable, "a class with a class method `read`, or None"))
+        limits, texts, flags = (
+            ("above", "at_least", "at_most"),
+            ("unit", "meaning", "latex"),
+            ("nonzero", "whole", "law"),
+        )
+        refuse_fields(
+            self,
+            **{name: (is_bound(getattr(self, name)), "a number, or None") for name in limits},
+            **{name: (isinstance(getattr(self, name), str), "a text") for name in texts},
+            **{name: (isinstance(getattr(self, name), bool), "True or False") for name in flags},
+            record=(readable, "a class with a class method `read`, or None"),
+        )
 
     @property
     def required(self) -> bool:
@@ -88,7 +116,7 @@ class Parameter:
         )
         words = [f"{text} {value:g}" for value, text in rules if value is not None]
         kinds = ((self.nonzero, "not zero"), (self.whole, "whole"))
-        return " and ".join([*words, *(text for asked, text in kinds if asked)])
+        return " and ".join([*words, *(text for applies, text in kinds if applies)])
 
     def objection(self, value: float) -> str | None:
         """Why a number is not admissible, or None when it is."""
@@ -144,6 +172,18 @@ class Parameter:
         except (TypeError, ValueError):
             return value, "has a unit but is no number; a law is written in plain numbers"
         return number, self.objection(number)
+
+
+def call_in(text: Any) -> tuple[str, list[Any], dict[str, Any]] | None:
+    """A call such as "Lumped(20)" as name, values and named values; None where a text is not one of plain values."""
+    try:
+        call = ast.parse(text, mode="eval").body
+        if isinstance(call, ast.Call) and isinstance(call.func, ast.Name):
+            options = {str(item.arg): ast.literal_eval(item.value) for item in call.keywords}
+            return call.func.id, [ast.literal_eval(value) for value in call.args], options
+    except (SyntaxError, ValueError, TypeError, RecursionError, MemoryError):
+        pass
+    return None
 
 
 def is_quantity(value: Any) -> bool:
@@ -270,5 +310,6 @@ def parameter(unit: str, meaning: str, *, default: Any = REQUIRED, latex: str = 
 
     declare("")  # what is wrong is said here, where it is written
     metadata: dict[str, Callable[[str], Parameter]] = {"declare": declare}
-    given = dataclasses.MISSING if default is REQUIRED else default
-    return dataclasses.field(default=given, metadata=metadata, kw_only=True)
+    return dataclasses.field(
+        default=dataclasses.MISSING if default is REQUIRED else default, metadata=metadata, kw_only=True
+    )

@@ -1,15 +1,23 @@
-"""What a record says of itself on one screen, whatever its size."""
+"""Texts for one screen: what a record says of itself, whatever its size, and a line on how far something has come."""
 
 from __future__ import annotations
 
+import sys
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from itertools import islice
+from typing import Any
 
 LINES, COLUMNS = 25, 100
 """Size of the screen."""
 CHARACTER = 0.55 / 72
 """Mean width of a character of one point of size, in: of the type of pictures."""
+Show = Callable[[float, str], None]
+"""Told how much is done, and a word or two on it."""
+FORMAT = "{desc}: {percentage:3.0f}%|{bar}| {n:.4g} of {total:.4g} {unit} [{elapsed}<{remaining}]"
+PAUSE = 0.2
+"""The line is drawn anew not more often than every so many seconds."""
 
 
 def on_one_screen(title: str, lines: Iterable[str], count: int) -> str:
@@ -60,3 +68,35 @@ def in_lines(title: str, width: float, size: float = 12.0) -> str:
 def counted(number: int, what: str) -> str:
     """A number and what it counts: "1 node", "2 nodes", "2 branches"."""
     return f"{number} {what}{'' if number == 1 else 'es' if what.endswith('ch') else 's'}"
+
+
+@contextmanager
+def progress(total: float, unit: str, stage: str) -> Iterator[Show]:
+    """Show on standard error, where that is a terminal and tqdm is installed (extra `progress`), how far something is.
+
+    Args:
+        total: how much there is to do.
+        unit: of what.
+        stage: words for the time before anything is done.
+    """
+    bar_of = _tqdm() if sys.stderr.isatty() else None
+    if bar_of is None:
+        yield lambda _done, _stage: None
+        return
+    with bar_of(
+        total=total, desc=stage, unit=unit, bar_format=FORMAT, mininterval=PAUSE, leave=False, dynamic_ncols=True
+    ) as bar:
+
+        def show(done: float, stage: str) -> None:
+            bar.set_description_str(stage, refresh=False)
+            bar.update(max(done - bar.n, 0))  # engines may look at a time twice
+
+        yield show
+
+
+def _tqdm() -> Any:
+    try:
+        from tqdm import tqdm
+    except ImportError:
+        return None
+    return tqdm

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from sympy import Expr, Float, Integer, Rational, Symbol
 
-from shaftwork.components.laws import breakpoints
+from shaftwork.components.discontinuities import breakpoints
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ParameterError, no_quantity
 from shaftwork.equations.quantities import is_rate

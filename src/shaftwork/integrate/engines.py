@@ -5,6 +5,11 @@ from __future__ import annotations
 import importlib.util
 import sys
 from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+EngineName = Literal["auto", "scipy", "scipy-radau", "heyoka", "sundials", "exact", "banded", "wave"]
+ENGINE_NAMES: tuple[EngineName, ...] = get_args(EngineName)
+"""What a run may be asked for: an engine by name, or `auto` for the one that suits."""
 
 
 @dataclass(frozen=True)

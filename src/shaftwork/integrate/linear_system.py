@@ -14,6 +14,7 @@ from scipy.sparse.linalg import expm_multiply
 
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.interruption import interruptible
+from shaftwork.core.calls import interruptible
 from shaftwork.integrate.modal import Eigensystem, find_modes
 from shaftwork.integrate.pieces import SmoothInterval
 from shaftwork.integrate.problem import Array, LinearInputs, Problem

@@ -13,8 +13,7 @@ from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.start_values import Start, initial_state
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.hints import hint
-from shaftwork.core.notices import once
+from shaftwork.core.notices import hint, once
 from shaftwork.core.parameters import briefly, in_si
 from shaftwork.network.kinds import Kind
 from shaftwork.network.wording import listed

@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
+from functools import cache, cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +20,11 @@ from shaftwork.codegen.start_values import initial_state, with_others
 from shaftwork.codegen.valueless import refuse_vanishing
 from shaftwork.core.callbacks import Callback
 from shaftwork.core.errors import ParameterError
+from shaftwork.codegen.start_values import initial_state
+from shaftwork.codegen.switching import Switching
+from shaftwork.codegen.valueless import refuse_vanishing, rough, without_value
+from shaftwork.core.calls import Callback
+from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.core.kept import Kept
 from shaftwork.core.notices import PulsationWarning, muted
 from shaftwork.core.parameters import in_si
@@ -25,6 +32,8 @@ from shaftwork.core.screen import counted, named, on_one_screen
 from shaftwork.integrate import choice
 from shaftwork.integrate.engines import available
 from shaftwork.integrate.problem import Problem, Trajectory
+from shaftwork.integrate.engines import EngineName, available
+from shaftwork.integrate.problem import Fractions, LinearInputs, Problem, Trajectory
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import (
     Demand,
@@ -63,7 +72,6 @@ VARIANTS = 8
 """Models of other structure, and choices of an engine, that are kept for later calls."""
 SIMILAR = 5.0
 """An engine suits parameters that differ by less than this factor too: looking anew would cost more than the run."""
-EngineName = Literal["auto", "scipy", "scipy-radau", "heyoka", "sundials", "exact", "banded", "wave"]
 
 
 class Model(EngineModel):

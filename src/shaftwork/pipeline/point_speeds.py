@@ -17,8 +17,7 @@ from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.slopes import jumps, slope
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import NetworkWarning
-from shaftwork.core.hints import hint
-from shaftwork.core.notices import PulsationWarning, warn
+from shaftwork.core.notices import PulsationWarning, hint, warn
 from shaftwork.network.controlled import Reading, readings_of
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.kinds import Kind

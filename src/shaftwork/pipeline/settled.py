@@ -17,8 +17,7 @@ from shaftwork.codegen.valueless import in_words
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.errors import NetworkWarning, SimulationError
-from shaftwork.core.hints import hint
-from shaftwork.core.notices import warn
+from shaftwork.core.notices import hint, warn
 from shaftwork.network.kinds import Kind
 from shaftwork.network.wording import listed
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from sympy import Expr, Float, S
 
-from shaftwork.components.lossy_gear import LossyGear
+from shaftwork.components.rotation import LossyGear
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import Diagnostic
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart

@@ -10,7 +10,8 @@ from typing import Any
 import networkx as nx
 import sympy
 
-from shaftwork.components.laws import breakpoints, t
+from shaftwork.components.discontinuities import breakpoints
+from shaftwork.components.laws import t
 from shaftwork.components.tables import InterpolationSlope
 from shaftwork.core.errors import Diagnostic
 from shaftwork.network.checks import LEFT_OUT, connection_problems, examine

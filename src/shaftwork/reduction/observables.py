@@ -16,9 +16,9 @@ from sympy import Add, Expr, Integer, Symbol, nan, oo, zoo
 
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, End, across_of, integral_of, through_of
 from shaftwork.components.clips import replaced
+from shaftwork.components.discontinuities import parts
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Modes
-from shaftwork.components.pieces import parts
 from shaftwork.components.slopes import slope
 from shaftwork.core.errors import Diagnostic, NetworkError
 from shaftwork.network.graph import GROUND, GraphBranch, GraphPart

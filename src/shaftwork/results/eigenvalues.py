@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigs, splu
 
 from shaftwork.core.errors import ParameterError, SimulationError
-from shaftwork.core.hints import hint
+from shaftwork.core.notices import hint
 from shaftwork.results.observer import Array
 from shaftwork.results.slopes import Complex
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from shaftwork.core.errors import MissingExtraError, ParameterError, SignalError
+from shaftwork.core.errors import MissingExtraError, ParameterError, SignalError, no_quantity
 from shaftwork.core.parameters import numbers_in_si
 from shaftwork.core.screen import in_lines
 from shaftwork.results.observer import Array
@@ -175,7 +175,7 @@ def response(
     if source not in slopes.inputs:
         raise SignalError(f"'{source}' is no input here. There are: {', '.join(slopes.inputs) or 'none'}.")
     if not isinstance(output, str) or output not in slopes.units:
-        raise unknown_output(title, slopes, output)
+        raise no_quantity(output, title, slopes.units)
     given = frequencies(f)
     number = slopes.inputs.index(source)
 
@@ -187,15 +187,6 @@ def response(
     unit = slopes.units.get(source, "1")
     values = _values(system(number), len(slopes.states), 2j * np.pi * given, read)
     return FrequencyResponse(title, source, output, (unit, slopes.units[output]), given, values)
-
-
-def unknown_output(title: str, slopes: Motions, name: Any) -> SignalError:
-    """The error for an output that is no quantity of the network, with those that are near it."""
-    owner = str(name).rpartition(".")[0]
-    own = [known for known in slopes.units if known.rpartition(".")[0] == owner]
-    listed = own or list(dict.fromkeys(known.rpartition(".")[0] for known in slopes.units))[:12]
-    what = f"'{owner}' has" if own else "Parts and nodes are"
-    return SignalError(f"No quantity {reprlib.repr(name)} in '{title}'. {what}: {', '.join(listed)}.")
 
 
 def _values(system: DrivenSystem, states: int, s: Complex, read: Callable[[Complex, Complex], Complex]) -> Complex:

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from shaftwork.core.errors import no_quantity
 from shaftwork.core.screen import counted
-from shaftwork.results.frequency import FrequencyResponse, frequency_response, unknown_output
+from shaftwork.results.frequency import FrequencyResponse, frequency_response
 from shaftwork.results.modes import Modes, find_modes
 from shaftwork.results.observer import Array
 from shaftwork.results.slopes import DeviationEquations
@@ -170,7 +171,7 @@ def linear_model(
     names = slopes.states if outputs is None else outputs
     for name in () if outputs is None else outputs:
         if name not in slopes.units and name not in slopes.states:
-            raise unknown_output(title, slopes, name)
+            raise no_quantity(name, title, slopes.units)
     point = dict(zip(slopes.states, x.tolist(), strict=True))
     return LinearModel(title, slopes.states, slopes.inputs, names, point, t, slopes, phase)
 

@@ -2,15 +2,28 @@
 
 from __future__ import annotations
 
-from shaftwork.scenes.bldc_shaft import BLDC_SHAFT, bldc_shaft
 from shaftwork.scenes.catalog import Scene
-from shaftwork.scenes.crane import CRANE, CRANE_START, SIX_PHASES, crane, crane_start, six_phases
-from shaftwork.scenes.crane_train import CRANE_TRAIN, crane_train
-from shaftwork.scenes.excavator import EXCAVATOR, excavator
-from shaftwork.scenes.excavator_train import EXCAVATOR_TRAIN, excavator_train
-from shaftwork.scenes.shaft_chain import SHAFT_CHAIN, shaft_chain
-from shaftwork.scenes.shaft_step import SHAFT_STEP, shaft_step
-from shaftwork.scenes.ship_line import SHIP_LINE, ship_line
+from shaftwork.scenes.crane import (
+    CRANE,
+    CRANE_START,
+    CRANE_TRAIN,
+    SIX_PHASES,
+    crane,
+    crane_start,
+    crane_train,
+    six_phases,
+)
+from shaftwork.scenes.excavator import EXCAVATOR, EXCAVATOR_TRAIN, excavator, excavator_train
+from shaftwork.scenes.long_shafts import (
+    BLDC_SHAFT,
+    SHAFT_CHAIN,
+    SHAFT_STEP,
+    SHIP_LINE,
+    bldc_shaft,
+    shaft_chain,
+    shaft_step,
+    ship_line,
+)
 
 SCENES: dict[str, Scene] = {
     scene.name: scene

@@ -40,12 +40,12 @@ class Scene:
         return self.build(**options)
 
 
-def choice(what: str, asked: str, scene: str, known: Mapping[str, T]) -> T:
+def choice(what: str, name: str, scene: str, options: Mapping[str, T]) -> T:
     """What an option of a scene stands for.
 
     Raises:
         ParameterError: there is no such option.
     """
-    if asked not in known:
-        raise ParameterError(f"There is no {what} {asked!r} of the {scene}. There are: {', '.join(known)}.")
-    return known[asked]
+    if name not in options:
+        raise ParameterError(f"There is no {what} {name!r} of the {scene}. There are: {', '.join(options)}.")
+    return options[name]

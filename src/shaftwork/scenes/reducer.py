@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from shaftwork.components.lossy_gear import LossyGear
-from shaftwork.components.rotation import Gear, Inertia, Spring
+from shaftwork.components.rotation import Gear, Inertia, LossyGear, Spring
 from shaftwork.pipeline.network import Network
 from shaftwork.scenes.catalog import choice
 

@@ -14,7 +14,7 @@ import numpy as np
 from shaftwork.core.errors import NetworkWarning, ParameterError
 from shaftwork.core.notices import muted
 from shaftwork.core.parameters import whole, without_unit
-from shaftwork.core.progress import progress
+from shaftwork.core.screen import progress
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import OutputTimes, checked_parameter, relative_tolerance, time_span
 from shaftwork.pipeline.network import Network, network_of

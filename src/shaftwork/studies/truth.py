@@ -11,7 +11,8 @@ import numpy as np
 from sympy import lambdify
 
 from shaftwork.components.base import Component
-from shaftwork.components.laws import NUMERICAL, as_expression, breakpoints
+from shaftwork.components.discontinuities import breakpoints
+from shaftwork.components.laws import NUMERICAL, as_expression
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.rotation import Damper, Inertia
 from shaftwork.components.shaft_models import OneSpring, Rigid, ShaftModel, Spectral, Wave

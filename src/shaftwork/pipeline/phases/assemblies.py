@@ -22,9 +22,9 @@ from shaftwork.codegen.recovery import BranchHistory
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.codegen.timeline import Timeline
 from shaftwork.codegen.valueless import first_missing, in_words, rough, without_value
+from shaftwork.components.discontinuities import pieces_degree
 from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME
-from shaftwork.components.pieces import pieces_degree
 from shaftwork.core.errors import CompileError, SimulationError, no_value
 from shaftwork.core.kept import Kept
 from shaftwork.integrate.engines import available

@@ -24,8 +24,9 @@ from shaftwork.codegen.linear_readings import ReadingMatrices
 from shaftwork.codegen.matrices import LinearPart
 from shaftwork.codegen.model import ScalarProgram
 from shaftwork.codegen.products import Factor
+from shaftwork.codegen.scalar import ScalarProgram
+from shaftwork.components.discontinuities import parts
 from shaftwork.components.noise import HeldNoise, SmoothNoise
-from shaftwork.components.pieces import parts
 from shaftwork.core.kept import Kept
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.graph import GROUND

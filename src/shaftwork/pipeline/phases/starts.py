@@ -11,7 +11,7 @@ from sympy.core.relational import Relational
 
 from shaftwork.codegen.code import branchwise, scalar
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, readings_in
-from shaftwork.components.laws import line
+from shaftwork.components.discontinuities import line
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import ANEW, Modes
 from shaftwork.core.errors import AccuracyWarning, ParameterError

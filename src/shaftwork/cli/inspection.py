@@ -1,0 +1,114 @@
+"""The commands that simulate nothing: `shaftwork scenes`, `check`, `latex` and `export`."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from shaftwork.cli.command import FALLBACK_END, Data, Say, command, load
+from shaftwork.core.errors import ParameterError
+
+if TYPE_CHECKING:
+    from shaftwork.equations.records import Equations
+
+FORMS = ("kirchhoff", "state", "second-order", "lagrange", "field")
+
+
+@command("the ready scenes, a line each with the source", model=False, machines=True)
+def scenes(_: Namespace, say: Say) -> Data:
+    """The ready scenes, a line each."""
+    from shaftwork.scenes import SCENES
+
+    width = max(len(name) for name in SCENES)
+    for scene in SCENES.values():
+        say(f"{scene.name:{width}}  {scene.title} ({scene.source})")
+    fields = ("name", "title", "source", "t_end", "signals", "chosen", "phases")
+    return {"scenes": [{field: getattr(scene, field) for field in fields} for scene in SCENES.values()]}
+
+
+@command("structure, states, time constants, stiffness, and the engine that auto would take", machines=True)
+def check(options: Namespace, say: Say) -> Data:
+    """What can be said of a network before anything is simulated."""
+    from shaftwork.pipeline.report import structure_report
+
+    net, scene = load(options)
+    model, t_end = net.compile(), scene.t_end if scene else FALLBACK_END
+    say(structure_report(net, model, t_end))
+    engine, why = model.choose_engine(t_end)
+    return {
+        "network": net.name,
+        "parts": len(model.form.graph.parts),
+        "nodes": len(model.form.graph.nodes),
+        "states": model.states,
+        "problems": [{"severity": problem.severity, "text": str(problem)} for problem in net.check()],
+        "engine": engine,
+        "why": why,
+    }
+
+
+def latex_options(parser: ArgumentParser) -> None:
+    """The options of `shaftwork latex`."""
+    parser.add_argument("--form", choices=FORMS, help="which equations (default: the first two)")
+    parser.add_argument("--phase", metavar="WORDS", help="of one phase, such as 'gap open, load stuck'")
+    parser.add_argument("--notation", metavar="NAME", help="letters of popenda, marinkovic or modelica")
+    parser.add_argument("--values", action="store_true", help="numbers instead of symbols")
+    parser.add_argument("--document", action="store_true", help="a whole document that pdflatex compiles")
+
+
+@command("print the equations as LaTeX", latex_options)
+def latex(options: Namespace, say: Say) -> Data:
+    """The equations of a phase: of those that the source of a scene has, or of the one in which the motion begins."""
+    from shaftwork.equations.report import joined
+
+    net, scene = load(options)
+    phases = (options.phase,) if options.phase else (scene.phases if scene else ()) or (net.start_phase(),)
+    texts = [_typeset(net.equations(phase=phase or None), options) for phase in phases]
+    if options.document:
+        say(joined(texts))
+        return {}
+    for phase, text in zip(phases, texts, strict=True):
+        if len(phases) > 1:
+            say(rf"\section*{{{phase}}}")
+        say(text)
+    return {}
+
+
+def _typeset(equations: Equations, options: Namespace) -> str:
+    equations = equations.written_as(options.notation)
+    if options.form == "lagrange":
+        from shaftwork.equations.lagrange import lagrangian
+
+        lagrange = lagrangian(equations)
+        return (lagrange.document if options.document else lagrange.latex)(values=options.values)
+    typeset = equations.document if options.document else equations.latex
+    return typeset(options.form, values=options.values)
+
+
+def export_options(parser: ArgumentParser) -> None:
+    """The options of `shaftwork export`."""
+    parser.add_argument("file", metavar="NEW.toml", nargs="?", help="file to write (default: the screen)")
+
+
+@command("the model file of a scene, to change and run", export_options)
+def export(options: Namespace, say: Say) -> Data:
+    """The model file of a scene, or of another model file with other values."""
+    from shaftwork.network.storage import netlist_text
+
+    net, scene = load(options)
+    if options.file is None:
+        say(netlist_text(net.netlist()).rstrip("\n"))
+    else:
+        path = Path(options.file)
+        if path.suffix != ".toml":
+            raise ParameterError(f"'{path}' must end in .toml, so that the other commands take it for a model file.")
+        if path.exists():
+            raise ParameterError(f"'{path}' exists already. Give another name, or delete it.")
+        net.save(path)
+        say(f"written: {path}")
+    if scene:
+        line = shlex.join(["shaftwork", "run", options.file or "FILE.toml", "--t-end", f"{scene.t_end:g}"])
+        print(f"A model file has no end time. For the motion of the scene: {line}", file=sys.stderr)
+    return {}
