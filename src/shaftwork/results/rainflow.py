@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shaftwork.core.errors import MissingExtraError, ParameterError
+from shaftwork.core.errors import MissingExtraError, ParameterError, SignalError
 from shaftwork.core.parameters import in_si, whole
 from shaftwork.core.screen import in_lines
-from shaftwork.results.course import Read
+from shaftwork.results.course import TurningPoints, turning_points
 from shaftwork.results.observer import Array
-from shaftwork.results.turning import TurningPoints, turning_points
+from shaftwork.results.reader import Read, Reader
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -163,6 +163,21 @@ def rainflow(read: Read, steps: Array, *, title: str, name: str, unit: str, smal
     start, end = turning.t[first][kept], turning.t[second][kept]
     duration = float(steps[-1] - steps[0])
     return Rainflow(title, name, unit, duration, turning, ranges[kept], means[kept], table[kept, 2], start, end)
+
+
+def load_cycles(reader: Reader, name: str, place: int | None, smallest: float) -> Rainflow:
+    """The load cycles of a quantity of a motion; see `Solution.rainflow`."""
+    unit, places = reader.unit(name), reader.places(name)
+    if place not in reader.numbers(name):
+        if not places:
+            raise SignalError(f"'{name}' is not read along a part. Leave out place={place!r}.")
+        raise SignalError(
+            f"'{name}' is read at {len(places)} places along the part; say which by place=0 to {len(places) - 1}. "
+            f"places['{name}'] has them in m."
+        )
+    shown = name if place is None else f"{name} at {places[place]:g} m"
+    read = reader.quantity(name, place)
+    return rainflow(read, reader.steps, title=reader.title, name=shown, unit=unit, smallest=smallest)
 
 
 def _picture(cycles: Rainflow, bins: int | tuple[int, int]) -> Figure:

@@ -10,9 +10,9 @@ import numpy as np
 
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
+from shaftwork.results.course import turning_points
 from shaftwork.results.observer import Array
 from shaftwork.results.quadrature import LobattoPanels, integrate
-from shaftwork.results.turning import turning_points
 from shaftwork.sizing.duty_cycle import Duty, Flow, cooling_at
 from shaftwork.sizing.motor_shaft import RPM, SMALLEST, MotorShaft, motor_shaft
 

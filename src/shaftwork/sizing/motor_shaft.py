@@ -17,10 +17,10 @@ from shaftwork.components.sources import SpeedSource
 from shaftwork.core.errors import ParameterError, SignalError
 from shaftwork.core.parameters import in_si
 from shaftwork.network.wording import at_nodes, listed
+from shaftwork.results.course import turning_points
 from shaftwork.results.observer import Array
 from shaftwork.results.quadrature import LobattoPanels
 from shaftwork.results.solution import Solution
-from shaftwork.results.turning import turning_points
 
 BLOCK = 50_000
 """Times that are read at once."""

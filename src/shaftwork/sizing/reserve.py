@@ -12,8 +12,8 @@ import numpy as np
 from shaftwork.components.tables import Table, interpolate
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
+from shaftwork.results.course import turning_points
 from shaftwork.results.observer import Array
-from shaftwork.results.turning import turning_points
 from shaftwork.sizing.motor_shaft import RPM, SMALLEST, MotorShaft
 from shaftwork.sizing.own_curve import fastest, own_curve, pull_out
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import brentq
 
+from shaftwork.results.course import turning_points
 from shaftwork.results.observer import Array
-from shaftwork.results.turning import turning_points
 from shaftwork.sizing.motor_shaft import REST, SMALLEST, MotorShaft
 
 SAMPLES, FINE = 4001, 4 * float(np.finfo(float).eps)
