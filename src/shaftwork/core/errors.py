@@ -142,4 +142,4 @@ def no_quantity(name: object, title: str, names: Iterable[str]) -> SignalError:
     else:
         close = get_close_matches(owner, by_owner, n=3) or list(by_owner)[:12]
         there = f"There is no part or node '{owner}'. Close to it: {', '.join(close)}."
-    return SignalError(f"No quantity '{name}' in '{title}'. {there}")
+    return SignalError(f"No quantity {name!r} in '{title}'. {there}")

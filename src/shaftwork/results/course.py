@@ -38,6 +38,8 @@ LOOKS = np.cos(np.pi * np.arange(32, -1, -1) / 32)
 """Where in a panel, from -1 to 1, its polynomial is looked at."""
 NEWTON = 5
 """Steps to a turn between two looks."""
+SMALLEST = 1e-6
+"""Ups and downs of less than this part of the range make no peak, where nobody says otherwise."""
 LATER = 1e-3
 """A peak that is higher by this fraction of what counts as a change is no later one."""
 
@@ -114,7 +116,7 @@ def course(read: Read, steps: Array, *, even: bool = False) -> Course:
         even: whether they are to be as good everywhere.
     """
     edges = np.unique(steps)
-    panels = LobattoPanels(edges[:-1], edges[1:])
+    panels = LobattoPanels.between(edges)
     shortest = SHORTEST * np.spacing(np.abs(edges).max())
     settled: list[tuple[LobattoPanels, Array]] = []
     end_value = float(read(edges[-1:])[0])
@@ -133,11 +135,8 @@ def course(read: Read, steps: Array, *, even: bool = False) -> Course:
         if not len(parted):
             break
         panels = panels.taken(parted).parted()
-    start, end = (np.concatenate([getattr(part, side) for part, _ in settled]) for side in ("start", "end"))
-    order = np.argsort(start, kind="stable")
-    return Course(
-        read, LobattoPanels(start[order], end[order]), np.concatenate([part for _, part in settled])[order], end_value
-    )
+    panels, order = LobattoPanels.joined([part for part, _ in settled])
+    return Course(read, panels, np.concatenate([part for _, part in settled])[order], end_value)
 
 
 def _missed(values: Array) -> Array:

@@ -24,8 +24,6 @@ KINDS: Mapping[str, str] = {
     "damage": "the share of the life that the motion takes, with `sn`",
 }
 """What a measure may say of a quantity."""
-SMALLEST = 1e-6
-"""Ups and downs of less than this part of the range make no peak."""
 
 
 @dataclass(frozen=True)

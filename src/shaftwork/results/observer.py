@@ -12,6 +12,8 @@ from shaftwork.core.parameters import numbers_in_si
 
 Array = NDArray[np.float64]
 
+RPM = 30 / np.pi
+"""1/min of a rad/s."""
 AT_ONCE = 4_000_000
 """Numbers that are read of a motion at once, 32 MB."""
 

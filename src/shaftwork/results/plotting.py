@@ -10,7 +10,7 @@ import numpy as np
 from shaftwork.core.errors import MissingExtraError
 from shaftwork.core.screen import in_lines
 from shaftwork.results.course import course
-from shaftwork.results.observer import Array, PhaseRow
+from shaftwork.results.observer import RPM, Array, PhaseRow
 from shaftwork.results.reader import Reader
 
 if TYPE_CHECKING:
@@ -25,8 +25,6 @@ ALIKE = 10.0
 """Curves whose largest values differ by more than this factor have axes of their own: the smaller would look flat."""
 MARKED = 60
 """Changes of mode up to which each is a line across the curves; more would hide them, and the phases show them too."""
-RPM = 30 / np.pi
-"""1/min of a rad/s."""
 HEIGHT, STRIP = 2.4, 0.3
 """Inches of an axis, and of a row of phases."""
 

@@ -14,12 +14,13 @@ from shaftwork.core.errors import AccuracyWarning, SignalError, imported
 from shaftwork.core.notices import warn
 from shaftwork.core.screen import counted, named, on_one_screen
 from shaftwork.integrate.problem import TOLERATED, UNSURPRISING
+from shaftwork.results.course import SMALLEST
 from shaftwork.results.energy import EnergyBalance, energy_balance
 from shaftwork.results.extremes import Extreme, Extremes
 from shaftwork.results.fatigue import Damage, SNLine, damage_of, damages
 from shaftwork.results.observer import Array, DenseStates, Observer, PhaseRow, array_in_si
 from shaftwork.results.plotting import plot_signals
-from shaftwork.results.rainflow import SMALLEST, Rainflow, load_cycles
+from shaftwork.results.rainflow import Rainflow, load_cycles
 from shaftwork.results.reader import Reader
 from shaftwork.results.samples import warn_of_coarse_samples
 
@@ -119,7 +120,7 @@ class Solution:
                 AccuracyWarning,
             )
 
-    @property
+    @cached_property
     def steps(self) -> Array:
         """(s,) ends of the integration steps."""
         return _read_only(self.dense.steps)

@@ -9,8 +9,8 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import ParameterError, SimulationError
 from shaftwork.pipeline.sensitivities.motion_slopes import MotionSlopes
-from shaftwork.results.course import turning_points
-from shaftwork.results.measures import KINDS, SMALLEST, Measure
+from shaftwork.results.course import SMALLEST, turning_points
+from shaftwork.results.measures import KINDS, Measure
 from shaftwork.results.solution import Solution
 
 POWERS: Mapping[str, int] = {"mean": 1, "rms": 2}
