@@ -12,6 +12,9 @@ from hypothesis import strategies as st
 
 import shaftwork as sw
 from shaftwork.results import exact_modes
+from shaftwork.results import exact_spectrum
+from shaftwork.shafts.exact_modes import modes as line_modes
+from shaftwork.shafts.exact_modes import natural_frequencies
 from shaftwork.shafts.exact_response import frequency_response
 from shaftwork.shafts.line import Section, SectionLine
 from tests.properties.examples import share_of_examples
@@ -104,7 +107,7 @@ def test_the_reference_shaft_has_its_printed_frequencies_whatever_its_model(
 ) -> None:
     """SOURCES, error 8: eight decimals; those beyond are of the transcendental equation, to rounding."""
     modes = _train(model, (0.025, J)).modes(exact=True)
-    assert len(modes) == exact_modes.MODES
+    assert len(modes) == exact_spectrum.MODES
     np.testing.assert_allclose(modes.frequencies[1:4], printed, atol=5.1e-9)
     line = SectionLine((Section.of_geometry(1.0, 0.02),), (0.025, J))
     np.testing.assert_allclose(modes.frequencies, natural_frequencies(line, count=10), rtol=1e-14)
@@ -314,7 +317,7 @@ def test_two_starts_that_lead_to_one_root_are_no_two_modes(roots: tuple[complex,
         def roots(self, starts: Any) -> Any:
             return np.array([roots[0] if abs(starts[0]) < 10 else roots[1]]), np.zeros((2, 1))
 
-    found = exact_modes._refined(Found(), np.array([8j, 12j]))
+    found = exact_spectrum._refined(Found(), np.array([8j, 12j]))
     assert (found is not None) is kept
 
 
@@ -402,7 +405,7 @@ def test_modes_that_crowd_are_named_with_the_frequency_up_to_which_all_are_known
 def test_what_the_meshes_lose_is_no_result(monkeypatch: pytest.MonkeyPatch) -> None:
     """The count of the exact modes knows no mesh: with one mode of the mesh left out nothing is returned."""
     net = _train(sw.Wave())
-    monkeypatch.setattr(exact_modes, "_together", lambda starts, real=exact_modes._together: real(starts[:-1]))
+    monkeypatch.setattr(exact_spectrum, "_together", lambda starts, real=exact_spectrum._together: real(starts[:-1]))
     with pytest.raises(sw.SimulationError, match="could not be settled"):
         net.modes(f_max=4000.0)
 

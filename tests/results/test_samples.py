@@ -93,7 +93,7 @@ def test_a_shaft_of_travelling_waves_tells_of_its_stations() -> None:
     net.add(sw.Shaft("line", length=1.0, diameter=0.02, model=sw.Wave()), "a", "ground")
     sol = net.simulate(0.05, t_eval=60)
     with pytest.warns(sw.AccuracyWarning, match=r"'line\.tau' is -?[\d.]+ N\*m at t = "):
-        warn_of_coarse_samples(sol, ["line.tau"])
+        warn_of_coarse_samples(sol.reader, sol.t, sol.x, ["line.tau"])
 
 
 def test_a_ripple_on_a_level_and_a_list_of_moments_are_nothing_to_tell() -> None:

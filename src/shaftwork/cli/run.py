@@ -142,7 +142,7 @@ def _write(solution: Solution, signals: Sequence[str], place: Path) -> None:
 
     from shaftwork.results.samples import warn_of_coarse_samples
 
-    warn_of_coarse_samples(solution, signals)
+    warn_of_coarse_samples(solution.reader, solution.t, solution.x, signals)
     units, profiles = solution.observer.units, solution.observer.profiles
     head, columns = ["t [s]"], [solution.t]
     for name in signals:

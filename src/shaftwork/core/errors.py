@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import Literal
+from importlib import import_module
+from typing import Any, Literal
 
 Severity = Literal["error", "warning", "note"]
 
@@ -97,6 +98,23 @@ class MissingExtraError(ShaftworkError, ImportError):
 
     def __init__(self, library: str, extra: str, purpose: str) -> None:
         super().__init__(f"{purpose} needs {library}. Install it with: pip install 'shaftwork[{extra}]'", name=library)
+
+
+def imported(library: str, extra: str, purpose: str) -> Any:
+    """An optional library.
+
+    Args:
+        library: to import.
+        extra: that brings it.
+        purpose: who needs it, "Solution.to_pandas()".
+
+    Raises:
+        MissingExtraError: it is not installed.
+    """
+    try:
+        return import_module(library)
+    except ImportError:
+        raise MissingExtraError(library, extra, purpose) from None
 
 
 class SignalError(ShaftworkError, KeyError):

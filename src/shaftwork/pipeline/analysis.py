@@ -21,8 +21,7 @@ from shaftwork.pipeline.point_speeds import as_multiple, speeds_to_give, warn_of
 from shaftwork.pipeline.settled import SteadyState
 from shaftwork.reduction.inputs import source_inputs
 from shaftwork.results import campbell as diagram
-from shaftwork.results.exact import ExactModel
-from shaftwork.results.linear import LinearModel, linear_model
+from shaftwork.results.linear import ExactModel, LinearModel, linear_model
 from shaftwork.results.modes import Modes
 from shaftwork.results.solution import Solution
 

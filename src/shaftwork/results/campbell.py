@@ -5,16 +5,18 @@ from __future__ import annotations
 import reprlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from shaftwork.core.errors import MissingExtraError, ParameterError
-from shaftwork.core.parameters import in_si, numbers_in_si
+from shaftwork.core.errors import ParameterError
+from shaftwork.core.parameters import in_si
 from shaftwork.core.screen import counted, in_lines
 from shaftwork.results.modes import Modes
 from shaftwork.results.modes_over_speed import BEYOND, Meeting, OverSpeed, Swinging, differing, numbered
-from shaftwork.results.observer import Array
+from shaftwork.results.observer import RPM, Array, array_in_si
+from shaftwork.results.plotting import new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -71,9 +73,10 @@ class Campbell:
         crossings = counted(len(self.crossings), "crossing")
         head = f"{self.heading}: {crossings} from {self.speeds[0]:g} to {self.speeds[-1]:g} rad/s"
         lines = [f"{'rad/s':>12}  {'1/min':>12}  {'order':>6}  {'Hz':>12}  mode"]
-        for made in self.crossings:
-            turns = made.speed * 30 / np.pi
-            lines.append(f"{made.speed:>12.6g}  {turns:>12.6g}  {made.order:>6g}  {made.frequency:>12.6g}  {made.mode}")
+        lines += [
+            f"{met.speed:>12.6g}  {met.speed * RPM:>12.6g}  {met.order:>6g}  {met.frequency:>12.6g}  {met.mode}"
+            for met in self.crossings
+        ]
         return "\n".join([head, *lines])
 
     @property
@@ -120,31 +123,30 @@ def campbell(
     n, lines = _ascending(speeds), _orders(orders)
     top = float(max(lines) * n[-1] / (2 * np.pi)) if f_max is None else in_si("f_max", f_max, "Hz", above=0)
     network = OverSpeed(lambda speed: modes_at(speed, BEYOND * top), top)
-    found = [network.at(float(n[0]))] * len(n) if constant else [network.at(float(speed)) for speed in n]
-    meetings = _constant(found[0], n, lines) if constant else network.meetings(n, lines)
-    names = _names(network, [*found, *(met.at for met in meetings)])
+    points = [network.at(float(n[0]))] * len(n) if constant else [network.at(float(speed)) for speed in n]
+    meetings = _constant(points[0], n, lines) if constant else network.meetings(n, lines)
+    names = _names(network, [*points, *(met.at for met in meetings)])
     crossings = (
         Crossing(met.speed, met.order, names[met.at.speed][met.rank], float(met.order * met.speed / (2 * np.pi)))
         for met in meetings
     )
-    inside = sorted(
-        (made for made in crossings if made.frequency <= top), key=lambda made: (made.speed, made.order, made.frequency)
-    )
-    rows = [dict(zip(names[point.speed], point.frequencies.tolist(), strict=True)) for point in found]
+    inside = [crossing for crossing in crossings if crossing.frequency <= top]
+    inside.sort(key=attrgetter("speed", "order", "frequency"))
+    rows = [dict(zip(names[point.speed], point.frequencies.tolist(), strict=True)) for point in points]
     shown = tuple(dict.fromkeys(name for row in rows for name, frequency in row.items() if frequency <= top))
     table = np.array([[row.get(name, 0.0) for name in shown] for row in rows]).reshape(len(n), len(shown))
     end = min(top, HEADROOM * float(table.max())) if f_max is None and table.any() else top
-    return Campbell(title, _about(title, found), n, lines, shown, table, tuple(inside), end)
+    return Campbell(title, _about(title, points), n, lines, shown, table, tuple(inside), end)
 
 
 def _constant(point: Swinging, n: Array, orders: Sequence[float]) -> list[Meeting]:
     """Where orders meet modes that are the same at all speeds."""
-    met = (
+    meetings = (
         Meeting(2 * np.pi * frequency / order, point, order, rank)
         for order in orders
         for rank, frequency in enumerate(point.frequencies.tolist())
     )
-    return [made for made in met if n[0] <= made.speed <= n[-1]]
+    return [met for met in meetings if n[0] <= met.speed <= n[-1]]
 
 
 def _names(network: OverSpeed, shown: Sequence[Swinging]) -> dict[float, list[str]]:
@@ -160,9 +162,9 @@ def _names(network: OverSpeed, shown: Sequence[Swinging]) -> dict[float, list[st
     }
 
 
-def _about(title: str, found: Sequence[Swinging]) -> str:
+def _about(title: str, points: Sequence[Swinging]) -> str:
     """The point of all modes, or those of the first and the last."""
-    first, last = (point.title.removeprefix(title).strip() for point in (found[0], found[-1]))
+    first, last = (point.title.removeprefix(title).strip() for point in (points[0], points[-1]))
     if first == last:
         return first
     point, _, time = first.partition(LAWS)
@@ -171,21 +173,13 @@ def _about(title: str, found: Sequence[Swinging]) -> str:
 
 
 def _ascending(speeds: Any) -> Array:
-    plain = numbers_in_si("speeds", speeds, "rad/s")
-    try:
-        given = np.atleast_1d(np.asarray(plain, dtype=float))
-    except (TypeError, ValueError):
-        given = np.empty(0)
-    if (
-        given.ndim != 1
-        or len(given) < 2
-        or not (np.isfinite(given).all() and given[0] >= 0 and (np.diff(given) > 0).all())
-    ):
+    n = array_in_si("speeds", speeds, "rad/s")
+    if len(n) < 2 or not (np.isfinite(n).all() and n[0] >= 0 and (np.diff(n) > 0).all()):
         raise ParameterError(
             f"speeds = {reprlib.repr(speeds)} must be two or more speeds in rad/s, ascending from 0 or above, such as "
             f"numpy.linspace(0, 300, 61)."
         )
-    return given
+    return n
 
 
 def _orders(orders: Any) -> tuple[float, ...]:
@@ -196,40 +190,27 @@ def _orders(orders: Any) -> tuple[float, ...]:
 
 
 def _diagram(diagram: Campbell) -> Figure:
-    try:
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise MissingExtraError("matplotlib", "plot", "Campbell.plot()") from None
-    figure = Figure(figsize=(9, 5.5), layout="constrained")
+    figure = new_figure("Campbell.plot()", 9.0, 5.5, f"{diagram.title}: natural frequencies and orders")
     axis = figure.subplots()
-    turns = 30 / np.pi
     for name, column in zip(diagram.modes, diagram.frequencies.T, strict=True):
         swings = column > 0
         beside = np.append(swings[1:], False) | np.append(False, swings[:-1])
         shown, alone = np.where(swings, column, np.nan), np.flatnonzero(swings & ~beside).tolist()
-        axis.plot(diagram.speeds * turns, shown, linewidth=1.4, label=name, marker="o", ms=3, markevery=alone)
+        axis.plot(diagram.speeds * RPM, shown, linewidth=1.4, label=name, marker="o", ms=3, markevery=alone)
     for order in diagram.orders:
         end = min(float(diagram.speeds[-1]), 2 * np.pi * diagram.f_max / order)
-        axis.plot([0, end * turns], [0, order * end / (2 * np.pi)], color="0.5", linewidth=0.8)
-        axis.annotate(
-            f"{order:g}",
-            (end * turns, order * end / (2 * np.pi)),
-            color="0.3",
-            fontsize=8,
-            xytext=(3, -10),
-            textcoords="offset points",
-        )
-    axis.plot(
-        [made.speed * turns for made in diagram.crossings], [made.frequency for made in diagram.crossings], "k.", ms=6
-    )
-    axis.set_xlim(float(diagram.speeds[0]) * turns, float(diagram.speeds[-1]) * turns)
+        tip = end * RPM, order * end / (2 * np.pi)
+        axis.plot([0, tip[0]], [0, tip[1]], color="0.5", linewidth=0.8)
+        axis.annotate(f"{order:g}", tip, color="0.3", fontsize=8, xytext=(3, -10), textcoords="offset points")
+    crossings = diagram.crossings
+    axis.plot([met.speed * RPM for met in crossings], [met.frequency for met in crossings], "k.", ms=6)
+    axis.set_xlim(float(diagram.speeds[0]) * RPM, float(diagram.speeds[-1]) * RPM)
     axis.set_ylim(0, diagram.f_max)
     axis.set_xlabel("speed in 1/min")
     axis.set_ylabel("f in Hz")
     axis.grid(alpha=0.3)
     if diagram.modes:
         axis.legend(loc="best", framealpha=0.8, edgecolor="none", fontsize=8)
-    figure.suptitle(in_lines(f"{diagram.title}: natural frequencies and orders", 9.0))
     if diagram.about:
         axis.set_title(in_lines(f"linearised {diagram.about}", 8.0, size=9.0), fontsize=9)
     return figure

@@ -1,4 +1,4 @@
-"""A quantity over a motion as polynomials: panels of time are parted until polynomials of degree 7 follow it.
+"""A quantity over a motion as polynomials of degree 7 on parted panels of time, with its extremes and turning points.
 
 Law: a panel's polynomial goes through the values at Lobatto's eight points. Where it follows the quantity its Chebyshev
 coefficients fall, and the last of them say what it misses. Source: Trefethen, Approximation Theory and Approximation
@@ -7,7 +7,6 @@ Practice, chapters 3 and 8.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,9 +16,8 @@ from shaftwork.numerics.polynomials import chebyshev_nodes, to_chebyshev, to_pow
 from shaftwork.numerics.zeros import Chosen, zeros
 from shaftwork.results.observer import Array, blocks
 from shaftwork.results.quadrature import NODES, SHARE, LobattoPanels
+from shaftwork.results.reader import Read
 
-Read = Callable[[Array], Array]
-"""From ascending times (k,) to the values of a quantity there."""
 Mask = NDArray[np.bool_]
 
 ROUGH, FINE, EVEN = 1e-3, 1e-9, 1e-6
@@ -41,6 +39,10 @@ LOOKS = chebyshev_nodes(32)
 """Where in a panel, from -1 to 1, its polynomial is looked at."""
 NEWTON = 5
 """Steps to a turn between two looks."""
+SMALLEST = 1e-6
+"""Ups and downs of less than this part of the range make no peak, where nobody says otherwise."""
+LATER = 1e-3
+"""A peak that is higher by this fraction of what counts as a change is no later one."""
 
 _DEGREE = len(NODES) - 1
 _TAILS = to_chebyshev(NODES)[-TAIL:]
@@ -115,7 +117,7 @@ def course(read: Read, steps: Array, *, even: bool = False) -> Course:
         even: whether they are to be as good everywhere.
     """
     edges = np.unique(steps)
-    panels = LobattoPanels(edges[:-1], edges[1:])
+    panels = LobattoPanels.between(edges)
     shortest = SHORTEST * np.spacing(np.abs(edges).max())
     settled: list[tuple[LobattoPanels, Array]] = []
     end_value = float(read(edges[-1:])[0])
@@ -134,11 +136,8 @@ def course(read: Read, steps: Array, *, even: bool = False) -> Course:
         if not len(parted):
             break
         panels = panels.taken(parted).parted()
-    start, end = (np.concatenate([getattr(part, side) for part, _ in settled]) for side in ("start", "end"))
-    order = np.argsort(start, kind="stable")
-    return Course(
-        read, LobattoPanels(start[order], end[order]), np.concatenate([part for _, part in settled])[order], end_value
-    )
+    panels, order = LobattoPanels.joined([part for part, _ in settled])
+    return Course(read, panels, np.concatenate([part for _, part in settled])[order], end_value)
 
 
 def _missed(values: Array) -> Array:
@@ -181,3 +180,47 @@ def _at(powers: Array, places: Array) -> Array:
     for column in powers.T[-2::-1]:
         value = value * places + column
     return np.asarray(value)
+
+
+@dataclass(frozen=True, eq=False)
+class TurningPoints:
+    """The first value, peaks and valleys in turn, and what the end has come to; one value where nothing changes.
+
+    Args:
+        t: (k,) times, s.
+        values: (k,) in the unit of the quantity.
+    """
+
+    t: Array
+    values: Array
+
+
+def turning_points(read: Read, steps: Array, *, smallest: float) -> TurningPoints:
+    """Peaks and valleys of a quantity, on both sides of a jump too.
+
+    Args:
+        read: the quantity at ascending times.
+        steps: (s,) times between which it is smooth.
+        smallest: changes up to this fraction of the whole range are no change; it keeps out the solver's noise.
+    """
+    times, values = course(read, steps, even=True).points()
+    places = _peaks_and_valleys(values, smallest * float(np.ptp(values)))
+    return TurningPoints(times[places], values[places])
+
+
+def _peaks_and_valleys(values: Array, smallest: float) -> NDArray[np.intp]:
+    """Indices of the first value and of every peak and valley after it that differ by more than `smallest`."""
+    slopes = np.sign(np.diff(values))
+    moving = np.flatnonzero(slopes)
+    extremes = moving[:-1][slopes[moving[1:]] != slopes[moving[:-1]]] + 1  # of a rest at the top its begin
+    turns = [0]
+    reached = 0  # the furthest since the last turn; it is a turn once the way back from it is long enough
+    for k in [*extremes.tolist(), len(values) - 1]:
+        step = values[k] - values[reached]
+        if reached != turns[-1] and step * (values[reached] - values[turns[-1]]) >= 0:
+            reached = k if abs(step) > LATER * smallest else reached
+        elif abs(step) > smallest:
+            if reached:
+                turns.append(reached)
+            reached = k
+    return np.array([*turns, reached] if reached else turns)

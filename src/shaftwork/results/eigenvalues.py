@@ -29,7 +29,6 @@ ROUNDINGS = 8
 """Rounding errors within which two entries are the same."""
 ZERO = 1e-10
 """A rate below this fraction of the shift is zero: shift and invert gives no more digits."""
-ATTEMPTS = 12
 
 
 def eigenmodes(matrix: Any, count: int | None) -> tuple[Complex, Complex]:
@@ -49,10 +48,10 @@ def eigenmodes(matrix: Any, count: int | None) -> tuple[Complex, Complex]:
     rates, columns = [np.empty(0, dtype=complex)], [np.empty((matrix.shape[0], 0), dtype=complex)]
     for first, last in pairwise(ends):
         members = order[first:last]
-        found, shapes = _connected(sparse.csr_array(matrix[members][:, members]), count)
-        whole = np.zeros((matrix.shape[0], len(found)), dtype=complex)
+        of_piece, shapes = _connected(sparse.csr_array(matrix[members][:, members]), count)
+        whole = np.zeros((matrix.shape[0], len(of_piece)), dtype=complex)
         whole[members] = shapes
-        rates.append(found)
+        rates.append(of_piece)
         columns.append(whole)
     all_rates, all_shapes = np.concatenate(rates), np.hstack(columns)
     lowest = np.argsort(np.abs(all_rates), kind="stable")[:count]
@@ -95,8 +94,8 @@ def _all(matrix: Array, *, lossless: bool) -> tuple[Complex, Complex]:
         values = -1j * frequencies
     else:
         values, vectors = np.linalg.eig(matrix)
-    kept = values.imag >= 0
-    return values[kept].astype(complex), vectors[:, kept].astype(complex)
+    upper = values.imag >= 0
+    return values[upper].astype(complex), vectors[:, upper].astype(complex)
 
 
 def _null_space(matrix: Array) -> tuple[Array, Array]:
@@ -114,9 +113,9 @@ def _separated(vectors: Array) -> Array:
     if vectors.shape[1] == 1:
         return vectors
     _, _, order = qr(vectors.T, mode="economic", pivoting=True)
-    made = vectors @ np.linalg.inv(vectors[np.sort(order[: vectors.shape[1]])])
-    made[np.abs(made) < len(vectors) * ROUNDINGS * np.finfo(float).eps * np.abs(made).max()] = 0.0
-    return np.asarray(made)
+    basis = vectors @ np.linalg.inv(vectors[np.sort(order[: vectors.shape[1]])])
+    basis[np.abs(basis) < len(vectors) * ROUNDINGS * np.finfo(float).eps * np.abs(basis).max()] = 0.0
+    return np.asarray(basis)
 
 
 def _lowest(matrix: Any, count: int, *, lossless: bool) -> tuple[Complex, Complex]:
@@ -128,16 +127,17 @@ def _lowest(matrix: Any, count: int, *, lossless: bool) -> tuple[Complex, Comple
     size = matrix.shape[0]
     shift = float(np.sqrt(abs(matrix).sum(axis=0).max() * abs(matrix).sum(axis=1).max())) / size
     wanted = 2 * count + 4
-    for _ in range(ATTEMPTS):
+    for _ in range(12):
         values, vectors = _nearest(matrix, shift, min(wanted, size - 2))
         moving = np.abs(values[np.abs(values) > ZERO * shift])
         if moving.size and shift > 0.5 * moving.min():
             shift = 0.2 * float(moving.min())
             continue
         complete = np.abs(values) < np.abs(values - shift).max() - shift
-        kept = complete & (values.imag >= 0)
-        if kept.sum() >= count:
-            return _cleaned(values[kept], vectors[:, kept], shift, lossless=lossless)
+        modes = complete & (values.imag >= 0)
+        if modes.sum() >= count:
+            values, vectors = values[modes], vectors[:, modes]
+            return np.where(np.abs(values) <= ZERO * shift, 0.0, 1j * values.imag if lossless else values), vectors
         wanted = min(2 * wanted, size - 2)
     raise SimulationError(f"The lowest {count} modes of {size} states were not found. Ask for fewer.")
 
@@ -152,12 +152,4 @@ def _nearest(matrix: Any, shift: float, wanted: int) -> tuple[Complex, Complex]:
         raise SimulationError(
             f"The modes next to {shift:.3g} 1/s were not found: {error}. Ask for another number of modes."
         ) from None
-    values[np.abs(values.imag) < ZERO * np.abs(values)] = values.real[np.abs(values.imag) < ZERO * np.abs(values)]
-    return values, vectors
-
-
-def _cleaned(values: Complex, vectors: Complex, shift: float, *, lossless: bool) -> tuple[Complex, Complex]:
-    """Zeros made exact, and losses where there are none."""
-    made = 1j * values.imag if lossless else values.copy()
-    made[np.abs(values) <= ZERO * shift] = 0.0
-    return made, vectors
+    return np.where(np.abs(values.imag) < ZERO * np.abs(values), values.real, values), vectors

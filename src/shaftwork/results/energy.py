@@ -75,44 +75,42 @@ def energy_balance(observer: Observer, dense: DenseStates, steps: Array) -> Ener
         steps: (s,) times between which `dense` is smooth.
     """
     before, after = _stored_on_both_sides(observer, dense, steps)
-    impulses, hits, given = _impulses(observer.impacts(dense), steps, after - before)
-    found = _Work(observer, dense, steps)
-    lost_in = dict(found.lost_in)
-    for part, energy in hits:
-        lost_in[part] = lost_in.get(part, 0.0) + float(energy.sum())
+    impulses, hits, at_once = _impulses(observer.impacts(dense), steps, after - before)
+    flow = _Work(observer, dense, steps)
     return EnergyBalance(
         t=steps,
         stored=after,
-        supplied=found.supplied + np.cumsum(impulses),
-        lost=found.lost + np.cumsum(sum((energy for _, energy in hits), start=np.zeros(len(steps)))),
-        work=found.work + float(np.abs(impulses).sum()),
-        lost_in=lost_in,
-        supplied_by={
-            part: found.supplied_by.get(part, 0.0) + given.get(part, 0.0) for part in {**found.supplied_by, **given}
-        },
+        supplied=flow.supplied + np.cumsum(impulses),
+        lost=flow.lost + np.cumsum(_total(hits, len(steps))),
+        work=flow.work + float(np.abs(impulses).sum()),
+        lost_in=_sums(flow.lost_in, {part: float(energy.sum()) for part, energy in hits.items()}),
+        supplied_by=_sums(flow.supplied_by, at_once),
     )
+
+
+def _sums(first: Mapping[str, float], second: Mapping[str, float]) -> dict[str, float]:
+    return {part: first.get(part, 0.0) + second.get(part, 0.0) for part in {**first, **second}}
 
 
 def _impulses(
     impacts: Iterable[tuple[float, str, Mapping[str, float], Mapping[str, float]]], steps: Array, jumps: Array
-) -> tuple[Array, list[tuple[str, Array]], dict[str, float]]:
+) -> tuple[Array, dict[str, Array], dict[str, float]]:
     """(s,) energy that sources give at once; of impacts by part the (s,) that is lost, and what sources give."""
     impulses = jumps.copy()
     lost: dict[str, Array] = {}
-    given: dict[str, float] = {}
+    supplied: dict[str, float] = {}
     for time, part, sources, others in impacts:
         if time <= steps[0]:  # the balance begins after it
             continue
         places = np.flatnonzero(steps == time)[-1:]
         if part:
-            own = sum(sources.values()) - impulses[places] - sum(others.values())
-            lost.setdefault(part, np.zeros(len(steps)))[places] += own
+            rest = sum(sources.values()) - impulses[places] - sum(others.values())
+            lost.setdefault(part, np.zeros(len(steps)))[places] += rest
         for other, energy in others.items():
             lost.setdefault(other, np.zeros(len(steps)))[places] += energy
         impulses[places] = sum(sources.values())
-        for source, supplied in sources.items():
-            given[source] = given.get(source, 0.0) + supplied
-    return impulses, list(lost.items()), given
+        supplied = _sums(supplied, sources)
+    return impulses, lost, supplied
 
 
 def _stored_on_both_sides(observer: Observer, dense: DenseStates, steps: Array) -> tuple[Array, Array]:
@@ -175,7 +173,7 @@ class _Work:
         times = panels.times.ravel()
         lost, supplied = self._observer.powers(times, self._dense(times))
         shape = panels.times.shape
-        first, second = ({name: power.reshape(shape) for name, power in made.items()} for made in (lost, supplied))
+        first, second = ({name: power.reshape(shape) for name, power in by.items()} for by in (lost, supplied))
         return first, second
 
     def _settle(self, panels: _Panels, whole: Array, before: Array, halvings: int) -> None:
@@ -190,12 +188,13 @@ class _Work:
         for block in blocks(len(panels.step), 2 * self._rows):
             halves = panels.taken(block).halved()
             powers = self._powers(halves)
-            parts = np.stack([halves.integrals(_total(made, halves.times.shape)) for made in powers])
+            parts = np.stack([halves.integrals(_total(by_part, halves.times.shape)) for by_part in powers])
             change = np.abs(parts.reshape(2, -1, 2).sum(axis=2) - whole[:, block]).sum(axis=0)
             noisy = (change > FALLS * before[block]) & (change <= NOISE * self._each)
             still = (change > TIGHT * self._each) & ~noisy if halvings > 1 else np.zeros(len(change), dtype=bool)
             open_ = np.repeat(still, 2)
-            self._add(halves.taken(~open_), *({name: power[~open_] for name, power in made.items()} for made in powers))
+            settled = ({name: power[~open_] for name, power in by_part.items()} for by_part in powers)
+            self._add(halves.taken(~open_), *settled)
             if still.any():
                 self._settle(halves.taken(open_), parts[:, open_], np.repeat(change, 2)[open_], halvings - 1)
 

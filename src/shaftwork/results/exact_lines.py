@@ -1,4 +1,4 @@
-"""Uniform shafts without a mesh: what they do at their ends and between, at a complex frequency.
+"""Uniform shafts without a mesh: what they do at their ends and between, and the small motions of a network with them.
 
 Of a shaft that swings as exp(s t) two numbers say everything: the speed V of its middle and the elastic torque W there.
 With p = s T / 2, the delay T, the impedance Z of its lossless waves, the bearing friction d = d' L / (2 Z) and the time
@@ -11,17 +11,28 @@ which are even and odd about the middle. Both are analytic in s but at -1 / b, a
 what is singular in a network of shafts is so because of a motion. Everything is divided by exp(G / 2), so that nothing
 overflows.
 
+The states x of the network between the shafts, and V and W of each of them, swing as exp(s t) where
+
+    s x = A x + Bh h(s) + (B + s B1) v        what arrives at the ends, h = tau - Z omega, drives the network
+    omega(s) = C x + Dh h(s) + D v            the ends of the shafts turn as the nodes do
+
+with h(s) and omega(s) linear in V and W. One small matrix for each s (`exact_problem`): its solutions are the frequency
+response, its singular points the rates of the modes.
+
 Source: the telegraph equations; Popenda 2019, (8)-(12), with d/dt replaced by s.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from shaftwork.results.observer import Array
-from shaftwork.results.slopes import Complex
+from shaftwork.results.slopes import Complex, Motions, OpenSlopes
 
 SMALL = 0.1
 """Below this G^2 the slope of sinhc is taken from its series."""
@@ -84,7 +95,7 @@ class ExactLines:
             middle: (2, k) V and W, times exp(G / 2).
             shares: (places,) of the way from its first end.
         """
-        p, stiffer, square, _, _ = (made[:, number, None] for made in self._halves(s))
+        p, stiffer, square, _, _ = (values[:, number, None] for values in self._halves(s))
         impedance, (speed, torque) = self.impedance[number], middle[:, :, None]
         place = np.asarray(shares) - 0.5
         cosh, sinhc = _even(np.sqrt(square), np.abs(place))
@@ -113,3 +124,101 @@ def _even(exponent: Complex, place: Array) -> tuple[Complex, Complex]:
 def _blocks(even: Complex, odd: Complex) -> Complex:
     """(k, q, 2, 2): both ends by V and W, the second of which changes its sign from end to end."""
     return np.stack([np.stack([even, odd], axis=-1), np.stack([even, -odd], axis=-1)], axis=-2)
+
+
+@dataclass(frozen=True, eq=False)
+class ExactSlopes:
+    """Small motions of a network with exact shafts, read by the names that they have with a mesh.
+
+    Args:
+        open: the network without the shafts.
+        lines: the shafts.
+        meshed: the same network with meshes, whose nodes say what can be read and how it is drawn.
+        profiles: what can be read along a part, with unit and places in m.
+        lengths: of the shafts, m.
+    """
+
+    open: OpenSlopes
+    lines: ExactLines
+    meshed: Motions
+    profiles: Mapping[str, tuple[str, tuple[float, ...]]]
+    lengths: tuple[float, ...]
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Those of the network, then speed and elastic torque of the middle of each shaft, over exp(-G / 2)."""
+        return (*self.open.states, *(f"{name}.{part}" for name in self.lines.names for part in ("even", "odd")))
+
+    @property
+    def state_units(self) -> tuple[str, ...]:
+        """(n,) their units."""
+        return (*self.open.state_units, *("rad/s", "N*m") * len(self.lines.names))
+
+    @cached_property
+    def weights(self) -> Array:
+        """(n,) factors with which the sum of squares is twice the stored energy, roughly."""
+        delay, impedance = self.lines.delay, self.lines.impedance
+        middle = np.stack([np.sqrt(impedance * delay), np.sqrt(delay / impedance)], axis=1)
+        return np.concatenate([self.open.weights, middle.ravel()])
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The named inputs."""
+        return self.open.inputs
+
+    @cached_property
+    def _inside(self) -> Mapping[str, tuple[int, float]]:
+        """Nodes between the ends of shafts: the shaft and the share of the way."""
+        return {
+            f"{name}.{k}.omega": (number, place / length)
+            for number, (name, length) in enumerate(zip(self.lines.names, self.lengths, strict=True))
+            for k, place in enumerate(self.meshed.profiles[f"{name}.omega"][1][1:-1], 1)
+        }
+
+    @cached_property
+    def units(self) -> Mapping[str, str]:
+        """Every quantity that can be read, and its unit; the energy of a shaft is none."""
+        energies = {f"{name}.energy" for name in self.lines.names}
+        units = {name: unit for name, unit in self.open.units.items() if name not in energies}
+        return units | {name: self.meshed.units[name] for name in self._inside}
+
+    @property
+    def nodes(self) -> Mapping[str, tuple[str, float]]:
+        """The nodes of the meshed network, which are read exactly."""
+        return self.meshed.nodes
+
+    @property
+    def masses(self) -> tuple[tuple[str, str], ...]:
+        """Those of the meshed network."""
+        return self.meshed.masses
+
+    def arriving(self, s: Complex, x: Complex) -> Complex:
+        """(ends, k) h = tau - Z omega at the ends of the shafts."""
+        middle = x[len(self.open.states) :].reshape(len(self.lines.names), 2, x.shape[1])
+        speeds, torques = self.lines.ends(s)
+        arriving = np.einsum("kqij,qjk->qik", torques - self.lines.impedance[:, None, None] * speeds, middle)
+        return np.asarray(arriving.reshape(2 * len(middle), x.shape[1]))
+
+    def swinging(self, s: Complex, x: Complex, v: Complex) -> Callable[[str], Complex]:
+        """A function from the name of a quantity to its amplitude (k,), along a part (k, places)."""
+        count = len(self.open.states)
+        middle = x[count:].reshape(len(self.lines.names), 2, x.shape[1])
+        read = self.open.swinging(s, x[:count], np.vstack([v, self.arriving(s, x)]))
+        inside: dict[int, Complex] = {}
+
+        def along(number: int, places: Any) -> tuple[Complex, Complex]:
+            return self.lines.along(number, s, middle[number], np.asarray(places) / self.lengths[number])
+
+        def amplitude(name: str) -> Complex:
+            owner, _, quantity = name.rpartition(".")
+            if name in self.profiles and owner in self.lines.names:
+                speed, torque = along(self.lines.names.index(owner), self.profiles[name][1])
+                return speed if quantity == "omega" else torque
+            if name not in self._inside:
+                return read(name)
+            number = self._inside[name][0]
+            if number not in inside:
+                inside[number] = along(number, self.meshed.profiles[f"{self.lines.names[number]}.omega"][1])[0]
+            return np.asarray(inside[number][:, int(owner.rpartition(".")[2])])
+
+        return amplitude

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.core.errors import SimulationError
 from shaftwork.results.exact_lines import ExactLines
-from shaftwork.results.observer import Array
+from shaftwork.results.frequency import solved_densely
+from shaftwork.results.observer import Array, blocks
 from shaftwork.results.slopes import Complex, OpenSlopes
 
-ENTRIES = 1_000_000
-"""Numbers of matrices held at once."""
 ITERATIONS, CONVERGED, SETTLED = 30, 1e-15, 1e-9
 """Steps to a root; found where a step is below the first fraction of it, or below the second and shrinks no more."""
 POINTS = (256, 512, 1024, 2048, 4096, 8192, 16384)
@@ -27,45 +28,49 @@ class ExactProblem:
         slopes: the network without its shafts.
         lines: the shafts.
         weights: (n,) factors of x, V and W with which they have equal units.
-        kept: the states x that have modes; None for all.
+        acting: the states x that have modes; None for all.
     """
 
     def __init__(
-        self, slopes: OpenSlopes, lines: ExactLines, weights: Array, kept: NDArray[np.intp] | None = None
+        self, slopes: OpenSlopes, lines: ExactLines, weights: Array, acting: NDArray[np.intp] | None = None
     ) -> None:
         states, inputs = slopes.A.shape[0], len(slopes.inputs)
-        kept = np.arange(states) if kept is None else kept
+        x = np.arange(states) if acting is None else acting
         rows = np.repeat(np.sqrt(lines.impedance / lines.delay), 2)[:, None]
-        w = weights[kept][:, None]
+        w = weights[x][:, None]
         self._lines, self._scale = lines, 1 / weights[states:]
-        self._A = w * slopes.A[kept][:, kept].toarray() / w.T
-        self._C = rows * slopes.C[:, kept].toarray() / w.T
-        self._arriving, self._through = w * slopes.B[kept, inputs:], rows * slopes.D[:, inputs:]
+        self._A = w * slopes.A[x][:, x].toarray() / w.T
+        self._C = rows * slopes.C[:, x].toarray() / w.T
+        self._arriving, self._through = w * slopes.B[x, inputs:], rows * slopes.D[:, inputs:]
         self._rows = rows
-        self._level = np.vstack([w * slopes.B[kept, :inputs], rows * slopes.D[:, :inputs]])
-        self._rate = np.vstack([w * slopes.B1[kept, :inputs], np.zeros((len(rows), inputs))])
-        self._states, self.unknowns = len(kept), len(kept) + len(rows)
+        self._level = np.vstack([w * slopes.B[x, :inputs], rows * slopes.D[:, :inputs]])
+        self._rate = np.vstack([w * slopes.B1[x, :inputs], np.zeros((len(rows), inputs))])
+        self._states, self.unknowns = len(x), len(x) + len(rows)
         self.size = float(max([*abs(self._A).sum(axis=0), *(1 / lines.delay)]))
 
     def matrix(self, s: Complex) -> Complex:
         """M (k, n, n) at s (k,)."""
-        made = self._joined(*self._lines.ends(s))
-        made[:, : self._states, : self._states] -= self._A
-        made[:, self._states :, : self._states] = -self._C
+        matrix = self._joined(*self._lines.ends(s))
+        matrix[:, : self._states, : self._states] -= self._A
+        matrix[:, self._states :, : self._states] = -self._C
         diagonal = np.arange(self._states)
-        made[:, diagonal, diagonal] += s[:, None]
-        return made
+        matrix[:, diagonal, diagonal] += s[:, None]
+        return matrix
 
     def slope(self, s: Complex) -> Complex:
         """d M / d s (k, n, n)."""
-        made = self._joined(*self._lines.end_slopes(s))
+        matrix = self._joined(*self._lines.end_slopes(s))
         diagonal = np.arange(self._states)
-        made[:, diagonal, diagonal] += 1.0
-        return made
+        matrix[:, diagonal, diagonal] += 1.0
+        return matrix
 
     def driven(self, s: Complex, number: int) -> Complex:
         """The right-hand side (k, n) under an input of amplitude one."""
         return np.asarray(self._level[:, number] + np.multiply.outer(s, self._rate[:, number]))
+
+    def solved(self, s: Complex, right: Complex) -> Complex:
+        """Solutions (k, n, 2) of right-hand sides (k, n, 2), NaN where the matrix is singular."""
+        return np.concatenate([solved_densely(self.matrix(s[here]), right[here]) for here in self._blocks(s)])
 
     def count(self, radius: float) -> int:
         """How many roots have |s| below a radius, each as often as it is one.
@@ -79,13 +84,16 @@ class ExactProblem:
         before = np.inf
         for points in POINTS:
             s = radius * np.exp(1j * np.pi * (np.arange(points) + 0.5) / points)
-            found = float(self._turning(s).mean())
-            if abs(found - before) < WHOLE and abs(found - round(found)) < WHOLE:
-                return round(found)
-            before = found
+            roots = float(self._turning(s).mean())
+            if abs(roots - before) < WHOLE and abs(roots - round(roots)) < WHOLE:
+                return round(roots)
+            before = roots
         raise SimulationError(
             f"The modes up to {radius / (2 * np.pi):g} Hz cannot be counted: one is too near. Ask for another f_max."
         )
+
+    def _blocks(self, s: Complex) -> Iterator[slice]:
+        return blocks(len(s), 4 * self.unknowns**2)  # the matrix, its slope, and what they make
 
     def _joined(self, speeds: Complex, torques: Complex) -> Complex:
         """What V and W (k, q, 2, 2) do to the rows of the network and of the ends, (k, n, n), the rest zero."""
@@ -96,15 +104,14 @@ class ExactProblem:
             ends[0, :, here, here] = speeds[:, k]
             ends[1, :, here, here] = torques[:, k] - self._lines.impedance[k] * speeds[:, k]
         speed, arriving = ends * self._scale
-        made = np.zeros((count, self.unknowns, self.unknowns), dtype=complex)
-        made[:, : self._states, self._states :] = -self._arriving @ arriving
-        made[:, self._states :, self._states :] = self._rows * speed - self._through @ arriving
-        return made
+        matrix = np.zeros((count, self.unknowns, self.unknowns), dtype=complex)
+        matrix[:, : self._states, self._states :] = -self._arriving @ arriving
+        matrix[:, self._states :, self._states :] = self._rows * speed - self._through @ arriving
+        return matrix
 
     def _turning(self, s: Complex) -> Array:
         """Real part (k,) of s trace(M^-1 M')."""
-        chunk = max(1, ENTRIES // self.unknowns**2)
-        pieces = [s[first : first + chunk] for first in range(0, len(s), chunk)]
+        pieces = (s[here] for here in self._blocks(s))
         traces = [np.trace(np.linalg.solve(self.matrix(z), self.slope(z)), axis1=1, axis2=2) for z in pieces]
         return np.asarray((s * np.concatenate(traces)).real)
 

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from operator import itemgetter
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from shaftwork.results.course import Course, course
-
-if TYPE_CHECKING:
-    from shaftwork.results.solution import Solution
+from shaftwork.results.course import course
+from shaftwork.results.reader import Reader
 
 SHOWN = 20
 """Quantities in the table of all."""
@@ -65,11 +63,11 @@ class Extremes(Mapping[str, tuple[Extreme, Extreme]]):
     where they turn and on both sides of jumps. Printed, it is a table.
 
     Args:
-        solution: the motion.
+        reader: of the motion.
     """
 
-    def __init__(self, solution: Solution) -> None:
-        self._solution = solution
+    def __init__(self, reader: Reader) -> None:
+        self._reader = reader
         self._rows: dict[str, ExtremesRow] = {}
 
     def __getitem__(self, name: str) -> tuple[Extreme, Extreme]:
@@ -77,13 +75,13 @@ class Extremes(Mapping[str, tuple[Extreme, Extreme]]):
         return row.least, row.most
 
     def __iter__(self) -> Iterator[str]:
-        return iter(dict.fromkeys((*self._solution.observer.units, *self._solution.observer.profiles)))
+        return iter(dict.fromkeys((*self._reader.observer.units, *self._reader.observer.profiles)))
 
     def __len__(self) -> int:
         return sum(1 for _ in self)
 
     def __contains__(self, name: object) -> bool:
-        return name in self._solution.observer.units or name in self._solution.observer.profiles
+        return name in self._reader.observer.units or name in self._reader.observer.profiles
 
     def row(self, name: str) -> ExtremesRow:
         """Extremes, mean over time and value at the end; along a part those of the worst places.
@@ -96,18 +94,16 @@ class Extremes(Mapping[str, tuple[Extreme, Extreme]]):
         return self._rows[name]
 
     def _searched(self, name: str) -> ExtremesRow:
-        solution = self._solution
-        if name not in self:
-            solution[name]  # refuses the name and says which there are
-        unit, places = solution.observer.profiles.get(name, (solution.observer.units.get(name, ""), ()))
-        rows = []
-        for number, place in enumerate(places) if places else ((None, None),):
-            quantity: Course = course(solution.reader.quantity(name, number), solution.steps)
-            unbounded = solution.reader.unbounded.get((name, number), {}).items()
+        reader, rows = self._reader, []
+        unit, places = reader.unit(name), reader.places(name)
+        for number in reader.numbers(name):
+            quantity = course(reader.quantity(name, number), reader.steps)
+            unbounded = reader.unbounded.get((name, number), {}).items()
             infinite = [(t, value) for t, value in unbounded if np.isinf(value)]
             lowest, highest = quantity.extremes()
-            found = min((lowest, *infinite), key=itemgetter(1)), max((highest, *infinite), key=itemgetter(1))
-            low, high = (Extreme(value + 0.0, t, name, unit, place) for t, value in found)
+            turns = min((lowest, *infinite), key=itemgetter(1)), max((highest, *infinite), key=itemgetter(1))
+            place = None if number is None else places[number]
+            low, high = (Extreme(value + 0.0, t, name, unit, place) for t, value in turns)
             rows.append(ExtremesRow(low, high, quantity.mean, quantity.end))
         least, most = (min(row.least for row in rows), max(row.most for row in rows))
         worst = int(np.argmax([abs(row.mean) for row in rows]))
@@ -131,6 +127,6 @@ class Extremes(Mapping[str, tuple[Extreme, Extreme]]):
     def __str__(self) -> str:
         names = tuple(self)
         more = [f"and {len(names) - SHOWN} more"] if len(names) > SHOWN else []
-        return "\n".join([f"'{self._solution.name}'", self.table(names[:SHOWN]), *more])
+        return "\n".join([f"'{self._reader.title}'", self.table(names[:SHOWN]), *more])
 
     __repr__ = __str__

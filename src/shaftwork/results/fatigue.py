@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
 import numpy as np
 
-from shaftwork.core.errors import ParameterError
+from shaftwork.core.errors import ParameterError, SignalError
 from shaftwork.core.parameters import in_si, without_unit
 from shaftwork.results.observer import Array
-from shaftwork.results.rainflow import Rainflow
+from shaftwork.results.rainflow import Rainflow, load_cycles
+from shaftwork.results.reader import Reader
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,3 +118,32 @@ def damage(cycles: Rainflow, sn: SNLine) -> Damage:
     """
     with np.errstate(divide="ignore"):
         return Damage(cycles, sn, cycles.count / sn.borne(cycles.amplitude, cycles.mean))
+
+
+def damage_of(reader: Reader, name: str, sn: object, smallest: float) -> Damage:
+    """The damage of a quantity of a motion; at the worst place, where it is read along a part."""
+    if not isinstance(sn, SNLine):
+        raise ParameterError(f"sn = {sn!r} must be an S-N line, such as SNLine(amplitude=300.0, cycles=1e6, slope=5).")
+    by_place = [damage(load_cycles(reader, name, place, smallest), sn) for place in reader.numbers(name)]
+    return max(by_place, key=lambda one: one.damage)
+
+
+def damages(reader: Reader, sn: SNLine | Mapping[str, SNLine], smallest: float) -> dict[str, Damage]:
+    """The damage of every shaft and spring, or of the quantities that S-N lines are given for."""
+    lines = dict(sn) if isinstance(sn, Mapping) else dict.fromkeys(_twisted(reader), sn)
+    if not lines:
+        raise SignalError(
+            f"There is no shaft or spring in '{reader.title}'. Name a quantity: damage('part.tau', sn=...)."
+        )
+    return {name: damage_of(reader, name, line, smallest) for name, line in lines.items()}
+
+
+def _twisted(reader: Reader) -> tuple[str, ...]:
+    """The torques of all that is twisted: springs and gaps have a twist, long shafts a torque along them."""
+    units = reader.observer.units
+    parts = dict.fromkeys(name.rpartition(".")[0] for name in units)
+    twisted = (
+        part for part in parts if f"{part}.phi_rel" in units or {f"{part}.phi", f"{part}.omega_rel"} <= units.keys()
+    )
+    along = (name for name in reader.observer.profiles if name.endswith(".tau"))
+    return (*(f"{part}.tau" for part in twisted if f"{part}.tau" in units), *along)

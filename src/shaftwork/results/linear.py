@@ -14,6 +14,10 @@ from scipy import sparse
 from shaftwork.core.errors import no_quantity
 from shaftwork.core.screen import counted
 from shaftwork.results.frequency import FrequencyResponse, frequency_response
+from shaftwork.results.exact_lines import ExactSlopes
+from shaftwork.results.exact_problem import ExactProblem
+from shaftwork.results.exact_spectrum import Starts, find_exact_modes
+from shaftwork.results.frequency import FrequencyResponse, StateEquations, frequency_response
 from shaftwork.results.modes import Modes, find_modes
 from shaftwork.results.observer import Array
 from shaftwork.results.slopes import DeviationEquations
@@ -114,9 +118,9 @@ class LinearModel:
 
     def _read(self, x: Array, v: Array, v_rate: Array) -> Array:
         """(outputs, k) for deviations of the states (n, k), the inputs (m, k) and their derivatives (m, k)."""
-        own = {name: k for k, name in enumerate(self.states)}
+        places = {name: k for k, name in enumerate(self.states)}
         read = self.slopes.motion(x.astype(complex), v.astype(complex), v_rate.astype(complex))
-        rows = [x[own[name]] if name in own else read(name).real for name in self.outputs]
+        rows = [x[places[name]] if name in places else read(name).real for name in self.outputs]
         return np.array(rows).reshape(len(self.outputs), x.shape[1])
 
     def modes(self, count: int | None = None, f_max: float | None = None) -> Modes:
@@ -144,12 +148,60 @@ class LinearModel:
             ParameterError: f holds no positive, finite numbers.
             SignalError: there is no such input or output.
         """
-        return frequency_response(self.title, self.slopes, (input, output), f)
+        return frequency_response(self.title, self.slopes, StateEquations(self.slopes), (input, output), f)
 
     def __repr__(self) -> str:
         pairs = (self.states, "state"), (self.inputs, "input"), (self.outputs, "output")
         sizes = ", ".join(counted(len(names), word) for names, word in pairs)
         return f"<LinearModel of '{self.title}': {sizes}>"
+
+
+@dataclass(frozen=True, eq=False)
+class ExactModel:
+    """Small motions about a point of a network with exact shafts: modes and frequency response.
+
+    Args:
+        title: of the network.
+        slopes: the network near the point.
+        starts: the modes of the network with meshes that are right up to a rate.
+        phase: the modes of its parts at the point, "gap open, load stuck"; empty where none has several.
+    """
+
+    title: str
+    slopes: ExactSlopes
+    starts: Starts
+    phase: str = ""
+
+    def modes(self, count: int | None = None, f_max: float | None = None) -> Modes:
+        """Frequencies, damping and shapes of the free motions.
+
+        Args:
+            count: the modes wanted, those of smallest |rate|; by default 10, or all up to f_max.
+            f_max: the largest |rate| / 2 pi, Hz.
+
+        Raises:
+            ParameterError: count or f_max is out of its range, or modes without number crowd below it.
+            SimulationError: it cannot be settled that all modes were found.
+
+        Warns:
+            NetworkWarning: an end takes all that arrives at it, so that there are fewer modes.
+        """
+        return find_exact_modes(self.title, self.slopes, self.starts, count, f_max)
+
+    def frequency_response(self, input: str, output: str, f: Any) -> FrequencyResponse:  # noqa: A002
+        """The complex amplitude of a quantity under a sinusoidal input of amplitude one.
+
+        Args:
+            input: one of `slopes.inputs`.
+            output: any quantity, "part.quantity" or "node.quantity".
+            f: (k,) frequencies, Hz.
+
+        Raises:
+            ParameterError: f holds no positive, finite numbers.
+            SignalError: there is no such input or output.
+        """
+        problem = ExactProblem(self.slopes.open, self.slopes.lines, self.slopes.weights)
+        return frequency_response(self.title, self.slopes, problem, (input, output), f)
 
 
 def linear_model(

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.results.course import Read
 from shaftwork.results.fatigue import SNLine
 from shaftwork.results.observer import Array
 from shaftwork.results.quadrature import LobattoPanels, integrate
+from shaftwork.results.reader import Read
 from shaftwork.results.solution import Solution
 
 KINDS: Mapping[str, str] = {
@@ -24,8 +24,6 @@ KINDS: Mapping[str, str] = {
     "damage": "the share of the life that the motion takes, with `sn`",
 }
 """What a measure may say of a quantity."""
-SMALLEST = 1e-6
-"""Ups and downs of less than this part of the range make no peak."""
 
 
 @dataclass(frozen=True)
@@ -73,18 +71,14 @@ class Measure:
         if self.kind == "damage":
             return solution.damage(self.quantity, sn=(sn or {})[self.quantity]).damage
         if self.kind == "end":
-            return _worst(np.atleast_2d(solution.at([solution.steps[-1]])[self.quantity]))
+            values = solution.at(solution.steps[-1:])[self.quantity].ravel()
+            return float(values[np.abs(values).argmax()])
         if self.kind in ("max", "min", "peak"):
             least, most = solution.extremes[self.quantity]
             return float({"max": most, "min": least, "peak": max(most, -least)}[self.kind])
-        places = range(len(solution.places.get(self.quantity, ()))) or (None,)
-        power = 2 if self.kind == "rms" else 1
-        means = (_mean(solution.reader.quantity(self.quantity, place), solution.steps, power) for place in places)
-        return max(means, key=abs)
-
-
-def _worst(values: Array) -> float:
-    return float(values.ravel()[np.abs(values).argmax()])
+        power, reader = 2 if self.kind == "rms" else 1, solution.reader
+        places = reader.numbers(self.quantity)
+        return max((_mean(reader.quantity(self.quantity, place), reader.steps, power) for place in places), key=abs)
 
 
 def _mean(read: Read, steps: Array, power: int) -> float:

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
-from shaftwork.core.errors import MissingExtraError, ParameterError, no_quantity
+from shaftwork.core.errors import ParameterError, no_quantity
 from shaftwork.core.parameters import in_si, whole
-from shaftwork.core.screen import counted, in_lines
+from shaftwork.core.screen import counted
 from shaftwork.results.eigenvalues import eigenmodes
 from shaftwork.results.observer import Array
+from shaftwork.results.plotting import new_figure
 from shaftwork.results.slopes import Complex, DeviationEquations, Motions
 
 if TYPE_CHECKING:
@@ -65,8 +67,7 @@ class Modes:
     @property
     def damping(self) -> Array:
         """(k,) damping ratios -Re(rate) / |rate|: 0 undamped, 1 decays without swinging, negative grows."""
-        size = np.abs(self.rates)
-        return np.where(size > 0, -self.rates.real / np.where(size > 0, size, 1.0), 0.0) + 0.0
+        return damping_ratios(self.rates)
 
     @cached_property
     def shapes(self) -> Mapping[str, Complex]:
@@ -74,8 +75,7 @@ class Modes:
 
         The largest speed in a mode is 1; where the motions have several units, in that with the most kinetic energy.
         """
-        none = np.zeros((len(self.slopes.inputs), len(self)), dtype=complex)
-        return _Shapes(self, self.slopes.swinging(self.rates, self.vectors, none))
+        return _Shapes(self, _free(self.slopes, self.rates, self.vectors))
 
     @property
     def table(self) -> tuple[tuple[str, float, float, complex, str], ...]:
@@ -111,7 +111,7 @@ class Modes:
 class _Shapes(Mapping[str, Complex]):
     """Amplitudes by quantity, computed when read."""
 
-    def __init__(self, modes: Modes, read: Any) -> None:
+    def __init__(self, modes: Modes, read: Callable[[str], Complex]) -> None:
         self._title, self._slopes, self._read = modes.title, modes.slopes, read
 
     def __getitem__(self, name: str) -> Complex:
@@ -145,12 +145,12 @@ def find_modes(title: str, slopes: DeviationEquations, count: int | None = None,
         SimulationError: the lowest modes of a large network were not found.
     """
     count, top = checked_count(count), largest_rate(f_max)
-    kept, following = _that_act(slopes)
-    weights = slopes.weights[kept]
-    scaled = sparse.diags_array(weights) @ slopes.A[kept][:, kept] @ sparse.diags_array(1 / weights)
+    acting, following = states_that_act(slopes.angles, slopes.A)
+    weights = slopes.weights[acting]
+    scaled = sparse.diags_array(weights) @ slopes.A[acting][:, acting] @ sparse.diags_array(1 / weights)
     rates, shapes = eigenmodes(sparse.csr_array(scaled), count)
     vectors = np.zeros((len(slopes.states), len(rates)), dtype=complex)
-    vectors[kept] = shapes / weights[:, None]
+    vectors[acting] = shapes / weights[:, None]
     vectors[following] = (slopes.A @ vectors)[following] * (rates != 0) / np.where(rates == 0, 1.0, rates)
     below = np.abs(rates) <= top
     return modes_of(title, slopes, rates[below], vectors[:, below])
@@ -159,6 +159,12 @@ def find_modes(title: str, slopes: DeviationEquations, count: int | None = None,
 def natural_frequencies(rates: Complex) -> Array:
     """|rate| / 2 pi in Hz of each rate in 1/s, and 0 where it does not swing, without an imaginary part above 0."""
     return np.asarray(np.where(rates.imag > 0, np.abs(rates), 0.0) / (2 * np.pi), dtype=float)
+
+
+def damping_ratios(rates: Complex) -> Array:
+    """-Re(rate) / |rate| of each rate in 1/s: 0 undamped, 1 decays without swinging, negative grows; 0 for no rate."""
+    size = np.abs(rates)
+    return np.where(size > 0, -rates.real / np.where(size > 0, size, 1.0), 0.0) + 0.0
 
 
 def largest_rate(f_max: float | None) -> float:
@@ -195,32 +201,41 @@ def modes_of(title: str, slopes: Motions, rates: Complex, vectors: Complex) -> M
     return Modes(title, _names(slopes, rates, vectors), rates, vectors, slopes)
 
 
-def _that_act(slopes: DeviationEquations) -> tuple[Any, Any]:
-    """The states that have modes, and the rest: angles that are only recorded follow from the others."""
-    read = np.asarray(abs(slopes.A).sum(axis=0)).ravel() > 0
-    read[: len(read) - slopes.angles] = True
-    return np.flatnonzero(read), np.flatnonzero(~read)
+def states_that_act(angles: int, *matrices: Any) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The states that have modes, and the rest, angles that are only recorded and follow from the others.
+
+    Args:
+        angles: how many of the states, the last ones, are angles.
+        *matrices: sparse (., n), by which the states act.
+    """
+    acts = np.sum([np.asarray(abs(matrix).sum(axis=0)).ravel() for matrix in matrices], axis=0) > 0
+    acts[: len(acts) - angles] = True
+    return np.flatnonzero(acts), np.flatnonzero(~acts)
+
+
+def _free(slopes: Motions, rates: Complex, vectors: Complex) -> Callable[[str], Complex]:
+    """From a name to the amplitudes of a quantity in motions that no input drives."""
+    return slopes.swinging(rates, vectors, np.zeros((len(slopes.inputs), len(rates)), dtype=complex))
 
 
 def _scaled(slopes: Motions, rates: Complex, vectors: Complex) -> Complex:
     """The shapes with their largest speed, in the unit with the most kinetic energy, equal to 1."""
-    none = np.zeros((len(slopes.inputs), vectors.shape[1]), dtype=complex)
-    read = slopes.swinging(rates, vectors, none)
+    read = _free(slopes, rates, vectors)
     units = np.array(slopes.state_units)
     energy = np.abs(vectors * slopes.weights[:, None]) ** 2
     by_unit = {unit: energy[units == unit].sum(axis=0) for unit in _speed_units(slopes)}
     amplitudes = {
-        unit: np.array([read(name) for name, (own, _) in slopes.nodes.items() if own == unit]) for unit in by_unit
+        unit: np.array([read(name) for name, (its, _) in slopes.nodes.items() if its == unit]) for unit in by_unit
     }
-    made = vectors.copy()
+    scaled = vectors.copy()
     for k in range(vectors.shape[1]):
         unit = max(by_unit, key=lambda name: by_unit[name][k], default="")
         column = vectors[:, k] * slopes.weights
         if unit and by_unit[unit][k] > MOVES**2 * energy[:, k].sum():
             column = amplitudes[unit][:, k]
         size = np.abs(column)
-        made[:, k] /= column[np.flatnonzero(size >= (1 - EQUAL) * size.max())[0]]
-    return made
+        scaled[:, k] /= column[np.flatnonzero(size >= (1 - EQUAL) * size.max())[0]]
+    return scaled
 
 
 def _names(slopes: Motions, rates: Complex, vectors: Complex) -> tuple[str, ...]:
@@ -241,8 +256,7 @@ def _standing(slopes: Motions, vectors: Complex) -> Iterator[str]:
     """Names for what does not change: the parts that move together, or else those that hold a torque."""
     if not vectors.size:
         return
-    none = np.zeros((len(slopes.inputs), vectors.shape[1]), dtype=complex)
-    read = slopes.swinging(np.zeros(vectors.shape[1], dtype=complex), vectors, none)
+    read = _free(slopes, np.zeros(vectors.shape[1], dtype=complex), vectors)
     speeds = np.array([np.abs(read(node)) for _, node in slopes.masses]).reshape(-1, vectors.shape[1])
     for speed, vector in zip(speeds.T, vectors.T, strict=True):
         moving = [slopes.masses[k][0] for k in np.flatnonzero(speed > MOVES)]
@@ -263,17 +277,13 @@ def _largest_nodes(modes: Modes) -> list[str]:
 
 
 def _plot(modes: Modes, numbers: tuple[int, ...]) -> Figure:
-    try:
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise MissingExtraError("matplotlib", "plot", "Modes.plot()") from None
-    figure = Figure(figsize=(9, 1.0 + 1.5 * len(numbers)), layout="constrained")
+    figure = new_figure("Modes.plot()", 9.0, 1.0 + 1.5 * len(numbers), f"{modes.title}: speeds of the nodes")
     axes = np.atleast_1d(figure.subplots(len(numbers), 1, sharex=True))
     nodes = modes.slopes.nodes
     for axis, number in zip(axes, numbers, strict=True):
         for unit in _speed_units(modes.slopes):
-            places = [place for own, place in nodes.values() if own == unit]
-            shape = np.array([modes.shapes[name][number] for name, (own, _) in nodes.items() if own == unit])
+            places = [place for its, place in nodes.values() if its == unit]
+            shape = np.array([modes.shapes[name][number] for name, (its, _) in nodes.items() if its == unit])
             (line,) = axis.plot(places, shape.real, marker="o", markersize=3, linewidth=1.2, label=unit)
             if np.abs(shape.imag).max() > MOVES**0.5:
                 later = f"{unit}, a quarter period before"
@@ -290,7 +300,6 @@ def _plot(modes: Modes, numbers: tuple[int, ...]) -> Figure:
     named = [(place, name) for place, name in named if "." not in name]  # those inside a part speak for themselves
     shown = named[:: max(1, -(-len(named) // LABELS))]
     axes[-1].set_xticks([place for place, _ in shown], [name for _, name in shown], rotation=45)
-    figure.suptitle(in_lines(f"{modes.title}: speeds of the nodes", 9.0))
     return figure
 
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from shaftwork.results.modes import Modes
+from shaftwork.results.modes import Modes, natural_frequencies
 from shaftwork.results.observer import Array
 from shaftwork.results.slopes import Complex
 
@@ -49,7 +49,7 @@ class Swinging:
     @property
     def frequencies(self) -> Array:
         """(k,) Hz."""
-        return np.asarray(np.abs(self.rates) / (2 * np.pi), dtype=float)
+        return natural_frequencies(self.rates)
 
     def above(self, order: float) -> Array:
         """(k,) how far each frequency lies above an order, Hz."""
@@ -58,9 +58,10 @@ class Swinging:
 
 def swinging(speed: float, modes: Modes, phase: str, f_max: float) -> Swinging:
     """The modes at a speed that swing, up to a frequency in Hz."""
-    kept = np.flatnonzero((modes.rates.imag > 0) & (modes.frequencies <= f_max))
-    vectors = modes.vectors[:, kept] * modes.slopes.weights[:, None]
-    return Swinging(speed, phase, modes.rates[kept], _of_length_one(vectors), modes.title)
+    swings = (modes.rates.imag > 0) & (modes.frequencies <= f_max)
+    vectors = modes.vectors[:, swings] * modes.slopes.weights[:, None]
+    lengths = np.linalg.norm(vectors, axis=0)
+    return Swinging(speed, phase, modes.rates[swings], vectors / np.where(lengths > 0, lengths, 1.0), modes.title)
 
 
 def same_modes(before: tuple[Complex, Complex], after: tuple[Complex, Complex]) -> list[tuple[int, int]]:
@@ -125,16 +126,12 @@ class OverSpeed:
             orders: excitations per turn.
         """
         points = [self.at(float(speed)) for speed in speeds]
-        found = [made for first, last in pairwise(points) for made in self._between(first, last, orders)]
-        last = points[-1]
-        ends = [
-            Meeting(last.speed, last, order, int(k)) for order in orders for k in np.flatnonzero(last.above(order) == 0)
-        ]
-        return [*found, *ends]
+        meetings = [met for first, last in pairwise(points) for met in self._between(first, last, orders)]
+        return [*meetings, *_at(points[-1], orders)]
 
     def _between(self, first: Swinging, last: Swinging, orders: Sequence[float]) -> list[Meeting]:
         """Those of an interval. Where the phase changes within it, it is halved until its parts have one phase each."""
-        waiting, found = [(first, last)], list[Meeting]()
+        waiting, meetings = [(first, last)], list[Meeting]()
         halvings, narrow = HALVINGS, NARROW * (last.speed - first.speed)
         while waiting:
             left, right = waiting.pop(0)
@@ -148,18 +145,18 @@ class OverSpeed:
                 halvings -= 1
                 waiting += [(left, between), (between, right)]
             else:
-                found += met
-        return found
+                meetings += met
+        return meetings
 
     def _alike(self, left: Swinging, right: Swinging) -> bool:
         """Whether two points have one phase and the same modes, but for some beyond the highest of interest."""
         if left.phase != right.phase:
             return False
         pairs = same_modes((left.rates, left.shapes), (right.rates, right.shapes))
-        kept = ({i for i, _ in pairs}, {j for _, j in pairs})
+        in_both = ({i for i, _ in pairs}, {j for _, j in pairs})
         return all(
             place in same or frequency > self.f_max
-            for point, same in zip((left, right), kept, strict=True)
+            for point, same in zip((left, right), in_both, strict=True)
             for place, frequency in enumerate(point.frequencies)
         )
 
@@ -167,18 +164,18 @@ class OverSpeed:
         self, left: Swinging, right: Swinging, orders: Sequence[float]
     ) -> tuple[list[Meeting], Swinging | None]:
         """The meetings of an interval, and a point within it where the modes are others after all."""
-        found, stranger = list[Meeting](), None
+        meetings, stranger = list[Meeting](), None
         count = min(len(left.rates), len(right.rates))
         for order in orders:
             low, high = left.above(order)[:count], right.above(order)[:count]
-            found += [Meeting(left.speed, left, order, int(rank)) for rank in np.flatnonzero(low == 0)]
+            meetings += [met for met in _at(left, (order,)) if met.rank < count]
             for rank in np.flatnonzero(low * high < 0).tolist():
                 at = self._refined(left, right, order, rank)
                 if not _goes_on(left, at, rank):
                     stranger = at
                 elif abs(at.above(order)[rank]) <= MET * at.frequencies[rank]:
-                    found.append(Meeting(at.speed, at, order, rank))
-        return found, stranger
+                    meetings.append(Meeting(at.speed, at, order, rank))
+        return meetings, stranger
 
     def _refined(self, left: Swinging, right: Swinging, order: float, rank: int) -> Swinging:
         """Where the mode of a rank meets an order, by the Illinois algorithm; sooner where the modes are others.
@@ -199,45 +196,42 @@ class OverSpeed:
         return at
 
 
+def _at(point: Swinging, orders: Iterable[float]) -> list[Meeting]:
+    """Where orders meet frequencies exactly at a point."""
+    return [
+        Meeting(point.speed, point, order, int(k)) for order in orders for k in np.flatnonzero(point.above(order) == 0)
+    ]
+
+
 def _goes_on(left: Swinging, at: Swinging, rank: int) -> bool:
     """Whether the mode of a rank is there at another point, in the same phase."""
     return at.phase == left.phase and rank < len(at.rates)
 
 
-@dataclass
-class Followed:
-    """The modes of one phase, each followed from speed to speed.
-
-    Args:
-        phase: in words.
-        rates: of each mode where it was seen last, 1/s.
-        shapes: of each mode where it was seen last.
-    """
-
-    phase: str
-    rates: list[complex] = field(default_factory=list)
-    shapes: list[Complex] = field(default_factory=list)
-
-    def places(self, point: Swinging) -> list[int]:
-        """The number of each mode of a further point; what was not there before is a new one."""
-        places = [-1] * len(point.rates)
-        if self.rates:
-            seen = np.array(self.rates), np.stack(self.shapes, axis=1)
-            for i, j in same_modes(seen, (point.rates, point.shapes)):
-                places[j] = i
-        for j, place in enumerate(places):
-            if place < 0:
-                places[j] = len(self.rates)
-                self.rates.append(0j)
-                self.shapes.append(point.shapes[:, j])
-            self.rates[places[j]], self.shapes[places[j]] = complex(point.rates[j]), point.shapes[:, j]
-        return places
-
-
 def numbered(points: Iterable[Swinging]) -> dict[float, list[int]]:
     """The number of each mode within its phase, counted from 0, by speed; points by ascending speed."""
-    followed: dict[str, Followed] = {}
-    return {point.speed: followed.setdefault(point.phase, Followed(point.phase)).places(point) for point in points}
+    seen: dict[str, list[tuple[complex, Complex]]] = {}
+    return {point.speed: _numbers(seen.setdefault(point.phase, []), point) for point in points}
+
+
+def _numbers(seen: list[tuple[complex, Complex]], point: Swinging) -> list[int]:
+    """The number of each mode of a further point; what was not there before is a new one.
+
+    Args:
+        seen: of each mode of the phase rate and shape where it was seen last, which this brings up to date.
+        point: at a higher speed.
+    """
+    numbers = [-1] * len(point.rates)
+    if seen:
+        before = np.array([rate for rate, _ in seen]), np.stack([shape for _, shape in seen], axis=1)
+        for i, j in same_modes(before, (point.rates, point.shapes)):
+            numbers[j] = i
+    for j, mode in enumerate(zip(point.rates.tolist(), point.shapes.T, strict=True)):
+        if numbers[j] < 0:
+            numbers[j] = len(seen)
+            seen.append(mode)
+        seen[numbers[j]] = mode
+    return numbers
 
 
 def differing(phases: Sequence[str]) -> dict[str, str]:
@@ -245,10 +239,5 @@ def differing(phases: Sequence[str]) -> dict[str, str]:
     split = [phase.split(BETWEEN) for phase in phases]
     if len({len(words) for words in split}) != 1:
         return dict(zip(phases, phases, strict=True))
-    kept = [k for k, words in enumerate(zip(*split, strict=True)) if len(set(words)) > 1]
-    return {phase: BETWEEN.join(words[k] for k in kept) for phase, words in zip(phases, split, strict=True)}
-
-
-def _of_length_one(vectors: Complex) -> Complex:
-    lengths = np.linalg.norm(vectors, axis=0)
-    return np.asarray(vectors / np.where(lengths > 0, lengths, 1.0))
+    differ = [k for k, words in enumerate(zip(*split, strict=True)) if len(set(words)) > 1]
+    return {phase: BETWEEN.join(words[k] for k in differ) for phase, words in zip(phases, split, strict=True)}

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from shaftwork.core.parameters import numbers_in_si
+
 Array = NDArray[np.float64]
 
+RPM = 30 / np.pi
+"""1/min of a rad/s."""
 AT_ONCE = 4_000_000
 """Numbers that are read of a motion at once, 32 MB."""
 
@@ -18,6 +22,39 @@ def blocks(count: int, width: int) -> Iterator[slice]:
     """Places 0 to `count` in blocks, of as many as are read at once where each holds `width` numbers."""
     rows = max(1, AT_ONCE // max(1, width))
     return (slice(first, min(first + rows, count)) for first in range(0, count, rows))
+
+
+def array_in_si(name: str, values: Any, unit: str) -> Array:
+    """(k,) numbers that a user gave, in SI; empty where they are no list of numbers.
+
+    Raises:
+        ParameterError: they have the unit of something else.
+    """
+    plain = numbers_in_si(name, values, unit)
+    try:
+        array = np.atleast_1d(np.asarray(plain, dtype=float))
+    except (TypeError, ValueError):
+        return np.empty(0)
+    return array if array.ndim == 1 else np.empty(0)
+
+
+class PhaseRow(NamedTuple):
+    """A phase of a motion.
+
+    Args:
+        start: s.
+        end: s.
+        modes: of every part that changes its mode, in words.
+    """
+
+    start: float
+    end: float
+    modes: Mapping[str, str]
+
+    @property
+    def name(self) -> str:
+        """In words, "gap open, brake locked"."""
+        return ", ".join(f"{part} {mode}" for part, mode in self.modes.items())
 
 
 class Observer(Protocol):

@@ -1,4 +1,4 @@
-"""Curves over time."""
+"""Pictures: an empty one with its title, and curves over time."""
 
 from __future__ import annotations
 
@@ -10,13 +10,12 @@ import numpy as np
 from shaftwork.core.errors import MissingExtraError
 from shaftwork.core.screen import in_lines
 from shaftwork.results.course import course
-from shaftwork.results.observer import Array
+from shaftwork.results.observer import RPM, Array, PhaseRow
+from shaftwork.results.reader import Reader
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from shaftwork.results.solution import Solution
 
 POINTS = 2000
 """Points of a curve besides those where it turns: more than a screen has."""
@@ -26,8 +25,6 @@ ALIKE = 10.0
 """Curves whose largest values differ by more than this factor have axes of their own: the smaller would look flat."""
 MARKED = 60
 """Changes of mode up to which each is a line across the curves; more would hide them, and the phases show them too."""
-TURNS = 30 / np.pi
-"""1/min of a rad/s."""
 HEIGHT, STRIP = 2.4, 0.3
 """Inches of an axis, and of a row of phases."""
 
@@ -35,14 +32,14 @@ Curve = tuple[Array, Array]
 """Times (k,) and values (k,) or, along a part, (k, places)."""
 
 
-def plot_signals(solution: Solution, names: tuple[str, ...]) -> Figure:
-    """Curves of like size and the same unit on one axis, time in common; below them the phases of the motion.
-
-    Extremes are drawn as high as they are, however fast the motion swings.
+def new_figure(purpose: str, width: float, height: float, title: str = "") -> Figure:
+    """An empty picture.
 
     Args:
-        solution: the motion.
-        names: quantities, such as "shaft.tau"; of one along a part all places are drawn.
+        purpose: who draws it, "Solution.plot()".
+        width: in.
+        height: in.
+        title: above all of it.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
@@ -50,34 +47,56 @@ def plot_signals(solution: Solution, names: tuple[str, ...]) -> Figure:
     try:
         from matplotlib.figure import Figure
     except ImportError:
-        raise MissingExtraError("matplotlib", "plot", "Solution.plot()") from None
-    curves = {name: _curve(solution, name) for name in dict.fromkeys(names)}
-    along, units = solution.observer.profiles, solution.observer.units
-    groups = _groups(curves, {name: along[name][0] if name in along else units[name] for name in curves})
-    parts = tuple(solution.phases[0].modes) if len(solution.phases) > 1 else ()
+        raise MissingExtraError("matplotlib", "plot", purpose) from None
+    figure = Figure(figsize=(width, height), layout="constrained")
+    if title:
+        figure.suptitle(in_lines(title, width))
+    return figure
+
+
+def plot_signals(
+    reader: Reader, names: tuple[str, ...], phases: Sequence[PhaseRow], events: Sequence[tuple[float, str, str, str]]
+) -> Figure:
+    """Curves of like size and the same unit on one axis, time in common; below them the phases of the motion.
+
+    Extremes are drawn as high as they are, however fast the motion swings.
+
+    Args:
+        reader: of the motion.
+        names: quantities, such as "shaft.tau"; of one along a part all places are drawn.
+        phases: of the motion.
+        events: between them.
+
+    Raises:
+        MissingExtraError: matplotlib is not installed.
+        SignalError: there is no such quantity.
+    """
+    units = {name: reader.unit(name) for name in names}
+    curves = {name: _curve(reader, name) for name in units}
+    groups = _groups(curves, units)
+    parts = tuple(phases[0].modes) if len(phases) > 1 else ()
     heights = [HEIGHT] * len(groups) + ([STRIP * (len(parts) + 1)] if parts else [])
-    figure = Figure(figsize=(9, 1.2 + sum(heights)), layout="constrained")
+    figure = new_figure("Solution.plot()", 9.0, 1.2 + sum(heights), reader.title)
     axes = np.atleast_1d(figure.subplots(len(heights), 1, sharex=True, gridspec_kw={"height_ratios": heights}))
     for axis, (unit, members) in zip(axes, groups, strict=False):
         _draw(axis, unit, {name: curves[name] for name in members})
-        if len(solution.events) <= MARKED:
-            for time, *_ in solution.events:
+        if len(events) <= MARKED:
+            for time, *_ in events:
                 axis.axvline(time, color="0.75", linewidth=0.6, zorder=0)
     if parts:
-        _draw_phases(axes[-1], solution, parts)
+        _draw_phases(axes[-1], phases, parts)
     axes[-1].set_xlabel("t in s")
-    axes[-1].set_xlim(solution.steps[0], solution.steps[-1])
-    figure.suptitle(in_lines(solution.name, 9.0))
+    axes[-1].set_xlim(reader.steps[0], reader.steps[-1])
     figure.align_ylabels()
     return figure
 
 
-def _curve(solution: Solution, name: str) -> Curve:
-    even = np.linspace(solution.steps[0], solution.steps[-1], POINTS)
-    if name in solution.places:
-        return even, solution.at(even)[name]
-    read = solution.reader.quantity(name, None)
-    turning, values = course(read, solution.steps).points()
+def _curve(reader: Reader, name: str) -> Curve:
+    even = np.linspace(reader.steps[0], reader.steps[-1], POINTS)
+    if reader.places(name):
+        return even, reader.values(name, even, reader.dense(even))
+    read = reader.quantity(name)
+    turning, values = course(read, reader.steps).points()
     times, values = np.append(turning, even), np.append(values, read(even))
     order = np.argsort(times, kind="stable")
     times, values = times[order], values[order]
@@ -87,12 +106,12 @@ def _curve(solution: Solution, name: str) -> Curve:
 def _envelope(times: Array, values: Array) -> Curve:
     """The lowest and the highest of what falls on the same place of the picture, in their order."""
     firsts = np.unique(np.searchsorted(times, np.linspace(times[0], times[-1], POINTS, endpoint=False)))
-    kept = [
+    places = [
         first + place
         for first, part in zip(firsts.tolist(), np.split(values, firsts[1:]), strict=True)
         for place in sorted({int(part.argmin()), int(part.argmax())})
     ]
-    return times[kept], values[kept]
+    return times[places], values[places]
 
 
 def _groups(curves: Mapping[str, Curve], units: Mapping[str, str]) -> list[tuple[str, list[str]]]:
@@ -123,22 +142,21 @@ def _draw(axis: Axes, unit: str, curves: Mapping[str, Curve]) -> None:
     axis.legend(loc="best", framealpha=0.8, edgecolor="none")
     if unit == "rad/s":
         axis.secondary_yaxis(
-            "right", functions=(lambda x: np.multiply(x, TURNS), lambda n: np.divide(n, TURNS))
+            "right", functions=(lambda x: np.multiply(x, RPM), lambda n: np.divide(n, RPM))
         ).set_ylabel("1/min")
 
 
-def _draw_phases(axis: Axes, solution: Solution, parts: Sequence[str]) -> None:
+def _draw_phases(axis: Axes, phases: Sequence[PhaseRow], parts: Sequence[str]) -> None:
     """A row for each part that changes its mode, in the colour of its mode."""
     from matplotlib.colors import to_rgba
     from matplotlib.patches import Patch
 
-    words = list(dict.fromkeys(row.modes[part] for part in parts for row in solution.phases))
+    words = list(dict.fromkeys(row.modes[part] for part in parts for row in phases))
     colors = {word: to_rgba(f"C{number % 10}", 0.55) for number, word in enumerate(words)}
     for place, part in enumerate(parts):
-        spans = [(row.start, row.end - row.start) for row in solution.phases]
-        axis.broken_barh(
-            spans, (place - 0.4, 0.8), facecolors=[colors[row.modes[part]] for row in solution.phases], linewidth=0
-        )
+        spans = [(row.start, row.end - row.start) for row in phases]
+        shades = [colors[row.modes[part]] for row in phases]
+        axis.broken_barh(spans, (place - 0.4, 0.8), facecolors=shades, linewidth=0)
     axis.set_yticks(range(len(parts)), parts)
     axis.set_ylim(len(parts) - 0.5, -0.5)
     handles = [Patch(color=color, label=word) for word, color in colors.items()]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -42,6 +42,18 @@ class LobattoPanels:
     start: Array
     end: Array
 
+    @classmethod
+    def between(cls, edges: Array) -> LobattoPanels:
+        """Panels from each time to the next, s."""
+        return cls(edges[:-1], edges[1:])
+
+    @classmethod
+    def joined(cls, parts: Sequence[LobattoPanels]) -> tuple[LobattoPanels, NDArray[np.intp]]:
+        """The panels of all parts, ascending, and their order."""
+        start, end = (np.concatenate([getattr(part, side) for part in parts]) for side in ("start", "end"))
+        order = np.argsort(start, kind="stable")
+        return cls(start[order], end[order]), order
+
     @property
     def length(self) -> Array:
         """(p,) s."""
@@ -50,9 +62,9 @@ class LobattoPanels:
     @property
     def times(self) -> Array:
         """(p, 8) nodes, ascending, s; the last a rounding before the end, where another panel may begin with a jump."""
-        made: Array = self.start[:, None] + self.length[:, None] * (NODES + 1) / 2
-        made[:, -1] = np.nextafter(self.end, self.start)
-        return made
+        times: Array = self.start[:, None] + self.length[:, None] * (NODES + 1) / 2
+        times[:, -1] = np.nextafter(self.end, self.start)
+        return times
 
     def parted(self) -> LobattoPanels:
         """Two panels for each."""
@@ -89,7 +101,7 @@ def integrate(integrand: Callable[[LobattoPanels], Array], steps: Array) -> tupl
     """
     least = max(1, LEAST // len(steps))
     edges = np.append((steps[:-1, None] + np.diff(steps)[:, None] * np.arange(least) / least).ravel(), steps[-1])
-    panels = LobattoPanels(edges[:-1], edges[1:])
+    panels = LobattoPanels.between(edges)
     shortest = ROUNDINGS * np.spacing(np.abs(steps).max())
     whole, first, count, before = panels.integrals(integrand(panels)), len(panels.start), 0, (np.inf, 0)
     total, size, settled = np.zeros(len(whole)), np.zeros(len(whole)), list[LobattoPanels]()
@@ -105,10 +117,8 @@ def integrate(integrand: Callable[[LobattoPanels], Array], steps: Array) -> tupl
         done = (change <= TIGHT * scale / first).all(axis=0) | (panels.length <= shortest)
         if rough <= TIGHT or count > MOST or noisy:
             done[:] = True
-        kept = np.repeat(done, 2)
-        total, size = total + fine[:, kept].sum(axis=1), size + sizes[:, kept].sum(axis=1)
-        settled.append(parts.taken(kept))
-        panels, whole, before = parts.taken(~kept), fine[:, ~kept], (rough, open_)
-    start, end = (np.concatenate([getattr(made, name) for made in settled]) for name in ("start", "end"))
-    order = np.argsort(start, kind="stable")
-    return total, LobattoPanels(start[order], end[order])
+        done = np.repeat(done, 2)
+        total, size = total + fine[:, done].sum(axis=1), size + sizes[:, done].sum(axis=1)
+        settled.append(parts.taken(done))
+        panels, whole, before = parts.taken(~done), fine[:, ~done], (rough, open_)
+    return total, LobattoPanels.joined(settled)[0]

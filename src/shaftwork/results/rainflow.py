@@ -7,17 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shaftwork.core.errors import MissingExtraError, ParameterError
+from shaftwork.core.errors import ParameterError, SignalError, imported
 from shaftwork.core.parameters import in_si, whole
-from shaftwork.core.screen import in_lines
-from shaftwork.results.course import Read
+from shaftwork.results.course import SMALLEST, TurningPoints, turning_points
 from shaftwork.results.observer import Array
-from shaftwork.results.turning import TurningPoints, turning_points
+from shaftwork.results.plotting import new_figure
+from shaftwork.results.reader import Read, Reader
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SMALLEST = 1e-6
 BINS = 24
 SHOWN = 12
 """Cycles in the printed table."""
@@ -71,9 +70,9 @@ class Rainflow:
         Raises:
             ParameterError: no whole numbers above 0.
         """
-        given = bins if isinstance(bins, tuple) else (bins, bins)
-        numbers = [count for count in map(whole, given) if count is not None]
-        if len(given) != 2 or len(numbers) != 2:
+        pair = bins if isinstance(bins, tuple) else (bins, bins)
+        numbers = [count for count in map(whole, pair) if count is not None]
+        if len(pair) != 2 or len(numbers) != 2:
             raise ParameterError(f"bins = {bins!r} must be a whole number above 0, or two: of ranges and of means.")
         low, high = (float(self.mean.min()), float(self.mean.max())) if len(self) else (0.0, 0.0)
         if high <= low:
@@ -144,10 +143,7 @@ def rainflow(read: Read, steps: Array, *, title: str, name: str, unit: str, smal
         MissingExtraError: the package rainflow is not installed.
         ParameterError: `smallest` is no fraction.
     """
-    try:
-        from rainflow import extract_cycles
-    except ImportError:
-        raise MissingExtraError("rainflow", "life", "Solution.rainflow()") from None
+    extract_cycles = imported("rainflow", "life", "Solution.rainflow()").extract_cycles
     fraction = in_si("smallest", smallest, at_least=0, at_most=1)
     turning = turning_points(read, steps, smallest=fraction)
     values = turning.values
@@ -155,24 +151,38 @@ def rainflow(read: Read, steps: Array, *, title: str, name: str, unit: str, smal
     # which cycle closes which is decided on values without noise: a torque that returns to zero returns to the same one
     series = (np.round(values / gate) if gate else values).tolist()
     # the package knows an end by a value that follows: without one a single ramp would be no cycle
-    found = sorted((first, second, count) for _, _, count, first, second in extract_cycles([*series, series[-1]]))
-    table = np.array(found, dtype=float).reshape(-1, 3)
+    cycles = sorted((first, second, count) for _, _, count, first, second in extract_cycles([*series, series[-1]]))
+    table = np.array(cycles, dtype=float).reshape(-1, 3)
     first, second = np.minimum(table[:, :2].astype(np.intp), len(values) - 1).T
     ranges, means = np.abs(values[second] - values[first]), 0.5 * (values[first] + values[second])
-    kept = ranges > gate
-    start, end = turning.t[first][kept], turning.t[second][kept]
+    counted = ranges > gate
+    start, end = turning.t[first][counted], turning.t[second][counted]
     duration = float(steps[-1] - steps[0])
-    return Rainflow(title, name, unit, duration, turning, ranges[kept], means[kept], table[kept, 2], start, end)
+    return Rainflow(
+        title, name, unit, duration, turning, ranges[counted], means[counted], table[counted, 2], start, end
+    )
+
+
+def load_cycles(reader: Reader, name: str, place: int | None, smallest: float) -> Rainflow:
+    """The load cycles of a quantity of a motion; see `Solution.rainflow`."""
+    unit, places = reader.unit(name), reader.places(name)
+    if place not in reader.numbers(name):
+        if not places:
+            raise SignalError(f"'{name}' is not read along a part. Leave out place={place!r}.")
+        raise SignalError(
+            f"'{name}' is read at {len(places)} places along the part; say which by place=0 to {len(places) - 1}. "
+            f"places['{name}'] has them in m."
+        )
+    shown = name if place is None else f"{name} at {places[place]:g} m"
+    read = reader.quantity(name, place)
+    return rainflow(read, reader.steps, title=reader.title, name=shown, unit=unit, smallest=smallest)
 
 
 def _picture(cycles: Rainflow, bins: int | tuple[int, int]) -> Figure:
     counts, ranges, means = cycles.matrix(bins)
-    try:
-        from matplotlib.colors import LogNorm
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise MissingExtraError("matplotlib", "plot", "Rainflow.plot()") from None
-    figure = Figure(figsize=(11, 4.5), layout="constrained")
+    figure = new_figure("Rainflow.plot()", 11.0, 4.5, f"{cycles.title}: {cycles.name}")
+    from matplotlib.colors import LogNorm
+
     left, right = figure.subplots(1, 2, width_ratios=(3, 2))
     unit = cycles.unit.replace("*", " ")
     shown = np.ma.masked_equal(counts, 0.0)
@@ -188,5 +198,4 @@ def _picture(cycles: Rainflow, bins: int | tuple[int, int]) -> Figure:
     right.set_ylim(bottom=0.0)
     right.set_xlabel("cycles")
     right.grid(alpha=0.3)
-    figure.suptitle(in_lines(f"{cycles.title}: {cycles.name}", 11.0))
     return figure

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +11,7 @@ from shaftwork.core.errors import AccuracyWarning
 from shaftwork.core.notices import warn
 from shaftwork.results.course import course
 from shaftwork.results.observer import Array
-
-if TYPE_CHECKING:
-    from shaftwork.results.solution import Solution
+from shaftwork.results.reader import Reader
 
 HIDDEN, STRAYED = 0.05, 0.2
 """Of the largest value: what samples may miss of an extreme, and the root mean square by which lines between samples
@@ -35,79 +32,57 @@ MOST_OUTPUTS = 10_000_000
 """Output times that can be asked for."""
 
 
-class Unseen(NamedTuple):
-    """Where samples are far from a quantity.
-
-    Args:
-        name: of the quantity.
-        unit: of the quantity.
-        t: where it turns, between two output times, s.
-        value: what it is there.
-        line: what a line between its samples is there.
-        samples: the smallest and the largest sample.
-        outputs: number of even output times that would show the turn, or None where no number would.
-    """
-
-    name: str
-    unit: str
-    t: float
-    value: float
-    line: float
-    samples: tuple[float, float]
-    outputs: int | None
-
-
-def warn_of_coarse_samples(solution: Solution, names: Sequence[str] = ()) -> None:
-    """Warn where the samples of quantities, by default of the states, do not show how these swing.
+def warn_of_coarse_samples(reader: Reader, t: Array, x: Array, names: Sequence[str] = ()) -> None:
+    """Warn where the samples of quantities do not show how these swing.
 
     Law: the states are looked at between output times and step ends. Where they stray most from lines between samples,
     and at times anywhere, the quantities are read and compared with their samples.
+
+    Args:
+        reader: of the motion.
+        t: (k,) output times, s.
+        x: (k, n) states at these times.
+        names: of the quantities; by default those of the states.
     """
-    if "dense" not in vars(solution) or len(solution.t) < LEAST:  # one that is stored would have to be made again
+    if len(t) < LEAST:
         return
-    unseen = _unseen(solution, names or tuple(name for name in solution.states if name in solution))
-    if unseen is None:
-        return
-    name, (low, high) = unseen.name, unseen.samples
-    enough = f"About t_eval={unseen.outputs} show it." if unseen.outputs else "No even output times show it."
-    warn(
-        f"The {len(solution.t)} output times of '{solution.name}' are too far apart for what swings in it: '{name}' is "
-        f"{unseen.value:.5g} {unseen.unit} at t = {unseen.t:.6g} s, where a line between its samples is at "
-        f"{unseen.line:.5g}, and its samples lie between {low:.5g} and {high:.5g}. {enough} sol.max('{name}') and "
-        f"sol.min('{name}') are right whatever the output times.",
-        AccuracyWarning,
-    )
+    names = names or tuple(name for name in reader.states if name in reader.observer.units)
+    if (worst := _worst_shown(reader, t, x, names)) is not None:
+        warn(_message(reader, t, x, *worst), AccuracyWarning)
 
 
-def _unseen(solution: Solution, names: Sequence[str]) -> Unseen | None:
-    """What samples show worst of some quantities, or None where they show all of them."""
-    times, first = np.unique(solution.t, return_index=True)
-    between, anywhere = _between(solution, times, solution.x[first])
+def _worst_shown(reader: Reader, t: Array, x: Array, names: Sequence[str]) -> tuple[str, int, float] | None:
+    """What samples show worst of some quantities: name, place and time in s; None where they show all of them."""
+    times, first = np.unique(t, return_index=True)
+    between, anywhere = _between(reader, times, x[first])
+    states = reader.dense(between)
     worst, where = 1.0, None
     for name in names:
-        samples, values = (motion[name].reshape(len(motion.t), -1) for motion in (solution, between))
+        samples, values = (
+            reader.values(name, *motion).reshape(len(motion[0]), -1) for motion in ((t, x), (between, states))
+        )
         size = np.maximum(np.abs(np.concatenate([samples, values])).max(axis=0), np.finfo(float).tiny)
         over = np.maximum(values - samples.max(axis=0), samples.min(axis=0) - values)
-        apart = np.abs(values - _lines(times, samples[first], between.t))
+        apart = np.abs(values - _lines(times, samples[first], between))
         astray = np.sqrt(np.mean(apart[anywhere] ** 2, axis=0))
         for share, far in ((over.max(axis=0) / HIDDEN, over), (astray / STRAYED, apart)):
             place = int(np.argmax(share / size))
             if share[place] > worst * size[place]:
                 worst = float(share[place] / size[place])
-                where = name, place, float(between.t[far[:, place].argmax()])
-    return None if where is None else _described(solution, *where, times)
+                where = name, place, float(between[far[:, place].argmax()])
+    return where
 
 
-def _between(solution: Solution, times: Array, states: Array) -> tuple[Solution, NDArray[np.bool_]]:
-    """The motion where its states stray most from lines between samples, and anywhere; which times are the latter."""
+def _between(reader: Reader, times: Array, states: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Times at which the states stray most from lines between samples, and any; which of them are the latter."""
     count = states.shape[1]
-    looks = _looks(times, solution.steps, min(MOST_LOOKS, MOST_VALUES // max(1, count)))
-    strayed = np.abs(solution.dense(looks) - _lines(times, states, looks))
+    looks = _looks(times, reader.steps, min(MOST_LOOKS, MOST_VALUES // max(1, count)))
+    strayed = np.abs(reader.dense(looks) - _lines(times, states, looks))
     each = min(len(looks), 1 + CHOSEN // max(1, count)) - 1
     chosen = np.argpartition(-strayed, each, axis=0)[: each + 1].ravel()
     evenly = np.searchsorted(looks, np.linspace(looks[0], looks[-1], ANYWHERE))
-    between = solution.at(looks[np.union1d(chosen, evenly)])
-    return between, np.isin(between.t, looks[evenly])
+    between = looks[np.union1d(chosen, evenly)]
+    return between, np.isin(between, looks[evenly])
 
 
 def _looks(times: Array, steps: Array, most: int) -> Array:
@@ -127,30 +102,34 @@ def _lines(times: Array, samples: Array, at: Array) -> Array:
     return np.asarray((1 - share) * samples[before] + share * samples[before + 1])
 
 
-def _described(solution: Solution, name: str, place: int, t: float, times: Array) -> Unseen:
+def _message(reader: Reader, t: Array, x: Array, name: str, place: int, near: float) -> str:
     """What is not seen of a quantity near a time: its turn there, and how close samples must be to show that."""
-    samples = solution[name].reshape(len(solution.t), -1)[:, place]
-    along = name in solution.observer.profiles
-    read = solution.reader.quantity(name, place if along else None)
-    after = int(np.searchsorted(times, t))
+    samples = reader.values(name, t, x).reshape(len(t), -1)[:, place]
+    low, high = float(samples.min()), float(samples.max())
+    read = reader.quantity(name, place if reader.places(name) else None)
+    times = np.unique(t)
+    after = int(np.searchsorted(times, near))
     start, end = times[after - 1 : after + 1].tolist()
-    inner = solution.steps[(solution.steps > start) & (solution.steps < end)]
+    inner = reader.steps[(reader.steps > start) & (reader.steps < end)]
     left, right = read(np.array([start, end])).tolist()
     turns = course(read, np.array([start, *inner, end])).extremes()
     lines = [left + (right - left) * (when - start) / (end - start) for when, _ in turns]
     which = int(np.argmax([abs(value - line) for (_, value), line in zip(turns, lines, strict=True)]))
     (when, value), line = turns[which], lines[which]
-    low, high = float(samples.min()), float(samples.max())
-    room = HIDDEN * max(abs(value), -low, high)
+    room, width = HIDDEN * max(abs(value), -low, high), 0.0
     offsets = np.geomspace(NARROWEST, 1.0, OFFSETS) * (end - start)
-    width = 0.0
     for side in (-1, 1):
-        near = np.clip(when + side * offsets, solution.steps[0], solution.steps[-1])[::side]
-        stays = np.abs(read(near)[::side] - value) <= room
+        aside = np.clip(when + side * offsets, reader.steps[0], reader.steps[-1])[::side]
+        stays = np.abs(read(aside)[::side] - value) <= room
         width += float(offsets[int(np.argmin(np.append(stays, False))) - 1]) if stays[0] else 0.0
     count = (times[-1] - times[0]) / width if width else np.inf
-    unit = solution.observer.profiles[name][0] if along else solution.observer.units[name]
-    return Unseen(name, unit, when, value, line, (low, high), _rounded_up(count) if count < MOST_OUTPUTS else None)
+    enough = f"About t_eval={_rounded_up(count)} show it." if count < MOST_OUTPUTS else "No even output times show it."
+    return (
+        f"The {len(t)} output times of '{reader.title}' are too far apart for what swings in it: '{name}' is "
+        f"{value:.5g} {reader.unit(name)} at t = {when:.6g} s, where a line between its samples is at {line:.5g}, and "
+        f"its samples lie between {low:.5g} and {high:.5g}. {enough} sol.max('{name}') and sol.min('{name}') are right "
+        "whatever the output times."
+    )
 
 
 def _rounded_up(count: float) -> int:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shaftwork.core.errors import MissingExtraError
+from shaftwork.core.errors import imported
+from shaftwork.results.modes import damping_ratios, natural_frequencies
 from shaftwork.results.observer import Array
 from shaftwork.results.slopes import Complex
 
@@ -35,12 +36,12 @@ class FrequencySensitivities:
     @property
     def frequencies(self) -> Array:
         """(k,) natural frequencies |rate| / 2 pi, Hz."""
-        return np.asarray(np.abs(self.rates) / (2 * np.pi))
+        return natural_frequencies(self.rates)
 
     @property
     def damping(self) -> Array:
         """(k,) damping ratios -Re(rate) / |rate|."""
-        return np.asarray(-self.rates.real / np.abs(self.rates))
+        return damping_ratios(self.rates)
 
     @property
     def of_frequencies(self) -> dict[str, Array]:
@@ -118,11 +119,8 @@ class MotionSensitivities:
 
 
 def _frame(columns: Mapping[str, Array], names: Sequence[str], purpose: str) -> pd.DataFrame:
-    try:
-        import pandas as pd
-    except ImportError:
-        raise MissingExtraError("pandas", "data", purpose) from None
-    return pd.DataFrame.from_dict(dict(columns), orient="index", columns=names)
+    frames: pd.DataFrame = imported("pandas", "data", purpose).DataFrame
+    return frames.from_dict(dict(columns), orient="index", columns=names)
 
 
 def _text(title: str, header: Sequence[str], rows: Mapping[str, Array]) -> str:

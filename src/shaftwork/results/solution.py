@@ -6,22 +6,21 @@ import reprlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from shaftwork.core.errors import AccuracyWarning, MissingExtraError, SignalError, no_quantity
+from shaftwork.core.errors import AccuracyWarning, SignalError, imported
 from shaftwork.core.notices import warn
-from shaftwork.core.parameters import numbers_in_si
 from shaftwork.core.screen import counted, named, on_one_screen
 from shaftwork.integrate.problem import TOLERATED, UNSURPRISING
+from shaftwork.results.course import SMALLEST
 from shaftwork.results.energy import EnergyBalance, energy_balance
 from shaftwork.results.extremes import Extreme, Extremes
-from shaftwork.results.fatigue import Damage, SNLine
-from shaftwork.results.life import damage_of, damages, load_cycles
-from shaftwork.results.limits import beside
-from shaftwork.results.observer import Array, DenseStates, Observer
-from shaftwork.results.rainflow import SMALLEST, Rainflow
+from shaftwork.results.fatigue import Damage, SNLine, damage_of, damages
+from shaftwork.results.observer import Array, DenseStates, Observer, PhaseRow, array_in_si
+from shaftwork.results.plotting import plot_signals
+from shaftwork.results.rainflow import Rainflow, load_cycles
 from shaftwork.results.reader import Reader
 from shaftwork.results.samples import warn_of_coarse_samples
 
@@ -34,25 +33,6 @@ COMPILED = ("dense", "observer")
 """What of a motion holds compiled code."""
 ALIKE = 1e-6
 """Two runs of one motion at the usual tolerance differ by less of the largest value of a state."""
-
-
-class PhaseRow(NamedTuple):
-    """A phase of a motion.
-
-    Args:
-        start: s.
-        end: s.
-        modes: of every part that changes its mode, in words.
-    """
-
-    start: float
-    end: float
-    modes: Mapping[str, str]
-
-    @property
-    def name(self) -> str:
-        """In words, "gap open, brake locked"."""
-        return ", ".join(f"{part} {mode}" for part, mode in self.modes.items())
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +120,7 @@ class Solution:
                 AccuracyWarning,
             )
 
-    @property
+    @cached_property
     def steps(self) -> Array:
         """(s,) ends of the integration steps."""
         return _read_only(self.dense.steps)
@@ -159,33 +139,9 @@ class Solution:
         Raises:
             SignalError: there is no such quantity; the message lists what the part has.
         """
-        if isinstance(name, str) and name in self.states:
+        if isinstance(name, str) and name in self.states:  # without the compiled code, which one that is stored has not
             return self.x[:, self.states.index(name)].copy()
-        values = self._computed(name, self.t, self.x)
-        missing = ~np.isfinite(values)
-        if missing.any():
-            rows = missing.reshape(len(self.t), -1).any(axis=1)
-            limit, _ = beside(lambda at: self._computed(name, at, self.dense(at)), self.t[rows], self.steps)
-            values[rows] = np.where(missing[rows] & np.isfinite(limit), limit, values[rows])
-            self._warn_of_missing(name, values)
-        return values
-
-    def _computed(self, name: str, t: Array, x: Array) -> Array:
-        """A quantity at times (k,) with states (k, n) as it is computed, which may be 0/0."""
-        if isinstance(name, str) and name in self.observer.profiles:
-            return self.observer.profile(name, t, x, self.dense)
-        return self.observer.signal(self._known(name), t, x, self.dense)
-
-    def _warn_of_missing(self, name: str, values: Array) -> None:
-        """Say where a quantity has no finite value."""
-        missing = ~np.isfinite(values).reshape(len(self.t), -1).all(axis=1)
-        if missing.any():
-            warn(
-                f"'{name}' of '{self.name}' has no finite value at t = {self.t[missing][0]:.6g} s, as where the slope "
-                "of a law, sqrt(t) at t = 0, is infinite. Its extremes hold it where it is infinite, its mean and "
-                "cycles the values beside it. Give the law a finite slope there.",
-                AccuracyWarning,
-            )
+        return self.reader.values(name, self.t, self.x)
 
     @property
     def places(self) -> Mapping[str, Array]:
@@ -206,12 +162,8 @@ class Solution:
             ParameterError: they have the unit of something else.
         """
         first, last = self.steps[0], self.steps[-1]
-        plain = numbers_in_si("t", t, "s")
-        try:
-            times = np.atleast_1d(np.asarray(plain, dtype=float))
-        except (TypeError, ValueError):
-            times = np.empty(0)
-        if times.ndim != 1 or not times.size:
+        times = array_in_si("t", t, "s")
+        if not times.size:
             raise SignalError(
                 f"{reprlib.repr(t)} is no list of times. Give times in s from {first:g} to {last:g}, such as "
                 f"[{first:g}, {last:g}]."
@@ -225,12 +177,12 @@ class Solution:
     @cached_property
     def reader(self) -> Reader:
         """Reads quantities at any times, many of them at the same times."""
-        return Reader(self)
+        return Reader(self.name, self.states, self.observer, self.dense)
 
     @cached_property
     def extremes(self) -> Extremes:
         """Minimum and maximum of every quantity, by name, each searched when it is first asked for."""
-        return Extremes(self)
+        return Extremes(self.reader)
 
     def max(self, name: str) -> Extreme:
         """The largest value of a quantity, such as "shaft.tau", and its time; along a part that of the worst place.
@@ -279,9 +231,9 @@ class Solution:
         An `AccuracyWarning` says where output times are too far apart to show how the named quantities, or else the
         states, swing.
         """
-        frame = _require("pandas", "data", "Solution.to_pandas()")
+        frame = imported("pandas", "data", "Solution.to_pandas()")
         columns = {name: self[name] for name in names or self.names}
-        warn_of_coarse_samples(self, names)
+        self._warn_of_coarse_samples(names)
         return frame.DataFrame(columns, index=frame.Index(self.t, name="t"))
 
     def to_xarray(self, *names: str) -> xarray.Dataset:
@@ -289,21 +241,18 @@ class Solution:
 
         Warns as `to_pandas` does.
         """
-        library = _require("xarray", "data", "Solution.to_xarray()")
+        library = imported("xarray", "data", "Solution.to_xarray()")
         units = self.observer.units
         data = {name: ("t", self[name], {"units": units[name]}) for name in names or self.names}
         time = ("t", self.t, {"units": "s"})
-        warn_of_coarse_samples(self, names)
+        self._warn_of_coarse_samples(names)
         return library.Dataset(  # type: ignore[no-any-return]
             data, coords={"t": time}, attrs={"title": self.name, "engine": self.engine, "why": self.why}
         )
 
     def plot(self, *names: str) -> Figure:
         """Curves over time, those of like size and the same unit on one axis, and the phases below (extra `plot`)."""
-        from shaftwork.results.plotting import plot_signals
-
-        along = tuple(self.observer.profiles)
-        return plot_signals(self, tuple(name if name in along else self._known(name) for name in names or self.states))
+        return plot_signals(self.reader, names or self.states, self.phases, self.events)
 
     def rainflow(self, name: str, *, place: int | None = None, smallest: float = SMALLEST) -> Rainflow:
         """The load cycles of a quantity, such as "shaft.tau", over the run (extra `life`).
@@ -320,7 +269,7 @@ class Solution:
             ParameterError: `smallest` is no fraction.
             SignalError: there is no such quantity or place.
         """
-        return load_cycles(self, name, place, smallest)
+        return load_cycles(self.reader, name, place, smallest)
 
     @overload
     def damage(self, name: str, *, sn: SNLine, smallest: float = SMALLEST) -> Damage: ...
@@ -345,25 +294,13 @@ class Solution:
             ParameterError: `sn` is no S-N line.
             SignalError: there is no such quantity, or no shaft.
         """
-        return damages(self, sn, smallest) if name is None else damage_of(self, name, sn, smallest)
+        if name is None:
+            return damages(self.reader, sn, smallest)
+        return damage_of(self.reader, name, sn, smallest)
 
-    def _known(self, name: str) -> str:
-        units = self.observer.units
-        if not isinstance(name, str):
-            some = ", ".join(self.names[:6])
-            raise SignalError(
-                f"{reprlib.repr(name)} is no name of a quantity. '{self.name}' has {len(units)}, such as: {some}. "
-                "All of them are in `names`."
-            )
-        if name in units:
-            return name
-        error = no_quantity(name, self.name, dict.fromkeys((*units, *self.observer.profiles)))
-        owner, _, quantity = name.rpartition(".")
-        if quantity.partition("_")[0] in ("phi", "s", "psi") and any(
-            other.rpartition(".")[0] == owner for other in units
-        ):
-            raise SignalError(f"{error} An angle is recorded when asked for: net.compile(angles=['{owner}']).")
-        raise error
+    def _warn_of_coarse_samples(self, names: Sequence[str]) -> None:
+        if "dense" in vars(self):  # one that is stored would have to be made again
+            warn_of_coarse_samples(self.reader, self.t, self.x, names)
 
     def __repr__(self) -> str:
         span = f"{counted(len(self.t), 'time')} from {self.t[0]:g} to {self.t[-1]:g} s"
@@ -382,15 +319,6 @@ class Solution:
 
 def _read_only(values: Array) -> Array:
     """The same numbers, not to be written into."""
-    made = values.view()
-    made.flags.writeable = False
-    return made
-
-
-def _require(library: str, extra: str, purpose: str) -> Any:
-    from importlib import import_module
-
-    try:
-        return import_module(library)
-    except ImportError:
-        raise MissingExtraError(library, extra, purpose) from None
+    view = values.view()
+    view.flags.writeable = False
+    return view

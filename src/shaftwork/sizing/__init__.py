@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from shaftwork.sizing.catalogue import CatalogueMotor, catalogue
 from shaftwork.sizing.choice import Candidate, Choice, choose
-from shaftwork.sizing.duty import duty
-from shaftwork.sizing.duty_cycle import Duty, Flow
+from shaftwork.sizing.duty import Duty, Flow, duty
 from shaftwork.sizing.reserve import Reserve
 
 __all__ = ["Candidate", "CatalogueMotor", "Choice", "Duty", "Flow", "Reserve", "catalogue", "choose", "duty"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, dataclass, fields
 from functools import cached_property
@@ -15,7 +14,7 @@ import numpy as np
 from shaftwork.components.motor_catalogue import Nameplate
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si, numbers_in_si
-from shaftwork.results.observer import Array
+from shaftwork.results.observer import RPM, Array
 
 OWN = Path(__file__).with_name("motors.csv")
 TYPICAL = "chosen: typical of a motor of this frame size and power; frame sizes by power after EN 50347"
@@ -70,11 +69,11 @@ class CatalogueMotor:
         for name, (unit, bounds) in NUMBERS.items():
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, in_si(name, getattr(self, name), unit, **bounds))
-        made = self.tau_n * self.n_n * math.pi / 30
-        if abs(made - self.power) > CONSISTENT * self.power:
+        product = self.tau_n * self.n_n / RPM
+        if abs(product - self.power) > CONSISTENT * self.power:
             raise ParameterError(
                 f"power = {self.power:g} W, but tau_n = {self.tau_n:g} N m at n_n = {self.n_n:g} 1/min makes "
-                f"{made:.4g} W. Give power in W, torques in N m, speeds in 1/min."
+                f"{product:.4g} W. Give power in W, torques in N m, speeds in 1/min."
             )
         if not self.tau_s <= self.tau_a or not self.tau_s < self.tau_k:
             raise ParameterError(
@@ -88,11 +87,10 @@ class CatalogueMotor:
     @cached_property
     def nameplate(self) -> Nameplate:
         """The motor as the parts of a network take it: `nameplate.cage("motor")`, `.kloss`, `.drive`."""
-        own = {
-            name: getattr(self, name) for name in ("power", "n_n", "tau_n", "n_sync", "tau_a", "tau_s", "tau_k", "f_n")
-        }
-        chosen = dict.fromkeys(own, TYPICAL) if self.source == TYPICAL else {}
-        return Nameplate(name=self.name, source=self.source, chosen=chosen, **own)
+        names = ("power", "n_n", "tau_n", "n_sync", "tau_a", "tau_s", "tau_k", "f_n")
+        values = {name: getattr(self, name) for name in names}
+        chosen = dict.fromkeys(names, TYPICAL) if self.source == TYPICAL else {}
+        return Nameplate(name=self.name, source=self.source, chosen=chosen, **values)
 
     @property
     def fastest(self) -> float:
@@ -155,20 +153,20 @@ def catalogue(path: str | Path | None = None) -> tuple[CatalogueMotor, ...]:
         )
     columns = [name.strip() for name in _cells(lines[0][1])]
     _refuse_columns(file, columns)
-    made, wrong = list[CatalogueMotor](), list[str]()
+    motors, wrong = list[CatalogueMotor](), list[str]()
     for number, line in lines[1:]:
         cells = _cells(line)
         try:
-            made.append(_motor(columns, cells, TYPICAL if path is None else file.name))
+            motors.append(_motor(columns, cells, TYPICAL if path is None else file.name))
         except ParameterError as error:
             wrong.append(
                 f"  line {number} ({cells[columns.index('name')] if len(cells) == len(columns) else ''}): {error}"
             )
-    wrong += [f"  {name!r} is the name of {count} motors." for name, count in _twice(made)]
+    wrong += [f"  {name!r} is the name of {count} motors." for name, count in _twice(motors)]
     if wrong:
         more = [f"  and {len(wrong) - SHOWN} more"] if len(wrong) > SHOWN else []
         raise ParameterError("\n".join([f"The catalogue '{file}' has mistakes:", *wrong[:SHOWN], *more]))
-    return tuple(made)
+    return tuple(motors)
 
 
 def _refuse_columns(file: Path, columns: list[str]) -> None:
@@ -205,13 +203,13 @@ def _motor(columns: list[str], cells: list[str], source: str) -> CatalogueMotor:
         raise ParameterError("its quotes do not match. A motor is one line, and what is in quotes ends in it.")
     if len(cells) != len(columns):
         raise ParameterError(f"it has {len(cells)} cells, and there are {len(columns)} columns.")
-    given: dict[str, Any] = {"source": source}
+    values: dict[str, Any] = {"source": source}
     for name, cell in zip(columns, map(str.strip, cells), strict=True):
         if cell:
-            given[name] = _number(name, cell) if name in NUMBERS else cell
-    if empty := [name for name in NEEDED if name not in given]:
+            values[name] = _number(name, cell) if name in NUMBERS else cell
+    if empty := [name for name in NEEDED if name not in values]:
         raise ParameterError(f"{', '.join(empty)} is empty.")
-    return CatalogueMotor(**given)
+    return CatalogueMotor(**values)
 
 
 def _number(name: str, cell: str) -> float:

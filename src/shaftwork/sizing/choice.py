@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shaftwork.core.errors import MissingExtraError, ParameterError
+from shaftwork.core.errors import ParameterError, imported
 from shaftwork.core.parameters import in_si
-from shaftwork.results.observer import Array
+from shaftwork.results.observer import RPM, Array
 from shaftwork.results.quadrature import LobattoPanels
 from shaftwork.sizing.catalogue import ROUNDING, CatalogueMotor, catalogue
-from shaftwork.sizing.duty_cycle import Duty, cooling_at
-from shaftwork.sizing.motor_shaft import REST, RPM
+from shaftwork.sizing.duty import Duty, cooling_at
+from shaftwork.sizing.motor_shaft import REST, zeros
+from shaftwork.sizing.speed_torque import speed_torque_plane
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,8 +31,6 @@ SHOWN = 8
 """Motors that fit, and motors that do not, in the printed table."""
 BRIEF = 1e-5
 """Panels of less than this part of a motion close in a jump; slopes in them are those of rounding."""
-BISECTIONS = 40
-"""Of the time between two nodes, until the rated speed is reached."""
 UNCHECKED = (
     "heat beyond equal copper losses: iron and friction, ambient temperature, altitude, harmonics of the inverter",
     "the inverter's own current and voltage limits",
@@ -133,11 +132,8 @@ class Choice:
         Raises:
             MissingExtraError: pandas is not installed.
         """
-        try:
-            import pandas as pd
-        except ImportError:
-            raise MissingExtraError("pandas", "data", "Choice.table()") from None
-        return pd.DataFrame(self.columns)
+        frames: type[pd.DataFrame] = imported("pandas", "data", "Choice.table()").DataFrame
+        return frames(self.columns)
 
     def plot(self) -> Figure:
         """The motion in the plane of speed and torque, with the limits of the best motor (extra `plot`).
@@ -146,9 +142,7 @@ class Choice:
             MissingExtraError: matplotlib is not installed.
             ParameterError: none fits.
         """
-        from shaftwork.sizing.picture import speed_torque_plane
-
-        return speed_torque_plane(self.duty, self.best.motor)
+        return speed_torque_plane(self.duty.shaft, self.duty.thermal("S1"), self.best.motor)
 
     def __str__(self) -> str:
         fitting = len(self.fitting)
@@ -196,18 +190,17 @@ def choose(
     """
     if not isinstance(duty, Duty):
         raise ParameterError(f"{type(duty).__name__} is no duty. Give what duty(solution, 'motor') returns.")
-    given = motors if isinstance(motors, Sequence) and not isinstance(motors, str) else catalogue(motors)
-    known = tuple(given)
-    if not known or not all(isinstance(motor, CatalogueMotor) for motor in known):
+    listed = tuple(motors if isinstance(motors, Sequence) and not isinstance(motors, str) else catalogue(motors))
+    if not listed or not all(isinstance(motor, CatalogueMotor) for motor in listed):
         raise ParameterError(
             "motors must be motors of a catalogue, one or more. Give the path of a CSV file, or a list of "
             "CatalogueMotor."
         )
     required = in_si("overload", overload, above=0)
     contained = in_si("rotor", rotor, "kg*m^2", at_least=0)
-    demand = _demand(duty, np.array(list(dict.fromkeys(motor.n_n for motor in known))))
-    found = [_candidate(demand, motor, contained, required) for motor in known]
-    ranked = sorted(found, key=lambda one: (not one.fits, *_rank(one)))
+    demand = _demand(duty, np.array(list(dict.fromkeys(motor.n_n for motor in listed))))
+    candidates = [_candidate(demand, motor, contained, required) for motor in listed]
+    ranked = sorted(candidates, key=lambda one: (not one.fits, *_rank(one)))
     unchecked = (*UNCHECKED, ROTOR_IMPULSE) if duty.jumps.size else UNCHECKED
     return Choice(duty, tuple(ranked), required, unchecked)
 
@@ -242,18 +235,13 @@ class _Demand:
 
 def _demand(duty: Duty, rated: Array) -> _Demand:
     """A motion for motors of rated speeds (r,), 1/min."""
-    read = duty.shaft.read
-    nodes = duty.panels.times.ravel()
-    n = np.abs(read(nodes)[1]) * RPM
-    found, level = np.nonzero((n[:-1, None] < rated) != (n[1:, None] < rated))
-    low, high, faster = nodes[found], nodes[found + 1], n[found + 1] > n[found]
-    for _ in range(BISECTIONS if len(found) else 0):
-        middle = (low + high) / 2
-        beyond = (np.abs(read(middle)[1]) * RPM >= rated[level]) == faster
-        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
-    panels = duty.panels.split(high)
+    shaft, nodes = duty.shaft, duty.panels.times.ravel()
+    n = np.abs(shaft.omega(nodes)) * RPM
+    place, level = np.nonzero((n[:-1, None] < rated) != (n[1:, None] < rated))
+    beyond = zeros(lambda t, n_n: np.abs(shaft.omega(t)) * RPM - n_n, nodes[place], nodes[place + 1], rated[level])
+    panels = duty.panels.split(beyond)
     shape = panels.times.shape
-    tau, omega = (values.reshape(shape) for values in read(panels.times.ravel()))
+    tau, omega = (values.reshape(shape) for values in shaft.read(panels.times.ravel()))
     lasting = panels.length > BRIEF * panels.length.sum()
     on = np.abs(tau) > REST * duty.tau_peak  # what is switched off accelerates nothing
     return _Demand(duty, panels, tau, np.where(on, panels.slopes(omega), 0.0), np.abs(omega) * RPM, lasting)
@@ -263,13 +251,13 @@ def _candidate(demand: _Demand, motor: CatalogueMotor, contained: float, overloa
     """A motor in a motion that already has some of its inertia, kg m^2, in it."""
     tau = demand.tau + (motor.J - contained) * demand.alpha
     thermal = demand.thermal(tau, motor)
-    asked, n = np.abs(tau[demand.lasting]).ravel(), demand.n[demand.lasting].ravel()
+    needed, n = np.abs(tau[demand.lasting]).ravel(), demand.n[demand.lasting].ravel()
     possible = motor.limit(n)
-    used = np.divide(asked, possible, out=np.where(asked > 0, np.inf, 0.0), where=possible > 0)
+    used = np.divide(needed, possible, out=np.where(needed > 0, np.inf, 0.0), where=possible > 0)
     worst = int(used.argmax())
     reserve = 1 / float(used[worst]) if used[worst] else math.inf
     reasons = tuple(_reasons(motor, thermal, reserve, demand.duty.n_top, overload))
-    return Candidate(motor, thermal, float(asked.max()), reserve, float(n[worst]), reasons)
+    return Candidate(motor, thermal, float(needed.max()), reserve, float(n[worst]), reasons)
 
 
 def _reasons(motor: CatalogueMotor, thermal: float, reserve: float, n_top: float, overload: float) -> Iterator[str]:

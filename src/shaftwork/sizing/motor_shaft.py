@@ -1,37 +1,38 @@
-"""Torque and speed of a motor at its own shaft, along a motion."""
+"""Torque and speed of a motor at its own shaft, along a motion, and how long it takes to come to a speed."""
 
 from __future__ import annotations
 
-import math
 import reprlib
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize.elementwise import find_root
 
 from shaftwork.components.base import Component
 from shaftwork.components.sources import SpeedSource
 from shaftwork.core.errors import ParameterError, SignalError
 from shaftwork.core.parameters import in_si
 from shaftwork.network.wording import at_nodes, listed
-from shaftwork.results.observer import Array
+from shaftwork.results.course import turning_points
+from shaftwork.results.observer import Array, blocks
 from shaftwork.results.quadrature import LobattoPanels
+from shaftwork.results.reader import Read
 from shaftwork.results.solution import Solution
-from shaftwork.results.turning import turning_points
 
-BLOCK = 50_000
-"""Times that are read at once."""
 SMALLEST = 1e-9
 """Ups and downs of less than this part of the range make no peak."""
 REST = 1e-12
 """A speed that stays within this part of the highest one may be standstill, such a torque none: see `is_nothing`."""
 CONSTANT = 4 * float(np.finfo(float).eps)
 """What changes by no more than this part of itself is constant."""
-RPM = 30 / math.pi
-"""1/min for a rad/s."""
+SAMPLES = 4001
+"""Times among which a speed is looked for."""
+FLAT = 1e-14
+"""A step in which the speed changes by no more than this part of the highest one is part of a plateau."""
 GEARED = ("ratio", "efficiency")
 """Parameters of a motor that has a gear of its own."""
 
@@ -64,23 +65,35 @@ class MotorShaft:
     own_gear: bool = False
     released: bool = False
 
+    @property
+    def name(self) -> str:
+        """Of the motor, or of the torque."""
+        return self.part.name if self.part else self.torque
+
+    @cached_property
+    def _tau(self) -> Read:
+        return self.solution.reader.quantity(self.torque)
+
+    @cached_property
+    def _omega(self) -> Read:
+        return self.solution.reader.quantity(self.speed)
+
     @cached_property
     def omega_top(self) -> float:
         """Highest speed of the motor in size, rad/s."""
-        speeds = turning_points(self._speeds, self.steps, smallest=SMALLEST).values
+        speeds = turning_points(self._omega, self.steps, smallest=SMALLEST).values
         return float(np.abs(speeds).max()) * abs(self.ratio)
 
     @property
     def omega_prescribed(self) -> float:
         """Speed of the motor at the start if every state were at rest, rad/s; zero where no source prescribes one."""
-        made, start = self.solution, self.steps[:1]
-        owners = dict.fromkeys(name.rpartition(".")[0] for name in made.names if name.endswith(".tau"))
-        if not any(isinstance(made.observer.part(owner), SpeedSource) for owner in owners):
+        observer, dense, start = self.solution.observer, self.solution.dense, self.steps[:1]
+        owners = dict.fromkeys(name.rpartition(".")[0] for name in observer.units if name.endswith(".tau"))
+        if not any(isinstance(observer.part(owner), SpeedSource) for owner in owners):
             return 0.0
-        still = np.zeros_like(made.dense(start))
-        return self.ratio * float(made.observer.signal(self.speed, start, still, made.dense)[0])
+        return self.ratio * float(observer.signal(self.speed, start, np.zeros_like(dense(start)), dense)[0])
 
-    @property
+    @cached_property
     def steps(self) -> Array:
         """(s,) times between which the motion is smooth, s."""
         return self.solution.steps
@@ -88,13 +101,13 @@ class MotorShaft:
     @cached_property
     def within(self) -> LobattoPanels:
         """Every step as a panel."""
-        return LobattoPanels(self.steps[:-1], self.steps[1:])
+        return LobattoPanels.between(self.steps)
 
     @cached_property
     def speeds_within(self) -> Array:
         """(s - 1, 8) speed of the motor at the nodes of every step, rad/s."""
         times = self.within.times
-        return np.asarray(self.ratio * self._speeds(times.ravel()).reshape(times.shape))
+        return np.asarray(self.ratio * self._omega(times.ravel()).reshape(times.shape))
 
     @cached_property
     def resting(self) -> NDArray[np.bool_]:
@@ -114,16 +127,15 @@ class MotorShaft:
 
     def read(self, times: Array) -> tuple[Array, Array]:
         """Torque in N m and speed in rad/s of the motor at ascending times (k,)."""
-        tau, omega = np.concatenate([[here[self.torque], here[self.speed]] for here in self._blocks(times)], axis=1)
+        parts = (times[block] for block in blocks(len(times), len(self.solution.states)))
+        tau, omega = np.concatenate([[self._tau(part), self._omega(part)] for part in parts], axis=1)
         drives = self.own_gear | (tau * omega >= 0)
-        made, turns = tau / self.ratio * np.where(drives, 1 / self.efficiency, self.efficiency), self.ratio * omega
-        return (np.where(self.resting[self.step_at(times)], 0.0, made) if self.released else made), turns
+        tau = tau / self.ratio * np.where(drives, 1 / self.efficiency, self.efficiency)
+        return np.where(self.resting[self.step_at(times)], 0.0, tau) if self.released else tau, self.ratio * omega
 
-    def _speeds(self, times: Array) -> Array:
-        return np.concatenate([here[self.speed] for here in self._blocks(times)])
-
-    def _blocks(self, times: Array) -> Iterator[Solution]:
-        return (self.solution.at(times[first : first + BLOCK]) for first in range(0, len(times), BLOCK))
+    def omega(self, times: Array) -> Array:
+        """(k,) speed in rad/s of the motor at ascending times (k,)."""
+        return self.ratio * self._omega(times)
 
 
 def is_nothing(values: Array, rounding: float) -> NDArray[np.bool_]:
@@ -170,7 +182,7 @@ def motor_shaft(
     if part is not None:
         return _of_part(solution, part, gear, released=released)
     assert torque is not None and speed is not None  # noqa: S101, PT018 (then both are named)
-    units = _unit(solution, torque), _unit(solution, speed)
+    units = solution.reader.unit(torque), solution.reader.unit(speed)
     if units != ("N*m", "rad/s"):
         raise SignalError(
             f"'{torque}' is in {units[0]}, '{speed}' in {units[1]}. Name a torque in N*m, a speed in rad/s."
@@ -194,9 +206,9 @@ def _refuse_other_shaft(solution: Solution, torque: str, speed: str) -> None:
 def _of_part(solution: Solution, name: str, gear: tuple[Any, Any], *, released: bool) -> MotorShaft:
     """The shaft of a motor, before the gear that its parameters say it has, or before one that is given."""
     motor, torque, speed = _source(solution, name)
-    if not all(known in motor.declared for known in GEARED):
+    if not all(parameter in motor.declared for parameter in GEARED):
         return MotorShaft(solution, torque, speed, motor, *_besides(gear), released=released)
-    ratio, efficiency = (float(motor.values[known]) for known in GEARED)
+    ratio, efficiency = (float(motor.values[parameter]) for parameter in GEARED)
     if gear != (None, None):
         raise ParameterError(
             f"'{name}' has a gear of its own, ratio {ratio:g}, efficiency {efficiency:g}, and its figures are those at "
@@ -218,9 +230,9 @@ def _besides(gear: tuple[Any, Any]) -> tuple[float, float]:
 
 def _source(solution: Solution, name: Any) -> tuple[Component, str, str]:
     """A motor and the names of its torque and its speed."""
-    if not isinstance(name, str) or f"{name}.tau" not in solution or not (found := _speed(solution, name)):
+    if not isinstance(name, str) or f"{name}.tau" not in solution or not (speed := _speed(solution, name)):
         raise SignalError(f"{name!r} is no motor: it has no torque on a shaft of one speed. {_motors(solution)}")
-    return solution.observer.part(name), f"{name}.tau", found
+    return solution.observer.part(name), f"{name}.tau", speed
 
 
 def _speed(solution: Solution, name: str) -> str:
@@ -230,15 +242,75 @@ def _speed(solution: Solution, name: str) -> str:
     except SignalError:  # a node
         return ""
     names = (f"{name}.omega_rel", f"{name}.omega") if role in ("source", "coupling") else ()
-    return next((made for made in names if made in solution), "")
+    return next((speed for speed in names if speed in solution), "")
 
 
 def _motors(solution: Solution) -> str:
     parts = dict.fromkeys(name.rpartition(".")[0] for name in solution if name.endswith(".tau"))
-    found = [f"'{part}'" for part in parts if _speed(solution, part)]
-    return f"In '{solution.name}' these drive: {', '.join(found)}." if found else f"Nothing drives '{solution.name}'."
+    drives = [f"'{part}'" for part in parts if _speed(solution, part)]
+    return f"In '{solution.name}' these drive: {', '.join(drives)}." if drives else f"Nothing drives '{solution.name}'."
 
 
-def _unit(solution: Solution, name: str) -> str:
-    solution[name]  # refuses a name that does not exist, and says which do
-    return solution.observer.units.get(name, "")
+def zeros(value: Callable[..., Array], low: Array, high: Array, *args: Array) -> Array:
+    """(k,) times at which a function of the time passes through zero, or jumps over it, to rounding.
+
+    Args:
+        value: from times (k,) and arguments (k,) to values (k,), which have different signs at both ends.
+        low: (k,) s.
+        high: (k,) s.
+        *args: (k,) arguments.
+    """
+    return np.asarray(find_root(value, (low, high), args=args).x if len(low) else low)
+
+
+def run_up(shaft: MotorShaft, share: float) -> float:
+    """Time in s from the last standstill to the first time at a share of the highest speed.
+
+    Args:
+        shaft: of a motor that moves.
+        share: of the highest speed, up to 1.
+    """
+    turns = turning_points(lambda times: np.abs(shaft.omega(times)), shaft.steps, smallest=SMALLEST).t
+    marks = np.unique(np.concatenate([shaft.steps, turns]))
+    times = np.unique(np.concatenate([marks, np.linspace(shaft.steps[0], shaft.steps[-1], SAMPLES)]))
+    reached = _top(shaft, marks) if share == 1 else _first(shaft, times, share * shaft.omega_top)
+    return reached - _start(shaft, times[times <= reached])
+
+
+def _first(shaft: MotorShaft, times: Array, goal: float) -> float:
+    """The first time at a speed in size."""
+    after = int(np.argmax(np.abs(shaft.omega(times)) >= goal))
+    if after == 0:
+        return float(times[0])
+    bracket = times[after - 1 : after], times[after : after + 1]
+    return float(zeros(lambda t: np.abs(shaft.omega(t)) - goal, *bracket)[0])
+
+
+def _top(shaft: MotorShaft, marks: Array) -> float:
+    """Where the highest speed begins: the start of a plateau, else its peak, among ends of steps and turning points."""
+    speeds = np.abs(shaft.omega(marks))
+    near = speeds >= shaft.omega_top * (1 - REST)
+    first = int(np.argmax(near))
+    beyond = np.flatnonzero(~near[first:])
+    here = slice(first, first + int(beyond[0]) if beyond.size else None)
+    plateaus = shaft.steps[:-1][np.ptp(shaft.speeds_within, axis=1) <= FLAT * shaft.omega_top]
+    begun = marks[here][np.isin(marks[here], plateaus)]
+    if begun.size:
+        return float(begun[0])
+    highest = np.flatnonzero(speeds[here] == speeds[here].max())  # a soft end comes to rounding of the top too early
+    return float(marks[here][highest[-1]])
+
+
+def _start(shaft: MotorShaft, times: Array) -> float:
+    """The last standstill: the end of a rest, a touch of zero, or a reversal; else the start of the motion."""
+    speeds = shaft.omega(times)
+    ends = shaft.steps[1:][shaft.resting]
+    standstills: list[float] = [float(times[0]), *ends[ends <= times[-1]].tolist()]
+    touches = np.flatnonzero(np.abs(speeds) <= REST * shaft.omega_top)
+    if touches.size:
+        last = touches[np.flatnonzero(np.diff(touches, prepend=-2) > 1)[-1] :]  # a soft start stays near zero
+        sizes = np.abs(speeds[last])
+        standstills.append(float(times[last[np.flatnonzero(sizes == sizes.min())[-1]]]))
+    turned = np.flatnonzero(speeds[:-1] * speeds[1:] < 0)[-1:]
+    standstills += zeros(shaft.omega, times[turned], times[turned + 1]).tolist()
+    return max(standstills)

@@ -1,4 +1,4 @@
-"""How far the torque of a motion stays below what a motor can give."""
+"""What torque a motor can give, by a limit or its own curve, and how far the torque of a motion stays below it."""
 
 from __future__ import annotations
 
@@ -9,24 +9,32 @@ from typing import Any
 
 import numpy as np
 
+from shaftwork.codegen.observer import ModelObserver
+from shaftwork.components.base import Component
+from shaftwork.components.rotation import Inertia
 from shaftwork.components.tables import Table, interpolate
-from shaftwork.core.errors import ParameterError
+from shaftwork.core.errors import NetworkWarning, ParameterError, ShaftworkError
+from shaftwork.core.notices import muted
 from shaftwork.core.parameters import in_si
-from shaftwork.results.observer import Array
-from shaftwork.results.turning import turning_points
-from shaftwork.sizing.motor_shaft import RPM, SMALLEST, MotorShaft
-from shaftwork.sizing.own_curve import fastest, own_curve, pull_out
+from shaftwork.pipeline.network import Network
+from shaftwork.results.course import turning_points
+from shaftwork.results.observer import RPM, Array
+from shaftwork.sizing.motor_shaft import SMALLEST, MotorShaft
 
 Limit = float | Table | Callable[[Array], Array] | None
 """Largest torque in size, N m, over the motor's speed without sign in 1/min; None for the motor's own."""
-Limited = Callable[[Array, Array], Array]
-"""The largest torque in N m at times (k,) in s and speeds (k,) in 1/min."""
+Curve = Callable[[Array, Array], Array]
+"""A torque in N m at times (k,) in s and speeds (k,): of a motor in rad/s, largest ones without sign in 1/min."""
 INSTANTS = 257
 """At which the pull-out torque of a motor is looked for that changes with time; between them it is a straight line."""
 NO_LIMIT = 1e9
 """Torque over its limit where there is none left of it."""
 EQUAL = 1e-9
 """Reserves that differ by less, as a part of themselves, are equal; it is the first instant that counts."""
+SPEEDS, ROUNDS, FINER = 129, 5, 17
+"""Speeds among which the largest torque is looked for; how often, and among how many, between those beside it."""
+BEYOND = 1.5
+"""The search goes to this many times the highest speed, both ways."""
 AS_ARRAY = (
     "Let it take an array of speeds in 1/min and give as many torques in N m: lambda n: np.where(n < 1500, 20.0, 10.0)."
 )
@@ -77,7 +85,7 @@ def reserve_of(shaft: MotorShaft, limit: Limit) -> Reserve:
     return Reserve(ratio, float(time[0]), float(omega) * RPM, float(tau), float(most))
 
 
-def limits(shaft: MotorShaft, limit: Limit) -> Limited:
+def limits(shaft: MotorShaft, limit: Limit) -> Curve:
     """The limit as a function of time and speed.
 
     Raises:
@@ -100,20 +108,20 @@ def limits(shaft: MotorShaft, limit: Limit) -> Limited:
 
 def _checked(limit: Callable[[Array], Any], n: Array) -> Array:
     try:
-        given = np.asarray(limit(n), dtype=float)
+        torques = np.asarray(limit(n), dtype=float)
     except (TypeError, ValueError) as error:
         raise ParameterError(f"limit fails for an array of speeds: {error}. {AS_ARRAY}") from error
-    if given.ndim > 1 or given.size not in (1, n.size):
-        raise ParameterError(f"limit gives {given.size} torques for {n.size} speeds. {AS_ARRAY}")
-    made = np.broadcast_to(given, n.shape)
-    if np.isnan(made).any() or made.min() < 0:
+    if torques.ndim > 1 or torques.size not in (1, n.size):
+        raise ParameterError(f"limit gives {torques.size} torques for {n.size} speeds. {AS_ARRAY}")
+    torques = np.broadcast_to(torques, n.shape)
+    if np.isnan(torques).any() or torques.min() < 0:
         raise ParameterError(
             "limit gives torques that are below zero or no numbers. Give the size in N m at any speed."
         )
-    return made
+    return torques
 
 
-def _own(shaft: MotorShaft) -> Limited:
+def _own(shaft: MotorShaft) -> Curve:
     curve = own_curve(shaft.part, shaft.steps)
     if curve is None or shaft.part is None:
         what = f"'{shaft.part.name}' ({type(shaft.part).__name__})" if shaft.part else f"'{shaft.torque}'"
@@ -125,5 +133,57 @@ def _own(shaft: MotorShaft) -> Limited:
     instants = np.linspace(shaft.steps[0], shaft.steps[-1], INSTANTS)
     ends = shaft.steps if len(shaft.steps) <= INSTANTS else shaft.steps[:0]
     times = np.unique(np.concatenate([instants, ends, np.nextafter(ends[1:], -np.inf)]))
-    most = pull_out(curve, times, fastest(shaft.part, shaft.omega_top))
+    most = _pull_out(curve, times, _fastest(shaft.part, shaft.omega_top))
     return lambda t, _: np.interp(t, times, most)
+
+
+def own_curve(motor: Component | None, steps: Array) -> Curve | None:
+    """Torque of a motor by time and speed; None for one whose torque depends on more, or is not its own.
+
+    Args:
+        motor: the component, with a shaft at its first port.
+        steps: (s,) of the motion, s.
+    """
+    if motor is None or motor.role != "source" or sum(not port.optional for port in motor.ports) != 1:
+        return None
+    net = Network("bench")
+    try:
+        with muted(NetworkWarning):  # of its curve the motor has been warned about when made
+            net.add(motor, "shaft")
+            net.add(Inertia("inertia", J=1.0), "shaft")
+            model = net.compile()
+    except ShaftworkError:
+        return None
+    if model.states != ("inertia.omega",) or any(part.modes for part in model.form.graph.parts):
+        return None
+    prepared = model.prepare(model.defaults)
+    observer = ModelObserver(
+        model.form, lambda: prepared.bound, model.switching.timeline(prepared.p, steps[0], steps[-1])
+    )
+    return lambda t, omega: observer.signal(f"{motor.name}.tau", t, omega[:, None])
+
+
+def _pull_out(curve: Curve, times: Array, top: float) -> Array:
+    """(k,) the largest torque in size, N m, that a curve has at each time, at any speed.
+
+    Args:
+        curve: of the motor.
+        times: (k,) s.
+        top: a speed in rad/s that is not far below those of the curve.
+    """
+    rows = np.arange(len(times))
+    low, high = np.full(len(times), -BEYOND * top), np.full(len(times), BEYOND * top)
+    best = np.zeros(len(times))
+    for number in (SPEEDS, *([FINER] * ROUNDS)):
+        omega = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, number)
+        tau = np.abs(curve(np.repeat(times, number), omega.ravel())).reshape(omega.shape)
+        at = tau.argmax(axis=1)
+        best = np.maximum(best, tau[rows, at])
+        low, high = omega[rows, np.maximum(at - 1, 0)], omega[rows, np.minimum(at + 1, number - 1)]
+    return best
+
+
+def _fastest(motor: Component, top: float) -> float:
+    """The highest speed in rad/s that a motor's curve is about: of the motion, or synchronous."""
+    value = motor.declared["n_sync"].magnitude(motor.values["n_sync"])[0] if "n_sync" in motor.declared else 0.0
+    return max(top, float(value) / RPM)

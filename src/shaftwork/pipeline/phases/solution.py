@@ -18,7 +18,8 @@ from shaftwork.pipeline.phases.in_place_events import Phase
 from shaftwork.pipeline.phases.mode_machines import ModeMachine, ModeNames
 from shaftwork.pipeline.phases.run import HybridRun, Span
 from shaftwork.pipeline.phases.wave_run import WaveRun
-from shaftwork.results.solution import PhaseRow, Solution
+from shaftwork.results.observer import PhaseRow
+from shaftwork.results.solution import Solution
 
 
 def solution(run: HybridRun, name: str) -> Solution:

@@ -9,20 +9,17 @@ has none, and what the mesh leads to is taken as far as it is what has been coun
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.core.errors import NetworkWarning, ParameterError, SimulationError
 from shaftwork.core.notices import warn
+from shaftwork.results.exact_lines import ExactSlopes
 from shaftwork.results.exact_problem import ExactProblem
-from shaftwork.results.modes import Modes, checked_count, largest_rate, modes_of
+from shaftwork.results.modes import Modes, checked_count, largest_rate, modes_of, states_that_act
 from shaftwork.results.observer import Array
 from shaftwork.results.slopes import Complex
-
-if TYPE_CHECKING:
-    from shaftwork.results.exact import ExactSlopes
 
 MODES = 10
 """Modes where nobody says how many."""
@@ -36,7 +33,6 @@ ROOM = 1.001
 """A circle for a number of modes reaches so many times as far as the next one."""
 APART = 0.5
 """Roots stay apart by at least this fraction of the distance of their starts."""
-ATTEMPTS = 3
 FADED, SINGULAR = 40.0, 1e13
 """At the rate -FADED / T what fades grows to beyond rounding: the matrix then has this condition where none echoes."""
 AUDIBLE = 3.0
@@ -65,13 +61,13 @@ def find_exact_modes(
     Warns:
         NetworkWarning: an end takes all that arrives, so that there are fewer modes.
     """
-    asked, limit = checked_count(count), min(BELOW * slopes.lines.crowding, _echo_limit(slopes))
+    wanted, limit = checked_count(count), min(BELOW * slopes.lines.crowding, _echo_limit(slopes))
     if f_max is not None:
         radius = largest_rate(f_max)
         if radius > limit:
             _stop(slopes, limit, f"f_max = {f_max:g} Hz")
-        return _lowest(_settled(title, slopes, starts, min(radius, limit)), asked)
-    enough = MODES if asked is None else asked
+        return _lowest(_settled(title, slopes, starts, min(radius, limit)), wanted)
+    enough = MODES if wanted is None else wanted
     radius = min(np.pi * enough / float(slopes.lines.delay.sum()), limit)
     while slopes.lines.half_waves(radius).sum() > 1.01 * enough:  # a mode for each half wave, roughly
         radius /= 2
@@ -79,11 +75,11 @@ def find_exact_modes(
     if len(sizes) > enough and sizes[enough] > 0:  # no farther than these few are, which the mesh knows
         radius = min(radius, ROOM * float(sizes[enough]))
     while True:
-        found = _settled(title, slopes, starts, radius)
-        if len(found) < enough and radius == limit and (asked is not None or np.isinf(slopes.lines.crowding)):
+        modes = _settled(title, slopes, starts, radius)
+        if len(modes) < enough and radius == limit and (wanted is not None or np.isinf(slopes.lines.crowding)):
             _stop(slopes, limit, f"count = {enough}")
-        if len(found) >= enough or radius == limit:
-            return _lowest(found, enough)
+        if len(modes) >= enough or radius == limit:
+            return _lowest(modes, enough)
         radius = min(2 * radius, limit)
 
 
@@ -97,15 +93,15 @@ def _echo_limit(slopes: ExactSlopes) -> float:
 
 
 def _lowest(modes: Modes, count: int | None) -> Modes:
-    kept = np.argsort(np.abs(modes.rates), kind="stable")[:count]
-    return modes_of(modes.title, modes.slopes, modes.rates[kept], modes.vectors[:, kept])
+    lowest = np.argsort(np.abs(modes.rates), kind="stable")[:count]
+    return modes_of(modes.title, modes.slopes, modes.rates[lowest], modes.vectors[:, lowest])
 
 
-def _stop(slopes: ExactSlopes, limit: float, asked: str) -> None:
+def _stop(slopes: ExactSlopes, limit: float, wanted: str) -> None:
     """Say why modes are named up to a limit alone; where they crowd there, by an error."""
     if np.isinf(slopes.lines.crowding):
         warn(
-            f"{asked}: an end of a shaft takes all that arrives at it (a damper of the impedance of the shaft), and "
+            f"{wanted}: an end of a shaft takes all that arrives at it (a damper of the impedance of the shaft), and "
             f"what does not come back makes no mode. Modes are named up to f_max = {limit / (2 * np.pi):.4g} Hz, "
             f"beyond which rounding alone would make some; for amplitudes take frequency_response.",
             NetworkWarning,
@@ -114,31 +110,33 @@ def _stop(slopes: ExactSlopes, limit: float, asked: str) -> None:
     shaft = slopes.lines.names[int(slopes.lines.damping.argmax())]
     most = 0.99 * BELOW * slopes.lines.crowding / (2 * np.pi)  # also with the digits that are shown
     raise ParameterError(
-        f"{asked}: the internal damping of shaft '{shaft}' makes modes without number whose rates crowd at "
+        f"{wanted}: the internal damping of shaft '{shaft}' makes modes without number whose rates crowd at "
         f"-C'/D' = {-slopes.lines.crowding:.4g} 1/s. All modes can be named up to f_max = {most:.4g} Hz."
     )
 
 
 def _settled(title: str, slopes: ExactSlopes, starts: Starts, radius: float) -> Modes:
     """All modes with |rate| up to a radius."""
-    for attempt in range(ATTEMPTS):
+    states, weights = len(slopes.open.states), slopes.weights[:, None]
+    problem, acting, following = _problem(slopes)
+    for attempt in range(3):
         mesh = starts(WIDER * radius, attempt)
         outer = _gap(np.abs(mesh.rates), radius)
         inside = np.flatnonzero(np.abs(mesh.rates) < outer)
-        problem, kept, following = _problem(slopes)
         standing, starts_inside = inside[mesh.rates[inside] == 0], mesh.rates[inside][mesh.rates[inside] != 0]
         moving = problem.count(outer) - len(standing)
         refined = _refined(problem, starts_inside)
         if refined is None or _number(refined[0]) != moving:
             refined = _reached(problem, starts_inside if moving else starts_inside[:0], outer)
-        rates, found = refined
+        rates, shapes = refined
         if _number(rates) != moving:
             continue
-        weights = slopes.weights[:, None]
         vectors = np.zeros((len(weights), len(rates)), dtype=complex)
-        vectors[np.concatenate([kept, np.arange(len(slopes.open.states), len(weights))])] = found
+        vectors[np.concatenate([acting, np.arange(states, len(weights))])] = shapes
         vectors /= weights
-        _follow(slopes, following, rates, vectors)
+        change = slopes.open.A @ vectors[:states]
+        change += slopes.open.B[:, len(slopes.inputs) :] @ slopes.arriving(rates, vectors)
+        vectors[following] = change[following] / rates
         rates = np.concatenate([np.zeros(len(standing), dtype=complex), rates])
         vectors = np.hstack([_standing(slopes, mesh, standing), vectors])
         below = np.abs(rates) <= radius
@@ -164,11 +162,8 @@ def _gap(sizes: Array, radius: float) -> float:
 
 def _problem(slopes: ExactSlopes) -> tuple[ExactProblem, NDArray[np.intp], NDArray[np.intp]]:
     """The problem without angles that are only recorded; the states that it has, and those that follow."""
-    matrix = slopes.open.A
-    reads = np.asarray(abs(matrix).sum(axis=0) + abs(slopes.open.C).sum(axis=0)).ravel() > 0
-    reads[: len(reads) - slopes.open.angles] = True
-    kept, following = np.flatnonzero(reads), np.flatnonzero(~reads)
-    return ExactProblem(slopes.open, slopes.lines, slopes.weights, kept), kept, following
+    acting, following = states_that_act(slopes.open.angles, slopes.open.A, slopes.open.C)
+    return ExactProblem(slopes.open, slopes.lines, slopes.weights, acting), acting, following
 
 
 def _reached(problem: ExactProblem, starts: Complex, radius: float) -> tuple[Complex, Complex]:
@@ -201,29 +196,21 @@ def _refined(problem: ExactProblem, starts: Complex) -> tuple[Complex, Complex] 
     if not groups:
         return starts, np.zeros((problem.unknowns, 0), dtype=complex)
     try:
-        found = [problem.roots(starts[group]) for group in groups]
+        solved = [problem.roots(starts[group]) for group in groups]
     except SimulationError:
         return None
-    rates = np.concatenate([root for root, _ in found])
+    rates = np.concatenate([roots for roots, _ in solved])
     label = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
     before, after = (np.abs(each[:, None] - each[None, :]) for each in (starts[order], rates))
     if ((after < APART * before) & (label[:, None] != label)).any():
         return None
-    return rates, np.hstack([vectors for _, vectors in found])
+    return rates, np.hstack([vectors for _, vectors in solved])
 
 
 def _standing(slopes: ExactSlopes, mesh: Modes, columns: NDArray[np.intp]) -> Complex:
     """What does not change at all, in which nothing moves along a shaft: as on the mesh, (n, k)."""
-    own = {name: k for k, name in enumerate(mesh.slopes.states)}
-    rows = [mesh.vectors[own[name]] if name in own else mesh.shapes[name] for name in slopes.open.states]
-    middle = ((f"{name}.{quantity}" for quantity in ("omega", "tau")) for name in slopes.lines.names)
-    rows += [(mesh.shapes[f"{made}_a"] + mesh.shapes[f"{made}_b"]) / 2 for shaft in middle for made in shaft]
+    places = {name: k for k, name in enumerate(mesh.slopes.states)}
+    rows = [mesh.vectors[places[name]] if name in places else mesh.shapes[name] for name in slopes.open.states]
+    middle = (f"{name}.{quantity}" for name in slopes.lines.names for quantity in ("omega", "tau"))
+    rows += [(mesh.shapes[f"{quantity}_a"] + mesh.shapes[f"{quantity}_b"]) / 2 for quantity in middle]
     return np.array(rows).reshape(len(rows), len(mesh))[:, columns]
-
-
-def _follow(slopes: ExactSlopes, following: NDArray[np.intp], rates: Complex, vectors: Complex) -> None:
-    """Enter the angles that are only recorded, which have no rate of their own."""
-    states = len(slopes.open.states)
-    arriving = slopes.arriving(rates, vectors)
-    change = slopes.open.A @ vectors[:states] + slopes.open.B[:, len(slopes.inputs) :] @ arriving
-    vectors[following] = change[following] / rates
