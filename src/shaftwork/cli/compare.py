@@ -13,7 +13,7 @@ from shaftwork.cli.models import end_of, load
 from shaftwork.core.errors import ParameterError, SimulationError
 
 if TYPE_CHECKING:
-    from shaftwork.studies.work_precision import Trial
+    from shaftwork.studies.work_precision_result import Trial
 
 FILES = ("work-precision.csv", "work-precision.png", "torques.png")
 COMPARED = 1.0
@@ -47,8 +47,8 @@ def run(options: Namespace, say: Say) -> Data:
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     from shaftwork.components.shafts import Shaft
     from shaftwork.studies import work_precision
-    from shaftwork.studies.ladder import rungs
-    from shaftwork.studies.work_precision import milliseconds
+    from shaftwork.studies.study_arguments import rungs
+    from shaftwork.studies.work_precision_result import milliseconds
 
     net, scene = load(options)
     shafts = [part.name for part in net.parts if isinstance(part, Shaft)]

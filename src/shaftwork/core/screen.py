@@ -60,3 +60,9 @@ def in_lines(title: str, width: float, size: float = 12.0) -> str:
 def counted(number: int, what: str) -> str:
     """A number and what it counts: "1 node", "2 nodes", "2 branches"."""
     return f"{number} {what}{'' if number == 1 else 'es' if what.endswith('ch') else 's'}"
+
+
+def in_columns(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Rows of as many cells as lines, every column as wide as its widest cell."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]

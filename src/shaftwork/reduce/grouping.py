@@ -13,6 +13,7 @@ import numpy as np
 from shaftwork.components.contacts import Backlash
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import whole
+from shaftwork.core.screen import in_columns
 from shaftwork.equations.nomenclature import breakable, column, unit
 from shaftwork.equations.nomenclature import table as longtable
 from shaftwork.equations.printing import printed_number
@@ -203,9 +204,7 @@ class GroupTable:
 
     def __str__(self) -> str:
         cells = [(row.part, row.quantity, f"{row.value:.6g}", row.unit, ", ".join(row.made_of)) for row in self.rows]
-        rows = [("part", "quantity", "value", "unit", "made of"), *cells]
-        widths = [max(len(row[column]) for row in rows) for column in range(5)]
-        lines = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+        lines = in_columns([("part", "quantity", "value", "unit", "made of"), *cells])
         return "\n".join([*lines, f"rigid now: {', '.join(self.rigid) or 'nothing'}"])
 
     def latex(self) -> str:

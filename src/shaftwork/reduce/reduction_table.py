@@ -13,6 +13,7 @@ from sympy import Add, Expr, Integer, Symbol, latex
 from shaftwork.components.laws import omega, phi, s, v
 from shaftwork.components.tables import Table
 from shaftwork.core.errors import SignalError
+from shaftwork.core.screen import in_columns
 from shaftwork.equations.assembly import FactoredTerms
 from shaftwork.equations.nomenclature import column, unit
 from shaftwork.equations.nomenclature import table as longtable
@@ -69,9 +70,7 @@ class ReductionTable:
         return by_name[name]
 
     def __str__(self) -> str:
-        rows = [HEADINGS, *(_cells(entry) for entry in self.entries)]
-        widths = [max(len(row[column]) for row in rows) for column in range(len(HEADINGS))]
-        lines = ("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)
+        lines = in_columns([HEADINGS, *map(_cells, self.entries)])
         return "\n".join((f"referred to {self.to}", *lines))
 
     def latex(self) -> str:
