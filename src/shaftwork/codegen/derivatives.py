@@ -13,7 +13,7 @@ from shaftwork.codegen.code import vectorised_list
 from shaftwork.codegen.elements import Array
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import slope
-from shaftwork.reduction.rows import Rows
+from shaftwork.reduction.explicit_rows import Rows
 
 
 class Values:

@@ -14,8 +14,8 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.state_transfer_jacobian import StateTransferJacobian
 from shaftwork.components.laws import switches, switches_of
 from shaftwork.components.laws import t as TIME
+from shaftwork.reduction.explicit_rows import Rows
 from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.rows import Rows
 
 
 class ValueWithSlopes:

@@ -18,7 +18,7 @@ from shaftwork.codegen.heyoka import HeyokaProgram
 from shaftwork.codegen.heyoka_expressions import Translator
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError
-from shaftwork.reduction.rows import Rows
+from shaftwork.reduction.explicit_rows import Rows
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from sympy import Symbol, count_ops, cse
 from shaftwork.codegen.code import branchwise, scalar
 from shaftwork.codegen.elements import Array
 from shaftwork.components.laws import t as TIME
-from shaftwork.reduction.rows import Rows
+from shaftwork.reduction.explicit_rows import Rows
 
 
 class ScalarProgram:

@@ -21,10 +21,10 @@ from shaftwork.codegen.derivatives import SlopeMatrix, Values
 from shaftwork.codegen.elements import Array
 from shaftwork.components.laws import t as TIME
 from shaftwork.network.kinds import Kind
+from shaftwork.reduction.explicit_rows import Rows
 from shaftwork.reduction.form import State, StateForm, store_name
 from shaftwork.reduction.gains import Number, exact_of
-from shaftwork.reduction.rows import Rows
-from shaftwork.reduction.symbolic_observables import SymbolicObservables
+from shaftwork.reduction.observables import Observables
 
 
 class StateTransferJacobian:
@@ -40,7 +40,7 @@ class StateTransferJacobian:
         self._form, self._rows, self._by = form, rows, (rows.states, tuple(parameters), (TIME,))
         kinds = (Kind.ACROSS_STORE, Kind.THROUGH_STORE)
         stores = (branch for branch in form.graph.branches if branch.template.kind in kinds)
-        expressed = SymbolicObservables(form, rows)
+        expressed = Observables(form, rows)
         self._branches = {store_name(form.graph, branch): branch.index for branch in stores}
         self._stored = {name: expressed.store(name) for name in self._branches}
         self._stored |= {state.name: Symbol(state.name, real=True) for state in form.states if state.kind == "integral"}

@@ -14,7 +14,7 @@ from shaftwork.codegen.lanes import LaneStep, Use
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.core.errors import CompileError
 from shaftwork.pipeline.model import Model
-from shaftwork.reduction.symbolic_observables import SymbolicObservables
+from shaftwork.reduction.observables import Observables
 from shaftwork.results.measures import Measure
 
 EXTREMES = {"max": (1.0,), "min": (-1.0,), "peak": (1.0, -1.0)}
@@ -40,7 +40,7 @@ class EnsembleCode:
         if model.rows is None or program is None or not model.states:
             raise CompileError("These equations have no program of their own.")
         self.model, self._rows, self._stores = model, model.rows, stores
-        self._expressed = SymbolicObservables(model.form, model.rows)
+        self._expressed = Observables(model.form, model.rows)
         quantities = [self._expressed.quantity(measure.quantity) for measure in measures]
         read = [found for found in quantities if found is not None]
         if len(read) < len(quantities):

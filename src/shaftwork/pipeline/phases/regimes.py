@@ -16,7 +16,7 @@ from shaftwork.pipeline.ending import Ending
 from shaftwork.pipeline.phases.hybrid_state import AHEAD_OF_RUN, ROUNDINGS, HybridState, Regime
 from shaftwork.pipeline.phases.mode_machines import ModeMachine, ModeNames
 from shaftwork.pipeline.phases.starts import begins_anew
-from shaftwork.reduction.cancelling import jamming
+from shaftwork.reduction.value_diagnosis import jamming
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.phases.assemblies import ModeEquations

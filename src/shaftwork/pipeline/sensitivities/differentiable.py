@@ -11,7 +11,7 @@ from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.components.slopes import slope
 from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.pipeline.model import Model
-from shaftwork.reduction.rows import Rows
+from shaftwork.reduction.explicit_rows import Rows
 
 NO_DERIVATIVE = {
     "decisive": "decides which equations hold, so nothing is smooth in it. Give it a value that is not exactly zero, "
