@@ -33,9 +33,8 @@ from shaftwork.equations.kirchhoff import kirchhoff
 from shaftwork.equations.quantities import rate_of
 from shaftwork.equations.records import Equations
 from shaftwork.network.builder import NetworkBuilder
-from shaftwork.reduction.blocks import BlockTooLargeError
+from shaftwork.reduction.explicit_rows import BlockTooLargeError, explicit_rows
 from shaftwork.reduction.form import state_form
-from shaftwork.reduction.rows import explicit_rows
 from shaftwork.scenes import SCENES
 from tests.equations.networks import (
     MECHANICAL,

@@ -11,7 +11,7 @@ from shaftwork.components import REGISTRY
 from shaftwork.core.domains import ROTATION, TRANSLATION, Domain
 from shaftwork.network.netlist import Placed
 from shaftwork.reduce import referred_parts
-from shaftwork.reduce.scales import Scale
+from shaftwork.reduce.kinematics import Scale
 
 VALUES: dict[str, dict[str, Any]] = {
     "CageMotor": {"tau_a": 5310.0, "tau_s": 4350.0, "tau_k": 5550.0, "tau_n": 2410.0, "n_n": 985.0, "n_sync": 1000.0},

@@ -7,8 +7,7 @@ import pytest
 from sympy import Expr, Symbol
 
 import shaftwork as sw
-from shaftwork.reduction.blocks import BlockTooLargeError, Tie, solve_tied
-from shaftwork.reduction.rows import explicit_rows
+from shaftwork.reduction.explicit_rows import BlockTooLargeError, Tie, explicit_rows, solve_tied
 
 SIZES = (2.0, 0.5, 3.0, 1.5, 0.8, 4.0)
 RATIOS = (0.7, 1.3, 0.4, 2.5, 0.9)

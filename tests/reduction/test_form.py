@@ -7,8 +7,8 @@ import pytest
 
 import shaftwork as sw
 from shaftwork.network.graph import build_graph
+from shaftwork.reduction.explicit_rows import explicit_rows
 from shaftwork.reduction.form import StateForm, state_form
-from shaftwork.reduction.rows import explicit_rows
 
 Placed = tuple[sw.Component, tuple[str, ...]]
 

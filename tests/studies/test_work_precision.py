@@ -11,9 +11,10 @@ import pytest
 import sympy
 
 import shaftwork as sw
-from shaftwork.studies.ladder import LADDER, rungs
+from shaftwork.studies.study_arguments import LADDER, rungs
 from shaftwork.studies.truth import QUANTITIES, truth, with_model
-from shaftwork.studies.work_precision import Trial, WorkPrecision, _timed, work_precision
+from shaftwork.studies.work_precision import _timed, work_precision
+from shaftwork.studies.work_precision_result import Trial, WorkPrecision
 
 SMALL = (sw.OneSpring(), sw.Lumped(10), sw.Lumped(20), sw.CentralDifference(10), sw.Spectral(8), sw.Wave(3))
 

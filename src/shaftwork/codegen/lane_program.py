@@ -21,6 +21,7 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError
 from shaftwork.numerics.hermite import JET
 from shaftwork.reduction.rows import Rows
+from shaftwork.reduction.explicit_rows import Rows
 
 FREE_TIME = heyoka.expression("time")
 """By its own time heyoka does not differentiate."""

@@ -29,7 +29,7 @@ from shaftwork.core.hints import hint
 from shaftwork.network.graph import GROUND, GraphPart
 from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.inputs import places_of, with_inputs
+from shaftwork.reduction.source_inputs import places_of, with_inputs
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 NEARBY = 1e-9

@@ -27,9 +27,8 @@ from shaftwork.core.kept import Kept
 from shaftwork.core.parameters import in_si, is_quantity, without_unit
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.blocks import BlockTooLargeError
+from shaftwork.reduction.explicit_rows import BlockTooLargeError, Rows, explicit_rows
 from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.rows import Rows, explicit_rows
 
 SCALAR_STATES, SCALAR_BRANCHES = 64, 400
 """Above this many states or branches the unrolled code costs more to make than it saves."""

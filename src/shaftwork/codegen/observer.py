@@ -18,8 +18,7 @@ from shaftwork.components.base import Component, Profile
 from shaftwork.core.errors import SignalError
 from shaftwork.network.graph import CircuitGraph, GraphPart
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.names import Names
+from shaftwork.reduction.form import Names, StateForm
 
 LARGEST_HISTORY = 2_000_000
 """Values, branches by times, of a trajectory whose branch quantities are made all at once."""

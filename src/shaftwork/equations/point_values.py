@@ -15,7 +15,7 @@ from shaftwork.equations.quantities import is_rate
 from shaftwork.equations.slopes import VARIED, Slope
 from shaftwork.network.graph import GROUND, CircuitGraph
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.names import Names
+from shaftwork.reduction.form import Names
 
 if TYPE_CHECKING:
     from shaftwork.equations.records import Equations

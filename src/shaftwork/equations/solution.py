@@ -17,7 +17,7 @@ from shaftwork.components.slopes import slope
 from shaftwork.equations.assembly import Assembly, FactoredTerms, Sides, Terms, rising_first, sides
 from shaftwork.equations.quantities import rate_of
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.blocks import LARGEST_BLOCK, solve_blocks
+from shaftwork.reduction.explicit_rows import LARGEST_BLOCK, solve_blocks
 
 Matrix = Mapping[tuple[int, int], Expr]
 

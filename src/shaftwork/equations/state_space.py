@@ -15,12 +15,10 @@ from shaftwork.equations.slopes import LawSlopes, Slope
 from shaftwork.equations.tableau import refuse_waves
 from shaftwork.network.graph import GraphBranch
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.blocks import BlockTooLargeError
-from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.inputs import places_of, source_inputs, with_inputs
-from shaftwork.reduction.names import Names
-from shaftwork.reduction.rows import explicit_rows
-from shaftwork.reduction.symbolic_observables import SymbolicObservables
+from shaftwork.reduction.explicit_rows import BlockTooLargeError, explicit_rows
+from shaftwork.reduction.form import Names, StateForm
+from shaftwork.reduction.observables import Observables
+from shaftwork.reduction.source_inputs import places_of, source_inputs, with_inputs
 
 if TYPE_CHECKING:  # the records make matrices through this module
     from shaftwork.equations.records import Equations
@@ -90,7 +88,7 @@ def state_space(
             "solves any, or compile().linearize() for numbers."
         ) from None
     wanted = tuple(state.name for state in form.states) if outputs is None else _listed(outputs)
-    read = SymbolicObservables(form, rows)
+    read = Observables(form, rows)
     groups = rows.states, [value for value, _ in values], [rate for _, rate in values]
     A, B, B1 = (_slopes(rows.rates, group) for group in groups)
     C, D, D1 = (_slopes([_quantity(form, read, name) for name in wanted], group) for group in groups)
@@ -130,7 +128,7 @@ def _with_laws(form: StateForm, laws: Mapping[int, Expr]) -> StateForm:
     return dataclasses.replace(form, graph=dataclasses.replace(form.graph, branches=tuple(branches)))
 
 
-def _quantity(form: StateForm, read: SymbolicObservables, name: str) -> Expr:
+def _quantity(form: StateForm, read: Observables, name: str) -> Expr:
     """A quantity in states, inputs and their rates.
 
     Raises:

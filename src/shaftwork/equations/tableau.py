@@ -24,7 +24,7 @@ from shaftwork.network.controlled import Reading, readings_of
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
 from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.inputs import Place
+from shaftwork.reduction.source_inputs import Place
 
 S = Symbol("s")
 """The variable of the image domain, 1/s."""

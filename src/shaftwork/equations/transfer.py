@@ -22,8 +22,8 @@ from shaftwork.equations.determinants import MOST_TERMS, TooManyTermsError, dete
 from shaftwork.equations.point_values import DIGITS, Numbers, Values, exact, fraction
 from shaftwork.equations.slopes import LawSlopes, Slope
 from shaftwork.equations.tableau import S, Sum, Tableau, Unknown, refuse_waves
-from shaftwork.reduction.inputs import Place, places_of
-from shaftwork.reduction.names import Names
+from shaftwork.reduction.form import Names
+from shaftwork.reduction.source_inputs import Place, places_of
 
 if TYPE_CHECKING:  # the records make transfer functions through this module
     from shaftwork.equations.records import Equations

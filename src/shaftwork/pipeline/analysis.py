@@ -19,7 +19,7 @@ from shaftwork.network.kinds import Kind
 from shaftwork.network.wording import listed
 from shaftwork.pipeline.point_speeds import as_multiple, speeds_to_give, warn_of_speeds_left, warn_of_turning_angles
 from shaftwork.pipeline.settled import SteadyState
-from shaftwork.reduction.inputs import source_inputs
+from shaftwork.reduction.source_inputs import source_inputs
 from shaftwork.results import campbell as diagram
 from shaftwork.results.linear import ExactModel, LinearModel, linear_model
 from shaftwork.results.modes import Modes

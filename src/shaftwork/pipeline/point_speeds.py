@@ -24,8 +24,8 @@ from shaftwork.network.kinds import Kind
 from shaftwork.network.wording import listed
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.gains import value_of
-from shaftwork.reduction.starting import speeds_along
 from shaftwork.reduction.tree import column_of
+from shaftwork.reduction.value_diagnosis import speeds_along
 
 SAME = 1e-9
 """Ratios that differ by less are equal, and a speed below this part of the largest is none."""

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from shaftwork.reduce.comparison import Comparison
-from shaftwork.reduce.grouping import Grouping
-from shaftwork.reduce.groups import Group, GroupTable
-from shaftwork.reduce.losses import FrequencyLoss, FrequencyTable
+from shaftwork.reduce.grouping import Group, Grouping, GroupTable
+from shaftwork.reduce.kinematics import Scale
+from shaftwork.reduce.losses import Comparison, FrequencyLoss, FrequencyTable
+from shaftwork.reduce.reduction_table import ReductionTable
 from shaftwork.reduce.reference_shaft import Referred, refer
 from shaftwork.reduce.referred_parts import Entry
-from shaftwork.reduce.scales import Scale
 from shaftwork.reduce.simplification import Simplified, simplify
-from shaftwork.reduce.table import ReductionTable
 
 __all__ = [
     "Comparison",

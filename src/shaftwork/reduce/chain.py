@@ -1,4 +1,4 @@
-"""A train as a chain: inertias in a row with springs between them, and what sits on each."""
+"""A train as a chain, read and written: inertias in a row with springs between them, and what sits on each."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from shaftwork.components.sources import SpeedSource
 from shaftwork.core.domains import ROTATION
 from shaftwork.core.errors import Diagnostic, NetworkError
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
+from shaftwork.pipeline.network import Network
 from shaftwork.reduce.tridiagonal_modes import Array, TridiagonalChain
 
 
@@ -39,7 +40,7 @@ class Station:
     @property
     def heaviest(self) -> str:
         """The name of its largest inertia."""
-        return max(self.inertias, key=lambda own: own[1])[0]
+        return max(self.inertias, key=lambda part: part[1])[0]
 
     @property
     def bearings(self) -> tuple[Spring, ...]:
@@ -97,11 +98,11 @@ class Chain:
     @cached_property
     def row(self) -> tuple[tuple[int, ...], TridiagonalChain]:
         """Places of the stations whose speed is not prescribed, and how they swing: the others are a frame to them."""
-        free = tuple(k for k, held in enumerate(self.prescribed) if not held)
+        free = tuple(k for k, prescribed in enumerate(self.prescribed) if not prescribed)
         c = np.array([0.0, *(link.c for link in self.links), 0.0])
-        held = np.array([True, *self.prescribed, True])
+        clamped = np.array([True, *self.prescribed, True])
         supports = np.array([station.support for station in self.stations])
-        supports += np.where(held[:-2], c[:-1], 0.0) + np.where(held[2:], c[1:], 0.0)
+        supports += np.where(clamped[:-2], c[:-1], 0.0) + np.where(clamped[2:], c[1:], 0.0)
         inertias = np.array([station.inertia for station in self.stations])
         between = [c[a + 1] if b == a + 1 else 0.0 for a, b in pairwise(free)]
         return free, TridiagonalChain(inertias[list(free)], np.array(between), supports[list(free)])
@@ -168,7 +169,7 @@ def read_chain(netlist: Netlist, keep: str) -> Chain:
             circuits.append(item)
         else:
             problems.append(_not_in_a_chain(item))
-    problems += (found for items in links.values() for found in _objections(items, keep))
+    problems += (problem for items in links.values() for problem in _objections(items, keep))
     if not problems:
         problems += _not_a_row(stations, links)
     if problems:
@@ -250,15 +251,15 @@ def _not_a_row(stations: dict[str, Station], links: dict[tuple[str, str], list[P
 
 def _in_a_row(stations: dict[str, Station], links: dict[tuple[str, str], list[Placed]]) -> Chain:
     ends = [node for node in stations if sum(node in pair for pair in links) < 2]
-    row, made, left = [ends[0]], list[Link](), dict(links)
+    row, joints, left = [ends[0]], list[Link](), dict(links)
     while left:
         pair = next(pair for pair in left if row[-1] in pair)
         items = left.pop(pair)
         row.append(pair[1] if pair[0] == row[-1] else pair[0])
         c, d, gap = (sum(float(getattr(item.part, name, 0.0)) for item in items) for name in ("c", "d", "gap"))
         springs = tuple(item.part.name for item in items if not isinstance(item.part, Damper))
-        made.append(Link(springs[0], c, d, gap, springs, tuple(items)))
-    return Chain(tuple(stations[node] for node in row), tuple(made))
+        joints.append(Link(springs[0], c, d, gap, springs, tuple(items)))
+    return Chain(tuple(stations[node] for node in row), tuple(joints))
 
 
 def _condensed(chain: Chain, keep: str, title: str) -> Chain:
@@ -287,3 +288,38 @@ def _condensed(chain: Chain, keep: str, title: str) -> Chain:
     if problems:
         raise NetworkError(f"'{title}' is no chain of inertias and springs", tuple(problems))
     return Chain(tuple(stations), tuple(links))
+
+
+def add_chain(net: Network, chain: Chain) -> None:
+    """Add the parts of a chain to a network, station by station."""
+    add_circuits(net, chain)
+    for k, station in enumerate(chain.stations):
+        add_riders(net, station, station.node)
+        if station.inertias:
+            net.add(Inertia(station.heaviest, J=station.inertia), station.node)
+        if k < len(chain.links):
+            add_link(net, chain.links[k], station, chain.stations[k + 1])
+
+
+def add_circuits(net: Network, chain: Chain) -> None:
+    """Add the circuits beside a chain."""
+    for item in chain.circuits:
+        net.add(item.part, *item.nodes)
+
+
+def add_riders(net: Network, station: Station, node: str) -> None:
+    """Add what sits at a station, at a node."""
+    for item in station.riders:
+        moved = turning_nodes(item)
+        net.add(item.part, *(node if each in moved else each for each in item.nodes))
+
+
+def add_link(net: Network, link: Link, station: Station, other: Station) -> None:
+    """Add what is between two stations: its own parts, or one spring or gap for several in series."""
+    ends = station.node, other.node
+    for item in link.placed:
+        net.add(item.part, *(ends if item.nodes[0] == station.node else ends[::-1]))
+    if not link.placed and link.gap:
+        net.add(Backlash(link.name, c=link.c, d=link.d, gap=link.gap), *ends)
+    elif not link.placed:
+        net.add(Spring(link.name, c=link.c, d=link.d), *ends)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -13,13 +13,13 @@ from sympy import Expr, Float, Symbol
 from shaftwork.components.base import Component
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, End, named_in, readings_in
 from shaftwork.components.laws import t
-from shaftwork.components.modes import Mode, ModeChoice, Modes
+from shaftwork.components.modes import Leave, Mode, ModeChoice, Modes
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.network.graph import resolve
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import Placed
 from shaftwork.network.templates import BranchTemplate, Template, make_template
-from shaftwork.reduce.scales import Scale
+from shaftwork.reduce.kinematics import Scale
 
 POINTS = (0.37, -1.93, 41.7, 0.0083)
 """Arguments at which laws are compared: between them they pass most limits and knees."""
@@ -42,7 +42,7 @@ def does_the_same(part: Component, referred: Component, scale: Scale) -> bool:
         return False
     forms = [dict.fromkeys(form for mode in element.options for form in mode.forms) for element in old.modes]
     try:
-        guards = all(_Guards(old, new, scale, *pair).agree() for pair in zip(old.modes, new.modes, strict=True))
+        guards = all(_guards_agree(old, new, *pair, scale) for pair in zip(old.modes, new.modes, strict=True))
         return guards and all(
             _agree(old.chosen(tuple(map(ModeChoice, chosen))), new.chosen(tuple(map(ModeChoice, chosen))), scale)
             for chosen in product(*forms)
@@ -81,8 +81,8 @@ class _PartView:
         Raises:
             TypeError: it has no real value there.
         """
-        known = {**self.numbers, **{symbol: Float(value) for symbol, value in at.items()}}
-        return float(law.xreplace(known).evalf())
+        values = {**self.numbers, **{symbol: Float(value) for symbol, value in at.items()}}
+        return float(law.xreplace(values).evalf())
 
     def is_electrical(self, end: End) -> bool:
         ports = (*self.part.ports, *self.part.inner_ports())
@@ -99,14 +99,14 @@ class _PartView:
 
     def ends_beside(self, other: _PartView, branch: BranchTemplate) -> tuple[End | None, ...]:
         """The ends of a branch; an optional port that the other part does not have is left at the frame."""
-        kept = {port.name for port in other.part.ports}
-        frame = [port.name for port in self.part.ports if port.optional and port.name not in kept]
+        ports = {port.name for port in other.part.ports}
+        frame = [port.name for port in self.part.ports if port.optional and port.name not in ports]
         return tuple(None if end in frame else end for end in branch.ends)
 
     def labelled(self, label: str, scale: Scale) -> Scale:
         """What the branch of a label is scaled by."""
-        found = (self.scale_of(branch, scale) for branch in self.template.branches if branch.label == label)
-        return next(found, scale)
+        scales = (self.scale_of(branch, scale) for branch in self.template.branches if branch.label == label)
+        return next(scales, scale)
 
     def read(self, symbol: Symbol, scale: Scale) -> float:
         """By what a reading of another port or branch of the part is multiplied to be that of the part as it was."""
@@ -118,12 +118,12 @@ class _PartView:
 
 def _samples(symbols: Sequence[Symbol], modes: Sequence[Modes]) -> Iterator[dict[Symbol, float]]:
     """Each symbol at one point after another, the numbers of modes at all that there are; time is not negative."""
-    numbers = {made.symbol: tuple(dict.fromkeys(mode.value for mode in made.options)) for made in modes}
-    own = [symbol for symbol in symbols if symbol.name in numbers]
-    for values in product(*(numbers[symbol.name] for symbol in own)):
+    numbers = {element.symbol: tuple(dict.fromkeys(mode.value for mode in element.options)) for element in modes}
+    mode_symbols = [symbol for symbol in symbols if symbol.name in numbers]
+    for values in product(*(numbers[symbol.name] for symbol in mode_symbols)):
         for first in range(len(POINTS)):
             chosen = {symbol: POINTS[(first + k) % len(POINTS)] for k, symbol in enumerate(symbols)}
-            chosen |= dict(zip(own, values, strict=True))
+            chosen |= dict(zip(mode_symbols, values, strict=True))
             yield {symbol: abs(value) if symbol == t else value for symbol, value in chosen.items()}
 
 
@@ -137,36 +137,43 @@ def _agree(old: _PartView, new: _PartView, scale: Scale) -> bool:
 def _same_branch(old: _PartView, new: _PartView, before: BranchTemplate, after: BranchTemplate, scale: Scale) -> bool:
     if before.terms:
         return _proportional(old, new, before, after, scale)
-    own = old.scale_of(before, scale)
-    square = own.ratio * own.through
+    at_branch = old.scale_of(before, scale)
+    square = at_branch.ratio * at_branch.through
     if before.line is not None and after.line is not None:
         pairs = zip(before.line, after.line, (square, 1.0), strict=True)
         return all(_close(new.value(b, {}), factor * old.value(a, {})) for a, b, factor in pairs)
-    factor = square if before.kind in LINEAR else own.through
+    factor = square if before.kind in LINEAR else at_branch.through
     if before.kind is Kind.ACROSS_SOURCE:
-        factor = 1 / own.ratio
-    symbols = tuple(dict.fromkeys((ACROSS, INTEGRAL, t, *readings_in(after.law), *_modes_in(after.law))))
-    for at in _samples(symbols, old.modes):
-        turned = {symbol: value * _turned(old, symbol, own, scale) for symbol, value in at.items()}
-        if not _close(new.value(after.law, at), factor * old.value(before.law, turned)):
-            return False
-    return True
+        factor = 1 / at_branch.ratio
+    laws = _evaluated(old, new, (before.law, after.law), (ACROSS, INTEGRAL, t), at_branch, scale)
+    return all(_close(now, factor * was) for was, now in laws)
+
+
+def _evaluated(
+    old: _PartView, new: _PartView, laws: tuple[Expr, Expr], symbols: tuple[Symbol, ...], at_branch: Scale, scale: Scale
+) -> Iterator[tuple[float, float]]:
+    """A law before and after, point by point: there as the part was, here with what its arguments are then."""
+    before, after = laws
+    arguments = tuple(dict.fromkeys((*symbols, *readings_in(after), *_modes_in(after))))
+    for at in _samples(arguments, old.modes):
+        behind = {symbol: value * _turned(old, symbol, at_branch, scale) for symbol, value in at.items()}
+        yield old.value(before, behind), new.value(after, at)
 
 
 def _modes_in(law: Expr) -> tuple[Symbol, ...]:
-    found = (symbol for symbol in law.free_symbols if str(symbol.name).partition("_")[0] == "mode")
-    return tuple(sorted(found, key=lambda symbol: str(symbol.name)))
+    symbols = (symbol for symbol in law.free_symbols if str(symbol.name).partition("_")[0] == "mode")
+    return tuple(sorted(symbols, key=lambda symbol: str(symbol.name)))
 
 
-def _turned(view: _PartView, symbol: Symbol, own: Scale, scale: Scale) -> float:
+def _turned(view: _PartView, symbol: Symbol, at_branch: Scale, scale: Scale) -> float:
     """By what an argument of a law at the reference shaft is multiplied to be that of the part as it was."""
     if symbol in (ACROSS, INTEGRAL):
-        return own.ratio
+        return at_branch.ratio
     if symbol == THROUGH:
-        return 1 / own.through
+        return 1 / at_branch.through
     if named_in(symbol)[0]:
         return view.read(symbol, scale)
-    return -1.0 if symbol != t and own.ratio < 0 else 1.0  # slipping forward is slipping backward
+    return -1.0 if symbol != t and at_branch.ratio < 0 else 1.0  # slipping forward is slipping backward
 
 
 def _proportional(old: _PartView, new: _PartView, before: BranchTemplate, after: BranchTemplate, scale: Scale) -> bool:
@@ -174,8 +181,8 @@ def _proportional(old: _PartView, new: _PartView, before: BranchTemplate, after:
     ends = [(plus if plus is not None else minus) for _, plus, minus in before.terms]
     scales = [old.scale_at(end, scale) for end in ends]
     for laws, others, factors in (
-        (before.terms, after.terms, [own.ratio for own in scales]),
-        (before.balances, after.balances, [own.through for own in scales]),
+        (before.terms, after.terms, [end_scale.ratio for end_scale in scales]),
+        (before.balances, after.balances, [end_scale.through for end_scale in scales]),
     ):
         was = [old.value(law, {}) * factor for (law, *_), factor in zip(laws, factors, strict=True)]
         now = [new.value(law, {}) for law, *_ in others]
@@ -188,54 +195,43 @@ def _close(one: float, other: float) -> bool:
     return math.isclose(one, other, rel_tol=CLOSE)
 
 
-@dataclass(frozen=True, eq=False)
-class _Guards:
-    """The guards of an element of a part, before and after."""
+def _guards_agree(old: _PartView, new: _PartView, before: Modes, after: Modes, scale: Scale) -> bool:
+    """Whether each mode ends where the same one ended; forward and backward are exchanged where the part turns."""
+    end = before.ends[0] if before.ends else old.part.ports[0].name
+    at_ends = old.scale_at(end, scale)
+    backwards = scale.ratio < 0 and at_ends.ratio < 0
+    twins = {mode.name: after[_turned_mode(mode, after).name if backwards else mode.name] for mode in before.options}
 
-    old: _PartView
-    new: _PartView
-    scale: Scale
-    before: Modes
-    after: Modes
+    def agree(leave: Leave, other: Leave) -> bool:
+        laws, symbols = (leave.when, other.when), (ACROSS, THROUGH, INTEGRAL, t)
+        to = twins[leave.to].name if leave.to in twins else leave.to
+        return other.to == to and _same_sign(_evaluated(old, new, laws, symbols, at_ends, scale))
 
-    def agree(self) -> bool:
-        """Whether each mode ends where the same one ended; forward and backward are exchanged where the part turns."""
-        renamed = {mode.name: self._same(mode).name for mode in self.before.options}
-        return all(self._ends_alike(mode, self.after[renamed[mode.name]], renamed) for mode in self.before.options)
-
-    def _same(self, mode: Mode) -> Mode:
-        if self.scale.ratio > 0 or mode.value == 0 or self._own.ratio > 0:
-            return self.after[mode.name]
-        turned = (other for other in self.after.options if (other.value, other.form) == (-mode.value, mode.form))
-        return next(turned, mode)
-
-    @cached_property
-    def _own(self) -> Scale:
-        ends = self.before.ends or (self.old.part.ports[0].name, None)
-        return self.old.scale_at(ends[0], self.scale)
-
-    def _ends_alike(self, mode: Mode, other: Mode, renamed: Mapping[str, str]) -> bool:
-        if len(mode.leaves) != len(other.leaves):
-            return False
-        left = list(other.leaves)
+    for mode in before.options:
+        left = list(twins[mode.name].leaves)
         for leave in mode.leaves:
-            to = renamed.get(leave.to, leave.to)
-            match = next((found for found in left if found.to == to and self._same_sign(leave.when, found.when)), None)
+            match = next((other for other in left if agree(leave, other)), None)
             if match is None:
                 return False
             left.remove(match)
-        return True
+        if left:
+            return False
+    return True
 
-    def _same_sign(self, before: Expr, after: Expr) -> bool:
-        """Whether a guard is a positive multiple of the other one."""
-        symbols = tuple(dict.fromkeys((ACROSS, THROUGH, INTEGRAL, t, *readings_in(after), *_modes_in(after))))
-        factors: list[float] = []
-        for at in _samples(symbols, self.old.modes):
-            turned = {symbol: value * _turned(self.old, symbol, self._own, self.scale) for symbol, value in at.items()}
-            was, now = self.old.value(before, turned), self.new.value(after, at)
-            if was == 0 or now == 0:
-                if was != now:
-                    return False
-                continue
-            factors.append(now / was)
-        return all(factor > 0 and _close(factor, factors[0]) for factor in factors)
+
+def _turned_mode(mode: Mode, after: Modes) -> Mode:
+    """Of slipping forward slipping backward; a mode without a direction itself."""
+    opposite = (other for other in after.options if (other.value, other.form) == (-mode.value, mode.form))
+    return next(opposite, mode) if mode.value else mode
+
+
+def _same_sign(pairs: Iterable[tuple[float, float]]) -> bool:
+    """Whether a guard is a positive multiple of another one."""
+    factors: list[float] = []
+    for was, now in pairs:
+        if was == 0 or now == 0:
+            if was != now:
+                return False
+            continue
+        factors.append(now / was)
+    return all(factor > 0 and _close(factor, factors[0]) for factor in factors)

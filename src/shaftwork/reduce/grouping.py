@@ -1,17 +1,22 @@
-"""Neighbouring inertias as one: every way to group a chain, and what each does to it."""
+"""Neighbouring inertias as one: every grouping of a chain, what each does to it, and the table of one of them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain as joined
-from itertools import combinations, pairwise
+from itertools import combinations, pairwise, zip_longest
 from math import comb
 
 import numpy as np
 
+from shaftwork.components.contacts import Backlash
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import whole
+from shaftwork.core.screen import in_columns
+from shaftwork.equations.nomenclature import breakable, column, unit
+from shaftwork.equations.nomenclature import table as longtable
+from shaftwork.equations.printing import printed_number
 from shaftwork.reduce.chain import Chain, Station, series
 
 MOST = 20_000
@@ -61,8 +66,8 @@ def groupings(chain: Chain, masses: int, keep: str, driven: int) -> tuple[Groupi
         raise ParameterError(
             f"masses = {masses!r} must be a whole number from 1 to the {count} inertias{besides} of the chain."
         )
-    kept = next((k for k, link in enumerate(chain.links) if keep and link.has(keep)), None) if masses > 1 else None
-    fixed = _fixed(chain, masses, kept)
+    shaft = next((k for k, link in enumerate(chain.links) if keep and link.has(keep)), None) if masses > 1 else None
+    fixed = _fixed(chain, masses, shaft)
     free = [k for k in range(count - 1) if k not in fixed]
     chosen = masses - 1 - len(fixed)
     if comb(len(free), chosen) > MOST:
@@ -70,25 +75,25 @@ def groupings(chain: Chain, masses: int, keep: str, driven: int) -> tuple[Groupi
             f"masses = {masses} of {count} inertias: {comb(len(free), chosen)} groupings are more than the {MOST} that "
             "are tried. Take fewer masses, or simplify in two steps."
         )
-    true = _swing(chain, driven, kept)
+    true = _swing(chain, driven, shaft)
     cuts = (tuple(sorted((*some, *fixed))) for some in combinations(free, chosen))
-    measured = (_measured(chain, each, kept, driven, true) for each in cuts)
+    measured = (_measured(chain, each, shaft, driven, true) for each in cuts)
     return tuple(
         sorted(measured, key=lambda grouping: (round(grouping.frequency_error, DIGITS), grouping.torque_error))
     )
 
 
-def _fixed(chain: Chain, masses: int, kept: int | None) -> tuple[int, ...]:
+def _fixed(chain: Chain, masses: int, shaft: int | None) -> tuple[int, ...]:
     """Links at which groups end in every grouping: the kept one, and those beside a speed that is prescribed."""
-    held = [k for k, prescribed in enumerate(chain.prescribed) if prescribed]
-    beside = [k for place in held for k in (place - 1, place)] if masses > 1 or len(held) > 1 else []
-    asked = (*beside, *(() if kept is None else (kept,)))
-    fixed = tuple(k for k in range(len(chain.links)) if k in asked)
+    places = [k for k, prescribed in enumerate(chain.prescribed) if prescribed]
+    beside = [k for place in places for k in (place - 1, place)] if masses > 1 or len(places) > 1 else []
+    ends = (*beside, *(() if shaft is None else (shaft,)))
+    fixed = tuple(k for k in range(len(chain.links)) if k in ends)
     if len(fixed) < masses:
         return fixed
-    sources = ", ".join(f"'{name}'" for k in held for name in chain.stations[k].prescribed_by)
-    nodes = ", ".join(f"'{chain.stations[k].node}'" for k in held)
-    rigid = ", or 1 for the rigid train" if len(held) == 1 else ""
+    sources = ", ".join(f"'{name}'" for k in places for name in chain.stations[k].prescribed_by)
+    nodes = ", ".join(f"'{chain.stations[k].node}'" for k in places)
+    rigid = ", or 1 for the rigid train" if len(places) == 1 else ""
     raise ParameterError(
         f"masses = {masses}: a speed is prescribed at {nodes} ({sources}), and what is grouped with it moves as "
         f"prescribed and swings no more. Take masses = {len(fixed) + 1} or more{rigid}."
@@ -96,16 +101,16 @@ def _fixed(chain: Chain, masses: int, kept: int | None) -> tuple[int, ...]:
 
 
 def _measured(
-    chain: Chain, cuts: tuple[int, ...], kept: int | None, driven: int, true: tuple[float, float]
+    chain: Chain, cuts: tuple[int, ...], shaft: int | None, driven: int, true: tuple[float, float]
 ) -> Grouping:
-    made, groups = grouped(chain, cuts, kept)
-    place = sum(cut < driven for cut in cuts)
-    swing = _swing(made, place, None if kept is None else cuts.index(kept))
+    groups_chain, groups = grouped(chain, cuts, shaft)
+    place = sum(end < driven for end in cuts)
+    swing = _swing(groups_chain, place, None if shaft is None else cuts.index(shaft))
     errors = [abs(now - was) / was if was else 0.0 for was, now in zip(true, swing, strict=True)]
-    return Grouping(groups, made, *errors)
+    return Grouping(groups, groups_chain, *errors)
 
 
-def _swing(chain: Chain, driven: int, kept: int | None) -> tuple[float, float]:
+def _swing(chain: Chain, driven: int, shaft: int | None) -> tuple[float, float]:
     """The lowest natural frequency, and the torque amplitude of a link in that mode after a unit step at a station.
 
     Law: |torque shape| / omega^2 for a step of torque; where the speed is prescribed the step is one of acceleration,
@@ -115,24 +120,24 @@ def _swing(chain: Chain, driven: int, kept: int | None) -> tuple[float, float]:
     if not rates.size:
         return 0.0, 0.0
     rate = float(rates[0])
-    if kept is None:
+    if shaft is None:
         return rate / (2 * np.pi), 0.0
     shape, torques = chain.swing(rate)
-    held = np.diff(torques, prepend=0.0, append=0.0)[driven] / rate**2
-    pushed = held if chain.prescribed[driven] else shape[driven]
-    return rate / (2 * np.pi), float(abs(torques[kept] * pushed)) / rate**2
+    answered = np.diff(torques, prepend=0.0, append=0.0)[driven] / rate**2
+    pushed = answered if chain.prescribed[driven] else shape[driven]
+    return rate / (2 * np.pi), float(abs(torques[shaft] * pushed)) / rate**2
 
 
-def grouped(chain: Chain, cuts: tuple[int, ...], kept: int | None) -> tuple[Chain, tuple[tuple[str, ...], ...]]:
+def grouped(chain: Chain, cuts: tuple[int, ...], shaft: int | None) -> tuple[Chain, tuple[tuple[str, ...], ...]]:
     """The chain of the groups between cuts, and their nodes.
 
     Args:
         chain: stations with inertia.
         cuts: places of the links at which groups end, ascending.
-        kept: that of the link that keeps its own stiffness; the groups beside it have their centres at its ends.
+        shaft: that of the link that keeps its own stiffness; the groups beside it have their centres at its ends.
     """
     bounds = tuple(pairwise((-1, *cuts, len(chain.stations) - 1)))
-    centres = [_centre(chain, last + 1, end, kept) for last, end in bounds]
+    centres = [_centre(chain, last + 1, end, shaft) for last, end in bounds]
     stations = tuple(
         _one(chain.stations[last + 1 : end + 1], chain.stations[centre])
         for (last, end), centre in zip(bounds, centres, strict=True)
@@ -142,11 +147,11 @@ def grouped(chain: Chain, cuts: tuple[int, ...], kept: int | None) -> tuple[Chai
     return Chain(stations, links, chain.circuits), groups
 
 
-def _centre(chain: Chain, first: int, last: int, kept: int | None) -> int:
+def _centre(chain: Chain, first: int, last: int, shaft: int | None) -> int:
     """Where a group stands: at the kept shaft, else at its largest inertia."""
-    if kept is not None and last == kept:
+    if shaft is not None and last == shaft:
         return last
-    if kept is not None and first == kept + 1:
+    if shaft is not None and first == shaft + 1:
         return first
     return max(range(first, last + 1), key=lambda k: chain.stations[k].inertia)
 
@@ -162,3 +167,65 @@ def _one(stations: tuple[Station, ...], centre: Station) -> Station:
         tuple(all_of("riders")),  # type: ignore[arg-type]
         sum(station.support for station in stations),
     )
+
+
+@dataclass(frozen=True)
+class Group:
+    """What became one part: name, quantity, value in SI, and the names of what it was made of."""
+
+    part: str
+    quantity: str
+    value: float
+    unit: str
+    made_of: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class GroupTable:
+    """The inertias and springs of a small model and what they were made of."""
+
+    rows: tuple[Group, ...]
+    rigid: tuple[str, ...]
+
+    @classmethod
+    def of(cls, groups: Chain, train: Chain) -> GroupTable:
+        """What the stations and links of a chain of groups were made of, those of a train."""
+        rows: list[Group] = []
+        for station, link in zip_longest(groups.stations, groups.links):
+            if station.inertias:
+                names = tuple(name for name, _ in station.inertias)
+                rows.append(Group(station.heaviest, "J", station.inertia, "kg*m^2", names))
+            if link:
+                rows.append(Group(link.name, "c", link.c, "N*m/rad", link.parts))
+            if link and link.gap:
+                rows.append(Group(link.name, "gap", link.gap, "rad", link.parts))
+        used = {name for row in rows for name in row.made_of}
+        return cls(tuple(rows), tuple(name for link in train.links for name in link.parts if name not in used))
+
+    def __str__(self) -> str:
+        cells = [(row.part, row.quantity, f"{row.value:.6g}", row.unit, ", ".join(row.made_of)) for row in self.rows]
+        lines = in_columns([("part", "quantity", "value", "unit", "made of"), *cells])
+        return "\n".join([*lines, f"rigid now: {', '.join(self.rigid) or 'nothing'}"])
+
+    def latex(self) -> str:
+        """The table as LaTeX, a `longtable` (packages booktabs, array, longtable); at its end what is rigid now."""
+        letters = {"gap": Backlash.declared["gap"].latex}
+        rows = [
+            (
+                breakable(row.part),
+                f"${letters.get(row.quantity, row.quantity)}$",
+                f"${printed_number(row.value)}$",
+                unit(row.unit),
+                _listed(row.made_of),
+            )
+            for row in self.rows
+        ]
+        if self.rigid:
+            rows.append(("rigid now", "", "", "", _listed(self.rigid)))
+        gap = r"@{\hspace{3mm}}"
+        columns = gap.join((column(30), "l", "r", "l", column(66)))
+        return longtable(columns, ("Part", "Quantity", "Value", "Unit", "Made of"), rows)
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    return ", ".join(map(breakable, names))

@@ -1,11 +1,12 @@
-"""The rigid couplings of a network: which nodes they make one shaft, at which ratios, and what no ratio describes."""
+"""Which nodes rigid parts make one shaft, at which ratios, and what no ratio describes."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import networkx as nx
 from sympy import Expr, Float, S
 
 from shaftwork.components.rotation import LossyGear
@@ -14,7 +15,89 @@ from shaftwork.core.errors import Diagnostic
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
 from shaftwork.network.kinds import Kind
 from shaftwork.network.wording import listed
-from shaftwork.reduce.scales import AGREE, Clusters, Scale
+
+AGREE = 1e-12
+"""Two ways round a train have one ratio when they differ by less than this fraction: only rounding."""
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What a speed and a power at a node are for those at another one.
+
+    Law: omega = ratio omega', P = P' / power; hence tau' = ratio power tau, and J' = J ratio^2 power for any store.
+
+    Args:
+        ratio: speed of the node over speed of the other.
+        power: share of the node's power that arrives at the other; 1 without lossy gears.
+        ratio_law: the ratio in the symbols of the network.
+        power_law: the share in the symbols of the network.
+    """
+
+    ratio: float = 1.0
+    power: float = 1.0
+    ratio_law: Expr = S.One
+    power_law: Expr = S.One
+
+    @property
+    def through(self) -> float:
+        """A torque at the other shaft over the torque here: ratio * power."""
+        return self.ratio * self.power
+
+    def __mul__(self, other: Scale) -> Scale:
+        return Scale(
+            self.ratio * other.ratio,
+            self.power * other.power,
+            self.ratio_law * other.ratio_law,
+            self.power_law * other.power_law,
+        )
+
+    def __truediv__(self, other: Scale) -> Scale:
+        return Scale(
+            self.ratio / other.ratio,
+            self.power / other.power,
+            self.ratio_law / other.ratio_law,
+            self.power_law / other.power_law,
+        )
+
+    def agrees(self, other: Scale) -> bool:
+        """Whether both are the same but for rounding."""
+        return math.isclose(self.ratio, other.ratio, rel_tol=AGREE) and math.isclose(
+            self.power, other.power, rel_tol=AGREE
+        )
+
+
+class Clusters:
+    """Nodes that turn at fixed ratios, in groups that grow together; a scale is to the first node of its group."""
+
+    def __init__(self, nodes: Iterable[int]) -> None:
+        self._of = {node: (node, Scale()) for node in nodes}
+        self._members = {node: [node] for node in self._of}
+
+    def __contains__(self, node: int) -> bool:
+        return node in self._of
+
+    def __getitem__(self, node: int) -> tuple[int, Scale]:
+        """First node of the group, and the scale of the node to it."""
+        return self._of[node]
+
+    def members(self, node: int) -> tuple[int, ...]:
+        """The group of a node, in the order of the nodes."""
+        return tuple(sorted(self._members[self._of[node][0]]))
+
+    def join(self, node: int, other: int, scale: Scale) -> None:
+        """Make one group of two apart, where `scale` is that of `node` to `other`."""
+        (first, from_first), (second, to_second) = self._of[node], self._of[other]
+        ratio = scale * to_second / from_first
+        if len(self._members[first]) > len(self._members[second]):
+            first, second, ratio = second, first, Scale() / ratio
+        for member in self._members.pop(first):
+            self._of[member] = (second, self._of[member][1] * ratio)
+            self._members[second].append(member)
+
+    def lock(self, node: int) -> None:
+        """Take out a group whose speed is zero, which has no ratio to anything."""
+        for member in self._members.pop(self._of[node][0]):
+            del self._of[member]
 
 
 @dataclass(frozen=True)
@@ -72,21 +155,21 @@ def kinematics(graph: CircuitGraph, drives: Mapping[str, str]) -> Kinematics:
     absorbed = tuple(place for place, part in enumerate(graph.parts) if _is_rigid(graph, part))
     parts = [graph.parts[place] for place in absorbed]
     rows = [_row(graph, graph.branches[index]) for part in parts for index in part.branches]
-    held = _joined(Clusters(moving), rows, [])
+    lossless = _joined(Clusters(moving), rows, [])
     problems: list[Diagnostic] = []
     for number, row in enumerate(rows):
         part = next(part for part in parts if part.name == row.part)
         if isinstance(part.component, LossyGear):
-            lossy = _with_loss(graph, part, row, drives.get(part.name), held)
+            lossy = _with_loss(graph, part, row, drives.get(part.name), lossless)
             problems += [lossy] if isinstance(lossy, Diagnostic) else []
             rows[number] = row if isinstance(lossy, Diagnostic) else lossy
-    if not problems:
-        rigid, shafts = _joined(Clusters(moving), rows, problems), _joined(Clusters(moving), rows, [])
-        for place, part in enumerate(graph.parts):
-            if place not in absorbed:
-                problems += _along(graph, part, shafts)
-        return Kinematics(rigid, shafts, absorbed, tuple(problems))
-    return Kinematics(held, held, absorbed, tuple(problems))
+    if problems:
+        return Kinematics(lossless, lossless, absorbed, tuple(problems))
+    rigid, shafts = _joined(Clusters(moving), rows, problems), _joined(Clusters(moving), rows, [])
+    for place, part in enumerate(graph.parts):
+        if place not in absorbed:
+            problems += _along(graph, part, shafts)
+    return Kinematics(rigid, shafts, absorbed, tuple(problems))
 
 
 def _is_rigid(graph: CircuitGraph, part: GraphPart) -> bool:
@@ -110,13 +193,13 @@ def _row(graph: CircuitGraph, branch: GraphBranch) -> SpeedConstraint:
 
 
 def _with_loss(
-    graph: CircuitGraph, gear: GraphPart, row: SpeedConstraint, side: str | None, still: Clusters
+    graph: CircuitGraph, gear: GraphPart, row: SpeedConstraint, side: str | None, moving: Clusters
 ) -> SpeedConstraint | Diagnostic:
     """The row of a lossy gear with what its driving side loses."""
-    found = side or _driving_side(graph, gear, still)
-    if isinstance(found, Diagnostic):
-        return found
-    back = found == "b" and getattr(gear.component, "efficiency_back", None) is not None
+    port = side or _driving_side(graph, gear, moving)
+    if isinstance(port, Diagnostic):
+        return port
+    back = port == "b" and getattr(gear.component, "efficiency_back", None) is not None
     name = "efficiency_back" if back else "efficiency"
     share = float(gear.component.declared[name].magnitude(getattr(gear.component, name))[0])
     if share <= 0:
@@ -126,24 +209,24 @@ def _with_loss(
             f"Where a drives, say so: drives={{'{gear.name}': 'a'}}.",
             (gear.name,),
         )
-    driving, law = gear.nodes[found], graph.symbol_of(gear, name)
+    driving, law = gear.nodes[port], graph.symbol_of(gear, name)
     terms = (replace(term, power=share, power_law=law) if term.node == driving else term for term in row.terms)
     return SpeedConstraint(row.part, tuple(terms))
 
 
-def _driving_side(graph: CircuitGraph, gear: GraphPart, still: Clusters) -> str | Diagnostic:
+def _driving_side(graph: CircuitGraph, gear: GraphPart, moving: Clusters) -> str | Diagnostic:
     """The side of a lossy gear on which every motor and source is."""
-    found: dict[str, list[str]] = {}
+    sources_at: dict[str, list[str]] = {}
     for port in ("a", "b"):
-        nodes = _beyond(graph, gear, gear.nodes[port], still)
-        found[port] = [part.name for part in graph.parts if nodes & _gives_at(graph, part)]
-    if bool(found["a"]) != bool(found["b"]):
-        return "a" if found["a"] else "b"
+        nodes = _beyond(graph, gear, gear.nodes[port], moving)
+        sources_at[port] = [part.name for part in graph.parts if nodes & _gives_at(graph, part)]
+    if bool(sources_at["a"]) != bool(sources_at["b"]):
+        return "a" if sources_at["a"] else "b"
     why = "no source says which way that is"
-    if round_it := [name for name in found["a"] if name in found["b"]]:
+    if round_it := [name for name in sources_at["a"] if name in sources_at["b"]]:
         why = f"it lies in a loop: {listed(round_it)} drives it from both of its sides"
-    elif found["a"]:
-        why = f"sources are on both sides ({listed(found['a'])}; {listed(found['b'])})"
+    elif sources_at["a"]:
+        why = f"sources are on both sides ({listed(sources_at['a'])}; {listed(sources_at['b'])})"
     return Diagnostic(
         "direction of power",
         f"LossyGear '{gear.name}' loses its share on the way of the power, and {why}.",
@@ -159,17 +242,14 @@ def _gives_at(graph: CircuitGraph, part: GraphPart) -> set[int]:
     return mechanical if part.component.role == "source" or len(mechanical) < len(nodes) else set()
 
 
-def _beyond(graph: CircuitGraph, gear: GraphPart, start: int, still: Clusters) -> set[int]:
+def _beyond(graph: CircuitGraph, gear: GraphPart, start: int, moving: Clusters) -> set[int]:
     """The moving nodes that are joined to one of a gear without passing it; only intersected."""
-    found, waiting = {start}, [start]
-    while waiting:
-        node = waiting.pop()
-        for part in graph.parts:
-            if part is not gear and node in part.nodes.values():
-                new = [number for number in part.nodes.values() if number in still and number not in found]
-                waiting += new
-                found.update(new)
-    return found
+    joints = nx.Graph()
+    joints.add_node(start)
+    for part in graph.parts:
+        if part is not gear:
+            nx.add_path(joints, [node for node in part.nodes.values() if node == start or node in moving])
+    return set(nx.node_connected_component(joints, start))
 
 
 def _joined(clusters: Clusters, rows: Sequence[SpeedConstraint], problems: list[Diagnostic]) -> Clusters:
@@ -255,25 +335,25 @@ def _along(graph: CircuitGraph, part: GraphPart, shafts: Clusters) -> Iterator[D
     """A spring, a gap or any part that stays joins nodes of one ratio."""
     nodes = [node for node in part.nodes.values() if node in shafts]
     for node in nodes[1:]:
-        (first, own), (second, other) = shafts[nodes[0]], shafts[node]
+        (first, scale), (second, other) = shafts[nodes[0]], shafts[node]
         if first != second:
             shafts.join(nodes[0], node, Scale())
-        elif not own.agrees(other):
+        elif not scale.agrees(other):
             here, there = graph.node_name(nodes[0]), graph.node_name(node)
             yield Diagnostic(
                 "two ratios",
-                f"'{part.name}' closes a loop: by the way round it, {_difference(own, other, here, there)}.",
+                f"'{part.name}' closes a loop: by the way round it, {_difference(scale, other, here, there)}.",
                 "No one ratio refers a shaft that its own gears twist; take the part out, or leave the train as it is.",
                 (part.name,),
                 (here, there),
             )
 
 
-def _difference(own: Scale, other: Scale, here: str, there: str) -> str:
+def _difference(scale: Scale, other: Scale, here: str, there: str) -> str:
     """In what two scales differ, in as many digits as it takes to see that."""
-    if not math.isclose(own.ratio, other.ratio, rel_tol=AGREE):
-        return f"node '{here}' turns {_unlike_one(own.ratio / other.ratio)} times as fast as node '{there}'"
-    share = _unlike_one(own.power / other.power)
+    if not math.isclose(scale.ratio, other.ratio, rel_tol=AGREE):
+        return f"node '{here}' turns {_unlike_one(scale.ratio / other.ratio)} times as fast as node '{there}'"
+    share = _unlike_one(scale.power / other.power)
     return f"power at node '{here}' counts {share} times what it does at node '{there}'"
 
 

@@ -12,10 +12,9 @@ from shaftwork.core.errors import Diagnostic, NetworkError, ParameterError, Sign
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
 from shaftwork.pipeline.network import Network, network_of
-from shaftwork.reduce.kinematics import Kinematics, kinematics
+from shaftwork.reduce.kinematics import Kinematics, Scale, kinematics
+from shaftwork.reduce.reduction_table import ReductionTable
 from shaftwork.reduce.referred_parts import ReferredPart, referred_part
-from shaftwork.reduce.scales import Scale
-from shaftwork.reduce.table import ReductionTable
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,27 +91,27 @@ def refer(net: Network, to: str, *, drives: Mapping[str, str] | None = None) -> 
     Source: Abdelkader 2016, (4)-(17), with (3) and (6) put right; Marinkovic 2012, 2.2 and (18).
     """
     graph, netlist = network_of(net).graph(), net.netlist()
-    known = _checked_sides(graph, {} if drives is None else drives)
+    sides = _checked_sides(graph, {} if drives is None else drives)
     node = _checked_node(graph, to)
-    found = kinematics(graph, known)
+    ratios = kinematics(graph, sides)
     title = f"'{net.name}' cannot be referred to '{to}'"
-    if found.problems:
-        raise NetworkError(title, found.problems)
-    if node not in found.shafts:
+    if ratios.problems:
+        raise NetworkError(title, ratios.problems)
+    if node not in ratios.shafts:
         raise ParameterError(f"Node '{to}' of '{net.name}' is held at rest: nothing can be referred to it.")
-    view = _NodeView(graph, netlist, found, node)
+    view = _NodeView(graph, netlist, ratios, node)
     parts, problems = view.parts()
     if problems:
         raise NetworkError(title, problems)
-    made = Network(f"{net.name}, referred to {to}")
+    small = Network(f"{net.name}, referred to {to}")
     for part in parts:
-        made.add(part.placed.part, *part.placed.nodes)
+        small.add(part.placed.part, *part.placed.nodes)
     entries = tuple(entry for part in parts for entry in part.entries)
     table = ReductionTable(to, entries, partial(_symbol_names, net))
     scales = {part.placed.part.name: part.scale for part in parts}
-    absorbed = tuple(graph.parts[place].name for place in found.absorbed)
+    absorbed = tuple(graph.parts[place].name for place in ratios.absorbed)
     at_rest = tuple(part.name for part in graph.parts if part.name not in scales and part.name not in absorbed)
-    return Referred(made, table, to, scales, view.nodes(), absorbed, at_rest)
+    return Referred(small, table, to, scales, view.nodes(), absorbed, at_rest)
 
 
 def _symbol_names(net: Network) -> Mapping[str, str]:
@@ -144,27 +143,27 @@ class _NodeView:
 
     graph: CircuitGraph
     netlist: Netlist
-    found: Kinematics
+    ratios: Kinematics
     to: int
 
     def parts(self) -> tuple[list[ReferredPart], tuple[Diagnostic, ...]]:
         """The parts at the reference shaft, and those that have no place there."""
-        made: list[ReferredPart] = []
+        parts: list[ReferredPart] = []
         problems: list[Diagnostic] = []
         for place, (item, part) in enumerate(zip(self.netlist.placed, self.graph.parts, strict=True)):
-            if place in self.found.absorbed:
+            if place in self.ratios.absorbed:
                 continue
             seen = self._part(item, part)
             if isinstance(seen, ReferredPart):
-                made.append(seen)
+                parts.append(seen)
             elif seen is not None:
                 problems.append(seen)
-        return made, tuple(problems)
+        return parts, tuple(problems)
 
     def _part(self, item: Placed, part: GraphPart) -> ReferredPart | Diagnostic | None:
         """A part at the reference shaft; None where it cannot move."""
         nodes = [number for number in part.nodes.values() if number != GROUND]
-        moving = [number for number in nodes if number in self.found.shafts]
+        moving = [number for number in nodes if number in self.ratios.shafts]
         places = tuple(self._place(part.nodes[port.name]) for port in item.part.ports[: len(item.nodes)])
         if not moving:
             electrical = any(self.graph.domains[number] is ELECTRICAL for number in nodes)
@@ -172,7 +171,7 @@ class _NodeView:
         if len(places) == 2 and places[0] == places[1]:
             return None
         name, kind = part.name, type(item.part).__name__
-        if self.found.shafts[moving[0]][0] != self.found.shafts[self.to][0]:
+        if self.ratios.shafts[moving[0]][0] != self.ratios.shafts[self.to][0]:
             return Diagnostic(
                 "other train",
                 f"{kind} '{name}' is not joined to '{self.graph.node_name(self.to)}' by any shaft.",
@@ -191,16 +190,16 @@ class _NodeView:
         """Where a node is in the referred network: rigid shafts are one node."""
         if node == GROUND or self.graph.domains[node] is ELECTRICAL:
             return self.graph.node_name(node)
-        if node not in self.found.rigid:
+        if node not in self.ratios.rigid:
             return REFERENCE
-        members = self.found.rigid.members(node)
+        members = self.ratios.rigid.members(node)
         return self.graph.node_name(self.to if self.to in members else members[0])
 
     def scale(self, node: int) -> Scale:
         """Of a node to the reference shaft."""
-        return self.found.shafts[node][1] / self.found.shafts[self.to][1]
+        return self.ratios.shafts[node][1] / self.ratios.shafts[self.to][1]
 
     def nodes(self) -> Mapping[str, tuple[str, Scale]]:
         """What every moving node became."""
-        moving = (node for node in range(len(self.graph.nodes)) if node in self.found.shafts)
+        moving = (node for node in range(len(self.graph.nodes)) if node in self.ratios.shafts)
         return {self.graph.node_name(node): (self._place(node), self.scale(node)) for node in moving}

@@ -22,7 +22,7 @@ from shaftwork.core.notices import muted
 from shaftwork.core.parameters import Parameter
 from shaftwork.network.netlist import REFERENCE, Placed
 from shaftwork.reduce.covariance import does_the_same
-from shaftwork.reduce.scales import Scale
+from shaftwork.reduce.kinematics import Scale
 
 Exponents = tuple[Expr, Expr]
 """Powers of the ratio and of the share of power by which a parameter is multiplied."""
@@ -145,19 +145,19 @@ def referred_part(item: Placed, nodes: tuple[str, ...], scale: Scale, domain: Do
     assert here is not None  # noqa: S101 (only mechanical parts are referred)
     if here is not domain and type(item.part) not in COUNTERPARTS:
         return f"there is no {domain.name} part that does what it does; refer to a shaft of its own kind"
-    ways = [(scale, nodes)]
+    attempts = [(scale, nodes)]
     if scale.ratio < 0 and len(item.part.ports) == 2:
         turned = Scale(-scale.ratio, scale.power, -scale.ratio_law, scale.power_law)
-        ways.append((turned, (*nodes, REFERENCE)[1::-1]))
+        attempts.append((turned, (*nodes, REFERENCE)[1::-1]))
     reason = ""
-    for way, places in ways:
+    for attempt, places in attempts:
         try:
-            made, entries = _scaled(item.part, way, here, domain)
+            counterpart, entries = _scaled(item.part, attempt, here, domain)
         except ShaftworkError as error:
             reason = str(error)
             continue
-        if does_the_same(item.part, made, way):
-            return ReferredPart(Placed(made, places), way, entries)
+        if does_the_same(item.part, counterpart, attempt):
+            return ReferredPart(Placed(counterpart, places), attempt, entries)
     turns = "it has a direction, and turns against the reference shaft" if scale.ratio < 0 else ""
     return reason or turns or "its law is not that of any such part behind a gear"
 
@@ -175,17 +175,14 @@ def _scaled(part: Component, scale: Scale, here: Domain, domain: Domain) -> tupl
         target = targets[name]
         value = declared.magnitude(getattr(part, name))[0]
         if scale.ratio < 0 and name in TURNED.get(type(part).__name__, ()):
-            made = -value, S.NegativeOne
+            referred, factor = -value, S.NegativeOne
         else:
-            made = _referred(value, target, _powers(part, declared), scale, (MOTIONS[here], MOTIONS[domain]))
-        values[target.name] = made[0]
-        if made[1] is not None and value != 0:
-            entries.append(
-                Entry(
-                    *(part.name, name, value, declared.unit, scale.ratio, scale.power),
-                    *(made[0], target.unit, signsimp(made[1])),
-                )
-            )
+            powers, motions = _powers(part, declared), (MOTIONS[here], MOTIONS[domain])
+            referred, factor = _referred(value, target, powers, scale, motions)
+        values[target.name] = referred
+        if factor is not None and value != 0:
+            before = part.name, name, value, declared.unit, scale.ratio, scale.power
+            entries.append(Entry(*before, referred, target.unit, signsimp(factor)))
     with muted(NetworkWarning):  # what is odd about the part was said when it was made
         return kind(part.name, **values), tuple(entries)
 
@@ -202,9 +199,9 @@ def _turned_limits(part: Component) -> dict[str, Parameter]:
 
 def _powers(part: Component, declared: Parameter) -> Exponents:
     """How a parameter scales: by what its class says, else by what is known of the class, else by its unit."""
-    own = getattr(type(part), "referred", None) or OF_CLASS.get(type(part).__name__)
-    if own is not None:
-        return own.get(declared.name, _exponents(0))
+    declared_by_class = getattr(type(part), "referred", None) or OF_CLASS.get(type(part).__name__)
+    if declared_by_class is not None:
+        return declared_by_class.get(declared.name, _exponents(0))
     return BY_UNIT.get(declared.unit, _exponents(0))
 
 
@@ -232,5 +229,5 @@ def _referred(
     ((speed, angle), (new_speed, new_angle)) = motions
     ratio = scale.ratio if scale.ratio != 1 else S.One  # a law at the reference shaft stays as it was written
     turned = {speed: ratio * new_speed, angle: ratio * new_angle}
-    made = as_expression(value).xreplace(turned)
-    return (made if sign * size == 1 else Float(sign * size) * made), law
+    law_there = as_expression(value).xreplace(turned)
+    return (law_there if sign * size == 1 else Float(sign * size) * law_there), law

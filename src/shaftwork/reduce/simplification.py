@@ -16,13 +16,11 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
 from shaftwork.network.netlist import REFERENCE, Placed
 from shaftwork.pipeline.network import Network, network_of
-from shaftwork.reduce.chain import Chain, read_chain
-from shaftwork.reduce.comparison import Comparison, check_motion, refuse_changes
-from shaftwork.reduce.grouping import Grouping, grouped, groupings
-from shaftwork.reduce.groups import GroupTable, add_chain
-from shaftwork.reduce.losses import FrequencyTable
+from shaftwork.reduce.chain import Chain, add_chain, read_chain
+from shaftwork.reduce.craig_bampton import truncated
+from shaftwork.reduce.grouping import Grouping, GroupTable, grouped, groupings
+from shaftwork.reduce.losses import Comparison, FrequencyTable, check_motion, refuse_changes
 from shaftwork.reduce.reference_shaft import Referred, refer
-from shaftwork.reduce.truncation import truncated
 from shaftwork.results.measures import Measure
 from shaftwork.results.solution import Solution
 
@@ -114,17 +112,17 @@ class Simplified:
         else:
             check_motion(before, self.train, start, end)
         options |= {"t_eval": before.t}
-        own = f"{self.keep}.tau" if f"{self.keep}.tau" in before.names else f"{self.keep}.f"
+        name = f"{self.keep}.tau" if f"{self.keep}.tau" in before.names else f"{self.keep}.f"
         single = len(self.groupings[0].groups) == 1
         small = _split(self.chain, self.keep) if single else self.network
         torque, share = (f"{self.keep}.tau_a", _share(self.chain, self.keep)) if single else (f"{self.keep}.tau", 1.0)
         after = small.simulate(end, **options)
         modal = self.by_modes.simulate(end, **options) if modes and self.by_modes else None
         ratio = self.referred.torque_ratio(self.keep)
-        largest = [Measure("peak", own).of(before) * abs(ratio), Measure("peak", torque).of(after) * share]
+        largest = [Measure("peak", name).of(before) * abs(ratio), Measure("peak", torque).of(after) * share]
         largest += [Measure("peak", torque).of(modal)] if modal else []
         by_modes = modal[torque] if modal else None
-        return Comparison(before.t, before[own] * ratio, after[torque] * share, tuple(largest), by_modes)
+        return Comparison(before.t, before[name] * ratio, after[torque] * share, tuple(largest), by_modes)
 
 
 def _share(chain: Chain, keep: str) -> float:
@@ -135,10 +133,10 @@ def _share(chain: Chain, keep: str) -> float:
 
 def _split(chain: Chain, keep: str) -> Network:
     """The rigid train as two halves of which one carries the other, so that the torque between them can be read."""
-    kept = _place(chain, keep)
-    halves = grouped(chain, (kept,), kept)[0]
-    own = next(item for item in chain.links[kept].placed if item.part.name == keep)
-    link = replace(halves.links[0], placed=(Placed(Gear(keep, ratio=1.0), own.nodes),))
+    cut = _place(chain, keep)
+    halves = grouped(chain, (cut,), cut)[0]
+    shaft = next(item for item in chain.links[cut].placed if item.part.name == keep)
+    link = replace(halves.links[0], placed=(Placed(Gear(keep, ratio=1.0), shaft.nodes),))
     net = Network("rigid")
     add_chain(net, replace(halves, links=(link,)))
     return net
@@ -183,20 +181,19 @@ def simplify(
     referred = refer(net, to or _reference(network_of(net), keep), drives=drives)
     chain = read_chain(referred.network.netlist(), keep)
     if keep and not any(link.has(keep) for link in chain.links):
-        known = ", ".join(item.part.name for link in chain.links for item in link.placed)
-        raise ParameterError(f"keep = {keep!r} is no shaft between two inertias of '{net.name}'. There are: {known}.")
+        shafts = ", ".join(item.part.name for link in chain.links for item in link.placed)
+        raise ParameterError(f"keep = {keep!r} is no shaft between two inertias of '{net.name}'. There are: {shafts}.")
     tried = groupings(chain, masses, keep, _driven(chain))
+    best = tried[0].chain
     title = f"{net.name}, {masses} {'mass' if masses == 1 else 'masses'}"
-    made = Network(title)
-    rows = add_chain(made, tried[0].chain)
-    used = {name for row in rows for name in row.made_of}
-    rigid = tuple(name for link in chain.links for name in link.parts if name not in used)
+    small = Network(title)
+    add_chain(small, best)
     modal = truncated(chain, masses, _place(chain, keep)) if keep and masses > 1 else None
     by_modes = modal.network(f"{title}, by modes") if modal else None
-    found = modal.frequencies() if modal else None
-    losses = FrequencyTable.of(chain.frequencies(), tried[0].chain.frequencies(), found)
-    angles = _by_angle(network_of(net), chain)
-    return Simplified(made, by_modes, GroupTable(rows, rigid), losses, keep, tried, net, referred, chain, angles)
+    table = GroupTable.of(best, chain)
+    losses = FrequencyTable.of(chain.frequencies(), best.frequencies(), modal.frequencies() if modal else None)
+    angles = _by_angle(net, chain)
+    return Simplified(small, by_modes, table, losses, keep, tried, net, referred, chain, angles)
 
 
 def _by_angle(net: Network, chain: Chain) -> tuple[str, ...]:
@@ -216,11 +213,11 @@ def _by_angle(net: Network, chain: Chain) -> tuple[str, ...]:
 def _reference(net: Network, keep: str) -> str:
     """An end of the kept shaft, or the first shaft that turns."""
     placed = net.netlist().placed
-    own = next((item for item in placed if item.part.name == keep), None)
-    if keep and own is None:
-        known = ", ".join(item.part.name for item in placed if len(item.nodes) == 2)
-        raise ParameterError(f"keep = {keep!r} is no part of '{net.name}'. Parts between two nodes are: {known}.")
-    candidates = placed if own is None else (own, *placed)
+    shaft = next((item for item in placed if item.part.name == keep), None)
+    if keep and shaft is None:
+        names = ", ".join(item.part.name for item in placed if len(item.nodes) == 2)
+        raise ParameterError(f"keep = {keep!r} is no part of '{net.name}'. Parts between two nodes are: {names}.")
+    candidates = placed if shaft is None else (shaft, *placed)
     turning = (
         node
         for item in candidates

@@ -38,19 +38,19 @@ class TridiagonalChain:
         Source: Demmel and Kahan, Accurate singular values of bidiagonal matrices, SIAM Journal on Scientific and
         Statistical Computing 11(5), 1990.
         """
-        size, held = len(self.inertias), self.supports.any()
+        size, supported = len(self.inertias), self.supports.any()
         if not size:
             return np.empty(0)
         pivots = felt(self.stiffnesses, self.supports) + np.append(self.stiffnesses, 0.0)
         beside = np.empty(2 * size - 1)
         beside[::2] = np.sqrt(pivots / self.inertias)
         beside[1::2] = self.stiffnesses / np.sqrt(pivots[:-1] * self.inertias[1:])
-        if not held:
+        if not supported:
             beside = beside[:-1]  # the whole turns, at a rate of zero
         last = len(beside) if count is None else min(size + count - 1, len(beside))
         if last < size:
             return np.empty(0)
-        found = eigvalsh_tridiagonal(
+        rates = eigvalsh_tridiagonal(
             np.zeros(len(beside) + 1),
             beside,
             select="i",
@@ -58,7 +58,7 @@ class TridiagonalChain:
             lapack_driver="stebz",
             tol=2 * np.finfo(float).tiny,
         )
-        return np.asarray(found, dtype=float)
+        return np.asarray(rates, dtype=float)
 
     def swing(self, rate: float) -> tuple[Array, Array]:
         """(n,) shape at one of the rates, with a modal inertia of 1 kg m^2, and (n - 1,) torques in the springs.
@@ -69,9 +69,9 @@ class TridiagonalChain:
         Source: Parlett and Dhillon, Fernando's solution to Wilkinson's problem: an application of double
         factorization, Linear Algebra and its Applications 267, 1997.
         """
-        own, last = self.supports - rate**2 * self.inertias, len(self.inertias) - 1
-        left, right = felt(self.stiffnesses, own), felt(self.stiffnesses[::-1], own[::-1])[::-1]
-        meet = int(np.argmin(np.abs(left + right - own) / self.inertias))
+        stiffness, last = self.supports - rate**2 * self.inertias, len(self.inertias) - 1
+        left, right = felt(self.stiffnesses, stiffness), felt(self.stiffnesses[::-1], stiffness[::-1])[::-1]
+        meet = int(np.argmin(np.abs(left + right - stiffness) / self.inertias))
         shape, torques = np.ones(last + 1), np.empty(last)
         for k in range(meet - 1, -1, -1):
             shape[k] = shape[k + 1] * followed(self.stiffnesses[k], left[k])
@@ -83,12 +83,12 @@ class TridiagonalChain:
         return shape / size, torques / size
 
 
-def felt(stiffnesses: Array, own: Array) -> Array:
+def felt(stiffnesses: Array, supports: Array) -> Array:
     """(n,) stiffness against the frame at each place, of itself and of all before it through the springs between."""
-    found = np.array(own)
+    stiffness = np.array(supports)
     for k, c in enumerate(stiffnesses):
-        found[k + 1] += found[k] * followed(c, found[k])
-    return found
+        stiffness[k + 1] += stiffness[k] * followed(c, stiffness[k])
+    return stiffness
 
 
 def followed(c: float, stiffness: float) -> float:
@@ -117,5 +117,5 @@ def singular_values(matrix: Array) -> Array:
     tall = entries if rows >= columns else entries.T
     values, _, _, scales, _, info = lapack.dgejsv(tall, joba=2, jobu=3, jobv=3, jobr=0, jobt=0, jobp=0)
     assert info == 0  # noqa: S101 (rotations of so few columns converge)
-    found = np.append(values * (scales[0] / scales[1]), np.zeros(max(columns - rows, 0)))
-    return np.asarray(np.sort(found), dtype=float)
+    padded = np.append(values * (scales[0] / scales[1]), np.zeros(max(columns - rows, 0)))
+    return np.asarray(np.sort(padded), dtype=float)

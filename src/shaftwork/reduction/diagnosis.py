@@ -15,17 +15,15 @@ from shaftwork.components.laws import t
 from shaftwork.components.tables import InterpolationSlope
 from shaftwork.core.errors import Diagnostic
 from shaftwork.network.checks import LEFT_OUT, connection_problems, examine
-from shaftwork.network.graph import CircuitGraph, build_graph
+from shaftwork.network.graph import CircuitGraph, GraphPart, build_graph
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import Netlist
 from shaftwork.network.wording import at_nodes, listed, title
-from shaftwork.reduction.cancelling import extreme_ratios, numeric_problems
-from shaftwork.reduction.changing import changing_problems
-from shaftwork.reduction.controlled import controlled_problems, reads_itself
+from shaftwork.reduction.controlled_sources import controlled_problems, reads_itself
 from shaftwork.reduction.form import StateForm, state_form
 from shaftwork.reduction.gains import value_of
-from shaftwork.reduction.starting import notes_of
 from shaftwork.reduction.tree import column_of
+from shaftwork.reduction.value_diagnosis import extreme_ratios, notes_of, numeric_problems
 from shaftwork.reduction.view import View, words_of
 
 _LACKING = (
@@ -53,27 +51,27 @@ def diagnose(netlist: Netlist) -> tuple[CircuitGraph | None, StateForm | None, t
     if not repaired.placed:
         return None, None, typed
     graph = build_graph(repaired)
-    found = [*connection_problems(graph)]
+    problems = [*connection_problems(graph)]
     try:
         form = state_form(graph)
-        found += [*structural_problems(form), *numeric_problems(form), *(() if typed else notes_of(graph))]
+        problems += [*structural_problems(form), *numeric_problems(form), *(() if typed else notes_of(graph))]
     except ArithmeticError:  # of the ratios: nothing else is computed with before the values are judged
         form = None
-        found.append(extreme_ratios(graph, range(len(graph.branches))))
-    problems = (*typed, *_causes(typed, found))
-    return (None, None, problems) if typed else (graph, form, problems)
+        problems.append(extreme_ratios(graph, range(len(graph.branches))))
+    causes = (*typed, *_causes(typed, problems))
+    return (None, None, causes) if typed else (graph, form, causes)
 
 
-def _causes(typed: Sequence[Diagnostic], found: Sequence[Diagnostic]) -> Iterator[Diagnostic]:
+def _causes(typed: Sequence[Diagnostic], problems: Sequence[Diagnostic]) -> Iterator[Diagnostic]:
     """The problems without those that follow from others: from a part left out, a value replaced, a missing end."""
     replaced = {part for problem in typed if problem.kind not in LEFT_OUT for part in problem.parts}
     covered = {node for problem in typed if problem.kind in LEFT_OUT for node in problem.nodes}
-    follows = {k for k, problem in enumerate(found) if problem.kind in _LACKING and covered & {*problem.nodes}}
+    follows = {k for k, problem in enumerate(problems) if problem.kind in _LACKING and covered & {*problem.nodes}}
     for kind in _LACKING:
-        same = [k for k, problem in enumerate(found) if problem.kind == kind]
-        follows |= {k for k in same if found[k].nodes and covered.issuperset(found[k].nodes)}
-        covered.update(node for k in same if found[k].severity == "error" for node in found[k].nodes)
-    for k, problem in enumerate(found):
+        same = [k for k, problem in enumerate(problems) if problem.kind == kind]
+        follows |= {k for k in same if problems[k].nodes and covered.issuperset(problems[k].nodes)}
+        covered.update(node for k in same if problems[k].severity == "error" for node in problems[k].nodes)
+    for k, problem in enumerate(problems):
         if k not in follows and not (problem.kind in _OF_VALUES and replaced & {*problem.parts}):
             yield problem
 
@@ -292,8 +290,8 @@ class _Structure(View):
 
     def fixed_ratios(self) -> Iterator[Diagnostic]:
         """Ratios whose values decide the structure of the equations."""
-        found = self.tree.frozen
-        names = tuple(name for name in self.graph.parameters if name in found)
+        frozen = self.tree.frozen
+        names = tuple(name for name in self.graph.parameters if name in frozen)
         if names:
             parts = tuple(dict.fromkeys(name.rsplit(".", 1)[0] for name in names))
             message = f"the values of {listed(names)} match in a closed loop and decide which equations there are."
@@ -314,3 +312,32 @@ def _jumps(law: sympy.Expr) -> tuple[float, ...]:
 
     reach = 1e-3 * min(gaps, default=1.0)
     return tuple(time for time in times if step(time, reach / 64) > 0.5 * step(time, reach) > 0)
+
+
+def changing_problems(view: View, jumping: Sequence[Diagnostic]) -> Iterator[Diagnostic]:
+    """Impulses that would need the inertia of their instant, and travelling waves.
+
+    Args:
+        view: the state form.
+        jumping: what is said of prescribed speeds that jump.
+    """
+    if not (changing := view.form.inertial):
+        return
+    store = view.words(changing[0]).store
+    begin = f"{view.titles(changing)} at {at_nodes(view.ends(changing))}: its {store} changes during the motion,"
+    rigid = [part for part in view.graph.parts if _strikes(part)]
+    jumps = [problem.parts[0] for problem in jumping]
+    waves = [*dict.fromkeys(view.graph.part_of(line).name for line in view.form.waves)]
+    for others, what, hint in (
+        ([part.name for part in rigid], "strikes rigidly", "Give the contact a stiffness c."),
+        (jumps, "jumps, which is an impulse to what is joined to it", "Let it rise in a short while, as Ramp does."),
+        (waves, "is a travelling wave", "Take model=Spectral(24) for the shaft."),
+    ):
+        if others:
+            message = f"{begin} but {listed(others)} {what}."
+            yield Diagnostic("changing inertia", message, hint, (*view.parts(changing), *others), view.ends(changing))
+
+
+def _strikes(part: GraphPart) -> bool:
+    """Whether a part has contacts from which speeds come back at once."""
+    return any(leave.rebound is not None for modes in part.modes for mode in modes.options for leave in mode.leaves)

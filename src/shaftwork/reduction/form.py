@@ -15,14 +15,18 @@ eliminated quantity comes back from F and Q.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+from sympy import Expr
+
+from shaftwork.components.base import Signal
 from shaftwork.components.branches import RATE
-from shaftwork.core.domains import Domain
+from shaftwork.core.domains import ROTATION, Domain
 from shaftwork.network.changing import is_bounded
 from shaftwork.network.controlled import Reading, readings_of
-from shaftwork.network.graph import CircuitGraph, GraphBranch
+from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart, signals_of
 from shaftwork.network.kinds import Kind
 from shaftwork.reduction.tree import NormalTree, normal_tree
 
@@ -54,6 +58,10 @@ class StateForm:
     graph: CircuitGraph
     tree: NormalTree
     angles: tuple[int, ...] = ()
+
+    def law_of(self, branch: int) -> Expr:
+        """The coefficient or law of a branch in the symbols of the network."""
+        return self.graph.in_network_symbols(self.graph.branches[branch].template.law, self.graph.branches[branch])
 
     @property
     def across_sources(self) -> tuple[int, ...]:
@@ -126,9 +134,9 @@ class StateForm:
     def integrals(self) -> tuple[int, ...]:
         """Branches whose integrated across variable is read by a law or asked for: each adds a state."""
         laws = (*self.laws, *self.tree.tree[Kind.LAW])
-        own = (index for index in laws if self.graph.branches[index].template.has_integral)
+        integrated = (index for index in laws if self.graph.branches[index].template.has_integral)
         read = (reading.of for reading in self.readings if reading.kind == "integral")
-        return tuple(dict.fromkeys((*own, *read, *self.angles)))
+        return tuple(dict.fromkeys((*integrated, *read, *self.angles)))
 
     @cached_property
     def recorded(self) -> tuple[int, ...]:
@@ -145,8 +153,8 @@ class StateForm:
     def readings(self) -> tuple[Reading, ...]:
         """What laws read besides what is across their own branches, each once: nodes, then branches."""
         laws = (*self.tree.links[Kind.LAW], *self.tree.tree[Kind.LAW], *self.controlled)
-        found = dict.fromkeys(reading for law in laws for reading in readings_of(self.graph, law).values())
-        return tuple(sorted(found, key=lambda reading: KINDS.index(reading.kind)))
+        readings = dict.fromkeys(reading for law in laws for reading in readings_of(self.graph, law).values())
+        return tuple(sorted(readings, key=lambda reading: KINDS.index(reading.kind)))
 
     @cached_property
     def waves(self) -> tuple[int, ...]:
@@ -191,8 +199,8 @@ def branch_name(graph: CircuitGraph, branch: GraphBranch) -> str:
 
 def store_name(graph: CircuitGraph, branch: GraphBranch) -> str:
     """The name that a store's state has, where it is one: "J1.omega", "shaft.tau_c"."""
-    made = _across_state if branch.template.kind is Kind.ACROSS_STORE else _through_state
-    return made(graph, branch).name
+    state_of = _across_state if branch.template.kind is Kind.ACROSS_STORE else _through_state
+    return state_of(graph, branch).name
 
 
 def integral_name(graph: CircuitGraph, branch: GraphBranch) -> str:
@@ -225,3 +233,59 @@ def _through_state(graph: CircuitGraph, branch: GraphBranch) -> State:
 def _integral_state(graph: CircuitGraph, branch: GraphBranch) -> State:
     quantity = _domain(graph, branch).integral
     return State(integral_name(graph, branch), branch.index, "integral", quantity.unit, quantity.latex)
+
+
+class Names:
+    """The names of all quantities of a model; made once for all motions in the same equations.
+
+    Args:
+        form: the state form.
+    """
+
+    def __init__(self, form: StateForm) -> None:
+        self._form, self._graph = form, form.graph
+
+    @cached_property
+    def signals(self) -> dict[str, tuple[GraphPart, Signal]]:
+        """Signals of parts."""
+        parts = self._graph.parts
+        return {f"{p.name}.{name}": (p, signal) for p in parts for name, signal in signals_of(self._graph, p).items()}
+
+    @cached_property
+    def integrals(self) -> dict[str, int]:
+        """States that are integrals, by number."""
+        return {state.name: k for k, state in enumerate(self._form.states) if state.kind == "integral"}
+
+    @cached_property
+    def nodes(self) -> dict[str, int]:
+        """Speeds of nodes and the like, by number of the node."""
+        pairs = zip(self._graph.nodes, self._graph.domains, strict=True)
+        return {f"{name}.{domain.across.name}": k for k, (name, domain) in enumerate(pairs)}
+
+    @cached_property
+    def units(self) -> Mapping[str, str]:
+        """Every quantity that can be read and its unit; where a part and a node share a name, the part's is meant."""
+        units = {f"{name}": domain.across.unit for name, domain in zip(self.nodes, self._graph.domains, strict=True)}
+        units |= {name: _unit(signal) for name, (_, signal) in self.signals.items()}
+        units |= {s.name: s.unit for s in self._form.states if s.kind == "integral"}
+        units |= {f"{part.name}.power": "W" for part in self._graph.parts}
+        return units | {f"{part.name}.energy": "J" for part in self._graph.parts}
+
+    @property
+    def wiring(self) -> Mapping[str, str]:
+        """See `CircuitGraph.wiring`."""
+        return self._graph.wiring
+
+    def nodes_of(self, name: str) -> tuple[str, ...]:
+        """Names of the nodes that a signal of a part or the speed of a node is of, the reference not among them."""
+        if name not in self.signals:
+            return (self._graph.node_name(self.nodes[name]),) if name in self.nodes else ()
+        part, signal = self.signals[name]
+        numbers = (part.nodes[end] for end in signal.ends if end is not None)
+        return tuple(self._graph.node_name(number) for number in numbers if number != GROUND)
+
+
+def _unit(signal: Signal) -> str:
+    domain = signal.domain or ROTATION
+    quantity = {"across": domain.across, "twist": domain.integral}.get(signal.kind, domain.through)
+    return quantity.unit

@@ -10,7 +10,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 from zlib import crc32
 
 from sympy import Expr, Float, Integer, Mul, Rational, Symbol, cancel
@@ -24,7 +24,6 @@ _OPERATIONS: Mapping[str, Callable[[Any, Any], Any]] = {
 }
 LONGEST = 1000
 """The largest denominator of a fraction that is printed as one."""
-T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,26 +98,28 @@ def divide(first: Number, second: Number) -> Number:
     return _combined("/", first, second)
 
 
-def fold(gains: Iterable[Gain], leaf: Callable[[Expr], T]) -> list[T]:
-    """Each gain with its coefficients replaced by what `leaf` makes of them; shared parts are computed once.
+def fold(numbers: Iterable[Number], leaf: Callable[[Expr], Any]) -> list[Any]:
+    """The numbers with the coefficients of gains replaced by what `leaf` makes of them; whole numbers stay.
+
+    What gains share is computed once.
 
     Args:
-        gains: what to compute.
+        numbers: what to compute.
         leaf: from a coefficient to a number or an expression.
     """
-    wanted = tuple(gains)
+    wanted = tuple(numbers)
     done: dict[int, Any] = {}
 
-    def known(number: Number) -> Any:
+    def value(number: Number) -> Any:
         return done[id(number)] if isinstance(number, Gain) else number
 
-    for gain in _parts_first(wanted):
+    for gain in _parts_first([number for number in wanted if isinstance(number, Gain)]):
         if gain.operation:
             first, second = gain.of
-            done[id(gain)] = _OPERATIONS[gain.operation](known(first), known(second))
+            done[id(gain)] = _OPERATIONS[gain.operation](value(first), value(second))
         else:
             done[id(gain)] = leaf(gain.of[0])
-    return [done[id(gain)] for gain in wanted]
+    return [value(number) for number in wanted]
 
 
 def _parts_first(gains: Sequence[Gain]) -> list[Gain]:
@@ -145,15 +146,10 @@ def any_sum_vanishes(gains: Iterable[Gain], values: Mapping[Expr, float]) -> boo
     terms = [gain.of for gain in sums]
     try:
         totals = fold(sums, values.__getitem__)
-        sizes = [max(abs(number) for number in _folded(pair, values)) for pair in terms]
+        sizes = [max(map(abs, fold(pair, values.__getitem__))) for pair in terms]
     except ZeroDivisionError:
         return True
     return any(abs(total) <= CANCELLATION * size for total, size in zip(totals, sizes, strict=True))
-
-
-def _folded(numbers: Sequence[Number], values: Mapping[Expr, float]) -> list[float]:
-    folded = iter(fold((number for number in numbers if isinstance(number, Gain)), values.__getitem__))
-    return [next(folded) if isinstance(number, Gain) else float(number) for number in numbers]
 
 
 def coefficients_in(gains: Iterable[Gain]) -> tuple[Expr, ...]:
@@ -163,9 +159,9 @@ def coefficients_in(gains: Iterable[Gain]) -> tuple[Expr, ...]:
 
 def exact_of(numbers: Iterable[Number]) -> list[Expr]:
     """The numbers as sympy expressions in the parameters of the network."""
-    listed = tuple(numbers)
-    expressions = iter(fold((number for number in listed if isinstance(number, Gain)), lambda made: made))
-    return [next(expressions) if isinstance(number, Gain) else Integer(number) for number in listed]
+    return [
+        Integer(exact) if isinstance(exact, int) else exact for exact in fold(numbers, lambda coefficient: coefficient)
+    ]
 
 
 def simplified(numbers: Iterable[Number]) -> list[Expr]:
@@ -173,9 +169,8 @@ def simplified(numbers: Iterable[Number]) -> list[Expr]:
 
     Those of long gear trains are made of each other: what they share is multiplied out once for all of them.
     """
-    listed = tuple(numbers)
-    found = iter(fold((number for number in listed if isinstance(number, Gain)), exactly))
-    return [in_decimals(_shortest(next(found))) if isinstance(number, Gain) else Integer(number) for number in listed]
+    exact = fold(numbers, exactly)
+    return [Integer(number) if isinstance(number, int) else in_decimals(_shortest(number)) for number in exact]
 
 
 def _shortest(expression: Expr) -> Expr:

@@ -16,8 +16,8 @@ from dataclasses import replace
 import networkx as nx
 from sympy import Add, Expr, Symbol
 
+from shaftwork.reduction.explicit_rows import Rows
 from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.rows import Rows
 
 LARGEST_GROUP = 8
 """States that such laws may connect: each of their rows has as many terms."""
@@ -84,9 +84,9 @@ def groups(form: StateForm, laws: Iterable[int], others: Iterable[Collection[int
         if not 0 < len(places) <= 2 or graph.has_edge(*ends):
             return None
         graph.add_edge(*ends)
-    found = [set(group) for group in nx.connected_components(graph.subgraph([n for n in graph if n != FRAME]))]
+    sets = [set(group) for group in nx.connected_components(graph.subgraph([n for n in graph if n != FRAME]))]
     rigid = (*others, *(held_places(form, link) for link in form.dependent_across))
     taken = set[int]().union(*rigid)
-    if not nx.is_forest(graph) or any(len(group) > LARGEST_GROUP or not taken.isdisjoint(group) for group in found):
+    if not nx.is_forest(graph) or any(len(group) > LARGEST_GROUP or not taken.isdisjoint(group) for group in sets):
         return None
-    return found
+    return sets

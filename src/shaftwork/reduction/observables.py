@@ -1,4 +1,4 @@
-"""What the guards of modes read, as expressions in states, parameters and time: any speed, torque and angle of a part.
+"""What parts, nodes and stores show, as expressions in states, parameters and time: what the guards of modes read.
 
 Reactions are among them, the torque through a stuck brake for instance. That of a tree branch is the sum over its
 cutset, in which an inertia that follows others takes its torque from their rates:
@@ -14,6 +14,7 @@ from typing import Literal
 
 from sympy import Add, Expr, Integer, Symbol, nan, oo, zoo
 
+from shaftwork.components.base import Signal
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, End, across_of, integral_of, through_of
 from shaftwork.components.clips import replaced
 from shaftwork.components.discontinuities import parts
@@ -21,11 +22,11 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Modes
 from shaftwork.components.slopes import slope
 from shaftwork.core.errors import Diagnostic, NetworkError
-from shaftwork.network.graph import GROUND, GraphBranch, GraphPart
+from shaftwork.network.graph import GROUND, GraphBranch, GraphPart, signals_of
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.form import StateForm
+from shaftwork.reduction.explicit_rows import Rows
+from shaftwork.reduction.form import StateForm, store_name
 from shaftwork.reduction.gains import exact_of
-from shaftwork.reduction.rows import Rows
 
 
 def _no_limit(name: str) -> Diagnostic:
@@ -52,6 +53,46 @@ class Observables:
         """What the expressions are made of, besides time and parameters."""
         return self.rows.states
 
+    def quantity(self, name: str) -> Expr | None:
+        """A quantity by its name, such as "shaft.tau"; None for an energy, a power or what does not exist."""
+        owner, _, quantity = name.rpartition(".")
+        part = next((part for part in self.graph.parts if part.name == owner), None)
+        if part is not None and (signal := signals_of(self.graph, part).get(quantity)) is not None:
+            return signal.sign * self._signal(part, signal)
+        if any(state.name == name and state.kind == "integral" for state in self.form.states):
+            return Symbol(name, real=True)
+        return self._nodes.get(name)
+
+    def store(self, name: str) -> Expr:
+        """What is stored, by the name of its state, whether it is one or not."""
+        if any(state.name == name for state in self.form.states):
+            return Symbol(name, real=True)
+        stores = (b for b in self.graph.branches if b.template.kind in (Kind.ACROSS_STORE, Kind.THROUGH_STORE))
+        branch = next(store for store in stores if store_name(self.graph, store) == name)
+        if branch.template.kind is Kind.THROUGH_STORE:
+            return self.through(branch.index)
+        return self._between(self.graph.parts[branch.part], branch.template.ends)
+
+    def _signal(self, part: GraphPart, signal: Signal) -> Expr:
+        if signal.kind == "across":
+            return self._between(part, signal.ends)
+        if signal.kind == "through":
+            return self.into(part, signal.ends[0])
+        springs = (branch for branch in self._of(part) if branch.template.kind is Kind.THROUGH_STORE)
+        spring = next(branch for branch in springs if signal.label in ("", branch.template.label))
+        through = self.through(spring.index)
+        return through if signal.kind == "store" else through / self.form.law_of(spring.index)
+
+    @cached_property
+    def _nodes(self) -> dict[str, Expr]:
+        speeds: dict[str, Expr] = {}
+        for part in self.graph.parts:
+            for port, node in part.nodes.items():
+                if node != GROUND:
+                    name = f"{self.graph.nodes[node]}.{self.graph.domains[node].across.name}"
+                    speeds.setdefault(name, self.across(part, port))
+        return speeds
+
     def guard(self, part: GraphPart, element: Modes, expression: Expr) -> Expr:
         """An expression of a guard, in the symbols of its component, in states, the network's parameters and time.
 
@@ -59,20 +100,20 @@ class Observables:
             NetworkError: it has no finite value: a law of another part has a pole where this part holds still.
         """
         ends = part.ends_of(element)
-        known: dict[Symbol, Expr] = {}
+        values: dict[Symbol, Expr] = {}
         for symbol in expression.free_symbols - {TIME}:
             if symbol == ACROSS:
-                known[symbol] = self.across(part, ends[0]) - self.across(part, ends[1])
+                values[symbol] = self._between(part, ends)
             elif symbol == THROUGH:
-                known[symbol] = self.into(part, ends[0])
+                values[symbol] = self.into(part, ends[0])
             elif symbol == INTEGRAL:
-                known[symbol] = self._integral(part, element.angle)
+                values[symbol] = self._integral(part, element.angle)
             else:
-                known[symbol] = self._named(part, symbol)
-        made = replaced(expression, known)
-        if not {zoo, oo, nan}.isdisjoint(parts((made,))):
+                values[symbol] = self._named(part, symbol)
+        guard = replaced(expression, values)
+        if not {zoo, oo, nan}.isdisjoint(parts((guard,))):
             raise NetworkError(f"'{self.graph.name}' cannot be assembled", (_no_limit(part.name),))
-        return made
+        return guard
 
     def _named(self, part: GraphPart, symbol: Symbol) -> Expr:
         for port in part.nodes:
@@ -85,6 +126,9 @@ class Observables:
             if symbol == integral_of(label):
                 return self._integral(part, label)
         return self.graph.symbol_of(part, symbol.name)
+
+    def _between(self, part: GraphPart, ends: tuple[End, End]) -> Expr:
+        return self.across(part, ends[0]) - self.across(part, ends[1])
 
     def across(self, part: GraphPart, port: End) -> Expr:
         """The across variable of a port against the reference."""
@@ -101,7 +145,7 @@ class Observables:
             return self.rows.across[tree]
         # a spring in series with others: its speed is the rate of its torque over its stiffness
         rates = Add(*(gain * self._rate_of_through(link) for link, gain in self._cutsets.get(tree, ())))
-        return -rates / self._law(tree)
+        return -rates / self.form.law_of(tree)
 
     def _rate_of_through(self, link: int) -> Expr:
         if link in self.form.through_states:
@@ -122,14 +166,15 @@ class Observables:
     def through(self, branch: int) -> Expr:
         """The through variable of a branch; of a coupling its lambda."""
         if branch not in self._through:
-            self._through[branch] = self._made(branch)
+            self._through[branch] = self._through_of(branch)
         return self._through[branch]
 
-    def _made(self, branch: int) -> Expr:
+    def _through_of(self, branch: int) -> Expr:
         if branch in self.rows.through:
             return self.rows.through[branch]
         if branch in self.form.dependent_across:
-            return self._law(branch) * Add(*(gain * self._rate_of_across(tree) for tree, gain in self._loop(branch)))
+            rates = (gain * self._rate_of_across(tree) for tree, gain in self._loop(branch))
+            return self.form.law_of(branch) * Add(*rates)
         if branch in self.form.tree.loops:  # a redundant joint carries nothing
             return Integer(0)
         return -Add(*(gain * self.through(link) for link, gain in self._cutsets.get(branch, ())))
@@ -146,24 +191,20 @@ class Observables:
     @cached_property
     def _cutsets(self) -> dict[int, list[tuple[int, Expr]]]:
         entries = [(tree, link, gain) for link, row in self.form.tree.cutsets.items() for tree, gain in row.items()]
-        found: dict[int, list[tuple[int, Expr]]] = {}
+        cutsets: dict[int, list[tuple[int, Expr]]] = {}
         for (tree, link, _), gain in zip(entries, exact_of(gain for _, _, gain in entries), strict=True):
-            found.setdefault(tree, []).append((link, gain))
-        return found
+            cutsets.setdefault(tree, []).append((link, gain))
+        return cutsets
 
     def _integral(self, part: GraphPart, label: str) -> Expr:
-        own = {branch.index: branch for branch in self._of(part)}
+        labels = {branch.index: branch.template.label for branch in self._of(part)}
         for state in self.form.states:
-            if state.kind == "integral" and state.branch in own and label in ("", own[state.branch].template.label):
+            if state.kind == "integral" and state.branch in labels and label in ("", labels[state.branch]):
                 return Symbol(state.name, real=True)
         raise AssertionError(f"{part.name} has no angle")  # its laws read one in every form
 
     def _of(self, part: GraphPart) -> list[GraphBranch]:
         return [self.graph.branches[k] for k in part.branches]
-
-    def _law(self, branch: int) -> Expr:
-        made = self.graph.branches[branch]
-        return self.graph.in_network_symbols(made.template.law, made)
 
 
 @dataclass(frozen=True)
@@ -215,4 +256,4 @@ class NamedReadings(Observables):
 
     def _integral(self, part: GraphPart, label: str) -> Expr:
         state = super()._integral(part, label)
-        return self._symbol(Observable("state", [made.name for made in self.form.states].index(state.name)))
+        return self._symbol(Observable("state", [each.name for each in self.form.states].index(state.name)))

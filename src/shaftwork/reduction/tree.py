@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from sympy import Expr
 
@@ -149,14 +150,14 @@ def _gain(graph: CircuitGraph, branch: GraphBranch, expression: Expr) -> Number:
     if expression.is_Integer:
         return int(expression)
     part = graph.parts[branch.part]
-    own = (graph.symbol_of(part, symbol.name) for symbol in branch.template.symbols)
-    values = {symbol: graph.parameters[symbol.name] for symbol in own}
+    symbols = (graph.symbol_of(part, symbol.name) for symbol in branch.template.symbols)
+    values = {symbol: graph.parameters[symbol.name] for symbol in symbols}
     return coefficient(graph.in_network_symbols(expression, branch), values)
 
 
 def _names_in(gains: list[Gain]) -> tuple[str, ...]:
     """The parameters that gains are made of."""
-    return tuple(sorted({symbol.name for made in coefficients_in(gains) for symbol in made.free_symbols}))
+    return tuple(sorted({symbol.name for ratio in coefficients_in(gains) for symbol in ratio.free_symbols}))
 
 
 def _by_branch(row: Row) -> Row:
@@ -179,7 +180,7 @@ def normal_tree(graph: CircuitGraph) -> NormalTree:
     locked: list[tuple[int, tuple[int, ...]]] = []
     columns = {branch.index: column_of(graph, branch) for branch in graph.branches}
     balances = {branch.index: balance_of(graph, branch) for branch in graph.branches} if lossy else columns
-    for branch in sorted(graph.branches, key=lambda made: _rank(graph, made)):  # stable: keeps the order of the table
+    for branch in sorted(graph.branches, key=partial(_rank, graph)):  # stable: keeps the order of the table
         kind, index = branch.template.kind, branch.index
         reduced = work.reduce(columns[index])
         opposed = torques.reduce(balances[index]) if lossy else reduced
@@ -220,7 +221,7 @@ def _rank(graph: CircuitGraph, branch: GraphBranch) -> tuple[Kind, int]:
     kind, modes = branch.template.kind, graph.parts[branch.part].modes
     if kind is not Kind.COUPLING or not modes:
         return kind, 0
-    return kind, 1 if any(made.passes_on for made in modes) else 2
+    return kind, 1 if any(element.passes_on for element in modes) else 2
 
 
 def _is_free(reduced: Row) -> bool:

@@ -82,8 +82,8 @@ class View:
 
     def ends(self, branches: Iterable[int]) -> tuple[str, ...]:
         """The nodes at the ends of branches."""
-        found = (edge for branch in branches for edge in ends_of(self.graph.branches[branch]))
-        return self.nodes(node for _, plus, minus in found for node in (plus, minus))
+        edges = (edge for branch in branches for edge in ends_of(self.graph.branches[branch]))
+        return self.nodes(node for _, plus, minus in edges for node in (plus, minus))
 
     def words(self, branch: int) -> Words:
         """The words of the domain in which a branch lies."""

@@ -7,7 +7,8 @@ from shaftwork.studies.stability import Cell, Stability, stability
 from shaftwork.studies.stability_cases import Case
 from shaftwork.studies.sweep import sweep
 from shaftwork.studies.sweep_result import Sweep
-from shaftwork.studies.work_precision import Trial, WorkPrecision, work_precision
+from shaftwork.studies.work_precision import work_precision
+from shaftwork.studies.work_precision_result import Trial, WorkPrecision
 
 __all__ = [
     "Case",

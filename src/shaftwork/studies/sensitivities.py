@@ -11,7 +11,7 @@ from shaftwork.pipeline.sensitivities.derivatives import frequency_sensitivities
 from shaftwork.pipeline.sensitivities.derivatives import motion_sensitivities as of_motion
 from shaftwork.results.measures import Measure
 from shaftwork.results.sensitivities import FrequencySensitivities, MotionSensitivities
-from shaftwork.studies.arguments import by_name
+from shaftwork.studies.study_arguments import by_name
 
 
 def frequency_sensitivities(

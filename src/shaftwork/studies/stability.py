@@ -6,23 +6,25 @@ import csv
 import re
 import time
 import warnings
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
 from shaftwork.components.shaft_models import ShaftModel, Wave
-from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError, in_one_line
+from shaftwork.core.errors import MissingExtraError, ParameterError, ShaftworkError, SimulationError, in_one_line
 from shaftwork.core.files import replaced
+from shaftwork.core.screen import in_columns
 from shaftwork.integrate.engines import ENGINES, available
 from shaftwork.pipeline.arguments import NOMINAL
 from shaftwork.pipeline.model import Model
 from shaftwork.results.observer import Array
-from shaftwork.studies.arguments import engine_names, several, shaft_models
 from shaftwork.studies.stability_cases import CASES, TORQUE, Case
 from shaftwork.studies.stability_truth import QUANTITIES, EndMotion, exact, predicted
+from shaftwork.studies.study_arguments import engine_names, several, shaft_models, text_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,7 +37,7 @@ MOST_BALANCED = 500
 """Up to so many states, where all of the motion is output, the energy balance is drawn for the engine "auto"."""
 
 Verdict = Literal["right", "coarse", "warned", "refused", "failed", "too long", "unknown", "wrong"]
-VERDICTS: tuple[Verdict, ...] = ("right", "coarse", "warned", "refused", "failed", "too long", "unknown", "wrong")
+VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
 
 @dataclass(frozen=True)
@@ -99,10 +101,10 @@ class Stability:
     @property
     def rows(self) -> dict[tuple[str, str], dict[str, Cell]]:
         """By case and model, then by engine."""
-        made: dict[tuple[str, str], dict[str, Cell]] = {}
+        rows: dict[tuple[str, str], dict[str, Cell]] = {}
         for cell in self.cells:
-            made.setdefault((cell.case, cell.model), {})[cell.engine] = cell
-        return made
+            rows.setdefault((cell.case, cell.model), {})[cell.engine] = cell
+        return rows
 
     @property
     def reasons(self) -> tuple[str, ...]:
@@ -118,12 +120,9 @@ class Stability:
         table = [["case", "model", *self.engines]]
         for (case, model), row in self.rows.items():
             table.append([case, model, *(str(row[name]) if name in row else "" for name in self.engines)])
-        widths = [max(len(row[k]) for row in table) for k in range(len(table[0]))]
-        lines = [
-            "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in table
-        ]
         counts = ", ".join(f"{count} {verdict}" for verdict, count in self.counts.items() if count)
-        return "\n".join([*lines, "", f"{len(self.cells)} cells: {counts}; wrong without a warning: {len(self.wrong)}"])
+        total = f"{len(self.cells)} cells: {counts}; wrong without a warning: {len(self.wrong)}"
+        return "\n".join([*in_columns(table), "", total])
 
     def to_csv(self, path: str | Path) -> None:
         """Write every cell with all that is known about it."""
@@ -135,9 +134,7 @@ class Stability:
 
     def plot(self) -> Figure:
         """The table as a coloured matrix (extra `plot`)."""
-        from shaftwork.studies.stability_picture import stability_figure
-
-        return stability_figure(self)
+        return _figure(self)
 
 
 def stability(
@@ -159,13 +156,13 @@ def stability(
     Raises:
         ParameterError: there is no such case, model or engine.
     """
-    asked = engine_names(engines) or ("auto", *(name for name in ENGINES if available(name)), "wave")
+    names = engine_names(engines) or ("auto", *(name for name in ENGINES if available(name)), "wave")
     read = shaft_models(models)
     cells: list[Cell] = []
     for case in [_named(case) if isinstance(case, str) else case for case in several("cases", cases)]:
         truth = exact(case)
         for model in read or case.models:
-            cells += _row(case, model, [name for name in asked if name in (case.engines or asked)], truth)
+            cells += _row(case, model, [name for name in names if name in (case.engines or names)], truth)
     return Stability(tuple(cells))
 
 
@@ -178,8 +175,8 @@ def _named(name: str) -> Case:
 
 def _row(case: Case, model: ShaftModel, engines: Sequence[str], truth: EndMotion) -> list[Cell]:
     """One model with each engine."""
-    own = truth if isinstance(model, Wave) else predicted(case, model)
-    label = (case.name, _text(model))
+    ideal = truth if isinstance(model, Wave) else predicted(case, model)
+    label = (case.name, text_of(model))
     try:
         with warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always")
@@ -187,7 +184,7 @@ def _row(case: Case, model: ShaftModel, engines: Sequence[str], truth: EndMotion
     except ShaftworkError as error:
         return [Cell(*label, engine, "", "refused", why=in_one_line(error)) for engine in engines]
     warned = "; ".join(str(warning.message) for warning in said)
-    return [_cell(case, label, compiled, engine, truth, own, warned) for engine in engines]
+    return [_cell(case, label, compiled, engine, truth, ideal, warned) for engine in engines]
 
 
 def _cell(
@@ -196,7 +193,7 @@ def _cell(
     compiled: Model,
     engine: str,
     truth: EndMotion,
-    own: EndMotion | None,
+    ideal: EndMotion | None,
     warned: str,
 ) -> Cell:
     began = time.process_time()
@@ -204,7 +201,7 @@ def _cell(
         with warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always")
             run = compiled.simulate(case.t_end, t_eval=case.times, engine=engine, max_steps=case.steps)  # type: ignore[arg-type]
-            found = {name: run[f"line.{name}"] for name in QUANTITIES}
+            quantities = {name: run[f"line.{name}"] for name in QUANTITIES}
             cpu = time.process_time() - began
             balanced = engine == "auto" and not case.periods and len(compiled.states) <= MOST_BALANCED
             energy = run.energy_residual if balanced else np.nan
@@ -215,20 +212,20 @@ def _cell(
     except ShaftworkError as error:
         return Cell(*label, engine, "", "refused", why=in_one_line(error))
     why = "; ".join(filter(None, [warned, *(str(warning.message) for warning in said)]))
-    measured, expected, deviation = distances(found, truth, own)
+    measured, expected, deviation = distances(quantities, truth, ideal)
     verdict = judge(measured, deviation, energy, truth.error, warned=bool(why))
     return Cell(*label, engine, run.engine, verdict, measured, expected, deviation, energy, cpu, why)
 
 
-def distances(found: dict[str, Array], truth: EndMotion, own: EndMotion | None) -> tuple[float, float, float]:
+def distances(run: dict[str, Array], truth: EndMotion, ideal: EndMotion | None) -> tuple[float, float, float]:
     """Of a run from the truth, of its model's own motion from the truth, and of the run from that motion.
 
     All are the largest over time and quantities, of the largest torque or speed of the truth and of the model's own
     motion, and no less than the motor's torque and the speed that the absolute tolerance of a run is made for.
     """
     sizes = {"tau": TORQUE, "omega": NOMINAL}
-    for known in (truth, own or truth):
-        for name, values in known.values.items():
+    for motion in (truth, ideal or truth):
+        for name, values in motion.values.items():
             kind = name.partition("_")[0]
             sizes[kind] = max(sizes[kind], float(np.abs(values).max()))
 
@@ -236,9 +233,9 @@ def distances(found: dict[str, Array], truth: EndMotion, own: EndMotion | None) 
         gaps = [np.abs(one[name] - other[name]).max() / sizes[name.partition("_")[0]] for name in QUANTITIES]
         return float(np.max(gaps))
 
-    if own is None:
-        return distance(found, truth.values), np.nan, np.nan
-    return distance(found, truth.values), distance(own.values, truth.values), distance(found, own.values)
+    if ideal is None:
+        return distance(run, truth.values), np.nan, np.nan
+    return distance(run, truth.values), distance(ideal.values, truth.values), distance(run, ideal.values)
 
 
 def judge(error: float, deviation: float, energy: float, uncertainty: float, *, warned: bool) -> Verdict:
@@ -261,8 +258,74 @@ def judge(error: float, deviation: float, energy: float, uncertainty: float, *, 
     return "unknown" if sound and np.isnan(deviation) else "wrong"
 
 
-def _text(model: ShaftModel) -> str:
-    text = repr(model)
-    for default in (", ends='half'", ", order=2", ", closure='sbp'", ", second_difference='consistent'"):
-        text = text.replace(default, "")
-    return text
+COLOURS = {
+    "right": "#2e8b57",
+    "coarse": "#a8d5a2",
+    "warned": "#f2d45c",
+    "refused": "#c3cad3",
+    "failed": "#8795a8",
+    "too long": "#f0a860",
+    "unknown": "#b59ad6",
+    "wrong": "#d62728",
+}
+ABSENT = "#ffffff"
+LEAST = 1e-16
+"""Errors below are drawn as this one."""
+COLUMN, LETTER = 0.24, 0.075
+"""Least width of a column, and width of a letter above the columns, in inches."""
+SIZE = re.compile(r"\b(?:m|n|places)=\d+(?:, )?")
+
+
+def _figure(study: Stability) -> Figure:
+    """Cases downwards; models, and in each of them engines, from left to right; the exponent of the error in each cell.
+
+    Models that differ by their size alone share columns, unless a case has several of them.
+    """
+    try:
+        from matplotlib.colors import ListedColormap
+        from matplotlib.figure import Figure
+        from matplotlib.patches import Patch
+    except ImportError:
+        raise MissingExtraError("matplotlib", "plot", "Stability.plot()") from None
+    engines, cases = study.engines, tuple(dict.fromkeys(cell.case for cell in study.cells))
+    kind_of = _kinds(study)
+    kinds = tuple(dict.fromkeys(kind_of.values()))
+    numbers = np.zeros((len(cases), len(kinds) * len(engines)))
+    names = list(COLOURS)
+    longest = max(len(line) for kind in kinds for line in kind.splitlines())
+    width = max(COLUMN * len(engines), LETTER * (longest + 2)) * len(kinds)
+    figure = Figure(figsize=(max(2.5 + width, 8.0), 2.4 + 0.22 * len(cases)), layout="constrained")
+    axes = figure.subplots()
+    for cell in study.cells:
+        row = cases.index(cell.case)
+        column = kinds.index(kind_of[cell.model]) * len(engines) + engines.index(cell.engine)
+        numbers[row, column] = 1 + names.index(cell.verdict)
+        if np.isfinite(cell.error):
+            exponent = int(np.ceil(np.log10(max(cell.error, LEAST))))
+            colour = "white" if cell.verdict in ("right", "wrong") else "black"
+            axes.text(column, row, str(exponent), ha="center", va="center", fontsize=6, color=colour)
+    axes.imshow(numbers, cmap=ListedColormap([ABSENT, *COLOURS.values()]), vmin=0, vmax=len(names), aspect="auto")
+    axes.set_yticks(range(len(cases)), cases, fontsize=7)
+    axes.set_xticks(range(numbers.shape[1]), engines * len(kinds), fontsize=6, rotation=90)
+    middles = np.arange(len(kinds)) * len(engines) + (len(engines) - 1) / 2
+    above = axes.secondary_xaxis("top")
+    above.set_xticks(middles, kinds, fontsize=8)
+    above.tick_params(length=0)
+    for k in range(1, len(kinds)):
+        axes.axvline(k * len(engines) - 0.5, color="black", linewidth=1.2)
+    for k in range(1, len(cases)):
+        axes.axhline(k - 0.5, color="white", linewidth=1.0)
+    counts = study.counts
+    handles = [Patch(color=COLOURS[name], label=f"{name} ({counts[name]})") for name in names]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(names), fontsize=7, frameon=False)
+    figure.suptitle("Extreme drives: verdict, and power of ten that the error does not exceed", fontsize=10)
+    return figure
+
+
+def _kinds(study: Stability) -> dict[str, str]:
+    """The heading over the columns of each model: its name, and in a second line what it is beside its size."""
+    models = tuple(dict.fromkeys(cell.model for cell in study.cells))
+    short = {model: SIZE.sub("", model).replace(", )", ")").replace("()", "") for model in models}
+    beside = Counter((case, short[model]) for case, model in study.rows)
+    several = {kind for (_, kind), count in beside.items() if count > 1}
+    return {model: (model if kind in several else kind).replace("(", "\n(", 1) for model, kind in short.items()}

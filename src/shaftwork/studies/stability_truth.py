@@ -58,14 +58,14 @@ def exact(case: Case) -> EndMotion:
     late = case.t_end - 6 * case.section.delay if case.periods else 0.0
     t = case.times - late
     kinks = (case.rise * case.section.delay,) if case.form in ("pulse", "ramp") else ()
-    found = motion(line, [JunctionTorque(0, lambda t: _torque(case, t), kinks)], case.t_end - late)
+    junctions = motion(line, [JunctionTorque(0, lambda t: _torque(case, t), kinks)], case.t_end - late)
     values = {
-        "tau_a": found.torque_in(0, t, "left"),
-        "tau_b": found.torque_in(0, t, "right"),
-        "omega_a": found.junction_speed(0, t),
-        "omega_b": found.junction_speed(1, t),
+        "tau_a": junctions.torque_in(0, t, "left"),
+        "tau_b": junctions.torque_in(0, t, "right"),
+        "omega_a": junctions.junction_speed(0, t),
+        "omega_b": junctions.junction_speed(1, t),
     }
-    return EndMotion(values, found.error, "characteristics")
+    return EndMotion(values, junctions.error, "characteristics")
 
 
 def _line(case: Case) -> SectionLine:
@@ -209,9 +209,9 @@ def _chain(case: Case, model: ShaftModel) -> _Chain | None:
     masses[0] += case.drive * case.inertia
     masses[last] += case.load * case.inertia
     brakes[last] = case.damper * section.impedance
-    kept = last if case.clamped else last + 1
-    held = (masses[:kept], shares[:kept], weights[:, :kept], springs, slips[:, :kept], dashpots, brakes[:kept])
-    return _Chain(*held, np.zeros(kept) if case.clamped else far)
+    count = last if case.clamped else last + 1
+    free = (masses[:count], shares[:count], weights[:, :count], springs, slips[:, :count], dashpots, brakes[:count])
+    return _Chain(*free, np.zeros(count) if case.clamped else far)
 
 
 def _parts(model: ShaftModel) -> tuple[Array, Array, Array, Array, Array] | None:
@@ -267,17 +267,17 @@ def _propagated(case: Case, matrix: Array, drive: Array) -> Array:
     state[torque], state[torque + 2] = float(case.form in ("step", "pulse")), 1.0
     state[rates] = TORQUE * drive * state[torque]
     jumps = (rise,) if case.form in ("pulse", "ramp") and rise < case.t_end else ()
-    made: dict[str, Array] = {}
-    found = {}
+    propagators: dict[str, Array] = {}
+    states = {}
     for start, end in pairwise(sorted({0.0, *case.times, *jumps})):
         key = f"{end - start:.9e}"  # equal intervals differ by the rounding of their ends
-        if key not in made:
-            made[key] = expm(whole * (end - start))
-        state = made[key] @ state
+        if key not in propagators:
+            propagators[key] = expm(whole * (end - start))
+        state = propagators[key] @ state
         if end in jumps:
             before, state[torque] = state[torque], float(case.form == "ramp")
             state[rates] += TORQUE * drive * (state[torque] - before)
             whole[: torque + 1, torque + 2] = 0.0
-            made.clear()
-        found[end] = state
-    return np.array([found[time] for time in case.times])
+            propagators.clear()
+        states[end] = state
+    return np.array([states[time] for time in case.times])

@@ -23,11 +23,10 @@ from shaftwork.results.fatigue import SNLine
 from shaftwork.results.measures import Measure
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
-from shaftwork.studies.arguments import by_name, engine_names, repeated
-from shaftwork.studies.sweep_processes import chunks
+from shaftwork.studies.study_arguments import by_name, engine_names, repeated
 from shaftwork.studies.sweep_result import VERDICTS, Limits, Sweep
 from shaftwork.studies.sweep_store import Store
-from shaftwork.studies.sweep_task import Chunk, Reader, Task, Worker
+from shaftwork.studies.sweep_task import Chunk, Reader, Task, Worker, chunks
 
 LEFT = "a zero, an impact, a stiff motion or a change of mode that is not beyond doubt is left to `simulate`"
 """Why variants have left those beside them."""
@@ -89,22 +88,25 @@ def sweep(
         SignalError: a measure is of a quantity that does not exist.
     """
     columns = _columns(network_of(net).netlist(), parameters, samples)
-    if steady:
-        refuse_motion(initial, "sweep(steady=True)")
-    if isinstance(initial, Solution):
-        with muted(NetworkWarning):  # compilation warns
-            initial = ending_of(initial, net.graph())
+    start = _start(net, initial, steady=steady)
     readers = _readers(measures, columns)
     limits = _limits(require, readers)
-    _, end = time_span(time_of_start(None, initial), t_end)
-    options = _options(readers, rtol, engine, initial, t_eval)
+    _, end = time_span(time_of_start(None, start), t_end)
+    options = _options(readers, rtol, engine, start, t_eval)
     count = _count(processes)
     task = Task(net, columns, readers, _lines(sn, readers), end, options, steady)
-    worker = Worker(task)
-    with nullcontext() if store is None else Store(store, task) as kept:
-        values, reasons, left = _run(task, worker, count, kept)
-    why = worker.why or (f"{left} of {len(task)} variants ran one by one: {LEFT}" if left else "")
+    values, reasons, why = _run(task, count, store)
     return Sweep(net.name, columns, dict(zip(readers, values.T, strict=True)), limits, reasons, why)
+
+
+def _start(net: Network, initial: Any, *, steady: bool) -> Any:
+    """Start values; of a motion what it ends with."""
+    if steady:
+        refuse_motion(initial, "sweep(steady=True)")
+    if not isinstance(initial, Solution):
+        return initial
+    with muted(NetworkWarning):  # compilation warns
+        return ending_of(initial, net.graph())
 
 
 def _options(
@@ -124,8 +126,9 @@ def _count(processes: int | None) -> int | None:
     return None if processes is None else count
 
 
-def _run(task: Task, worker: Worker, processes: int | None, store: Store | None) -> tuple[Array, tuple[str, ...], int]:
-    """(variants, measures), why variants failed, and how many could not be followed side by side."""
+def _run(task: Task, processes: int | None, path: str | Path | None) -> tuple[Array, tuple[str, ...], str]:
+    """(variants, measures), why variants failed, and why some or all ran one by one."""
+    worker = Worker(task)
     values, reasons = np.full((len(task), len(task.measures)), np.nan), [""] * len(task)
     open_, alone, failed = np.ones(len(task), dtype=bool), 0, 0
 
@@ -138,15 +141,17 @@ def _run(task: Task, worker: Worker, processes: int | None, store: Store | None)
         for variant, reason in zip(chunk.variants.tolist(), chunk.reasons, strict=True):
             reasons[variant] = reason
 
-    for chunk in [] if store is None else store.chunks:
-        take(chunk)
-    with progress(len(task), "variants", "compiling") as show:
-        for chunk in chunks(worker, task, np.flatnonzero(open_), processes):
-            if store is not None:
-                store.append(chunk)
+    with nullcontext() if path is None else Store(path, task) as store:
+        for chunk in store.chunks if store else []:
             take(chunk)
-            show(len(task) - int(open_.sum()), f"{failed} failed" if failed else "sweep")
-    return values, tuple(reasons), alone
+        with progress(len(task), "variants", "compiling") as show:
+            for chunk in chunks(worker, task, np.flatnonzero(open_), processes):
+                if store:
+                    store.append(chunk)
+                take(chunk)
+                show(len(task) - int(open_.sum()), f"{failed} failed" if failed else "sweep")
+    why = worker.why or (f"{alone} of {len(task)} variants ran one by one: {LEFT}" if alone else "")
+    return values, tuple(reasons), why
 
 
 def _columns(netlist: Netlist, parameters: Any, samples: Any) -> dict[str, Array]:
@@ -159,10 +164,10 @@ def _columns(netlist: Netlist, parameters: Any, samples: Any) -> dict[str, Array
         raise ParameterError(
             "Give a grid, sweep(net, {'shaft.c': [...]}, ...), or a table, samples={'shaft.c': [...]}."
         )
-    given = samples if parameters is None else parameters
-    if not hasattr(given, "items"):
-        raise ParameterError(f"{given!r} must map parameters to their values, such as {{'shaft.c': [2e4, 3e4]}}.")
-    named = [(str(name), _plain(values)) for name, values in given.items()]
+    table = samples if parameters is None else parameters
+    if not hasattr(table, "items"):
+        raise ParameterError(f"{table!r} must map parameters to their values, such as {{'shaft.c': [2e4, 3e4]}}.")
+    named = [(str(name), _plain(values)) for name, values in table.items()]
     if twice := repeated(name for name, _ in named):  # a data frame may have two columns of one name
         raise ParameterError(f"There are two columns '{twice}'. Give each parameter one.")
     checked = {name: _checked(netlist, name, values) for name, values in named}
@@ -180,17 +185,13 @@ def _grid(values: Mapping[str, Array]) -> dict[str, Array]:
     """Every combination of values, the last name fastest."""
     count = math.prod(map(len, values.values()))
     if count > MOST_VARIANTS:
-        sizes = " x ".join(f"{len(own)}" for own in values.values())
+        sizes = " x ".join(f"{len(column)}" for column in values.values())
         raise ParameterError(
             f"A grid of {sizes} values has {count} variants, more than {MOST_VARIANTS}. Give fewer values, or draw "
             "samples={...} of them."
         )
-    columns: dict[str, Array] = {}
-    before = 1
-    for name, own in values.items():
-        columns[name] = np.tile(np.repeat(own, count // before // len(own)), before)
-        before *= len(own)
-    return columns
+    grids = np.meshgrid(*values.values(), indexing="ij")
+    return {name: grid.ravel() for name, grid in zip(values, grids, strict=True)}
 
 
 def _checked(netlist: Netlist, name: str, values: Any) -> Array:
@@ -201,8 +202,9 @@ def _checked(netlist: Netlist, name: str, values: Any) -> Array:
         values = list(values)
         values = np.array(values) if all(type(value) is float for value in values) else values
     numbers = values if isinstance(values, np.ndarray) and values.dtype == float and values.ndim == 1 else None
-    found = [checked_parameter(netlist, name, value) for value in (values if numbers is None else _telling(numbers))]
-    return np.array(found if numbers is None else numbers, dtype=float)
+    examples = values if numbers is None else _telling(numbers)
+    admissible = [checked_parameter(netlist, name, value) for value in examples]
+    return np.array(admissible if numbers is None else numbers, dtype=float)
 
 
 def _plain(values: Any) -> Any:
@@ -266,8 +268,9 @@ def _limits(require: Mapping[str, Any] | None, readers: Mapping[str, Reader]) ->
 
 def _lines(sn: Any, readers: Mapping[str, Reader]) -> dict[str, SNLine]:
     """The S-N line of every quantity whose damage is measured."""
-    asked = [made.quantity for made in readers.values() if isinstance(made, Measure) and made.kind == "damage"]
-    lines = dict(sn) if isinstance(sn, Mapping) else dict.fromkeys(asked, sn)
-    if missing := [name for name in asked if not isinstance(lines.get(name), SNLine)]:
+    named = (reader for reader in readers.values() if isinstance(reader, Measure))
+    quantities = [measure.quantity for measure in named if measure.kind == "damage"]
+    lines = dict(sn) if isinstance(sn, Mapping) else dict.fromkeys(quantities, sn)
+    if missing := [name for name in quantities if not isinstance(lines.get(name), SNLine)]:
         raise ParameterError(f"The damage of '{missing[0]}' needs an S-N line: sn=SNLine(...), or sn={{name: SNLine}}.")
-    return {name: lines[name] for name in asked}
+    return {name: lines[name] for name in quantities}

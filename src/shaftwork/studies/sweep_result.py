@@ -1,4 +1,4 @@
-"""What a sweep has found: a table of variants, which of them meet the requirements, and the best."""
+"""What a sweep has found: a table of variants, which of them meet the requirements, the best, and a picture."""
 
 from __future__ import annotations
 
@@ -139,16 +139,14 @@ class Sweep:
             ParameterError: there is no such column.
             MissingExtraError: matplotlib is not installed.
         """
-        from shaftwork.studies.sweep_picture import parallel_coordinates
-
-        return parallel_coordinates(self, names)
+        return _parallel_coordinates(self, names)
 
     def __str__(self) -> str:
         names = [*self.parameters, *self.measures]
-        given = {**self.parameters, **self.measures}
+        columns = {**self.parameters, **self.measures}
         passed, shown = self.passed, range(min(len(self), SHOWN))
         rows = [
-            [f"{k}", *(f"{given[name][k]:z.6g}" for name in names), "yes" if passed[k] else "no", self.reasons[k]]
+            [f"{k}", *(f"{columns[name][k]:z.6g}" for name in names), "yes" if passed[k] else "no", self.reasons[k]]
             for k in shown
         ]
         header = ["", *names, "passed", "reason" if any(self.reasons) else ""]
@@ -163,3 +161,49 @@ class Sweep:
         failed = int(self.failed.sum())
         counts = f"{self.name}: {counted(len(self), 'variant')}, {int(passed.sum())} passed, {failed} failed"
         return "\n".join([counts, *lines, *more])
+
+
+MOST_LINES = 2000
+"""More lines would hide each other."""
+TICKS = 5
+
+
+def _parallel_coordinates(sweep: Sweep, names: tuple[str, ...]) -> Figure:
+    """Each axis from the smallest to the largest value; what does not meet the requirements is grey, limits are red."""
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise MissingExtraError("matplotlib", "plot", "Sweep.plot()") from None
+    from matplotlib.collections import LineCollection
+
+    columns = {**sweep.parameters, **sweep.measures}
+    if unknown := [name for name in names if name not in columns]:
+        raise ParameterError(f"There is no column '{unknown[0]}'. There are: {', '.join(columns)}.")
+    shown = names or tuple(columns)
+    rows = np.flatnonzero(~sweep.failed)[:MOST_LINES]
+    low = {name: float(columns[name][rows].min(initial=np.inf)) for name in shown} if rows.size else {}
+    size = {name: (float(columns[name][rows].max()) - low[name]) or 1.0 for name in low}
+    figure = Figure(figsize=(2.2 * max(len(shown), 2), 4.8), layout="constrained")
+    axes = figure.subplots()
+    shares = [(columns[name][rows] - low[name]) / size[name] for name in low]
+    lines = np.array([list(enumerate(heights)) for heights in zip(*shares, strict=True)])
+    passed = sweep.passed[rows]
+    for chosen, color, order in ((~passed, "0.8", 1), (passed, "tab:blue", 2)):
+        if chosen.any():
+            axes.add_collection(
+                LineCollection(list(lines[chosen]), colors=color, linewidths=0.7, alpha=0.6, zorder=order)
+            )
+    for k, name in enumerate(shown):
+        axes.axvline(k, color="0.3", linewidth=0.8, zorder=3)
+        for share in np.linspace(0.0, 1.0, TICKS) if name in low else ():
+            text = f"{low[name] + share * size[name]:.4g}"
+            axes.annotate(text, (k, share), (3, 0), textcoords="offset points", fontsize=7, va="center", zorder=4)
+        for limit in sweep.require.get(name, ()) if name in low else ():
+            if limit is not None:
+                axes.plot([k - 0.08, k + 0.08], [(limit - low[name]) / size[name]] * 2, color="tab:red", zorder=4)
+    axes.set_xlim(-0.2, len(shown) - 0.5)
+    axes.set_ylim(-0.05, 1.05)
+    axes.set_xticks(range(len(shown)), shown, fontsize=8)
+    axes.set_yticks([])
+    axes.set_title(f"{sweep.name}: {len(sweep)} variants, {int(sweep.passed.sum())} meet the requirements", fontsize=10)
+    return figure

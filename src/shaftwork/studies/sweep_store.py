@@ -118,37 +118,37 @@ class Store:
             ) from None
 
     def _refuse_other(self, line: bytes) -> None:
-        found = _parsed(line)
-        if not isinstance(found, dict) or "format" not in found:
+        title = _parsed(line)
+        if not isinstance(title, dict) or "format" not in title:
             raise ParameterError(
                 f"store = '{self._path}' is no file of a sweep: line 1 does not say of which. Give another name; if it "
                 "was one and is damaged, delete the file."
             )
-        for what, own in self._title.items():
-            if found.get(what) != own:
+        for what, expected in self._title.items():
+            if title.get(what) != expected:
                 raise ParameterError(
                     f"store = '{self._path}' holds another sweep, which differs in its {what}, so its results are "
                     "not those of this one. Give another name, or repeat the call that made it."
                 )
-        if (before := found.get("version")) != _version():
+        if (before := title.get("version")) != _version():
             raise ParameterError(
                 f"store = '{self._path}' was begun by {f'version {before}' if before else 'an earlier version'} of "
                 f"Shaftwork, and this is {_version()}: other versions may come to other digits. Give another name."
             )
 
     def _read(self, line: bytes, number: int, task: Task) -> Chunk:
-        made = _parsed(line)
-        if wrong := _objection(made, task):
+        record = _parsed(line)
+        if wrong := _objection(record, task):
             raise ParameterError(
                 f"store = '{self._path}' is damaged in line {number}: {wrong}. Delete this line, and its variants are "
                 "computed anew, or delete the file."
             )
-        values = [[math.nan if value is None else value for value in row] for row in made["values"]]
+        values = [[math.nan if value is None else value for value in row] for row in record["values"]]
         return Chunk(
-            np.array(made["variants"], dtype=np.intp),
+            np.array(record["variants"], dtype=np.intp),
             np.array(values, dtype=float).reshape(-1, len(task.measures)),
-            tuple(made["reasons"]),
-            made.get("left", 0),
+            tuple(record["reasons"]),
+            record.get("left", 0),
         )
 
     def append(self, chunk: Chunk) -> None:
@@ -158,18 +158,18 @@ class Store:
             ParameterError: it cannot be written.
         """
         values = [[value if math.isfinite(value) else None for value in row] for row in chunk.values.tolist()]
-        made = {
+        record = {
             "variants": chunk.variants.tolist(),
             "values": values,
             "reasons": list(chunk.reasons),
             "left": chunk.left,
         }
-        self._write((json.dumps(made | {"check": check_of(made)}) + "\n").encode())
+        self._write((json.dumps(record | {"check": check_of(record)}) + "\n").encode())
 
 
-def check_of(made: Mapping[str, Any]) -> int:
+def check_of(record: Mapping[str, Any]) -> int:
     """A sum over all that a line says but itself: a digit that was changed changes it."""
-    return zlib.crc32(json.dumps({key: value for key, value in made.items() if key != "check"}).encode())
+    return zlib.crc32(json.dumps({key: value for key, value in record.items() if key != "check"}).encode())
 
 
 def _parsed(line: bytes) -> Any:
@@ -180,36 +180,36 @@ def _parsed(line: bytes) -> Any:
         return None
 
 
-def _objection(made: Any, task: Task) -> str:
+def _objection(record: Any, task: Task) -> str:
     """Why a line is not what a chunk of a sweep is written as; empty where it is."""
-    if not isinstance(made, dict):
+    if not isinstance(record, dict):
         return "it is not whole, or no chunk of a sweep"
-    if missing := [key for key in ("variants", "values", "reasons") if key not in made]:
+    if missing := [key for key in ("variants", "values", "reasons") if key not in record]:
         return f"it lacks {listed(missing)}"
-    variants, values, reasons = made["variants"], made["values"], made["reasons"]
+    variants, values, reasons = record["variants"], record["values"], record["reasons"]
     if not _are(variants, lambda one: _counts(one, len(task) - 1)) or len(set(variants)) < len(variants):
         return f"its variants are not different whole numbers from 0 to {len(task) - 1}"
     if not _are(values, lambda row: _are(row, _measured, len(task.measures)), len(variants)):
         return f"its values are not {len(task.measures)} numbers for each of its {len(variants)} variants"
     if not _are(reasons, lambda one: isinstance(one, str), len(variants)):
         return f"its reasons are not a text for each of its {len(variants)} variants"
-    if not _counts(made.get("left", 0), len(variants)):
+    if not _counts(record.get("left", 0), len(variants)):
         return f"'left' is not a whole number from 0 to {len(variants)}"
-    return "" if made.get("check") == check_of(made) else "its digits are not those that were written"
+    return "" if record.get("check") == check_of(record) else "its digits are not those that were written"
 
 
-def _are(made: Any, holds: Callable[[Any], bool], count: int | None = None) -> bool:
+def _are(items: Any, holds: Callable[[Any], bool], count: int | None = None) -> bool:
     """Whether it is a list, of so many entries, of which each is as it should be."""
-    return isinstance(made, list) and count in (None, len(made)) and all(map(holds, made))
+    return isinstance(items, list) and count in (None, len(items)) and all(map(holds, items))
 
 
-def _counts(made: Any, most: int) -> bool:
-    return type(made) is int and 0 <= made <= most
+def _counts(value: Any, most: int) -> bool:
+    return type(value) is int and 0 <= value <= most
 
 
-def _measured(made: Any) -> bool:
+def _measured(value: Any) -> bool:
     """A number, or nothing where a variant failed."""
-    return made is None or (type(made) in (int, float) and abs(made) <= sys.float_info.max)
+    return value is None or (type(value) in (int, float) and abs(value) <= sys.float_info.max)
 
 
 def _version() -> str:

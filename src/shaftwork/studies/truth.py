@@ -67,13 +67,13 @@ def with_model(net: Network, shaft: str, model: ShaftModel) -> Network:
 
     Other shafts than the named one that are rigid or one spring stay so: that is a wish, no approximation.
     """
-    made = Network(net.name)
+    varied = Network(net.name)
     for placed in net.netlist().placed:
         part = placed.part
         if isinstance(part, Shaft) and (part.name == shaft or not isinstance(part.resolved, Rigid | OneSpring)):
             part = dataclasses.replace(part, model=model)
-        made.add(part, *placed.nodes)
-    return made
+        varied.add(part, *placed.nodes)
+    return varied
 
 
 def truth(net: Network, shaft: str, t_end: float, t: Array, tell: Callable[[str], None] = lambda _: None) -> Truth:
@@ -134,8 +134,8 @@ def quantities(solution: Solution, net: Network, shaft: str) -> dict[str, Array]
         read = np.argsort(np.abs(places - middle), kind="stable")[:2]
     apart = places[read][:, None] - places[read] + np.eye(len(read))
     lagrange = np.prod((middle - places[read] - np.diag(middle - places[read] - 1)) / apart, axis=1)
-    made = {name: solution[f"{shaft}.{name}"] for name in QUANTITIES if name != "tau_mid"}
-    return made | {"tau_mid": torques[:, read] @ lagrange}
+    values = {name: solution[f"{shaft}.{name}"] for name in QUANTITIES if name != "tau_mid"}
+    return values | {"tau_mid": torques[:, read] @ lagrange}
 
 
 def frequencies(modes: Modes) -> Array:
@@ -145,10 +145,10 @@ def frequencies(modes: Modes) -> Array:
 
 def _exact_frequencies(net: Network) -> Array:
     try:
-        found = frequencies(net.modes(exact=True))
+        exact = frequencies(net.modes(exact=True))
     except ShaftworkError:
         return np.empty(0)
-    return found[:JUDGED] if len(found) >= JUDGED else np.empty(0)
+    return exact[:JUDGED] if len(exact) >= JUDGED else np.empty(0)
 
 
 def _read(net: Network, shaft: str, t_end: float, t: Array, rtol: float = TIGHT) -> dict[str, Array]:
@@ -164,27 +164,27 @@ def _by_characteristics(netlist: Netlist, shaft: str, t_end: float, t: Array) ->
         tuple(_total(netlist, node, Damper, "d") for node in order),
     )
     sources = [placed for placed in netlist.placed if isinstance(placed.part, TorqueSource)]
-    found = motion(line, [_torque(placed, order) for placed in sources], t_end)
+    junctions = motion(line, [_torque(placed, order) for placed in sources], t_end)
     number = next(k for k, placed in enumerate(shafts) if placed.part.name == shaft)
     left, right = number, number + 1
     middle = line.junctions[number] + line.sections[number].length / 2
-    torques = [found.torque_in(number, t, "left"), found.torque_in(number, t, "right")]
-    speeds = [found.junction_speed(left, t), found.junction_speed(right, t)]
+    torques = [junctions.torque_in(number, t, "left"), junctions.torque_in(number, t, "right")]
+    speeds = [junctions.junction_speed(left, t), junctions.junction_speed(right, t)]
     sign = 1.0
     if shafts[number].nodes[0] != order[number]:  # wired from right to left
         sign, torques, speeds = -1.0, torques[::-1], speeds[::-1]
     values = dict(
         zip(("tau_a", "tau_b", "omega_a", "omega_b"), (*(sign * tau for tau in torques), *speeds), strict=True)
     )
-    values["tau_mid"] = sign * found.torque(middle, t)
-    return values, found.error
+    values["tau_mid"] = sign * junctions.torque(middle, t)
+    return values, junctions.error
 
 
 def _train(netlist: Netlist) -> tuple[list[str], list[Placed]]:
     """The nodes of a train from one end to the other, and the shafts between them."""
     shafts = [placed for placed in netlist.placed if isinstance(placed.part, Shaft)]
-    known = (Inertia, Damper, TorqueSource, Shaft)
-    if not shafts or not all(isinstance(placed.part, known) for placed in netlist.placed):
+    kinds = (Inertia, Damper, TorqueSource, Shaft)
+    if not shafts or not all(isinstance(placed.part, kinds) for placed in netlist.placed):
         raise ParameterError("The network is no train of inertias, shafts, bearings and torques.")
     at: dict[str, list[Placed]] = {}
     for placed in shafts:

@@ -34,9 +34,9 @@ from shaftwork.pipeline.phases.mode_machines import ModeMachine, ModeNames
 from shaftwork.pipeline.phases.rates import rates_of
 from shaftwork.pipeline.phases.shown import GuardReadings
 from shaftwork.pipeline.prepared import Prepared
-from shaftwork.reduction.names import Names
+from shaftwork.reduction.explicit_rows import Rows
+from shaftwork.reduction.form import Names
 from shaftwork.reduction.observables import NamedReadings, Observables
-from shaftwork.reduction.rows import Rows
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.model import Model

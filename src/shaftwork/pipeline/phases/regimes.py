@@ -17,6 +17,7 @@ from shaftwork.pipeline.phases.mode_machines import ModeMachine, ModeNames
 from shaftwork.pipeline.phases.starts import begins_anew
 from shaftwork.pipeline.start import Ending
 from shaftwork.reduction.cancelling import jamming
+from shaftwork.reduction.value_diagnosis import jamming
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.phases.assemblies import ModeEquations

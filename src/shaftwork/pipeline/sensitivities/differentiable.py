@@ -17,6 +17,7 @@ from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.model import PhasedModel
 from shaftwork.pipeline.start import start_of
 from shaftwork.reduction.rows import Rows
+from shaftwork.reduction.explicit_rows import Rows
 
 NO_DERIVATIVE = {
     "decisive": "decides which equations hold, so nothing is smooth in it. Give it a value that is not exactly zero, "

@@ -20,7 +20,7 @@ from shaftwork.pipeline.sensitivities.carrying import End, SensitivityTransfer
 from shaftwork.pipeline.sensitivities.differentiable import rows_of
 from shaftwork.pipeline.sensitivities.legs import DifferentiatedMotion, Leg, parted
 from shaftwork.pipeline.sensitivities.saltation import ADVICE, TOGETHER, Jump, JumpConditions, by_chance
-from shaftwork.reduction.symbolic_observables import SymbolicObservables
+from shaftwork.reduction.observables import Observables
 
 ROUNDING = 1e-3
 """What a change of a parameter by all of itself does to a state is rounding below this part of the state's size."""
@@ -78,7 +78,7 @@ class MotionSlopes:
         """The equations of a model with their derivatives; made once."""
         if model not in self._equations:
             rows = rows_of(model)
-            expressed = SymbolicObservables(model.form, rows)
+            expressed = Observables(model.form, rows)
             found = {name: _known(name, expressed) for name in self._quantities}
             integrands = [found[name] ** power for name, power in self._integrands]
             self._equations[model] = Differentiated(model.form, rows, self._symbols, found, integrands)
@@ -233,7 +233,7 @@ def _warn(doubt: float, t: float) -> None:
         )
 
 
-def _known(name: str, expressed: SymbolicObservables) -> Expr:
+def _known(name: str, expressed: Observables) -> Expr:
     found = expressed.quantity(name)
     if found is None:
         raise ParameterError(f"'{name}' has no derivative here. Take a speed, a torque or a twist.")

@@ -1,4 +1,4 @@
-"""Problems of values: those that cancel each other, or that a computer cannot hold, although the structure is sound."""
+"""What values say: problems where they cancel each other or no computer holds them, and notes of parts on their own."""
 
 from __future__ import annotations
 
@@ -10,12 +10,15 @@ from typing import Any
 import networkx as nx
 import numpy as np
 import sympy
+from sympy import Float, Symbol
 
+from shaftwork.components.branches import THROUGH
 from shaftwork.core.errors import Diagnostic
-from shaftwork.network.graph import CircuitGraph, GraphBranch
-from shaftwork.network.wording import at_nodes, listed
+from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
+from shaftwork.network.kinds import Kind
+from shaftwork.network.wording import at_nodes, listed, title
 from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.gains import Gain, Number, fold
+from shaftwork.reduction.gains import Gain, Number, fold, value_of
 from shaftwork.reduction.tree import Row, balance_of, column_of
 from shaftwork.reduction.view import View
 
@@ -31,8 +34,8 @@ def numeric_problems(form: StateForm) -> tuple[Diagnostic, ...]:
     if wild := sorted({link for link, gain in gains if not (math.isfinite(gain.value) and gain.value)}):
         return (extreme_ratios(graph, (branch for link in wild for branch in (link, *loops[link]))),)
     groups = ((form.tree_conductances, form.link_conductances), (form.across_states, form.dependent_across))
-    found = (problem for own, beside in groups for problem in _cancelling(form, own, beside))
-    return (*found, *jamming(form, graph.parameters))
+    problems = (problem for trees, beside in groups for problem in _cancelling(form, trees, beside))
+    return (*problems, *jamming(form, graph.parameters))
 
 
 def jamming(form: StateForm, parameters: Mapping[str, float]) -> Iterator[Diagnostic]:
@@ -58,8 +61,8 @@ def jamming(form: StateForm, parameters: Mapping[str, float]) -> Iterator[Diagno
         if min(values.values(), default=1.0) <= 0:
             return  # negative values need no coupling to cancel
         F, Q = (_block(rows, trees, links, parameters) for rows in (form.tree.loops, form.tree.cutsets))
-        own, others = (np.array([values[branch] for branch in group]) for group in (trees, links))
-        sign *= np.linalg.slogdet(np.diag(own) + Q * others @ F.T).sign
+        capacities, others = (np.array([values[branch] for branch in group]) for group in (trees, links))
+        sign *= np.linalg.slogdet(np.diag(capacities) + Q * others @ F.T).sign
     if sign <= 0:
         yield _jammed(View(form), tuple(branch.index for branch in form.graph.branches if branch.template.through))
 
@@ -74,8 +77,8 @@ def self_locks(form: StateForm, parameters: Mapping[str, float]) -> bool:
     if form.tree.cutsets is form.tree.loops:
         return False
     lossy = (branch for branch in form.graph.branches if branch.template.through)
-    pairs = ((made, *pair) for made in lossy for pair in zip(made.terms, made.balances, strict=True))
-    powers = (form.graph.in_network_symbols(term[0] * balance[0], made) for made, term, balance in pairs)
+    pairs = ((branch, *pair) for branch in lossy for pair in zip(branch.terms, branch.balances, strict=True))
+    powers = (form.graph.in_network_symbols(term[0] * balance[0], branch) for branch, term, balance in pairs)
     return any(_value(power, parameters) < 0 for power in powers)
 
 
@@ -90,22 +93,21 @@ def _sign_of_tree(
     branches = [branch for branch in form.graph.branches if branch.index not in form.tree.loops]
     columns = [column(form.graph, branch) for branch in branches]
     nodes = range(len(form.graph.nodes))
-    matrix = _matrix([[made.get(node, 0) for made in columns] for node in nodes], parameters)
-    return float(np.linalg.slogdet(matrix).sign) if len(branches) == len(nodes) else 1.0
+    if len(branches) != len(nodes):
+        return 1.0
+    entries = [factors.get(node, 0) for node in nodes for factors in columns]
+    return float(np.linalg.slogdet(_matrix(entries, (len(nodes), len(nodes)), parameters)).sign)
 
 
 def _block(rows: Mapping[int, Row], trees: Sequence[int], links: Sequence[int], parameters: Mapping[str, float]) -> Any:
     """(trees, links) the factors of tree branches and links in loops or cutsets."""
-    return _matrix([[rows[link].get(tree, 0) for link in links] for tree in trees], parameters, len(links))
+    entries = [rows[link].get(tree, 0) for tree in trees for link in links]
+    return _matrix(entries, (len(trees), len(links)), parameters)
 
 
-def _matrix(numbers: Sequence[Sequence[Number]], parameters: Mapping[str, float], columns: int = 0) -> Any:
-    """Gains in numbers."""
-    gains = [number for row in numbers for number in row if isinstance(number, Gain)]
-
-    known = dict(zip(map(id, gains), fold(gains, partial(_value, parameters=parameters)), strict=True))
-    made = [[known[id(number)] if isinstance(number, Gain) else number for number in row] for row in numbers]
-    return np.array(made, dtype=float).reshape(len(numbers), -1 if made and made[0] else columns)
+def _matrix(entries: Sequence[Number], shape: tuple[int, int], parameters: Mapping[str, float]) -> Any:
+    """Gains in numbers, row by row."""
+    return np.array(fold(entries, partial(_value, parameters=parameters)), dtype=float).reshape(shape)
 
 
 def _jammed(view: View, lossy: Sequence[int]) -> Diagnostic:
@@ -125,32 +127,32 @@ def extreme_ratios(graph: CircuitGraph, branches: Iterable[int]) -> Diagnostic:
     return Diagnostic("extreme ratios", message, "Check their units and powers of ten.", names)
 
 
-def _cancelling(form: StateForm, own: Sequence[int], beside: Sequence[int]) -> Iterator[Diagnostic]:
+def _cancelling(form: StateForm, unknowns: Sequence[int], beside: Sequence[int]) -> Iterator[Diagnostic]:
     """Coupled conductances (or inertias) of which a negative one cancels others, block by block."""
-    values = _coefficients(form.graph, (*own, *beside), form.graph.parameters)
+    values = _coefficients(form.graph, (*unknowns, *beside), form.graph.parameters)
     if all(value > 0 for value in values.values()):
         return  # positive values cannot cancel
     blocks: nx.Graph[int] = nx.Graph()
-    blocks.add_nodes_from(own)
-    members = frozenset(own)
+    blocks.add_nodes_from(unknowns)
+    members = frozenset(unknowns)
     blocks.add_edges_from((tree, link) for link in beside for tree in form.tree.loops[link] if tree in members)
-    for found in nx.connected_components(blocks):
-        trees, links = sorted(found & members), sorted(found - members)
+    for block in nx.connected_components(blocks):
+        trees, links = sorted(block & members), sorted(block - members)
         F, Q = (_block(rows, trees, links, form.graph.parameters) for rows in (form.tree.loops, form.tree.cutsets))
         matrix = np.diag([values[tree] for tree in trees]) + Q * [values[link] for link in links] @ F.T
-        if min(values[branch] for branch in found) <= 0 and _is_singular(matrix):
+        if min(values[branch] for branch in block) <= 0 and _is_singular(matrix):
             yield _cancelling_block(View(form), (*trees, *links))
 
 
 def _coefficients(graph: CircuitGraph, branches: Iterable[int], parameters: Mapping[str, float]) -> dict[int, float]:
-    made: dict[tuple[Any, ...], Any] = {}
+    functions: dict[tuple[Any, ...], Any] = {}
     values: dict[int, float] = {}
     for index in branches:
         template, part = graph.branches[index].template, graph.part_of(index)
-        if (key := (template.law, template.symbols)) not in made:
-            made[key] = sympy.lambdify(template.symbols, template.law, "math")
+        if (key := (template.law, template.symbols)) not in functions:
+            functions[key] = sympy.lambdify(template.symbols, template.law, "math")
         numbers = (parameters[f"{part.name}.{symbol.name}"] for symbol in template.symbols)
-        values[index] = float(made[key](*numbers))
+        values[index] = float(functions[key](*numbers))
     return values
 
 
@@ -169,3 +171,74 @@ def _cancelling_block(view: View, branches: Sequence[int]) -> Diagnostic:
     )
     hint = f"Change one of the values, or give a node {words.remedy}."
     return Diagnostic("cancelling values", message, hint, view.parts(branches), nodes)
+
+
+_JOINTS = (Kind.THROUGH_STORE, Kind.COUPLING)
+"""Springs and gears: what hands a torque on at standstill."""
+PAIR = 2
+"""Ends of a spring, or shafts of a gear of two."""
+_SLIPPING_OR_STUCK = 3
+"""Modes of what rubs at all times: forward, backward, stuck; a brake has more."""
+
+
+def notes_of(graph: CircuitGraph) -> Iterator[Diagnostic]:
+    """What is worth saying about parts by their values."""
+    for part in graph.parts:
+        at = tuple(node for node in part.nodes.values() if node != GROUND)
+        nodes = tuple(graph.nodes[node] for node in at)
+        for note in part.component.notes():
+            load = "" if note.torque is None else _against(graph, at[0], note.torque)
+            message = f"{title(part.component)} at {at_nodes(nodes)} {note.message}{load}."
+            yield Diagnostic(note.kind, message, note.hint, (part.name,), nodes, "note")
+
+
+def _against(graph: CircuitGraph, start: int, torque: float) -> str:
+    """The loads behind a node that rest until a torque there is above theirs, in words; losses of gears left out."""
+    columns = (column_of(graph, branch) for branch in graph.branches if branch.template.kind in _JOINTS)
+    pairs = ({node: value_of(factor) for node, factor in column.items()} for column in columns if len(column) == PAIR)
+    speeds = speeds_along(graph, start, pairs)
+    loads: dict[str, float] = {}
+    for part in graph.parts:
+        for node in {*part.nodes.values()} & speeds.keys():
+            if limit := _breakaway(graph, part, math.copysign(1.0, torque * speeds[node])):
+                loads[title(part.component)] = limit * abs(speeds[node])
+    total = sum(loads.values())
+    if total <= 0:
+        return ""
+    stuck = ", which it does not move" if total >= abs(torque) else ""
+    return f", against {total:.4g} N*m of {' and '.join(loads)}{stuck}"
+
+
+def speeds_along(graph: CircuitGraph, start: int, joints: Iterable[Mapping[int, float]]) -> dict[int, float]:
+    """Speeds of the nodes that are joined to one, over its own.
+
+    Args:
+        graph: the network.
+        start: the one.
+        joints: node to factor, in sums that are zero; that of the frame is.
+    """
+    at: list[list[dict[int, float]]] = [[] for _ in graph.nodes]
+    for joint in joints:
+        moving = {node: factor for node, factor in joint.items() if node != GROUND}
+        for node in moving if len(moving) > 1 else ():
+            at[node].append(moving)
+    speeds, ends = {start: 1.0}, [start]
+    while ends:
+        for joint in at[ends.pop()]:
+            open_ends = [node for node in joint if node not in speeds]
+            if len(open_ends) == 1:
+                (other,) = open_ends
+                speeds[other] = -sum(joint[node] * speeds[node] for node in joint if node != other) / joint[other]
+                ends.append(other)
+    return speeds
+
+
+def _breakaway(graph: CircuitGraph, part: GraphPart, direction: float) -> float:
+    """The torque up to which a part between a node and the frame rests when pushed; 0 where none is known."""
+    if len([end for end in part.nodes.values() if end != GROUND]) > 1:
+        return 0.0
+    values = {Symbol(name, real=True): Float(graph.parameters[f"{part.name}.{name}"]) for name in part.parameters}
+    slips = (modes.options for modes in part.modes if len(modes.options) == _SLIPPING_OR_STUCK)
+    guards = (leave.when for options in slips for mode in options if mode.gives_way for leave in mode.leaves)
+    limits = [-when.xreplace({THROUGH: Float(0), **values}) for when in guards if direction * when.diff(THROUGH) > 0]
+    return sum(float(limit) for limit in limits if limit.is_comparable)

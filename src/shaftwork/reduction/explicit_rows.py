@@ -6,10 +6,11 @@ left to the sparse matrices of the array program; both are tested to agree.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from sympy import Add, Dummy, Expr, Integer, Symbol
+import networkx as nx
+from sympy import Add, Dummy, Expr, Integer, Matrix, Symbol
 
 from shaftwork.components.branches import ACROSS, INTEGRAL, RATE
 from shaftwork.components.clips import replaced
@@ -18,7 +19,6 @@ from shaftwork.components.slopes import slope
 from shaftwork.network.controlled import Reading, readings_of
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.blocks import BlockTooLargeError, Tie, solve_blocks, solve_tied
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.gains import exact_of
 from shaftwork.reduction.tree import Row
@@ -59,24 +59,19 @@ class _Solution:
         self.form, self.graph = form, form.graph
         self.states = tuple(Symbol(state.name, real=True) for state in form.states)
         carried = zip(form.states, self.states, strict=True)
-        own = {(state.kind, state.branch): symbol for state, symbol in carried}
+        symbols = {(state.kind, state.branch): symbol for state, symbol in carried}
         self.loops = _exact(form, form.tree.loops)
         self.balances = self.loops if form.tree.cutsets is form.tree.loops else _exact(form, form.tree.cutsets)
         self.cutsets: dict[int, list[tuple[int, Expr]]] = {}
         for link, row in self.balances.items():
             for tree, gain in row:
                 self.cutsets.setdefault(tree, []).append((link, gain))
-        self.across: dict[int, Expr] = {k: own["across", k] for k in form.across_states}
-        self.across.update({k: self.law(k) for k in form.across_sources})
+        self.across: dict[int, Expr] = {k: symbols["across", k] for k in form.across_states}
+        self.across.update({k: self.form.law_of(k) for k in form.across_sources})
         self.across.update({k: Dummy(real=True) for k in form.controlled})
-        self.through: dict[int, Expr] = {k: own["through", k] for k in form.through_states}
-        self.integral = {k: own["integral", k] for k in form.integrals}
+        self.through: dict[int, Expr] = {k: symbols["through", k] for k in form.through_states}
+        self.integral = {k: symbols["integral", k] for k in form.integrals}
         self.beyond: dict[int, Expr] = {}
-
-    def law(self, branch: int) -> Expr:
-        """Coefficient or law of a branch in the symbols of the network."""
-        made = self.graph.branches[branch]
-        return self.graph.in_network_symbols(made.template.law, made)
 
     def around(self, link: int) -> Expr:
         """Across variable of a link: the sum over its loop, as far as the tree is known."""
@@ -90,19 +85,19 @@ class _Solution:
     def rows(self) -> Rows:
         form = self.form
         sources = form.tree.links[Kind.THROUGH_SOURCE]
-        self.through.update({k: self.law(k) for k in sources})
+        self.through.update({k: self.form.law_of(k) for k in sources})
         self._solve_conductances(sources)
         self._put_in_controls()
         for link in form.link_conductances:
             self.across[link] = self.around(link)
-            self.through[link] = self.law(link) * self.across[link]
+            self.through[link] = self.form.law_of(link) * self.across[link]
         for link in form.tree.links[Kind.LAW]:
             self.across[link] = self.around(link)
-            known = {ACROSS: self.across[link], INTEGRAL: self.integral.get(link, INTEGRAL), **self.read(link)}
-            law = self.law(link)
+            arguments = {ACROSS: self.across[link], INTEGRAL: self.integral.get(link, INTEGRAL), **self.read(link)}
+            law = self.form.law_of(link)
             if link in form.inertial:
-                self.beyond[link], law = slope(law, RATE).xreplace(known), law.xreplace({RATE: Integer(0)})
-            self.through[link] = replaced(law, known)
+                self.beyond[link], law = slope(law, RATE).xreplace(arguments), law.xreplace({RATE: Integer(0)})
+            self.through[link] = replaced(law, arguments)
         for link in (*sources, *form.through_states, *form.dependent_across):
             self.across[link] = self.around(link)
         rates = (*self._speed_rates(), *self._torque_rates(), *(self.across[k] for k in form.integrals))
@@ -114,16 +109,16 @@ class _Solution:
     def read(self, branch: int) -> dict[Symbol, Expr]:
         """What the law of a branch reads of other ports and branches of its part."""
         reads = readings_of(self.graph, branch).items()
-        return {symbol: self.value(made) for symbol, made in reads if made.kind != "rate"}
+        return {symbol: self.value(reading) for symbol, reading in reads if reading.kind != "rate"}
 
     def value(self, reading: Reading) -> Expr:
         """A quantity that a law reads, in states and sources of time."""
         match reading:
             case Reading("across", node):
                 row = {} if node == GROUND else self.form.tree.potentials[node] or {}
-                known = [tree for tree in row if tree in self.across]
-                gains = exact_of(row[tree] for tree in known)
-                return Add(*(gain * self.across[tree] for tree, gain in zip(known, gains, strict=True)))
+                trees = [tree for tree in row if tree in self.across]
+                gains = exact_of(row[tree] for tree in trees)
+                return Add(*(gain * self.across[tree] for tree, gain in zip(trees, gains, strict=True)))
             case Reading("through", store) if store not in self.through:  # others of its cutset decide
                 links = (*self.form.through_states, *self.form.tree.links[Kind.THROUGH_SOURCE])
                 return -self.out_of(store, links)
@@ -133,16 +128,16 @@ class _Solution:
 
     def _put_in_controls(self) -> None:
         """Controlled sources by what they read; until then a symbol stands for each."""
-        found = {self.across[k]: replaced(self.law(k), self.read(k)) for k in self.form.controlled}
-        self.across = {k: replaced(across, found) for k, across in self.across.items()} if found else self.across
+        controls = {self.across[k]: replaced(self.form.law_of(k), self.read(k)) for k in self.form.controlled}
+        self.across = {k: replaced(across, controls) for k, across in self.across.items()} if controls else self.across
 
     def _solve_conductances(self, sources: Sequence[int]) -> None:
         form = self.form
         unknowns = form.tree_conductances
         right = {tree: -self.out_of(tree, (*form.through_states, *sources)) for tree in unknowns}
-        matrix: dict[tuple[int, int], Expr] = {(tree, tree): self.law(tree) for tree in unknowns}
+        matrix: dict[tuple[int, int], Expr] = {(tree, tree): self.form.law_of(tree) for tree in unknowns}
         for link in form.link_conductances:
-            g, drive = self.law(link), self.around(link)
+            g, drive = self.form.law_of(link), self.around(link)
             self._add_products(matrix, link, g, frozenset(unknowns))
             for tree, gain in self.balances[link]:
                 if tree in right:
@@ -154,9 +149,9 @@ class _Solution:
         unknowns = form.across_states
         links = (*form.link_conductances, *form.through_states, *form.laws)
         right = {tree: -self.out_of(tree, links) for tree in unknowns}
-        ties = [self._tie(link, self.law(link), right.keys()) for link in form.dependent_across]
+        ties = [self._tie(link, self.form.law_of(link), right.keys()) for link in form.dependent_across]
         ties += [self._tie(link, capacity, right.keys()) for link, capacity in self.beyond.items()]
-        return solve_tied({tree: self.law(tree) for tree in unknowns}, ties, right)
+        return solve_tied({tree: self.form.law_of(tree) for tree in unknowns}, ties, right)
 
     def _tie(self, link: int, capacity: Expr, unknowns: Container[int]) -> Tie:
         """A dependent store, or what one has beyond a constant, as what it does to the stores that carry it."""
@@ -167,16 +162,16 @@ class _Solution:
 
     def _rate(self, link: int, rates: Mapping[int, Expr]) -> Expr:
         """The rate of what is across a link, from known rates of stores and those of prescribed speeds."""
-        known = {**{tree: slope(self.law(tree), TIME) for tree in self.form.across_sources}, **rates}
-        return Add(*(gain * known[tree] for tree, gain in self.loops[link] if tree in known))
+        all_rates = {**{tree: slope(self.form.law_of(tree), TIME) for tree in self.form.across_sources}, **rates}
+        return Add(*(gain * all_rates[tree] for tree, gain in self.loops[link] if tree in all_rates))
 
     def _torque_rates(self) -> tuple[Expr, ...]:
         form = self.form
         unknowns = form.through_states
         right = {link: self.across[link] for link in unknowns}
-        matrix: dict[tuple[int, int], Expr] = {(link, link): 1 / self.law(link) for link in unknowns}
+        matrix: dict[tuple[int, int], Expr] = {(link, link): 1 / self.form.law_of(link) for link in unknowns}
         for tree in form.dependent_through:
-            compliance = 1 / self.law(tree)
+            compliance = 1 / self.form.law_of(tree)
             members = self.cutsets.get(tree, [])
             states = [(link, gain) for link, gain in members if link in right]
             source = Add(*(gain * slope(self.through[link], TIME) for link, gain in members if link not in right))
@@ -205,7 +200,128 @@ def _exact(form: StateForm, rows: Mapping[int, Row]) -> dict[int, tuple[tuple[in
         for tree, gain in row.items()
         if tree not in couplings and link not in form.tree.redundant
     ]
-    made: dict[int, list[tuple[int, Expr]]] = {link: [] for link in rows}
+    exact_rows: dict[int, list[tuple[int, Expr]]] = {link: [] for link in rows}
     for (link, tree, _), exact in zip(entries, exact_of(gain for _, _, gain in entries), strict=True):
-        made[link].append((tree, exact))
-    return {link: tuple(row) for link, row in made.items()}
+        exact_rows[link].append((tree, exact))
+    return {link: tuple(row) for link, row in exact_rows.items()}
+
+
+LARGEST_BLOCK = 3
+"""Coupled unknowns that are solved symbolically; the formulas for more are longer than anyone reads."""
+
+
+class BlockTooLargeError(Exception):
+    """The rows have no closed form that anyone would read."""
+
+
+@dataclass(frozen=True)
+class Tie:
+    """A dependent store: y = capacity (row x + prescribed) acts back on those that carry it, each by its share of y.
+
+    Args:
+        capacity: of the store.
+        shares: of y, by unknown.
+        row: what its rate has of each unknown rate x.
+        prescribed: what its rate has besides, of prescribed rates.
+    """
+
+    capacity: Expr
+    shares: Mapping[int, Expr]
+    row: Mapping[int, Expr]
+    prescribed: Expr
+
+
+def solve_tied(capacities: Mapping[int, Expr], ties: Sequence[Tie], right: Mapping[int, Expr]) -> tuple[Expr, ...]:
+    """Solve capacities x + shares y = right for the rates x of stores, where y are the reactions of dependent ones.
+
+    Law: few unknowns are solved for with y put in. Of many that are tied by few, the reactions are solved for,
+    (1 + capacity row shares / capacities) y = capacity (row right / capacities + prescribed), and each rate follows
+    from them by itself.
+
+    Raises:
+        BlockTooLargeError: neither has a block of `LARGEST_BLOCK` or fewer.
+    """
+    driven = dict(right)
+    matrix = {(tree, tree): capacity for tree, capacity in capacities.items()}
+    for tie in ties:
+        for first, share in tie.shares.items():
+            driven[first] -= share * tie.capacity * tie.prescribed
+            for second, gain in tie.row.items():
+                matrix[first, second] = matrix.get((first, second), Integer(0)) + share * tie.capacity * gain
+    try:
+        return solve_blocks(matrix, tuple(capacities), driven)
+    except BlockTooLargeError:
+        return _by_reactions(capacities, ties, right)
+
+
+def _by_reactions(capacities: Mapping[int, Expr], ties: Sequence[Tie], right: Mapping[int, Expr]) -> tuple[Expr, ...]:
+    """The rates by the reactions of what is carried by several; what is carried by one alone is added to that one."""
+    whole, driven = dict(capacities), dict(right)
+    for tie in ties:
+        if len(tie.row) == 1 and tie.row.keys() == tie.shares.keys():
+            ((tree, share),) = tie.shares.items()
+            whole[tree] += share * tie.capacity * tie.row[tree]
+            driven[tree] -= share * tie.capacity * tie.prescribed
+    several = [tie for tie in ties if len(tie.row) > 1 or tie.row.keys() != tie.shares.keys()]
+    matrix = {(k, k): Integer(1) for k in range(len(several))}
+    for k, tie in enumerate(several):
+        for m, other in enumerate(several):
+            common = [tree for tree in tie.row if tree in other.shares]
+            if common:
+                felt = Add(*(tie.row[tree] * other.shares[tree] / whole[tree] for tree in common))
+                matrix[k, m] = matrix.get((k, m), Integer(0)) + tie.capacity * felt
+    apart = {
+        k: tie.capacity * Add(tie.prescribed, *(gain * driven[tree] / whole[tree] for tree, gain in tie.row.items()))
+        for k, tie in enumerate(several)
+    }
+    reactions = solve_blocks(matrix, range(len(several)), apart)
+    for tie, reaction in zip(several, reactions, strict=True):
+        for tree, share in tie.shares.items():
+            driven[tree] -= share * reaction
+    return tuple(driven[tree] / capacity for tree, capacity in whole.items())
+
+
+def solve_blocks(
+    matrix: Mapping[tuple[int, int], Expr], unknowns: Sequence[int], right: Mapping[int, Expr]
+) -> tuple[Expr, ...]:
+    """Solve a sparse symbolic system block by block of coupled unknowns.
+
+    Raises:
+        BlockTooLargeError: a block has more than `LARGEST_BLOCK` unknowns.
+    """
+    links: nx.Graph[int] = nx.Graph()
+    links.add_nodes_from(unknowns)
+    links.add_edges_from(matrix)
+    solution: dict[int, Expr] = {}
+    order = {unknown: k for k, unknown in enumerate(unknowns)}
+    for component in nx.connected_components(links):
+        block = sorted(component, key=order.__getitem__)
+        if len(block) > LARGEST_BLOCK:
+            raise BlockTooLargeError
+        if len(block) == 1:
+            (only,) = block
+            solution[only] = right[only] / matrix[only, only]
+            continue
+        solution.update(zip(block, _cramer(matrix, block, right), strict=True))
+    return tuple(solution[unknown] for unknown in unknowns)
+
+
+def _cramer(matrix: Mapping[tuple[int, int], Expr], block: Sequence[int], right: Mapping[int, Expr]) -> Iterator[Expr]:
+    """Solve one block by cofactors.
+
+    The cofactors are made of single symbols, and the entries put in afterwards: sympy would otherwise try to cancel
+    factors of long entries, which takes minutes for a few geared inertias.
+    """
+    entries = {
+        (i, j): matrix[first, second]
+        for i, first in enumerate(block)
+        for j, second in enumerate(block)
+        if (first, second) in matrix
+    }
+    names = {place: Symbol(f"m{place[0]}{place[1]}") for place in entries}
+    square = Matrix(len(block), len(block), lambda i, j: names.get((i, j), Integer(0)))
+    put_in = {names[place]: entry for place, entry in entries.items()}
+    adjugate = square.adjugate().xreplace(put_in)
+    determinant = square.det(method="berkowitz").xreplace(put_in)
+    for i in range(len(block)):
+        yield Add(*(adjugate[i, j] * right[other] for j, other in enumerate(block))) / determinant

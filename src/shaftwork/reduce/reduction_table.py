@@ -13,6 +13,7 @@ from sympy import Add, Expr, Integer, Symbol, latex
 from shaftwork.components.laws import omega, phi, s, v
 from shaftwork.components.tables import Table
 from shaftwork.core.errors import SignalError
+from shaftwork.core.screen import in_columns
 from shaftwork.equations.assembly import FactoredTerms
 from shaftwork.equations.nomenclature import column, unit
 from shaftwork.equations.nomenclature import table as longtable
@@ -61,15 +62,13 @@ class ReductionTable:
         Raises:
             SignalError: there is none.
         """
-        known = {f"{entry.part}.{entry.quantity}": entry for entry in self.entries}
-        if name not in known:
-            raise SignalError(f"No parameter '{name}' was referred to '{self.to}'. There are: {', '.join(known)}.")
-        return known[name]
+        by_name = {f"{entry.part}.{entry.quantity}": entry for entry in self.entries}
+        if name not in by_name:
+            raise SignalError(f"No parameter '{name}' was referred to '{self.to}'. There are: {', '.join(by_name)}.")
+        return by_name[name]
 
     def __str__(self) -> str:
-        rows = [HEADINGS, *(_cells(entry) for entry in self.entries)]
-        widths = [max(len(row[column]) for row in rows) for column in range(len(HEADINGS))]
-        lines = ("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)
+        lines = in_columns([HEADINGS, *map(_cells, self.entries)])
         return "\n".join((f"referred to {self.to}", *lines))
 
     def latex(self) -> str:
@@ -92,9 +91,9 @@ class ReductionTable:
 
     @cached_property
     def _names(self) -> Mapping[Symbol, str]:
-        known = {name: without_marks(text) for name, text in self.read_names().items()}
+        letters = {name: without_marks(text) for name, text in self.read_names().items()}
         symbols = {symbol for entry in self.entries for symbol in (_own(entry), *entry.factor.free_symbols)}
-        return {symbol: known.get(symbol.name) or _fallback(symbol.name) for symbol in symbols}
+        return {symbol: letters.get(symbol.name) or _fallback(symbol.name) for symbol in symbols}
 
     def _printed(self, entry: Entry) -> tuple[str, ...]:
         return (
@@ -112,12 +111,12 @@ class ReductionTable:
 
         Where a letter alone is wider than the column, by the name of its part, the formula is that of the text.
         """
-        own = self._names[_own(entry)]
-        if any(printed_width(letter) > FORMULA / LETTER for letter in (_primed(own), *self._letters_in(entry))):
+        letter = self._names[_own(entry)]
+        if any(printed_width(letter) > FORMULA / LETTER for letter in (_primed(letter), *self._letters_in(entry))):
             return _broken(_formula(entry), FORMULA)
         above, below = entry.factor.as_numer_denom()
         sign = "-" if above.could_extract_minus_sign() else ""
-        upper, lower = (own, *self._factors(-above if sign else above)), self._factors(below)
+        upper, lower = (letter, *self._factors(-above if sign else above)), self._factors(below)
         fraction = rf"\frac{{{TIMES.join(upper)}}}{{{TIMES.join(lower)}}}"
         if not lower:
             law = BREAKS.join(upper)
@@ -126,7 +125,7 @@ class ReductionTable:
         else:
             divisor = BREAKS.join(lower)
             law = rf"{BREAKS.join(upper)} \,/\allowbreak\, {f'({divisor})' if len(lower) > 1 else divisor}"
-        return f"${_primed(own)} = {sign}{law}$"
+        return f"${_primed(letter)} = {sign}{law}$"
 
     def _letters_in(self, entry: Entry) -> tuple[str, ...]:
         return tuple(self._names[symbol] for symbol in (_own(entry), *entry.factor.free_symbols))

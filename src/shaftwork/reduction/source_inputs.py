@@ -42,13 +42,13 @@ def inputs_of(graph: CircuitGraph, number: int) -> dict[str, Place]:
         for k in part.branches
         if graph.branches[k].template.kind is Kind.ACROSS_SOURCE and not graph.branches[k].template.reads
     }
-    own = signals_of(graph, part)
-    if prescribed:
-        across = ((name, made) for name, made in own.items() if made.kind == "across" and made.ends in prescribed)
-        return {f"{part.name}.{name}": Place(number, made, prescribed[made.ends]) for name, made in across}
-    if part.component.role not in ("source", "loss"):
+    if not prescribed and part.component.role not in ("source", "loss"):
         return {}
-    return {f"{part.name}.{name}": Place(number, made, -1) for name, made in own.items() if made.kind == "through"}
+    return {
+        f"{part.name}.{name}": Place(number, signal, prescribed.get(signal.ends, -1))
+        for name, signal in signals_of(graph, part).items()
+        if signal.kind == ("across" if prescribed else "through") and (not prescribed or signal.ends in prescribed)
+    }
 
 
 def source_inputs(graph: CircuitGraph) -> tuple[str, ...]:
@@ -66,15 +66,15 @@ def places_of(graph: CircuitGraph, names: Sequence[str]) -> tuple[Place, ...]:
     Raises:
         SignalError: there is no such input.
     """
-    known = {name: place for number in range(len(graph.parts)) for name, place in inputs_of(graph, number).items()}
+    by_name = {name: place for number in range(len(graph.parts)) for name, place in inputs_of(graph, number).items()}
     for name in names:
-        if name not in known:
-            close = get_close_matches(str(name), known, n=3) or tuple(known)[:12]
+        if name not in by_name:
+            close = get_close_matches(str(name), by_name, n=3) or tuple(by_name)[:12]
             raise SignalError(
                 f"'{name}' is no input of '{graph.name}'. An input is what a source gives: "
                 f"{', '.join(close) or 'none'}. To excite another node, add a source there; its law may be 0."
             )
-    return tuple(known[name] for name in names)
+    return tuple(by_name[name] for name in names)
 
 
 def with_inputs(form: StateForm, places: Sequence[Place]) -> tuple[StateForm, tuple[int, ...]]:

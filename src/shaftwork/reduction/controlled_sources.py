@@ -19,9 +19,9 @@ from shaftwork.reduction.view import View, Words, words_of
 
 def reads_itself(view: View, law: int) -> bool:
     """Whether what a law among the links reads depends at the same instant on what it gives."""
-    own = view.tree.loops[law] if view.graph.branches[law].template.law.has(ACROSS) else ()
+    around = view.tree.loops[law] if view.graph.branches[law].template.law.has(ACROSS) else ()
     read = (tree for reading in readings_of(view.graph, law).values() for tree in _tree_branches(view, reading))
-    return law in _deciding(view, (*own, *read))
+    return law in _deciding(view, (*around, *read))
 
 
 def _tree_branches(view: View, reading: Reading) -> tuple[int, ...]:
@@ -36,7 +36,7 @@ def _tree_branches(view: View, reading: Reading) -> tuple[int, ...]:
 
 def _deciding(view: View, trees: Iterable[int]) -> tuple[int, ...]:
     """Laws and sources that decide the across variables of tree branches together with the states."""
-    found: dict[int, None] = {}
+    deciding: dict[int, None] = {}
     left, seen = list(trees), set[int]()
     while left:
         tree = left.pop()
@@ -44,14 +44,14 @@ def _deciding(view: View, trees: Iterable[int]) -> tuple[int, ...]:
             continue
         seen.add(tree)
         if view.kind(tree) in (Kind.ACROSS_SOURCE, Kind.LAW):
-            found[tree] = None
+            deciding[tree] = None
         elif view.kind(tree) is Kind.CONDUCTANCE:
             for link in view.cutsets[tree]:
                 if view.kind(link) is Kind.CONDUCTANCE:
                     left.extend(view.tree.loops[link])
                 elif view.kind(link) is not Kind.THROUGH_STORE:
-                    found[link] = None
-    return tuple(sorted(found))
+                    deciding[link] = None
+    return tuple(sorted(deciding))
 
 
 def controlled_problems(view: View) -> Iterator[Diagnostic]:
@@ -61,8 +61,8 @@ def controlled_problems(view: View) -> Iterator[Diagnostic]:
     unknown = (
         problem
         for law in reading
-        for made in readings_of(view.graph, law).values()
-        for problem in _unknown(view, law, made)
+        for each in readings_of(view.graph, law).values()
+        for problem in _unknown(view, law, each)
     )
     yield from dict.fromkeys(unknown)  # one cause for all windings of a motor
     for law in view.form.controlled:
@@ -76,11 +76,10 @@ def _unknown(view: View, law: int, reading: Reading) -> Iterator[Diagnostic]:
     what = f"{name} reads what is across {at_nodes(nodes)}"
     parts = view.parts((law,))
     if series := [tree for tree in trees if view.kind(tree) is Kind.THROUGH_STORE]:
-        kept = view.words(series[0])
-        message = f"{what}, where only {kept.spring}s meet: it follows from how fast their {kept.through} changes."
-        yield Diagnostic(
-            "controlled source", message, f"Let it read a {kept.through}, or put a {kept.loss} there.", parts, nodes
-        )
+        there = view.words(series[0])
+        message = f"{what}, where only {there.spring}s meet: it follows from how fast their {there.through} changes."
+        hint = f"Let it read a {there.through}, or put a {there.loss} there."
+        yield Diagnostic("controlled source", message, hint, parts, nodes)
     if law in view.form.controlled:
         moving = [k for k in _deciding(view, trees) if view.kind(k) is Kind.LAW or k in view.form.controlled]
         if moving:
