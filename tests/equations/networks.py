@@ -9,7 +9,8 @@ from shaftwork.components.base import REGISTRY
 from shaftwork.components.electrical import VoltageSource
 from shaftwork.components.laws import omega, phi, t
 from shaftwork.components.loads import CoulombLoad, ViscousLoad
-from shaftwork.components.machines import DCMachine, KlossMotor
+from shaftwork.components.machines import DCMachine
+from shaftwork.components.motors import KlossMotor
 from shaftwork.components.rotation import Damper, Gear, Ground, Inertia, PlanetaryGear, Spring
 from shaftwork.components.shaft_models import ShaftModel
 from shaftwork.components.shafts import Shaft

@@ -11,10 +11,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 import shaftwork as sw
-from shaftwork.results import exact_modes
 from shaftwork.results import exact_spectrum
-from shaftwork.shafts.exact_modes import modes as line_modes
-from shaftwork.shafts.exact_modes import natural_frequencies
 from shaftwork.shafts.exact_response import frequency_response
 from shaftwork.shafts.line import Section, SectionLine
 from tests.properties.examples import share_of_examples

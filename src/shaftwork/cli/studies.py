@@ -25,7 +25,7 @@ from shaftwork.core.errors import ParameterError, SimulationError
 from shaftwork.integrate.engines import ENGINE_NAMES
 
 if TYPE_CHECKING:
-    from shaftwork.studies.work_precision import Trial
+    from shaftwork.studies.work_precision_result import Trial
 
 SWEEP_FILES = ("sweep.csv", "sweep.png")
 COMPARISON_FILES = ("work-precision.csv", "work-precision.png", "torques.png")
@@ -138,8 +138,8 @@ def compare(options: Namespace, say: Say) -> Data:
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     from shaftwork.components.shafts import Shaft
     from shaftwork.studies import work_precision
-    from shaftwork.studies.ladder import rungs
-    from shaftwork.studies.work_precision import milliseconds
+    from shaftwork.studies.study_arguments import rungs
+    from shaftwork.studies.work_precision_result import milliseconds
 
     net, scene = load(options)
     shafts = [part.name for part in net.parts if isinstance(part, Shaft)]

@@ -22,13 +22,13 @@ from sympy import Add, Dummy, Expr, Symbol
 from shaftwork.codegen.code import vectorised_list
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.state_transfer import StateTransfer
-from shaftwork.components.laws import switches, switches_of
+from shaftwork.components.discontinuities import switches, switches_of
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import slope
+from shaftwork.reduction.explicit_rows import Rows
 from shaftwork.reduction.form import State, StateForm
 from shaftwork.reduction.gains import Number, exact_of
-from shaftwork.reduction.rows import Rows
-from shaftwork.reduction.symbolic_observables import SymbolicObservables
+from shaftwork.reduction.observables import Observables
 
 
 class Values:
@@ -125,7 +125,7 @@ class StateTransferJacobian:
 
     def __init__(self, form: StateForm, rows: Rows, parameters: Sequence[Symbol]) -> None:
         self._form, self._rows, self._by = form, rows, (rows.states, tuple(parameters), (TIME,))
-        transfer, expressed = StateTransfer(form), SymbolicObservables(form, rows)
+        transfer, expressed = StateTransfer(form), Observables(form, rows)
         self.names = transfer.names
         """Every store and angle, as in `StateTransfer`."""
         self._branches = transfer.branches

@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.heyoka_parameters import Fixed, HeldParameters
-from shaftwork.codegen.fixed import Fixed
-from shaftwork.codegen.heyoka_held import HeldParameters
 from shaftwork.components.discontinuities import parts
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.calls import interruptible

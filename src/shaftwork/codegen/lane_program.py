@@ -12,15 +12,12 @@ import numpy as np
 from sympy import Expr, Symbol
 
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.fixed import Fixed
-from shaftwork.codegen.hermite import JET
 from shaftwork.codegen.heyoka import HeyokaProgram
 from shaftwork.codegen.heyoka_expressions import Translator
 from shaftwork.codegen.heyoka_parameters import Fixed
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError
 from shaftwork.numerics.hermite import JET
-from shaftwork.reduction.rows import Rows
 from shaftwork.reduction.explicit_rows import Rows
 
 FREE_TIME = heyoka.expression("time")

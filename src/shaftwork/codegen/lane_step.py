@@ -22,8 +22,6 @@ import numpy as np
 from scipy.integrate import DOP853
 
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.hermite import BEYOND, JET, apart, inner
-from shaftwork.codegen.lane_errors import TINY
 from shaftwork.codegen.lane_program import FREE_TIME, KEPT, LaneFunction, LaneProgram, at
 from shaftwork.numerics.hermite import BEYOND, JET, apart, inner
 

@@ -25,7 +25,7 @@ from shaftwork.codegen.waves import DenseWaves
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.slopes import jumps, slope
 from shaftwork.core.errors import SimulationError
-from shaftwork.core.hints import hint
+from shaftwork.core.notices import hint
 from shaftwork.network.graph import GROUND, GraphPart
 from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm

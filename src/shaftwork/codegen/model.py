@@ -18,10 +18,8 @@ from shaftwork.codegen.arrays import ArrayProgram, BoundArrays
 from shaftwork.codegen.code import branchwise, scalar
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.runs import MachineCode, RunProgram
-from shaftwork.components.laws import t as TIME
-from shaftwork.components.pieces import pieces_degree
-from shaftwork.codegen.scalar import ScalarProgram
 from shaftwork.components.discontinuities import pieces_degree
+from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError, MissingExtraError, ParameterError
 from shaftwork.core.kept import Kept
 from shaftwork.core.parameters import in_si, is_quantity, without_unit

@@ -15,7 +15,7 @@ from shaftwork.codegen.code import scalar, vectorised
 from shaftwork.codegen.elements import Array, Index
 from shaftwork.codegen.sampling import MOST_SAMPLES, RESOLVED, Sides, bumps, changes_of, nearest, sampled
 from shaftwork.codegen.timeline import NOTHING, Timeline, timeline
-from shaftwork.components.laws import line, narrow_places, switches, unsolved_places
+from shaftwork.components.discontinuities import line, narrow_places, switches, unsolved_places
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.kept import Kept

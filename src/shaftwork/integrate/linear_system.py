@@ -12,9 +12,8 @@ from scipy import sparse
 from scipy.linalg import expm
 from scipy.sparse.linalg import expm_multiply
 
-from shaftwork.core.errors import ParameterError
-from shaftwork.core.interruption import interruptible
 from shaftwork.core.calls import interruptible
+from shaftwork.core.errors import ParameterError
 from shaftwork.integrate.modal import Eigensystem, find_modes
 from shaftwork.integrate.pieces import SmoothInterval
 from shaftwork.integrate.problem import Array, LinearInputs, Problem

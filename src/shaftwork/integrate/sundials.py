@@ -12,9 +12,6 @@ import numpy as np
 
 from shaftwork.core.calls import unprinted
 from shaftwork.core.errors import MissingExtraError
-from shaftwork.core.quiet import unprinted
-from shaftwork.core.notices import FILTERS
-from shaftwork.integrate.chebyshev import Polynomial, points
 from shaftwork.integrate.crossings import Crossings
 from shaftwork.integrate.guards import LEAST, SHORTER, GuardWatch, share_of_tolerance
 from shaftwork.integrate.pieces import (

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from shaftwork.core.calls import unprinted
 from shaftwork.core.notices import FILTERS
-from shaftwork.core.quiet import unprinted
 from shaftwork.integrate.engines import ENGINES
 from shaftwork.integrate.guards import CLEARANCE
 from shaftwork.integrate.pieces import GuardedFunctions, SmoothInterval, failure

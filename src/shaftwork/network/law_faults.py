@@ -16,8 +16,8 @@ from shaftwork.components.laws import SYMBOLS, t
 from shaftwork.components.modes import ANEW, Modes
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.components.tables import Interpolation, InterpolationSlope, Table
-from shaftwork.core.declarations import is_label
 from shaftwork.core.domains import ROTATION
+from shaftwork.core.parameters import is_label
 from shaftwork.network.changing import StoreFaultError
 from shaftwork.network.controlled import check_readings
 from shaftwork.network.grammar import FUNCTION_NAMES, FUNCTIONS

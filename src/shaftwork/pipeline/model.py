@@ -6,8 +6,6 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
-from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,22 +16,15 @@ from shaftwork.codegen.observer import ModelObserver
 from shaftwork.codegen.operating import steady_state
 from shaftwork.codegen.start_values import initial_state, with_others
 from shaftwork.codegen.valueless import refuse_vanishing
-from shaftwork.core.callbacks import Callback
-from shaftwork.core.errors import ParameterError
-from shaftwork.codegen.start_values import initial_state
-from shaftwork.codegen.switching import Switching
-from shaftwork.codegen.valueless import refuse_vanishing, rough, without_value
 from shaftwork.core.calls import Callback
-from shaftwork.core.errors import CompileError, ParameterError
+from shaftwork.core.errors import ParameterError
 from shaftwork.core.kept import Kept
 from shaftwork.core.notices import PulsationWarning, muted
 from shaftwork.core.parameters import in_si
 from shaftwork.core.screen import counted, named, on_one_screen
 from shaftwork.integrate import choice
-from shaftwork.integrate.engines import available
-from shaftwork.integrate.problem import Problem, Trajectory
 from shaftwork.integrate.engines import EngineName, available
-from shaftwork.integrate.problem import Fractions, LinearInputs, Problem, Trajectory
+from shaftwork.integrate.problem import Problem, Trajectory
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import (
     Demand,

@@ -15,7 +15,7 @@ from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.recovery import BranchHistory
-from shaftwork.codegen.switching import Switching
+from shaftwork.codegen.time_switches import Switching
 from shaftwork.codegen.valueless import rough, without_value
 from shaftwork.core.errors import CompileError
 from shaftwork.core.kept import Kept

@@ -13,7 +13,6 @@ from scipy import sparse
 
 from shaftwork.core.errors import no_quantity
 from shaftwork.core.screen import counted
-from shaftwork.results.frequency import FrequencyResponse, frequency_response
 from shaftwork.results.exact_lines import ExactSlopes
 from shaftwork.results.exact_problem import ExactProblem
 from shaftwork.results.exact_spectrum import Starts, find_exact_modes

@@ -21,7 +21,7 @@ from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.courses import FEW
 from shaftwork.pipeline.phases.hybrid_state import AHEAD, AHEAD_OF_RUN, CLEAR, EPS, GOLDEN, NOTHING, ROUNDINGS
 from shaftwork.pipeline.phases.mode_machines import ModeNames
-from shaftwork.reduction.symbolic_observables import SymbolicObservables
+from shaftwork.reduction.observables import Observables
 from shaftwork.results.measures import Measure
 
 EXTREMES = {"max": (1.0,), "min": (-1.0,), "peak": (1.0, -1.0)}
@@ -49,7 +49,7 @@ class EnsembleCode:
         if model.rows is None or program is None or not model.states:
             raise CompileError("These equations have no program of their own.")
         self.model, self._rows, self._stores = model, model.rows, stores
-        self._expressed = SymbolicObservables(model.form, model.rows)
+        self._expressed = Observables(model.form, model.rows)
         quantities = [self._expressed.quantity(measure.quantity) for measure in measures]
         read = [found for found in quantities if found is not None]
         if len(read) < len(quantities):

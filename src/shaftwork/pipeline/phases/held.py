@@ -24,7 +24,6 @@ from shaftwork.codegen.linear_readings import ReadingMatrices
 from shaftwork.codegen.matrices import LinearPart
 from shaftwork.codegen.model import ScalarProgram
 from shaftwork.codegen.products import Factor
-from shaftwork.codegen.scalar import ScalarProgram
 from shaftwork.components.discontinuities import parts
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.kept import Kept

@@ -16,7 +16,6 @@ from shaftwork.pipeline.phases.hybrid_state import AHEAD_OF_RUN, ROUNDINGS, Hybr
 from shaftwork.pipeline.phases.mode_machines import ModeMachine, ModeNames
 from shaftwork.pipeline.phases.starts import begins_anew
 from shaftwork.pipeline.start import Ending
-from shaftwork.reduction.cancelling import jamming
 from shaftwork.reduction.value_diagnosis import jamming
 
 if TYPE_CHECKING:

@@ -21,11 +21,11 @@ from shaftwork.pipeline.sensitivities.differentiable import rows_of, smooth_para
 from shaftwork.pipeline.sensitivities.legs import motion_of
 from shaftwork.pipeline.sensitivities.motion_slopes import MotionSlopes
 from shaftwork.pipeline.start import refuse_motion
-from shaftwork.results.measures import KINDS, SMALLEST, Measure
+from shaftwork.results.course import SMALLEST, turning_points
+from shaftwork.results.measures import KINDS, Measure
 from shaftwork.results.sensitivities import FrequencySensitivities, MotionSensitivities
 from shaftwork.results.slopes import Complex
 from shaftwork.results.solution import Solution
-from shaftwork.results.turning import turning_points
 
 APART = 1e-6
 """Rates that differ by less than this part of themselves are one rate, which has no derivative of its own."""

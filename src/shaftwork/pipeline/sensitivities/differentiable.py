@@ -16,7 +16,6 @@ from shaftwork.pipeline.analysis import Given
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.model import PhasedModel
 from shaftwork.pipeline.start import start_of
-from shaftwork.reduction.rows import Rows
 from shaftwork.reduction.explicit_rows import Rows
 
 NO_DERIVATIVE = {
