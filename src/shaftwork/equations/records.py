@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Protocol
 
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.screen import counted, named, on_one_screen
-from shaftwork.equations.network_equations import NetworkEquations
 from shaftwork.equations.notations import Notation, notation_of
+from shaftwork.equations.rows import NetworkEquations
 
 if TYPE_CHECKING:
     from shaftwork.equations.fields import Field

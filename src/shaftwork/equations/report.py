@@ -7,10 +7,10 @@ from typing import Literal, get_args
 
 from shaftwork.core.errors import CompileError, ShaftworkError
 from shaftwork.equations.blocks import Block, Blocks
-from shaftwork.equations.network_equations import NetworkEquations
 from shaftwork.equations.nomenclature import nomenclature
 from shaftwork.equations.printing import aligned
 from shaftwork.equations.quantities import INSTEAD
+from shaftwork.equations.rows import NetworkEquations
 from shaftwork.equations.series import shortened
 from shaftwork.equations.spelling import in_text, without_marks
 

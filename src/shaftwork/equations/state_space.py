@@ -5,12 +5,12 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from sympy import Add, Dummy, Expr, ImmutableMatrix, Integer, Symbol, cancel
 
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError, SignalError, no_quantity
+from shaftwork.equations.rows import NetworkEquations
 from shaftwork.equations.slopes import LawSlopes, Slope
 from shaftwork.equations.tableau import refuse_waves
 from shaftwork.network.graph import GraphBranch
@@ -21,9 +21,6 @@ from shaftwork.reduction.inputs import places_of, source_inputs, with_inputs
 from shaftwork.reduction.names import Names
 from shaftwork.reduction.rows import explicit_rows
 from shaftwork.reduction.symbolic_observables import SymbolicObservables
-
-if TYPE_CHECKING:  # the records make matrices through this module
-    from shaftwork.equations.records import Equations
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +55,7 @@ class StateSpace:
 
 
 def state_space(
-    equations: Equations, inputs: str | Sequence[str] | None, outputs: str | Sequence[str] | None
+    equations: NetworkEquations, inputs: str | Sequence[str] | None, outputs: str | Sequence[str] | None
 ) -> StateSpace:
     """The matrices.
 
@@ -103,7 +100,7 @@ def _listed(names: str | Sequence[str]) -> tuple[str, ...]:
     return (names,) if isinstance(names, str) else tuple(names)
 
 
-def _near(equations: Equations, slopes: LawSlopes) -> StateForm:
+def _near(equations: NetworkEquations, slopes: LawSlopes) -> StateForm:
     """The form with laws by their slopes, in letters of the network, and sources at zero."""
     quantities, laws = equations.assembly.quantities, dict[int, Expr]()
     for branch in equations.form.graph.branches:
@@ -137,12 +134,12 @@ def _quantity(form: StateForm, read: SymbolicObservables, name: str) -> Expr:
         SignalError: there is none of this name, or it is no sum of states.
     """
     names = Names(form)
-    found = Symbol(name, real=True) if any(state.name == name for state in form.states) else read.quantity(name)
-    if found is None:
+    quantity = Symbol(name, real=True) if any(state.name == name for state in form.states) else read.quantity(name)
+    if quantity is None:
         if name in names.units:
             raise SignalError(f"'{name}' is a product of speeds and torques, and no sum of states.")
         raise no_quantity(name, form.graph.name, names.units)
-    return found
+    return quantity
 
 
 def _slopes(rows: Sequence[Expr], by: Sequence[Symbol]) -> ImmutableMatrix:
