@@ -17,11 +17,12 @@ from sympy import Add, Expr, Integer, Symbol, cancel, expand
 
 from shaftwork.components.branches import ACROSS, HISTORY, INTEGRAL
 from shaftwork.components.laws import t as TIME
-from shaftwork.equations import lagrange_print
 from shaftwork.equations.assembly import FactoredTerms, Sides, sides, terms_of
 from shaftwork.equations.coordinates import Coordinates, coordinates, is_prescribed
 from shaftwork.equations.lagrange_equations import Constraint, LagrangeEquations, MotionEquation, Square
+from shaftwork.equations.lagrange_print import blocks_of, document
 from shaftwork.equations.lagrange_proof import Proof, prove
+from shaftwork.equations.report import rendered, typeset
 from shaftwork.equations.rows import NetworkEquations
 from shaftwork.equations.second_order import linear_stiffness
 from shaftwork.network.graph import GROUND, GraphBranch
@@ -42,7 +43,7 @@ class Lagrangian(LagrangeEquations):
         Args:
             values: print the parameters' values instead of their symbols.
         """
-        return lagrange_print.body(self, values=values)
+        return typeset(self.kirchhoff, blocks_of(self, values=values))
 
     def document(self, *, values: bool = False) -> str:
         """A complete LaTeX document: energies, generalised forces and equations, and the nomenclature with the values.
@@ -50,10 +51,10 @@ class Lagrangian(LagrangeEquations):
         Args:
             values: print the parameters' values instead of their symbols.
         """
-        return lagrange_print.document(self, values=values)
+        return document(self, values=values)
 
     def _repr_latex_(self) -> str:
-        return lagrange_print.notebook(self)
+        return rendered(self.kirchhoff, blocks_of(self, values=False))
 
 
 def lagrangian(equations: NetworkEquations) -> Lagrangian:

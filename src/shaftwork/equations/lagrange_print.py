@@ -13,21 +13,11 @@ from shaftwork.equations.lagrange_equations import LagrangeEquations, MotionEqua
 from shaftwork.equations.nomenclature import nomenclature, unit
 from shaftwork.equations.printing import Line
 from shaftwork.equations.quantities import rate_of
-from shaftwork.equations.report import in_sections, rendered, section, typeset
+from shaftwork.equations.report import in_sections, section
 from shaftwork.equations.sums import Sums
 
 KINETIC, POTENTIAL, LOSS = "E_k", "E_p", r"\mathcal{R}"
 """Letters of the energies, after Abdelkader 2016, (19), and of Rayleigh's function."""
-
-
-def body(lagrangian: LagrangeEquations, *, values: bool) -> str:
-    """The body of a LaTeX document, each block under a paragraph heading."""
-    return typeset(lagrangian.kirchhoff, _blocks(lagrangian, values=values))
-
-
-def notebook(lagrangian: LagrangeEquations) -> str:
-    """The body with headings that a notebook renders."""
-    return rendered(lagrangian.kirchhoff, _blocks(lagrangian, values=False))
 
 
 def document(lagrangian: LagrangeEquations, *, values: bool) -> str:
@@ -41,7 +31,7 @@ def document(lagrangian: LagrangeEquations, *, values: bool) -> str:
     besides = [(f"${letter}$", of, "--", unit(size)) for letter, (of, size, squares) in energies.items() if squares]
     names = _names(lagrangian) | coordinates.keys()
     sections = {
-        "Lagrange's equations": section(_blocks(lagrangian, values=values)),
+        "Lagrange's equations": section(blocks_of(lagrangian, values=values)),
         "Nomenclature": nomenclature(lagrangian.kirchhoff, names, coordinates, besides),
     }
     return in_sections(lagrangian.kirchhoff, sections)
@@ -61,7 +51,8 @@ def _names(lagrangian: LagrangeEquations) -> set[str]:
     return {symbol.name for symbol in symbols | {positions[rate] for rate in symbols & positions.keys()}}
 
 
-def _blocks(lagrangian: LagrangeEquations, *, values: bool) -> tuple[Block, ...]:
+def blocks_of(lagrangian: LagrangeEquations, *, values: bool) -> tuple[Block, ...]:
+    """The blocks that say anything."""
     blocks = _LagrangeBlocks(lagrangian, Blocks(lagrangian.kirchhoff, values)).printed()
     return tuple(block for block in blocks if block.lines)
 

@@ -20,6 +20,7 @@ from shaftwork.core.errors import CompileError, ParameterError, SignalError, no_
 from shaftwork.equations.assembly import FactoredTerms
 from shaftwork.equations.blocks import Blocks
 from shaftwork.equations.cramer import TooManyTermsError, in_numbers, quotient
+from shaftwork.equations.notations import QUANTITIES
 from shaftwork.equations.printing import LINE_WIDTH, Line, Writer, aligned, printed_width
 from shaftwork.equations.rows import NetworkEquations
 from shaftwork.equations.slopes import FRACTION_DIGITS, LawSlopes, PointValues, Slope, Values
@@ -34,8 +35,6 @@ STEPS, EXTRA = 1000, 10
 
 REAL = Symbol("s", real=True)
 """Stands for s in print, where all letters are real."""
-GREEK = {"tau": r"\tau", "omega": r"\omega", "phi": r"\varphi", "psi": r"\psi"}
-"""The letters of quantities whose names are those of Greek ones."""
 
 Complex = NDArray[np.complex128]
 
@@ -300,7 +299,8 @@ def _named(name: str, names: Mapping[str, str]) -> str:
     part, _, quantity = name.rpartition(".")
     stem, _, end = quantity.partition("_")
     index = rf"\mathrm{{{escaped(part)}}}{f',{escaped(end)}' if end else ''}"
-    return names.get(name, rf"{GREEK.get(stem, stem)}_{{{index}}}")
+    letter = QUANTITIES[stem].latex if stem in QUANTITIES else stem
+    return names.get(name, rf"{letter}_{{{index}}}")
 
 
 def _letters(slopes: Mapping[Symbol, Slope], taken: set[str]) -> dict[str, str]:
