@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Literal
 
 from sympy import Expr, Integer, Symbol
@@ -72,10 +71,6 @@ class Tableau:
     def _graph(self) -> CircuitGraph:
         return self.assembly.form.graph
 
-    @cached_property
-    def _laws(self) -> dict[int, Sum]:
-        return {}
-
     def rows(self, read: Sum) -> dict[Unknown, Sum]:
         """As many rows as unknowns, each by the one that it is the row of; with what a sum contains among them."""
         rows: dict[Unknown, Sum] = {("across", node): self._balance(node) for node in range(len(self._graph.nodes))}
@@ -136,9 +131,7 @@ class Tableau:
             case Kind.CONDUCTANCE:
                 return total([(self.assembly.quantities.law(index), self.across(branch))])
             case Kind.LAW:
-                if index not in self._laws:
-                    self._laws[index] = self._near(branch)
-                return self._laws[index]
+                return self._near(branch)
             case Kind.THROUGH_SOURCE:
                 return {}
         # a coupling that says what others have said carries nothing
