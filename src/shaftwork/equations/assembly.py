@@ -37,6 +37,11 @@ class Sides(NamedTuple):
     groups: tuple[FactoredTerms, ...]
 
 
+def branches_of(item: ThroughQuantity | int) -> tuple[int, ...]:
+    """The branches of a flow, or the one that is an across store or a coupling."""
+    return item.branches if isinstance(item, ThroughQuantity) else (item,)
+
+
 def sides(left: Expr, terms: Iterable[Expr]) -> Sides:
     """A row without a common factor."""
     return Sides(tidy(left), (FactoredTerms(Integer(1), rising_first(terms)),))
@@ -44,8 +49,8 @@ def sides(left: Expr, terms: Iterable[Expr]) -> Sides:
 
 def rising_first(terms: Iterable[Expr]) -> Terms:
     """The terms that are not zero, those with a plus sign first, else in their order."""
-    kept = [tidy(term) for term in terms if term != 0]
-    return tuple(sorted(kept, key=lambda term: bool(term.could_extract_minus_sign())))
+    tidied = (tidy(term) for term in terms if term != 0)
+    return tuple(sorted(tidied, key=lambda term: bool(term.could_extract_minus_sign())))
 
 
 def terms_of(total: Expr) -> tuple[Expr, ...]:
@@ -91,42 +96,41 @@ class Assembly:
 
     def ends(self, branch: int) -> tuple[int, int]:
         """First and second node of a branch."""
-        made = self.form.graph.branches[branch]
-        return made.plus, made.minus
+        return self.form.graph.branches[branch].plus, self.form.graph.branches[branch].minus
 
     @cached_property
     def at_node(self) -> tuple[tuple[ThroughQuantity | int, ...], ...]:
         """For each node the flows, across stores and couplings that touch it, in the order of the parts."""
-        found: list[dict[ThroughQuantity | int, None]] = [{} for _ in self.form.graph.nodes]
+        touching: list[dict[ThroughQuantity | int, None]] = [{} for _ in self.form.graph.nodes]
         for branch in self.form.graph.branches:
             item = self.quantities.flow_of.get(branch.index, branch.index)
             touched = [node for _, plus, minus in branch.terms for node in (plus, minus)]
             for node in touched or (branch.plus, branch.minus):
                 if node != GROUND:
-                    found[node][item] = None
-        return tuple(tuple(items) for items in found)
+                    touching[node][item] = None
+        return tuple(tuple(items) for items in touching)
 
     def balance(self, node: int) -> Sides:
         """Stores of the node against everything that drives or loads it."""
-        own: list[Expr] = []
-        terms: list[Expr] = []
-        for item in self.at_node[node]:
-            if isinstance(item, ThroughQuantity):
-                terms.append((1 if item.minus == node else -1) * item.sign * self.quantities.through(item))
-            elif self.ends(item) == (node, GROUND):
-                own.append(self.quantities.law(item))
-            else:
-                terms.append(-Add(*(gain * self.stored(item) for gain in self.incidence(item, node))))
-        speed = rate_of(self.quantities.node(node))
-        return sides(Mul(Add(*own), speed) if own else Integer(0), terms)
+        items = self.at_node[node]
+        stores = [item for item in items if isinstance(item, int) and self.ends(item) == (node, GROUND)]
+        inertia = Add(*map(self.quantities.law, stores))
+        left = Mul(inertia, rate_of(self.quantities.node(node))) if stores else Integer(0)
+        return sides(left, (self.received(item, node) for item in items if item not in stores))
+
+    def received(self, item: ThroughQuantity | int, node: int) -> Expr:
+        """What a node receives through a flow, an across store or a coupling."""
+        if isinstance(item, ThroughQuantity):
+            return (1 if item.minus == node else -1) * item.sign * self.quantities.through(item)
+        return -Add(*(gain * self.stored(item) for gain in self.incidence(item, node)))
 
     def incidence(self, branch: int, node: int) -> Iterator[Expr]:
         """Factors with which a branch takes its through variable from a node."""
-        made = self.form.graph.branches[branch]
-        for coefficient, plus, minus in made.balances or ((Integer(1), made.plus, made.minus),):
+        graph, record = self.form.graph, self.form.graph.branches[branch]
+        for coefficient, plus, minus in record.balances or ((Integer(1), record.plus, record.minus),):
             for end, sign in ((plus, 1), (minus, -1)):
                 if end == node:
-                    yield sign * self.form.graph.in_network_symbols(coefficient, made)
+                    yield sign * graph.in_network_symbols(coefficient, record)
 
     def stored(self, branch: int) -> Expr:
         """The through variable of an across store or of a coupling."""
@@ -176,23 +180,23 @@ class Assembly:
 
     def in_place(self, terms: Iterable[Expr]) -> Terms:
         """Terms in which prescribed across variables that are sums stand by these."""
-        found = (term.xreplace(self._sums) for term in terms)
-        return tuple(part for term in found for part in terms_of(term.expand(deep=False)))
+        replaced = (term.xreplace(self._sums) for term in terms)
+        return tuple(part for term in replaced for part in terms_of(term.expand(deep=False)))
 
     @cached_property
     def _sums(self) -> dict[Expr, Expr]:
-        found: dict[Expr, Expr] = {}
+        sums: dict[Expr, Expr] = {}
         for branch in self.form.across_sources:
             across = self.quantities.across(self.ends(branch))
             if self.is_sum(branch):
                 (letter,) = across.free_symbols
-                found[letter] = across.coeff(letter) * self.quantities.law(branch)
-        return found
+                sums[letter] = across.coeff(letter) * self.quantities.law(branch)
+        return sums
 
     def coupling(self, branch: int) -> Sides:
         """What an ideal coupling imposes on the speeds of its nodes."""
-        made = self.form.graph.branches[branch]
-        pairs = [(self.form.graph.in_network_symbols(factor, made), ends) for factor, *ends in made.terms]
+        graph, record = self.form.graph, self.form.graph.branches[branch]
+        pairs = [(graph.in_network_symbols(factor, record), ends) for factor, *ends in record.terms]
         terms = [tidy(factor * self.quantities.across((ends[0], ends[1]))) for factor, ends in pairs]
         left = [term for term in terms if not term.could_extract_minus_sign()]
         return sides(Add(*left), (-term for term in terms if term.could_extract_minus_sign()))
@@ -240,20 +244,20 @@ class Assembly:
     @cached_property
     def cutsets(self) -> dict[int, tuple[tuple[int, Expr], ...]]:
         """For each tree branch the links of its cutset with their factors, in the order of the branch table."""
-        rows, found = sorted(self.form.tree.cutsets.items()), dict[int, list[tuple[int, Expr]]]()
+        rows, members = sorted(self.form.tree.cutsets.items()), dict[int, list[tuple[int, Expr]]]()
         gains = iter(simplified(gain for _, row in rows for gain in row.values()))
         for link, row in rows:
             for tree in row:
-                found.setdefault(tree, []).append((link, next(gains)))
-        return {tree: tuple(members) for tree, members in found.items()}
+                members.setdefault(tree, []).append((link, next(gains)))
+        return {tree: tuple(links) for tree, links in members.items()}
 
     @cached_property
     def lumped(self) -> frozenset[int]:
         """Links that are printed by their flow's symbol: laws and sources whose flow lies wholly outside the tree."""
         flows = dict.fromkeys(self.quantities.flow_of[law] for law in self.form.laws if not self.is_sum(law))
-        return frozenset(branch for flow in flows if all(map(self._known, flow.branches)) for branch in flow.branches)
+        return frozenset(branch for flow in flows if all(map(self._is_free, flow.branches)) for branch in flow.branches)
 
-    def _known(self, branch: int) -> bool:
+    def _is_free(self, branch: int) -> bool:
         """Whether a branch is a link that shares no unknown with the conductances of the tree."""
         if branch not in self.form.tree.loops:
             return False
@@ -274,4 +278,4 @@ class Assembly:
             else:
                 term = -gain * self.through_law(link, Add(*self.around(link)))
                 terms[link] = terms_of(term.expand()) if self.is_sum(link) else (term,)
-        return tuple(term for made in terms.values() for term in made)
+        return tuple(term for of_link in terms.values() for term in of_link)

@@ -15,11 +15,10 @@ from shaftwork.core.domains import ELECTRICAL, ROTATION, TRANSLATION
 from shaftwork.core.errors import CompileError
 from shaftwork.equations.assembly import FactoredTerms, Sides, sides, terms_of, tidy
 from shaftwork.equations.fields import fields_of
-from shaftwork.equations.network_equations import NetworkEquations
 from shaftwork.equations.notations import in_letters
 from shaftwork.equations.printing import LINE_WIDTH, Line, Writer, printed_width, with_rates
 from shaftwork.equations.quantities import ThroughQuantity, rate_of
-from shaftwork.equations.rows import Eliminated, Row, StateEquation
+from shaftwork.equations.rows import Eliminated, NetworkEquations, Row, StateEquation
 from shaftwork.equations.second_order import SecondOrder
 from shaftwork.equations.spelling import INDEX_CLOSES, INDEX_OPENS, in_text
 from shaftwork.equations.sums import MEANING, WEIGHTS, Sums, sums_of

@@ -22,12 +22,11 @@ from shaftwork.components.base import Derived, symbols_of
 from shaftwork.components.laws import t
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.domains import ROTATION
-from shaftwork.equations.assembly import sides, terms_of
+from shaftwork.equations.assembly import branches_of, sides, terms_of
 from shaftwork.equations.letters import parameter_letters
-from shaftwork.equations.network_equations import NetworkEquations, with_derived
 from shaftwork.equations.notations import Letter, in_letters, inverses_of
 from shaftwork.equations.printing import Line, Writer, with_rates
-from shaftwork.equations.quantities import ThroughQuantity
+from shaftwork.equations.rows import NetworkEquations, with_derived
 from shaftwork.equations.spelling import without_marks
 from shaftwork.network.graph import GROUND, GraphPart
 
@@ -111,14 +110,8 @@ class Field:
                 ends = (("a", -1, Integer(0)), ("b", 1, other.symbol("length")))
                 yield from (sign * other.torque.subs(X, x) for end, sign, x in ends if other.part.nodes[end] == node)
         for item in assembly.at_node[node]:
-            if isinstance(
-                graph.part_of(item.branches[0] if isinstance(item, ThroughQuantity) else item).component, Shaft
-            ):
-                continue
-            if isinstance(item, ThroughQuantity):
-                yield (1 if item.minus == node else -1) * item.sign * assembly.quantities.through(item)
-            else:
-                yield from (-gain * assembly.stored(item) for gain in assembly.incidence(item, node))
+            if not isinstance(graph.part_of(branches_of(item)[0]).component, Shaft):
+                yield assembly.received(item, node)
 
     @cached_property
     def definitions(self) -> Mapping[Symbol, Expr]:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property, partial
+from itertools import chain
 
-from sympy import Add, Expr, Symbol
+from sympy import Expr, Symbol
 
-from shaftwork.equations.assembly import Assembly, Sides, sides
-from shaftwork.equations.quantities import ThroughQuantity, rate_of
+from shaftwork.equations.assembly import Assembly, Sides, branches_of, sides
+from shaftwork.equations.quantities import rate_of
 from shaftwork.equations.records import Equations
 from shaftwork.equations.rows import (
     CouplingEquation,
@@ -56,34 +57,28 @@ class _KirchhoffWriter:
 
     def origin(self, branches: Iterable[int], nodes: Iterable[int] = ()) -> Origin:
         """Parts, branches and nodes of a row, each once, in the order of the network."""
-        kept = tuple(sorted(set(branches)))
-        made = [self.graph.branches[index] for index in kept]
-        touched = {*nodes, *(node for item in made for node in (item.plus, item.minus))}
-        touched.update(node for item in made for _, plus, minus in item.terms for node in (plus, minus))
-        parts = dict.fromkeys(self.graph.parts[item.part].name for item in made)
-        return tuple(parts), kept, tuple(self.graph.nodes[node] for node in sorted(touched - {GROUND}))
+        numbers = tuple(sorted(set(branches)))
+        members = [self.graph.branches[number] for number in numbers]
+        touched = {*nodes, *(node for branch in members for node in (branch.plus, branch.minus))}
+        touched.update(node for branch in members for _, plus, minus in branch.terms for node in (plus, minus))
+        parts = dict.fromkeys(self.graph.parts[branch.part].name for branch in members)
+        return tuple(parts), numbers, tuple(self.graph.nodes[node] for node in sorted(touched - {GROUND}))
 
     def part(self, branch: int) -> str:
         return self.graph.part_of(branch).name
 
     def nodes(self) -> Iterator[NodeEquation]:
         for number, name in enumerate(self.graph.nodes):
-            items = self.assembly.at_node[number]
-            branches = [k for item in items for k in (item.branches if isinstance(item, ThroughQuantity) else (item,))]
-            parts, kept, _ = self.origin(branches)
-            make, taken = partial(self.assembly.balance, number), partial(self._taken, number, kept)
-            yield NodeEquation(parts, kept, (name,), make, name, taken)
-
-    def _taken(self, node: int, branches: tuple[int, ...]) -> Mapping[int, Expr]:
-        return {branch: Add(*self.assembly.incidence(branch, node)) for branch in branches}
+            touching = (branches_of(item) for item in self.assembly.at_node[number])
+            parts, branches, _ = self.origin(chain.from_iterable(touching))
+            make = partial(self.assembly.balance, number)
+            yield NodeEquation(parts, branches, (name,), make, name, number, self.assembly)
 
     def loops(self) -> Iterator[LoopEquation]:
         for link in sorted(self.form.tree.loops):
             if self.assembly.kind(link) is not Kind.COUPLING:
                 origin = self.origin((link, *self.form.tree.loops[link]))
-                yield LoopEquation(
-                    *origin, partial(self.assembly.loop, link), link, partial(self.assembly.factors, link)
-                )
+                yield LoopEquation(*origin, partial(self.assembly.loop, link), link, self.assembly)
 
     def laws(self) -> Iterator[LawEquation]:
         for flow in self.assembly.quantities.flows:
@@ -104,16 +99,12 @@ class _KirchhoffWriter:
                 yield CouplingEquation(*self.origin((branch.index,)), partial(self.assembly.coupling, branch.index))
 
     def states(self) -> Iterator[StateEquation]:
+        systems = {"across": self._speeds, "through": self._torques}
         for state in self.form.states:
-            branch, named = state.branch, (state.name, Symbol(state.name, real=True), state.unit)
-            origin = self.origin((branch,))
-            if state.kind == "integral":
-                row = partial(self._integral_row, branch)
-                yield StateEquation(*origin, row, *named, _always, row)
-            else:
-                system = self._speeds if state.kind == "across" else self._torques
-                row, coupled = partial(_row, system, branch), partial(_coupled, system, branch)
-                yield StateEquation(*origin, row, *named, partial(_solved, system, branch), coupled)
+            branch, system = state.branch, systems.get(state.kind)
+            make = partial(_row, system, branch) if system else partial(self._integral_row, branch)
+            symbol = Symbol(state.name, real=True)
+            yield StateEquation(*self.origin((branch,)), make, state.name, symbol, state.unit, system)
 
     def _speeds(self) -> EliminationSystem:
         return self.solution.speeds
@@ -133,8 +124,8 @@ class _KirchhoffWriter:
             name = branch_name(self.graph, self.graph.branches[branch])
             yield Eliminated(*self._cutset(branch), make, name, self._series(branch), "torque")
         for branch in self.form.tree_conductances:
-            made = self.graph.branches[branch]
-            where = " and ".join(self.graph.node_name(node) for node in (made.plus, made.minus) if node != GROUND)
+            ends = self.assembly.ends(branch)
+            where = " and ".join(self.graph.node_name(node) for node in ends if node != GROUND)
             why = f"no store at {where} fixes the speed across {self.part(branch)}; it follows from the balance"
             make = partial(self.solution.algebraic.row, branch)
             yield Eliminated(*self._cutset(branch), make, f"across {self.part(branch)}", why, "algebraic")
@@ -226,25 +217,13 @@ class _KirchhoffWriter:
             yield "Ratios cancel for the given values; other ratios change the structure of these equations."
 
 
-def _always() -> bool:
-    return True
-
-
 def _row(system: Callable[[], EliminationSystem], branch: int) -> Sides:
     return system().row(branch)
 
 
-def _solved(system: Callable[[], EliminationSystem], branch: int) -> bool:
-    return system().solved(branch)
-
-
-def _coupled(system: Callable[[], EliminationSystem], branch: int) -> Sides:
-    return system().coupled(branch)
-
-
 def _listed(names: Iterable[str]) -> str:
     """Names in a sentence: "a, b and c"; "c others" where there are many."""
-    kept = list(dict.fromkeys(names))
-    if len(kept) > 6:
-        kept = [*kept[:4], f"{len(kept) - 4} others"]
-    return " and ".join(filter(None, (", ".join(kept[:-1]), kept[-1]))) if kept else "nothing"
+    listed = list(dict.fromkeys(names))
+    if len(listed) > 6:
+        listed = [*listed[:4], f"{len(listed) - 4} others"]
+    return " and ".join(filter(None, (", ".join(listed[:-1]), listed[-1]))) if listed else "nothing"

@@ -8,151 +8,33 @@ have energies like drive trains: a capacitor's is kinetic, a coil's potential. S
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
-from sympy import Add, Expr, Integer, Rational, Symbol, cancel, expand
+from sympy import Add, Expr, Integer, Symbol, cancel, expand
 
 from shaftwork.components.branches import ACROSS, HISTORY, INTEGRAL
 from shaftwork.components.laws import t as TIME
-from shaftwork.equations.assembly import FactoredTerms, Sides, rising_first, sides, terms_of, tidy
+from shaftwork.equations.assembly import FactoredTerms, Sides, sides, terms_of
 from shaftwork.equations.coordinates import Coordinates, coordinates, is_prescribed
-from shaftwork.equations.motion import Motion
-from shaftwork.equations.quantities import rate_of
-from shaftwork.equations.records import Equations
-from shaftwork.equations.rows import Row
+from shaftwork.equations.lagrange_equations import Constraint, LagrangeEquations, MotionEquation, Square
+from shaftwork.equations.lagrange_print import blocks_of, document
+from shaftwork.equations.lagrange_proof import Proof, prove
+from shaftwork.equations.report import rendered, typeset
+from shaftwork.equations.rows import NetworkEquations
 from shaftwork.equations.second_order import linear_stiffness
 from shaftwork.network.graph import GROUND, GraphBranch
 from shaftwork.network.kinds import Kind
 
-if TYPE_CHECKING:  # the record proves and prints itself through these modules
-    from shaftwork.equations.lagrange_proof import Proof
-
-
-class Square(NamedTuple):
-    """Half of a coefficient times the square of a position or speed: an energy, or half of a loss.
-
-    Attributes:
-        branch: number of the branch.
-        coefficient: inertia, stiffness or damping.
-        along: what is squared.
-    """
-
-    branch: int
-    coefficient: Expr
-    along: Expr
-
-    @property
-    def energy(self) -> Expr:
-        """The whole term."""
-        return Rational(1, 2) * self.coefficient * self.along**2
-
-    def pull(self, symbol: Symbol) -> FactoredTerms:
-        """Minus the term differentiated: a torque."""
-        return FactoredTerms(tidy(-self.coefficient * self.along.diff(symbol)), rising_first(terms_of(self.along)))
-
 
 @dataclass(frozen=True, eq=False)
-class MotionEquation(Row):
-    """Lagrange's equation of a coordinate, solved for the rate of its momentum: d/dt(dT/dq') = Q - dV/dq - dR/dq'.
-
-    Args:
-        node: the node whose angle, position or flux linkage the coordinate is.
-        coordinate: its symbol q.
-        force: the generalised force Q.
-        displacements: for each node that moves with the coordinate by how much: its position differentiated by q.
-    """
-
-    node: str
-    coordinate: Symbol
-    force: Expr
-    displacements: Mapping[str, Expr]
-
-
-@dataclass(frozen=True, eq=False)
-class Constraint(Row):
-    """What a part imposes on the rates by a reaction that does work: a gear with losses, a controlled voltage.
-
-    Args:
-        reaction: the torque, force or current with which it does so; it stands in the generalised forces.
-    """
-
-    reaction: Symbol
-
-
-@dataclass(frozen=True, eq=False)
-class Lagrangian:
-    """The energies of a network and the equations of motion that follow.
-
-    Law: d/dt(dL/dq') - dL/dq + dR/dq' = Q with L = T - V. Angles are counted from the untwisted position.
-
-    Args:
-        kirchhoff: Kirchhoff's equations of the same network, in the same phase.
-        coordinates: generalised coordinates q: angles, positions and flux linkages of nodes.
-        inertias: kinetic energies of inertias and masses (and of capacitors).
-        springs: potential energies of springs and of laws that are linear in the twist (and of coils).
-        dampers: terms of Rayleigh's function: of linear dampers (and resistors), half of the power that each loses.
-        equations: the equation of each coordinate, with its generalised force.
-        constraints: what couplings with losses and controlled sources impose besides, each with a reaction in `forces`.
-        reactions: torques, forces and currents of couplings and prescribed speeds, which do no work and stand nowhere.
-        laws: torques, forces and currents that stand in `forces`, in coordinates and rates.
-        motion: every other quantity of Kirchhoff's equations in coordinates and rates: speeds, torques of springs.
-        prescribed: speed of every prescribed angle or position.
-    """
-
-    kirchhoff: Equations
-    coordinates: tuple[Symbol, ...]
-    inertias: tuple[Square, ...]
-    springs: tuple[Square, ...]
-    dampers: tuple[Square, ...]
-    equations: tuple[MotionEquation, ...]
-    constraints: tuple[Constraint, ...]
-    reactions: tuple[Symbol, ...]
-    laws: Mapping[Symbol, Expr]
-    motion: Mapping[Symbol, Expr]
-    prescribed: Mapping[Symbol, Expr]
-
-    @cached_property
-    def kinetic(self) -> Expr:
-        """Kinetic energy T."""
-        return Add(*(square.energy for square in self.inertias))
-
-    @cached_property
-    def potential(self) -> Expr:
-        """Potential energy V."""
-        return Add(*(square.energy for square in self.springs))
-
-    @cached_property
-    def dissipation(self) -> Expr:
-        """Rayleigh's function R, half of the power that linear dampers lose."""
-        return Add(*(square.energy for square in self.dampers))
-
-    @property
-    def forces(self) -> tuple[Expr, ...]:
-        """Generalised force Q of each coordinate: laws and sources by virtual work, in their symbols."""
-        return tuple(row.force for row in self.equations)
-
-    @property
-    def lagrangian(self) -> Expr:
-        """L = T - V."""
-        return self.kinetic - self.potential
-
-    @property
-    def velocities(self) -> tuple[Symbol, ...]:
-        """The rates of the coordinates."""
-        return tuple(map(rate_of, self.coordinates))
-
-    @property
-    def phase(self) -> str:
-        """The mode of every part that changes its mode, "gap open, load stuck", for which the equations hold."""
-        return self.kirchhoff.phase
+class Lagrangian(LagrangeEquations):
+    """Lagrange's equations of a network, and what is made of them."""
 
     def proof(self) -> Proof:
         """That these are Kirchhoff's equations: every one compared, with the symbolic difference, which is zero."""
-        from shaftwork.equations.lagrange_proof import prove
-
         return prove(self)
 
     def latex(self, *, values: bool = False) -> str:
@@ -161,9 +43,7 @@ class Lagrangian:
         Args:
             values: print the parameters' values instead of their symbols.
         """
-        from shaftwork.equations.lagrange_print import body
-
-        return body(self, values=values)
+        return typeset(self.kirchhoff, blocks_of(self, values=values))
 
     def document(self, *, values: bool = False) -> str:
         """A complete LaTeX document: energies, generalised forces and equations, and the nomenclature with the values.
@@ -171,19 +51,15 @@ class Lagrangian:
         Args:
             values: print the parameters' values instead of their symbols.
         """
-        from shaftwork.equations.lagrange_print import document
-
         return document(self, values=values)
 
     def _repr_latex_(self) -> str:
-        from shaftwork.equations.lagrange_print import notebook
-
-        return notebook(self)
+        return rendered(self.kirchhoff, blocks_of(self, values=False))
 
 
-def lagrangian(equations: Equations) -> Lagrangian:
+def lagrangian(equations: NetworkEquations) -> Lagrangian:
     """Lagrange's equations of the network that Kirchhoff's are given of; of these only the network is read."""
-    return _LagrangeWriter(equations).made()
+    return _LagrangeWriter(equations).lagrangian()
 
 
 class GeneralisedTorque(NamedTuple):
@@ -201,11 +77,10 @@ class GeneralisedTorque(NamedTuple):
 
 
 class _LagrangeWriter:
-    def __init__(self, equations: Equations) -> None:
+    def __init__(self, equations: NetworkEquations) -> None:
         self.equations, self.quantities = equations, equations.assembly.quantities
         self.graph = self.quantities.graph
         self.coordinates = coordinates(self.quantities)
-        self.motion = Motion(self.coordinates)
         self.inertias: list[Square] = []
         self.springs: list[Square] = []
         self.dampers: list[Square] = []
@@ -213,7 +88,7 @@ class _LagrangeWriter:
         self.constraints: list[Constraint] = []
         self.laws: dict[Symbol, Expr] = {}
 
-    def made(self) -> Lagrangian:
+    def lagrangian(self) -> Lagrangian:
         for branch in self.graph.branches:
             self._enter(branch)
         equations = tuple(self._equations())
@@ -228,7 +103,7 @@ class _LagrangeWriter:
             tuple(self.constraints),
             tuple(map(self._reaction, self.coordinates.imposed)),
             self.laws,
-            {**self.motion.of_flows(flows), **self.motion.known},
+            {**self.coordinates.of_flows(flows), **self.coordinates.motion},
             self.coordinates.prescribed,
         )
 
@@ -247,28 +122,28 @@ class _LagrangeWriter:
         law = self.quantities.law(branch.index)
         match branch.template.kind:
             case Kind.ACROSS_STORE:
-                self.inertias.append(Square(branch.index, law, self.motion.speed(branch)))
+                self.inertias.append(Square(branch.index, law, self.coordinates.speed(branch)))
             case Kind.THROUGH_STORE:
-                self.springs.append(Square(branch.index, law, self.motion.twist(branch)))
+                self.springs.append(Square(branch.index, law, self.coordinates.twist(branch)))
             case Kind.CONDUCTANCE:
-                self.dampers.append(Square(branch.index, law, self.motion.speed(branch)))
+                self.dampers.append(Square(branch.index, law, self.coordinates.speed(branch)))
             case Kind.LAW | Kind.THROUGH_SOURCE:
                 self._enter_law(branch, law)
             case Kind.ACROSS_SOURCE if not is_prescribed(branch):
                 reaction, sign = self._reaction(branch.index), self.quantities.flow_of[branch.index].sign
-                self._constrain(branch, reaction, self.motion.speed(branch), self.motion.of(law))
-                self.torques.append(GeneralisedTorque(branch.index, sign * reaction, self.motion.twist(branch)))
+                self._constrain(branch, reaction, self.coordinates.speed(branch), self.coordinates.of(law))
+                self.torques.append(GeneralisedTorque(branch.index, sign * reaction, self.coordinates.twist(branch)))
             case Kind.COUPLING if branch.template.through:
                 reaction = self._reaction(branch.index)
-                speeds = self.coordinates.rate(self.motion.summed(branch, branch.terms))
+                speeds = self.coordinates.rate(self.coordinates.summed(branch, branch.terms))
                 self._constrain(branch, reaction, speeds, Integer(0))
                 self.torques.append(
-                    GeneralisedTorque(branch.index, reaction, self.motion.summed(branch, branch.balances))
+                    GeneralisedTorque(branch.index, reaction, self.coordinates.summed(branch, branch.balances))
                 )
 
     def _enter_law(self, branch: GraphBranch, law: Expr) -> None:
         """What is linear in the twist is an energy; what is left a torque, by its symbol where it has one."""
-        flow, twist, whole = self.quantities.flow_of[branch.index], self.motion.twist(branch), True
+        flow, twist, whole = self.quantities.flow_of[branch.index], self.coordinates.twist(branch), True
         if (stiffness := linear_stiffness(law)) != 0:
             rest, whole = law.subs(INTEGRAL, 0), False
             fixed = not branch.template.reads and not rest.has(ACROSS, TIME)
@@ -277,7 +152,7 @@ class _LagrangeWriter:
             law = Integer(0) if fixed else rest
             if law == 0:
                 return
-        size, symbol = self.motion.by_law(branch, law), self.quantities.through(flow)
+        size, symbol = self.coordinates.by_law(branch, law), self.quantities.through(flow)
         if branch.template.is_history:
             self.laws[self.quantities.history(branch.index)] = self._history(branch)
         if whole and len(flow.branches) == 1:
@@ -289,7 +164,7 @@ class _LagrangeWriter:
     def _history(self, branch: GraphBranch) -> Expr:
         """What arrives at an end of a line: what left the other end a delay ago."""
         other = self.equations.assembly.opposite[branch.index]
-        speed, history = self.motion.speed(self.graph.branches[other]), self.quantities.history(other)
+        speed, history = self.coordinates.speed(self.graph.branches[other]), self.quantities.history(other)
         return self.quantities.printed(branch.index).xreplace({ACROSS: speed, HISTORY: history})
 
     def _constrain(self, branch: GraphBranch, reaction: Symbol, left: Expr, right: Expr) -> None:
@@ -321,8 +196,8 @@ class _LagrangeWriter:
         """The rate of the momentum dT/dq', sorted by accelerations; what is prescribed of it counts as a torque."""
         coefficients: dict[Symbol, list[Expr]] = {}
         right = [*terms_of(force)]
-        for made in inertias:
-            rate, factor = self.coordinates.rate(made.along), made.coefficient * made.along.diff(velocity)
+        for inertia in inertias:
+            rate, factor = self.coordinates.rate(inertia.along), inertia.coefficient * inertia.along.diff(velocity)
             present = rate.free_symbols & self._accelerations
             for symbol in present:
                 coefficients.setdefault(symbol, []).append(factor * rate.diff(symbol))
@@ -349,10 +224,10 @@ def _moved(at: Coordinates) -> dict[Symbol, dict[str, Expr]]:
 S = TypeVar("S", Square, GeneralisedTorque)
 
 
-def _by_symbol(found: Iterable[S], symbols: Iterable[Symbol]) -> dict[Symbol, list[S]]:
-    """For each symbol what contains it."""
-    made: dict[Symbol, list[S]] = {symbol: [] for symbol in symbols}
-    for item in found:
-        for symbol in item.along.free_symbols & made.keys():
-            made[symbol].append(item)
-    return made
+def _by_symbol(terms: Iterable[S], symbols: Iterable[Symbol]) -> dict[Symbol, list[S]]:
+    """For each symbol the terms that contain it."""
+    containing: dict[Symbol, list[S]] = {symbol: [] for symbol in symbols}
+    for term in terms:
+        for symbol in term.along.free_symbols & containing.keys():
+            containing[symbol].append(term)
+    return containing

@@ -4,78 +4,66 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 from sympy import Integer
 
 from shaftwork.equations.assembly import FactoredTerms, Sides, sides, terms_of
 from shaftwork.equations.blocks import Block, Blocks
+from shaftwork.equations.lagrange_equations import LagrangeEquations, MotionEquation, Square
 from shaftwork.equations.nomenclature import nomenclature, unit
 from shaftwork.equations.printing import Line
 from shaftwork.equations.quantities import rate_of
-from shaftwork.equations.report import in_sections, rendered, section, typeset
+from shaftwork.equations.report import in_sections, section
 from shaftwork.equations.sums import Sums
-
-if TYPE_CHECKING:  # the record prints itself through this module
-    from shaftwork.equations.lagrange import Lagrangian, MotionEquation, Square
 
 KINETIC, POTENTIAL, LOSS = "E_k", "E_p", r"\mathcal{R}"
 """Letters of the energies, after Abdelkader 2016, (19), and of Rayleigh's function."""
 
 
-def body(lagrangian: Lagrangian, *, values: bool) -> str:
-    """The body of a LaTeX document, each block under a paragraph heading."""
-    return typeset(lagrangian.kirchhoff, _blocks(lagrangian, values=values))
-
-
-def notebook(lagrangian: Lagrangian) -> str:
-    """The body with headings that a notebook renders."""
-    return rendered(lagrangian.kirchhoff, _blocks(lagrangian, values=False))
-
-
-def document(lagrangian: Lagrangian, *, values: bool) -> str:
+def document(lagrangian: LagrangeEquations, *, values: bool) -> str:
     """A LaTeX document that compiles as it is."""
-    made, coordinates = lagrangian, {symbol.name: "coordinate" for symbol in lagrangian.coordinates}
+    coordinates = {symbol.name: "coordinate" for symbol in lagrangian.coordinates}
     energies = {
-        KINETIC: ("kinetic energy", "J", made.inertias),
-        POTENTIAL: ("potential energy", "J", made.springs),
-        LOSS: ("Rayleigh's function, half of the power lost", "W", made.dampers),
+        KINETIC: ("kinetic energy", "J", lagrangian.inertias),
+        POTENTIAL: ("potential energy", "J", lagrangian.springs),
+        LOSS: ("Rayleigh's function, half of the power lost", "W", lagrangian.dampers),
     }
     besides = [(f"${letter}$", of, "--", unit(size)) for letter, (of, size, squares) in energies.items() if squares]
+    names = _names(lagrangian) | coordinates.keys()
     sections = {
-        "Lagrange's equations": section(_blocks(made, values=values)),
-        "Nomenclature": nomenclature(made.kirchhoff, _names(made) | coordinates.keys(), coordinates, besides),
+        "Lagrange's equations": section(blocks_of(lagrangian, values=values)),
+        "Nomenclature": nomenclature(lagrangian.kirchhoff, names, coordinates, besides),
     }
-    return in_sections(made.kirchhoff, sections)
+    return in_sections(lagrangian.kirchhoff, sections)
 
 
-def _names(lagrangian: Lagrangian) -> set[str]:
+def _names(lagrangian: LagrangeEquations) -> set[str]:
     """The names of all symbols in the equations; of a rate, of that of which it is the rate as well."""
     rows = (*lagrangian.equations, *lagrangian.constraints)
     positions = {rate_of(symbol): symbol for symbol in (*lagrangian.motion, *lagrangian.prescribed)}
     quantities = lagrangian.kirchhoff.assembly.quantities
     angles = {quantities.angle(number) for number in range(len(quantities.graph.nodes))}
-    found = {symbol for row in rows for symbol in row.left.free_symbols | row.right.free_symbols}
+    symbols = {symbol for row in rows for symbol in row.left.free_symbols | row.right.free_symbols}
     for symbol, law in (*lagrangian.laws.items(), *lagrangian.prescribed.items()):
-        found |= {symbol, *law.free_symbols}
+        symbols |= {symbol, *law.free_symbols}
     for symbol in angles & lagrangian.motion.keys():
-        found |= {symbol, *lagrangian.motion[symbol].free_symbols}
-    return {symbol.name for symbol in found | {positions[rate] for rate in found & positions.keys()}}
+        symbols |= {symbol, *lagrangian.motion[symbol].free_symbols}
+    return {symbol.name for symbol in symbols | {positions[rate] for rate in symbols & positions.keys()}}
 
 
-def _blocks(lagrangian: Lagrangian, *, values: bool) -> tuple[Block, ...]:
-    return tuple(
-        block for block in _LagrangeBlocks(lagrangian, Blocks(lagrangian.kirchhoff, values)).made() if block.lines
-    )
+def blocks_of(lagrangian: LagrangeEquations, *, values: bool) -> tuple[Block, ...]:
+    """The blocks that say anything."""
+    blocks = _LagrangeBlocks(lagrangian, Blocks(lagrangian.kirchhoff, values)).printed()
+    return tuple(block for block in blocks if block.lines)
 
 
 class _LagrangeBlocks:
-    def __init__(self, lagrangian: Lagrangian, blocks: Blocks) -> None:
+    def __init__(self, lagrangian: LagrangeEquations, blocks: Blocks) -> None:
         self.lagrangian, self.blocks, self.writer = lagrangian, blocks, blocks.writer
         self.graph = blocks.equations.form.graph
         self.quantities = blocks.equations.assembly.quantities
 
-    def made(self) -> Iterator[Block]:
+    def printed(self) -> Iterator[Block]:
         """All blocks."""
         yield Block("Lagrange's equations", tuple(self._general()))
         yield Block("Coordinates", tuple(self._coordinates()), "Angles are counted from the untwisted position.")
@@ -114,10 +102,9 @@ class _LagrangeBlocks:
         return self.blocks.summed_between(tuple(row.node for row in self.lagrangian.equations))
 
     def _energies(self) -> Iterator[Line]:
-        made = self.lagrangian
-        yield from self._energy(KINETIC, made.inertias, Sums.kinetic)
-        yield from self._energy(POTENTIAL, made.springs, Sums.potential)
-        yield from self._energy(LOSS, made.dampers, Sums.losses)
+        yield from self._energy(KINETIC, self.lagrangian.inertias, Sums.kinetic)
+        yield from self._energy(POTENTIAL, self.lagrangian.springs, Sums.potential)
+        yield from self._energy(LOSS, self.lagrangian.dampers, Sums.losses)
 
     def _energy(self, letter: str, squares: Iterable[Square], of: Callable[[Sums], Iterator[str]]) -> Iterator[Line]:
         """A sum of squares, those of a shaft with weights in one."""
@@ -156,11 +143,10 @@ class _LagrangeBlocks:
             return self.writer.line(row.sides)
         twists = {node for summed, _ in ends for node in summed.twists}
         rates = (row.coordinate, rate_of(row.coordinate))
-        squares = zip((self.lagrangian.springs, self.lagrangian.dampers), rates, strict=True)
         shown = [
             square.pull(symbol)
-            for made, symbol in squares
-            for square in made
+            for squares, symbol in zip((self.lagrangian.springs, self.lagrangian.dampers), rates, strict=True)
+            for square in squares
             if self.graph.branches[square.branch].plus in twists
         ]
         groups = tuple(group for group in row.groups if group not in shown)

@@ -16,19 +16,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 from sympy import Add, Dummy, Expr, Float, Integer, Poly, Symbol, cancel, expand, fraction, together
 from sympy.core.function import Application
 
 from shaftwork.equations.coordinates import coordinates
+from shaftwork.equations.lagrange_equations import LagrangeEquations
 from shaftwork.equations.quantities import rate_of
 from shaftwork.equations.rows import Row
 from shaftwork.network.graph import GROUND
 from shaftwork.reduction.gains import exactly, in_decimals
-
-if TYPE_CHECKING:
-    from shaftwork.equations.lagrange import Lagrangian
 
 CLOSE = 1e-8
 """A ratio solved for is the given one within this: ratios are typed to some ten digits."""
@@ -85,9 +82,9 @@ class Proof:
         motions = (row for row in self.rows if row.kind == "motion")
         lines += (f"{row.of:{width}}  difference {row.difference}  from {_sum_of(row)}" for row in motions)
         for kind in ("loop", "coupling", "law"):
-            held = [row.difference == 0 for row in self.rows if row.kind == kind]
-            if held:
-                lines.append(f"{kind}s: {sum(held)} of {len(held)} agree")
+            agreeing = [row.difference == 0 for row in self.rows if row.kind == kind]
+            if agreeing:
+                lines.append(f"{kind}s: {sum(agreeing)} of {len(agreeing)} agree")
         if self.left or self.reactions:
             names = ", ".join(symbol.name for symbol in self.reactions)
             lines.append(f"balances left: {self.left}, for the reactions {names}")
@@ -97,7 +94,7 @@ class Proof:
 
 def _sum_of(row: LagrangeComparison) -> str:
     """The balances that make an equation of motion, by the names of their nodes."""
-    named = zip((node for made in row.kirchhoff for node in made.nodes), row.factors, strict=True)
+    named = zip((node for balance in row.kirchhoff for node in balance.nodes), row.factors, strict=True)
     return " + ".join(node if factor == 1 else f"{_bracketed(factor)} * {node}" for node, factor in named)
 
 
@@ -105,20 +102,21 @@ def _bracketed(factor: Expr) -> str:
     return str(factor) if factor.is_Symbol else f"({factor})"
 
 
-def prove(lagrangian: Lagrangian) -> Proof:
+def prove(lagrangian: LagrangeEquations) -> Proof:
     """Compare every equation of Kirchhoff's with Lagrange's."""
-    made, name = _Comparisons(lagrangian), lagrangian.kirchhoff.form.graph.name
+    comparisons, name = _Comparisons(lagrangian), lagrangian.kirchhoff.form.graph.name
     left = len(lagrangian.kirchhoff.nodes) - len(lagrangian.equations)
-    return Proof(name, lagrangian.phase, tuple(made.rows()), lagrangian.reactions, left, made.given)
+    return Proof(name, lagrangian.phase, tuple(comparisons.rows()), lagrangian.reactions, left, comparisons.ratios)
 
 
 class _Comparisons:
-    def __init__(self, lagrangian: Lagrangian) -> None:
+    def __init__(self, lagrangian: LagrangeEquations) -> None:
         self.lagrangian, self.kirchhoff = lagrangian, lagrangian.kirchhoff
         self.quantities = self.kirchhoff.assembly.quantities
+        self.motion = dict(lagrangian.motion)
         self.imposed = {row.branches[0]: row for row in lagrangian.constraints}
         self.decided = tuple(Symbol(name, real=True) for name in self.kirchhoff.form.tree.frozen)
-        self.given = self._given() if self.decided else {}
+        self.ratios = self._ratios() if self.decided else {}
 
     def rows(self) -> Iterator[LagrangeComparison]:
         """All comparisons: equations of motion, loops, couplings, laws."""
@@ -126,23 +124,19 @@ class _Comparisons:
         for equation in self.lagrangian.equations:
             moved = equation.displacements
             nodes = tuple(balances[node] for node in moved)
-            works = (factor * self.known(balances[node].expression) for node, factor in moved.items())
+            works = (factor * self.in_coordinates(balances[node].expression) for node, factor in moved.items())
             difference = self.zero(Add(*works) - equation.expression)
             yield LagrangeComparison("motion", equation.coordinate.name, nodes, tuple(moved.values()), difference)
         for kind, row, residual in self.kinematic:
             yield LagrangeComparison(kind, ", ".join(row.parts), (row,), (Integer(1),), self.zero(residual))
         for row in self.kirchhoff.laws:
-            left = self.known(row.left.xreplace(dict(self.lagrangian.laws)))
-            difference = self.zero(self.known(row.right) - left - self._imposed(row))
+            left = self.in_coordinates(row.left.xreplace(dict(self.lagrangian.laws)))
+            difference = self.zero(self.in_coordinates(row.right) - left - self._imposed(row))
             yield LagrangeComparison("law", ", ".join(row.parts), (row,), (Integer(1),), difference)
 
-    def known(self, expression: Expr) -> Expr:
+    def in_coordinates(self, expression: Expr) -> Expr:
         """An expression of Kirchhoff's equations in coordinates and rates."""
-        return expression.xreplace(self._motion)
-
-    @cached_property
-    def _motion(self) -> dict[Symbol, Expr]:
-        return dict(self.lagrangian.motion)
+        return expression.xreplace(self.motion)
 
     def _imposed(self, row: Row) -> Expr:
         """What the coordinates do not satisfy by themselves: a constraint, where the row is that of its branch."""
@@ -151,10 +145,9 @@ class _Comparisons:
     @cached_property
     def kinematic(self) -> tuple[tuple[str, Row, Expr], ...]:
         """Loops and couplings with what is left of them in coordinates, where nothing should be."""
-        loops = (("loop", row, self.known(row.expression).xreplace(self._tied)) for row in self.kirchhoff.loops)
-        couplings = (
-            ("coupling", row, self.known(row.expression) - self._imposed(row)) for row in self.kirchhoff.couplings
-        )
+        kirchhoff, at = self.kirchhoff, self.in_coordinates
+        loops = (("loop", row, at(row.expression).xreplace(self._tied)) for row in kirchhoff.loops)
+        couplings = (("coupling", row, at(row.expression) - self._imposed(row)) for row in kirchhoff.couplings)
         return (*loops, *couplings)
 
     @cached_property
@@ -168,16 +161,16 @@ class _Comparisons:
         angles = {self.quantities.angle(node): fewer.positions[node] for node in fewer.positions if node != GROUND}
         return {rate_of(symbol): fewer.rate(angles[symbol]) for symbol in self.lagrangian.coordinates}
 
-    def _given(self) -> dict[Symbol, Expr]:
+    def _ratios(self) -> dict[Symbol, Expr]:
         """The ratios on whose values the structure rests, in terms of others: what makes loops and couplings hold."""
-        given: dict[Symbol, Expr] = {}
+        ratios: dict[Symbol, Expr] = {}
         for _, _, residual in self.kinematic:
             rates = [rate for rate in self.lagrangian.velocities if rate in residual.free_symbols]
             conditions = [*(residual.diff(rate) for rate in rates), residual.xreplace(dict.fromkeys(rates, Integer(0)))]
             for condition in conditions:
-                found = self._solved(_cancelled(condition.xreplace(given)))
-                given = {symbol: value.xreplace(found) for symbol, value in given.items()} | found
-        return given
+                solved = self._solved(_cancelled(condition.xreplace(ratios)))
+                ratios = {symbol: value.xreplace(solved) for symbol, value in ratios.items()} | solved
+        return ratios
 
     def _solved(self, condition: Expr) -> dict[Symbol, Expr]:
         """The first ratio that the condition gives as the value that it has; none where there is no condition."""
@@ -193,7 +186,7 @@ class _Comparisons:
 
     def zero(self, expression: Expr) -> Expr:
         """An expression that should be zero, in the form that is, where it is."""
-        exact = expand(exactly(expression.xreplace(self.given)), power_exp=False, power_base=False, log=False)
+        exact = expand(exactly(expression.xreplace(self.ratios)), power_exp=False, power_base=False, log=False)
         return in_decimals(exact if exact == 0 else _cancelled(exact))
 
 

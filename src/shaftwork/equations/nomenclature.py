@@ -9,9 +9,9 @@ from itertools import zip_longest
 from sympy import Basic
 
 from shaftwork.components.tables import Table
-from shaftwork.equations.network_equations import NetworkEquations
 from shaftwork.equations.notations import Letter
 from shaftwork.equations.printing import Writer, printed_number
+from shaftwork.equations.rows import NetworkEquations
 from shaftwork.equations.series import Numbers, listed, replaced, series_in
 from shaftwork.equations.spelling import INDEX_CLOSES, INDEX_OPENS, in_text, split_index, without_marks
 from shaftwork.network.effective import effective

@@ -14,11 +14,11 @@ from shaftwork.equations.spelling import indexed
 
 INVERSE = " inverse"
 """At the end of the name of a letter that stands for the reciprocal of a parameter."""
-_QUANTITIES = {
-    (quantity.latex, quantity.unit): quantity.name
-    for domain in DOMAINS
-    for quantity in (domain.across, domain.through, domain.integral)
+QUANTITIES = {
+    quantity.name: quantity for domain in DOMAINS for quantity in (domain.across, domain.through, domain.integral)
 }
+"""Speeds, torques and angles of all domains by their names."""
+_NAMES = {(quantity.latex, quantity.unit): name for name, quantity in QUANTITIES.items()}
 
 
 @dataclass(frozen=True)
@@ -81,10 +81,9 @@ class Notation:
     rate: str = r"\frac{{d {}}}{{d t}}"
 
     def __post_init__(self) -> None:
-        if unknown := [name for name in self.quantities if name not in _QUANTITIES.values()]:
+        if unknown := [name for name in self.quantities if name not in QUANTITIES]:
             raise ParameterError(
-                f"Notation: there is no quantity {', '.join(map(repr, unknown))}. There are: "
-                f"{', '.join(_QUANTITIES.values())}."
+                f"Notation: there is no quantity {', '.join(map(repr, unknown))}. There are: {', '.join(QUANTITIES)}."
             )
         try:
             says = self.rate.format("x") != self.rate.format("y")
@@ -105,7 +104,7 @@ class Notation:
         if chosen is not None:
             return _spelt(letter, chosen)
         sign = r"\Delta " if letter.base.startswith(r"\Delta ") else ""
-        quantity = _QUANTITIES.get((letter.base.removeprefix(sign), letter.unit), "")
+        quantity = _NAMES.get((letter.base.removeprefix(sign), letter.unit), "")
         if quantity not in self.quantities:
             return letter
         spelt = _spelt(letter, self.quantities[quantity])

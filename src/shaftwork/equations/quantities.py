@@ -8,7 +8,7 @@ node a to its node b.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -129,24 +129,23 @@ class Quantities:
         """The same; of a wave that arrives, what left the other end."""
         read = {"across": self.node, "through": self.store, "integral": self.integral, "rate": self.rate}
         others = readings_of(self.graph, branch).items()
-        return self.own_law(branch).xreplace({symbol: read[made.kind](made.of) for symbol, made in others})
+        return self.own_law(branch).xreplace({symbol: read[reading.kind](reading.of) for symbol, reading in others})
 
     def own_law(self, branch: int) -> Expr:
         """A law in parameters and derived quantities of the network, but not in what it reads of others."""
-        made = self.graph.branches[branch]
-        law: Expr = made.template.printed.xreplace(self._of_network[made.part])
+        record = self.graph.branches[branch]
+        law: Expr = record.template.printed.xreplace(self._of_network[record.part])
         return law
 
     @cached_property
     def _of_network(self) -> tuple[dict[Symbol, Symbol], ...]:
         """For each part its own symbols of parameters and derived quantities, and those of the network."""
-        names = [(part, (*part.parameters, *(made.name for made in part.derived))) for part in self.graph.parts]
-        return tuple({Symbol(k, real=True): self.graph.symbol_of(part, k) for k in own} for part, own in names)
+        names = [(part, (*part.parameters, *(derived.name for derived in part.derived))) for part in self.graph.parts]
+        return tuple({Symbol(k, real=True): self.graph.symbol_of(part, k) for k in of_part} for part, of_part in names)
 
     def history(self, branch: int) -> Symbol:
         """What arrives at an end of a line."""
-        made = self.graph.branches[branch]
-        return Symbol(f"{self.graph.parts[made.part].name}.{made.template.label}", real=True)
+        return Symbol(f"{self.graph.part_of(branch).name}.{self.graph.branches[branch].template.label}", real=True)
 
     def node(self, number: int) -> Expr:
         """The across variable of a node: that of the store or source which joins it to the reference, else its own."""
@@ -168,15 +167,16 @@ class Quantities:
     @cached_property
     def _angles(self) -> tuple[Symbol, ...]:
         """Named after the part that defines the speed, and after the node where the part has several of that name."""
-        own = [self._own_angle(number) for number in range(len(self.graph.nodes))]
-        between = (branch for branch in self.graph.branches if branch.minus != GROUND)
-        read = (integral_name(self.graph, made) for made in between if made.index in self.graph.integrated[made.part])
-        counted = Counter((*own, *read))
-        named = zip(own, self.graph.domains, self.graph.nodes, strict=True)
+        graph = self.graph
+        of_nodes = [self._angle_name(number) for number in range(len(graph.nodes))]
+        between = (branch for branch in graph.branches if branch.minus != GROUND)
+        read = (integral_name(graph, branch) for branch in between if branch.index in graph.integrated[branch.part])
+        counted = Counter((*of_nodes, *read))
+        named = zip(of_nodes, graph.domains, graph.nodes, strict=True)
         names = (name if counted[name] == 1 else f"{domain.integral.name}({node})" for name, domain, node in named)
         return tuple(Symbol(name, real=True) for name in names)
 
-    def _own_angle(self, number: int) -> str:
+    def _angle_name(self, number: int) -> str:
         """The name of a node's angle after the part that defines its speed; of a node without one after the node."""
         quantity, owner = self.graph.domains[number].integral, self.owners.get(number)
         if owner is None:
@@ -187,18 +187,18 @@ class Quantities:
 
     def rate(self, branch: int) -> Expr:
         """The rate of what is across a branch."""
-        made = self.graph.branches[branch]
-        across = self.across((made.plus, made.minus))
+        across = self.across((self.graph.branches[branch].plus, self.graph.branches[branch].minus))
         return across.xreplace({symbol: rate_of(symbol) for symbol in across.free_symbols})
 
     def integral(self, branch: int) -> Symbol:
         """The integral of what is across a branch: of a law that reads it, or of a prescribed speed."""
-        made, name = self.graph.branches[branch], integral_name(self.graph, self.graph.branches[branch])
-        if branch not in self.graph.integrated[made.part] and made.template.kind is Kind.ACROSS_SOURCE:
-            if self.owners.get(made.plus) == branch:
-                return self.angle(made.plus)
-            siblings = (self.graph.branches[index].template.kind for index in self.graph.parts[made.part].branches)
-            name += f"_{self._label(made)}" if sum(kind is Kind.ACROSS_SOURCE for kind in siblings) > 1 else ""
+        record, part = self.graph.branches[branch], self.graph.part_of(branch)
+        name = integral_name(self.graph, record)
+        if branch not in self.graph.integrated[record.part] and record.template.kind is Kind.ACROSS_SOURCE:
+            if self.owners.get(record.plus) == branch:
+                return self.angle(record.plus)
+            siblings = (self.graph.branches[index].template.kind for index in part.branches)
+            name += f"_{self._label(record)}" if sum(kind is Kind.ACROSS_SOURCE for kind in siblings) > 1 else ""
         return Symbol(name, real=True)
 
     def through(self, flow: ThroughQuantity) -> Symbol:
@@ -208,9 +208,9 @@ class Quantities:
             if first.template.kind is Kind.THROUGH_STORE:
                 return self.store(first.index)
             law = flow.sign * self.law(first.index)
-            given = law.is_Symbol and first.template.kind is Kind.THROUGH_SOURCE and law.name in self.graph.parameters
+            of_source = law.is_Symbol and first.template.kind is Kind.THROUGH_SOURCE
             # the torque of a part with modes has the same letter in all of them
-            if given and not self.graph.parts[flow.part].modes:
+            if of_source and law.name in self.graph.parameters and not self.graph.parts[flow.part].modes:
                 return law
         return self._named(flow.part, self.domain((flow.plus, flow.minus)).through, flow.label)
 
@@ -228,14 +228,13 @@ class Quantities:
 
         What holds a load at rest is then, as the load's torque while it moves, what it gives to its node.
         """
-        made = self.graph.branches[branch]
-        terms = made.template.terms
-        return self._sign_between(self.graph.parts[made.part], terms[0][1:]) if len(terms) == 1 else 1
+        terms = self.graph.branches[branch].template.terms
+        return self._sign_between(self.graph.part_of(branch), terms[0][1:]) if len(terms) == 1 else 1
 
     def multiplier_label(self, branch: int) -> str:
         """What tells a coupling from the other branches of its part; empty where it is the only one."""
-        made = self.graph.branches[branch]
-        return self._label(made) if len(self.graph.parts[made.part].branches) > 1 else ""
+        several = len(self.graph.part_of(branch).branches) > 1
+        return self._label(self.graph.branches[branch]) if several else ""
 
     def multiplier_quantity(self, branch: int) -> Quantity:
         """What a coupling's through variable is: that of its first term of coefficient 1 or -1."""
@@ -247,11 +246,11 @@ class Quantities:
     @cached_property
     def owners(self) -> dict[int, int]:
         """For a node the branch to the reference whose across variable is its own: a source, else the first store."""
-        found: dict[int, int] = {}
+        owners: dict[int, int] = {}
         for branch in self._defining:
             if branch.minus == GROUND != branch.plus:
-                found.setdefault(branch.plus, branch.index)
-        return found
+                owners.setdefault(branch.plus, branch.index)
+        return owners
 
     @cached_property
     def inner(self) -> dict[int, tuple[int, str]]:
@@ -280,20 +279,20 @@ class Quantities:
     @cached_property
     def pairs(self) -> dict[Ends, Pair]:
         """The across variables between two nodes that have a symbol, by their ends."""
-        found: dict[Ends, Pair] = {}
+        pairs: dict[Ends, Pair] = {}
         for branch in self._defining:
             ends = (branch.plus, branch.minus)
-            if branch.minus != GROUND and ends not in found and ends[::-1] not in found:
-                found[ends] = Pair(branch.part, self._defined(branch), branch.template.label)
+            if branch.minus != GROUND and ends not in pairs and ends[::-1] not in pairs:
+                pairs[ends] = Pair(branch.part, self._defined(branch), branch.template.label)
         for flow in self.flows:
             ends = (flow.plus, flow.minus)
-            if GROUND not in ends and ends not in found and ends[::-1] not in found:
+            if GROUND not in ends and ends not in pairs and ends[::-1] not in pairs:
                 quantity = self.domain(ends).across
                 suffix = "" if self.domain(ends) is ELECTRICAL else "_rel"
                 label = f"{quantity.name}{suffix}" + (f"_{flow.label}" if flow.label else "")
                 symbol = Symbol(f"{self.graph.parts[flow.part].name}.{label}", real=True)
-                found[ends] = Pair(flow.part, symbol, flow.label)
-        return found
+                pairs[ends] = Pair(flow.part, symbol, flow.label)
+        return pairs
 
     def _defined(self, branch: GraphBranch) -> Symbol:
         """The symbol of the across variable that a store or a source defines."""
@@ -312,25 +311,44 @@ class Quantities:
 
     def _flows_of(self, number: int) -> Iterator[ThroughQuantity]:
         part = self.graph.parts[number]
-        together: dict[tuple[int, int, bool], list[int]] = {}
+        parallel: dict[tuple[int, int, bool], tuple[int, ...]] = {}
         for index in part.branches:
             branch = self.graph.branches[index]
             if branch.template.kind not in (Kind.COUPLING, Kind.ACROSS_STORE):
                 prescribes = branch.template.kind is Kind.ACROSS_SOURCE  # takes what the balance leaves, by no law
-                together.setdefault((branch.plus, branch.minus, prescribes), []).append(index)
-        joints = [self.graph.branches[index].terms for index in part.branches if self.graph.branches[index].terms]
-        held = any(len(terms) == 1 and (*terms[0][1:], False) in together for terms in joints)  # by a torque beside it
-        several = len(together) > 1 or held or any(RATE in self.graph.branches[k].template.reads for k in part.branches)
-        labels = [self._label(self.graph.branches[branches[0]]) if several else "" for branches in together.values()]
-        numbers = [running_number(label) or label for label in labels]
-        alike = len(set(numbers)) < len(numbers)  # springs and dampers in different places: the numbers do not do
-        for ((plus, minus, _), branches), label, brief in zip(together.items(), labels, numbers, strict=True):
-            made = label.removeprefix(f"{self.domain((plus, minus)).through.name}_") if alike else brief
-            if alike and len(branches) > 1:  # the label is that of the store, which is only a part of it
-                made = f"total_{brief}"
-            yield ThroughQuantity(number, tuple(branches), plus, minus, self._sign(part, branches), made)
+                key = (branch.plus, branch.minus, prescribes)
+                parallel[key] = (*parallel.get(key, ()), index)
+        ends = [(plus, minus) for plus, minus, prescribes in parallel if not prescribes]
+        labels = self._flow_labels(part, tuple(parallel.values()), ends)
+        for ((plus, minus, _), branches), label in zip(parallel.items(), labels, strict=True):
+            yield ThroughQuantity(number, branches, plus, minus, self._sign(part, branches), label)
 
-    def _sign(self, part: GraphPart, branches: list[int]) -> int:
+    def _flow_labels(self, part: GraphPart, flows: Sequence[tuple[int, ...]], ends: Collection[Ends]) -> list[str]:
+        """What tells the flows of a part apart: numbers where these do; nothing where there is only one torque.
+
+        Args:
+            part: the part.
+            flows: the branches of each flow.
+            ends: those of flows that follow a law.
+        """
+        branches = [self.graph.branches[index] for index in part.branches]
+        terms = [branch.terms for branch in branches if len(branch.terms) == 1]
+        holds = any((plus, minus) in ends for ((_, plus, minus),) in terms)  # by a torque beside that of the law
+        if len(flows) == 1 and not holds and not any(RATE in branch.template.reads for branch in branches):
+            return [""]
+        first = [self.graph.branches[indices[0]] for indices in flows]
+        labels = [self._label(branch) for branch in first]
+        numbers = [running_number(label) or label for label in labels]
+        if len(set(numbers)) == len(numbers):
+            return numbers
+        # springs and dampers in different places; the label of parallel ones is that of the store among them
+        quantities = [self.domain((branch.plus, branch.minus)).through for branch in first]
+        return [
+            f"total_{number}" if len(indices) > 1 else label.removeprefix(f"{quantity.name}_")
+            for indices, number, label, quantity in zip(flows, numbers, labels, quantities, strict=True)
+        ]
+
+    def _sign(self, part: GraphPart, branches: tuple[int, ...]) -> int:
         """The sign of the signal of the same name, so that both mean the same torque."""
         templates = [self.graph.branches[index].template for index in branches]
         if any(template.kind is Kind.THROUGH_STORE for template in templates):
@@ -345,5 +363,5 @@ class Quantities:
         template, siblings = branch.template, self.graph.parts[branch.part].branches
         if template.label:
             return template.label
-        own = [symbol.name for symbol in template.symbols]
-        return own[0] if len(own) == 1 else str(siblings.index(branch.index) + 1)
+        names = [symbol.name for symbol in template.symbols]
+        return names[0] if len(names) == 1 else str(siblings.index(branch.index) + 1)

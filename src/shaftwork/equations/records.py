@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Protocol
 
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.screen import counted, named, on_one_screen
-from shaftwork.equations.network_equations import NetworkEquations
 from shaftwork.equations.notations import Notation, notation_of
+from shaftwork.equations.rows import NetworkEquations
 
 if TYPE_CHECKING:
     from shaftwork.equations.fields import Field
@@ -127,13 +127,14 @@ class Equations(NetworkEquations):
             CompileError: second-order form of a network with electrical nodes; no shaft to print before division.
             ParameterError: there is no such phase or notation.
         """
-        from shaftwork.equations.report import body
+        from shaftwork.equations.report import blocks_of, typeset
 
         if phase is not None:
             if self.in_phase is None:
                 raise ParameterError(f"phase = {phase!r}: no part of '{self.form.graph.name}' changes its mode.")
             return self.in_phase(phase).latex(form, values=values, notation=notation)
-        return body(self.written_as(notation), form, values=values)
+        equations = self.written_as(notation)
+        return typeset(equations, blocks_of(equations, form, values=values))
 
     def __str__(self) -> str:
         graph = self.form.graph
@@ -171,6 +172,6 @@ class Equations(NetworkEquations):
         return document(self.written_as(notation), form, values=values)
 
     def _repr_latex_(self) -> str:
-        from shaftwork.equations.report import notebook
+        from shaftwork.equations.report import blocks_of, rendered
 
-        return notebook(self)
+        return rendered(self, blocks_of(self, None, values=False))

@@ -7,10 +7,10 @@ from typing import Literal, get_args
 
 from shaftwork.core.errors import CompileError, ShaftworkError
 from shaftwork.equations.blocks import Block, Blocks
-from shaftwork.equations.network_equations import NetworkEquations
 from shaftwork.equations.nomenclature import nomenclature
 from shaftwork.equations.printing import aligned
 from shaftwork.equations.quantities import INSTEAD
+from shaftwork.equations.rows import NetworkEquations
 from shaftwork.equations.series import shortened
 from shaftwork.equations.spelling import in_text, without_marks
 
@@ -36,11 +36,6 @@ BEGIN = r"""\date{}
 \maketitle"""
 
 
-def body(equations: NetworkEquations, form: Form | None, *, values: bool) -> str:
-    """The blocks of one form, or of Kirchhoff's equations and the state form, each under a paragraph heading."""
-    return typeset(equations, blocks_of(equations, form, values=values))
-
-
 def typeset(equations: NetworkEquations, blocks: Iterable[Block]) -> str:
     """Blocks for a document, below the phase for which they hold."""
     return "\n".join(("\\allowdisplaybreaks", *_phase(equations), *map(_paragraph, blocks)))
@@ -55,11 +50,6 @@ def _paragraph(block: Block) -> str:
     return f"\\paragraph{{{block.heading}}}\\mbox{{}}\n{_content(block)}"
 
 
-def notebook(equations: NetworkEquations) -> str:
-    """The body with headings that a notebook renders."""
-    return rendered(equations, blocks_of(equations, None, values=False))
-
-
 def rendered(equations: NetworkEquations, blocks: Iterable[Block]) -> str:
     """Blocks for a notebook, below the phase for which they hold."""
     phase = (f"$\\textbf{{Phase}}$ {in_text(equations.phase)}\n",) if equations.phase else ()
@@ -67,7 +57,7 @@ def rendered(equations: NetworkEquations, blocks: Iterable[Block]) -> str:
 
 
 def blocks_of(equations: NetworkEquations, form: Form | None, *, values: bool) -> tuple[Block, ...]:
-    """The blocks of a form of the equations that say anything.
+    """The blocks that say anything: of one form, or of Kirchhoff's equations and the state form.
 
     Raises:
         ShaftworkError: there is no such form.

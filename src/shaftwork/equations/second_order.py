@@ -18,7 +18,6 @@ from shaftwork.components.slopes import jumps, slope
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import CompileError
 from shaftwork.equations.coordinates import coordinates, shortest
-from shaftwork.equations.motion import Motion
 from shaftwork.equations.quantities import INSTEAD, Quantities, rate_of, refuse_controlled
 from shaftwork.network.graph import CircuitGraph, GraphBranch
 from shaftwork.network.kinds import Kind
@@ -94,8 +93,8 @@ def second_order(graph: CircuitGraph) -> SecondOrder:
 class _SecondOrderWriter:
     def __init__(self, graph: CircuitGraph) -> None:
         self.graph, self.quantities = graph, Quantities(graph)
-        self.motion = Motion(coordinates(self.quantities))
-        self.place = {symbol: k for k, symbol in enumerate(self.motion.coordinates.symbols)}
+        self.at = coordinates(self.quantities)
+        self.place = {symbol: k for k, symbol in enumerate(self.at.symbols)}
         self.matrices: dict[Kind, dict[tuple[int, int], list[Expr]]] = {
             kind: {} for kind in (Kind.ACROSS_STORE, Kind.CONDUCTANCE, Kind.THROUGH_STORE)
         }
@@ -114,7 +113,7 @@ class _SecondOrderWriter:
             {key: total for key in sorted(entries) if (total := Add(*entries[key])) != 0}
             for entries in self.matrices.values()
         )
-        nodes = tuple(self.graph.nodes[node] for node in self.motion.coordinates.free)
+        nodes = tuple(self.graph.nodes[node] for node in self.at.free)
         forces = tuple(Add(*terms) for terms in self.forces)
         return SecondOrder(
             nodes, tuple(self.place), mass, damping, stiffness, forces, self.laws, self.across, self.prescribed
@@ -128,14 +127,13 @@ class _SecondOrderWriter:
 
     def _driven(self, twist: Expr) -> tuple[Expr, ...]:
         """The terms of a position that are prescribed."""
-        at = self.motion.coordinates
-        positions = [symbol for symbol in at.prescribed if symbol in twist.free_symbols]
-        self.prescribed |= {symbol: at.prescribed[symbol] for symbol in positions}
+        positions = [symbol for symbol in self.at.prescribed if symbol in twist.free_symbols]
+        self.prescribed |= {symbol: self.at.prescribed[symbol] for symbol in positions}
         return tuple(shortest(twist.diff(symbol)) * symbol for symbol in positions)
 
     def _add_linear(self, branch: GraphBranch, kind: Kind, coefficient: Expr) -> None:
         """Add coefficient * f f' for an inertia, a damping or a stiffness; what a prescribed motion asks goes to T."""
-        twist, rate = self.motion.twist(branch), self.motion.coordinates.rate
+        twist, rate = self.at.twist(branch), self.at.rate
         gains, driven = self._gains(twist), self._driven(twist)
         if kind is not Kind.THROUGH_STORE:
             driven = tuple(map(rate, driven))
@@ -157,8 +155,8 @@ class _SecondOrderWriter:
             law, whole = law.subs(INTEGRAL, 0), False
             if law == 0:
                 return
-        at, flow = self.motion.coordinates, self.quantities.flow_of[branch.index]
-        gains, driven = self._gains(self.motion.twist(branch)), self._driven(self.motion.twist(branch))
+        at, flow, position = self.at, self.quantities.flow_of[branch.index], self.at.twist(branch)
+        gains, driven = self._gains(position), self._driven(position)
         twist = Add(*(gain * at.symbols[k] for k, gain in gains.items()), *driven)
         across = Add(*(gain * at.velocities[k] for k, gain in gains.items()), *map(at.rate, driven))
         law = law.xreplace({ACROSS: across, INTEGRAL: twist})

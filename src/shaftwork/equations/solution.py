@@ -29,7 +29,7 @@ class EliminationSystem:
     Args:
         unknowns: branch numbers, in order.
         matrix: the nonzero entries by row and column.
-        right: the terms of a row's right side.
+        right: the terms of a row's right side, some of which may be zero.
         symbol: what an unknown is called.
     """
 
@@ -134,7 +134,7 @@ class SolvedForm:
                 if assembly.kind(link) is Kind.CONDUCTANCE:
                     drive = Add(*assembly.around(link, without=Kind.CONDUCTANCE))
                     terms.append(-gain * assembly.quantities.law(link) * drive)
-            return tuple(term for term in terms if term != 0)
+            return tuple(terms)
 
         def symbol(tree: int) -> Expr:
             return assembly.quantities.across(assembly.ends(tree))
@@ -151,30 +151,27 @@ class SolvedForm:
             _add_products(matrix, rows, columns, quantities.law(link))
         return matrix
 
-    def _prescribed_inertia(self, tree: int) -> Terms:
-        """What a prescribed acceleration asks of an inertia that is geared to it and to the unknown."""
+    def _prescribed_inertia(self, tree: int) -> Iterator[Expr]:
+        """What a prescribed acceleration demands of an inertia that is geared to it and to the unknown."""
         assembly = self.assembly
-        terms: list[Expr] = []
         for link, gain in assembly.cutsets.get(tree, ()):
             if assembly.kind(link) is Kind.ACROSS_STORE:
                 for source, factor in assembly.factors(link):
                     if assembly.kind(source) is Kind.ACROSS_SOURCE:
-                        rate = slope(assembly.quantities.law(source), TIME)
-                        terms.append(-gain * assembly.quantities.law(link) * factor * rate)
-        return tuple(term for term in terms if term != 0)
+                        yield -gain * assembly.quantities.law(link) * factor * self._source_rate(source)
 
-    def _forced_twist(self, link: int) -> Terms:
+    def _forced_twist(self, link: int) -> Iterator[Expr]:
         """What a source's changing torque adds to the twist of a spring in series with it."""
         assembly = self.assembly
-        terms: list[Expr] = []
         for tree, gain in assembly.factors(link):
             if assembly.kind(tree) is Kind.THROUGH_STORE:
                 compliance = 1 / assembly.quantities.law(tree)
                 for source, factor in assembly.cutsets.get(tree, ()):
                     if assembly.kind(source) is not Kind.THROUGH_STORE:
-                        rate = slope(assembly.quantities.law(source), TIME)
-                        terms.append(-gain * compliance * factor * rate)
-        return tuple(term for term in terms if term != 0)
+                        yield -gain * compliance * factor * self._source_rate(source)
+
+    def _source_rate(self, source: int) -> Expr:
+        return slope(self.assembly.quantities.law(source), TIME)
 
 
 def _grouped(factor: Expr, terms: Terms) -> Iterator[FactoredTerms]:
@@ -183,9 +180,9 @@ def _grouped(factor: Expr, terms: Terms) -> Iterator[FactoredTerms]:
     within: list[Expr] = []
     for term in terms:
         sums = [part for part in term.args if part.is_Add] if term.is_Mul else []
-        own = factor * term / sums[0] if len(sums) == 1 else factor
-        if len(sums) == 1 and not factor.free_symbols <= own.free_symbols:
-            beside.append(FactoredTerms(own, rising_first(sums[0].args)))
+        rest = factor * term / sums[0] if len(sums) == 1 else factor
+        if len(sums) == 1 and not factor.free_symbols <= rest.free_symbols:
+            beside.append(FactoredTerms(rest, rising_first(sums[0].args)))
         else:
             within.append(term)
     yield FactoredTerms(factor, rising_first(within))

@@ -5,12 +5,12 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from sympy import Add, Dummy, Expr, ImmutableMatrix, Integer, Symbol, cancel
 
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError, SignalError, no_quantity
+from shaftwork.equations.rows import NetworkEquations
 from shaftwork.equations.slopes import LawSlopes, Slope
 from shaftwork.equations.tableau import refuse_waves
 from shaftwork.network.graph import GraphBranch
@@ -19,9 +19,6 @@ from shaftwork.reduction.explicit_rows import BlockTooLargeError, explicit_rows
 from shaftwork.reduction.form import Names, StateForm
 from shaftwork.reduction.observables import Observables
 from shaftwork.reduction.source_inputs import places_of, source_inputs, with_inputs
-
-if TYPE_CHECKING:  # the records make matrices through this module
-    from shaftwork.equations.records import Equations
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +53,7 @@ class StateSpace:
 
 
 def state_space(
-    equations: Equations, inputs: str | Sequence[str] | None, outputs: str | Sequence[str] | None
+    equations: NetworkEquations, inputs: str | Sequence[str] | None, outputs: str | Sequence[str] | None
 ) -> StateSpace:
     """The matrices.
 
@@ -101,7 +98,7 @@ def _listed(names: str | Sequence[str]) -> tuple[str, ...]:
     return (names,) if isinstance(names, str) else tuple(names)
 
 
-def _near(equations: Equations, slopes: LawSlopes) -> StateForm:
+def _near(equations: NetworkEquations, slopes: LawSlopes) -> StateForm:
     """The form with laws by their slopes, in letters of the network, and sources at zero."""
     quantities, laws = equations.assembly.quantities, dict[int, Expr]()
     for branch in equations.form.graph.branches:
@@ -135,12 +132,12 @@ def _quantity(form: StateForm, read: Observables, name: str) -> Expr:
         SignalError: there is none of this name, or it is no sum of states.
     """
     names = Names(form)
-    found = Symbol(name, real=True) if any(state.name == name for state in form.states) else read.quantity(name)
-    if found is None:
+    quantity = Symbol(name, real=True) if any(state.name == name for state in form.states) else read.quantity(name)
+    if quantity is None:
         if name in names.units:
             raise SignalError(f"'{name}' is a product of speeds and torques, and no sum of states.")
         raise no_quantity(name, form.graph.name, names.units)
-    return found
+    return quantity
 
 
 def _slopes(rows: Sequence[Expr], by: Sequence[Symbol]) -> ImmutableMatrix:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Literal
 
 from sympy import Expr, Integer, Symbol
@@ -36,11 +35,11 @@ Sum = Mapping[Unknown, Expr]
 
 def total(terms: Iterable[tuple[Expr | int, Sum]]) -> Sum:
     """A sum of multiples."""
-    found: dict[Unknown, Expr] = {}
+    factors: dict[Unknown, Expr] = {}
     for factor, row in terms:
         for unknown, entry in row.items():
-            found[unknown] = found.get(unknown, Integer(0)) + factor * entry
-    return {unknown: entry for unknown, entry in found.items() if entry != 0}
+            factors[unknown] = factors.get(unknown, Integer(0)) + factor * entry
+    return {unknown: entry for unknown, entry in factors.items() if entry != 0}
 
 
 def refuse_waves(form: StateForm) -> None:
@@ -72,19 +71,15 @@ class Tableau:
     def _graph(self) -> CircuitGraph:
         return self.assembly.form.graph
 
-    @cached_property
-    def _laws(self) -> dict[int, Sum]:
-        return {}
-
     def rows(self, read: Sum) -> dict[Unknown, Sum]:
         """As many rows as unknowns, each by the one that it is the row of; with what a sum contains among them."""
-        made: dict[Unknown, Sum] = {("across", node): self._balance(node) for node in range(len(self._graph.nodes))}
-        left = [unknown for row in (*made.values(), read) for unknown in row]
-        while missing := [unknown for unknown in dict.fromkeys(left) if unknown not in made]:
-            found = {unknown: self._imposed(*unknown) for unknown in missing}
-            made |= found
-            left = [unknown for row in found.values() for unknown in row]
-        return made
+        rows: dict[Unknown, Sum] = {("across", node): self._balance(node) for node in range(len(self._graph.nodes))}
+        unknowns = [unknown for row in (*rows.values(), read) for unknown in row]
+        while missing := [unknown for unknown in dict.fromkeys(unknowns) if unknown not in rows]:
+            added = {unknown: self._imposed(*unknown) for unknown in missing}
+            rows |= added
+            unknowns = [unknown for row in added.values() for unknown in row]
+        return rows
 
     def entered(self, place: Place) -> dict[Unknown, int]:
         """What an input adds to the right sides of the rows."""
@@ -136,9 +131,7 @@ class Tableau:
             case Kind.CONDUCTANCE:
                 return total([(self.assembly.quantities.law(index), self.across(branch))])
             case Kind.LAW:
-                if index not in self._laws:
-                    self._laws[index] = self._near(branch)
-                return self._laws[index]
+                return self._near(branch)
             case Kind.THROUGH_SOURCE:
                 return {}
         # a coupling that says what others have said carries nothing
@@ -164,10 +157,11 @@ class Tableau:
 
     def _near(self, branch: GraphBranch) -> Sum:
         """A law near a point: its slopes times what it reads."""
-        own = {ACROSS: self.across, INTEGRAL: self.integral}
+        at_branch = {ACROSS: self.across, INTEGRAL: self.integral}
         reads = readings_of(self._graph, branch.index)
         slopes = self.slopes.of(branch).items()
-        return total((slope, own[by](branch) if by in own else self._value(reads[by])) for by, slope in slopes)
+        read = ((slope, at_branch[by](branch) if by in at_branch else self._value(reads[by])) for by, slope in slopes)
+        return total(read)
 
     def _value(self, reading: Reading) -> Sum:
         if reading.kind == "across":

@@ -5,17 +5,16 @@ They are quotients of two determinants of the tableau, by Cramer's rule; compute
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import networkx as nx
 import numpy as np
 from mpmath import mpf, polyroots, workdps
 from numpy.typing import NDArray
-from sympy import Add, Expr, Float, Integer, Poly, Rational, Symbol, lcm, prime, sring, together
+from sympy import Add, Expr, Float, Integer, Poly, Rational, Symbol, default_sort_key
 
 from shaftwork.core.errors import CompileError, ParameterError, SignalError, no_quantity
 from shaftwork.equations.determinants import MOST_TERMS, TooManyTermsError, determinant
@@ -24,19 +23,24 @@ from shaftwork.equations.slopes import LawSlopes, Slope
 from shaftwork.equations.tableau import S, Sum, Tableau, Unknown, refuse_waves
 from shaftwork.reduction.form import Names
 from shaftwork.reduction.source_inputs import Place, places_of
+from shaftwork.equations.assembly import FactoredTerms
+from shaftwork.equations.blocks import Blocks
+from shaftwork.equations.cramer import TooManyTermsError, in_numbers, quotient
+from shaftwork.equations.notations import QUANTITIES
+from shaftwork.equations.printing import LINE_WIDTH, Line, Writer, aligned, printed_width
+from shaftwork.equations.rows import NetworkEquations
+from shaftwork.equations.slopes import FRACTION_DIGITS, LawSlopes, PointValues, Slope, Values
+from shaftwork.equations.spelling import escaped, without_marks
+from shaftwork.equations.tableau import S, Sum, Tableau, refuse_waves
+from shaftwork.reduction.gains import LONGEST
+from shaftwork.reduction.inputs import Place, places_of
+from shaftwork.reduction.names import Names
 
-if TYPE_CHECKING:  # the records make transfer functions through this module
-    from shaftwork.equations.records import Equations
-
-FEW = 1000
-"""The largest denominator of a fraction that is printed as one."""
-
-MOST_NUMBERS = 200_000
-"""Terms of the minors where these are polynomials in s alone."""
-SHORT = 600
-"""Terms of a quotient up to which all common factors are looked for: it takes seconds."""
 STEPS, EXTRA = 1000, 10
 """Steps in which roots are improved, and the binary digits more for each of them: what cancels in a polynomial."""
+
+REAL = Symbol("s", real=True)
+"""Stands for s in print, where all letters are real."""
 
 Complex = NDArray[np.complex128]
 
@@ -62,7 +66,7 @@ class TransferFunction:
     numerator: Poly
     denominator: Poly
     slopes: Mapping[Symbol, Slope]
-    equations: Equations
+    equations: NetworkEquations
     s = S
 
     @cached_property
@@ -94,9 +98,8 @@ class TransferFunction:
         """
         if not self._symbols and (parameters or at):
             raise ParameterError("This transfer function is in numbers already. Make it without values=True.")
-        numbers = Numbers(self.equations, parameters, at, t)
-        numbers.add(self.slopes)
-        above, below = (_in_numbers(p.as_expr(), numbers.known) for p in (self.numerator, self.denominator))
+        numbers = PointValues(self.equations, parameters, at, t).with_slopes(self.slopes)
+        above, below = (in_numbers(p.as_expr(), numbers) for p in (self.numerator, self.denominator))
         if not below:
             raise ParameterError(f"{self.output} / {self.input} has no finite value with these numbers.")
         above, below = above.cancel(below, include=True)
@@ -117,14 +120,14 @@ class TransferFunction:
         Raises:
             ParameterError: one is larger than floats are.
         """
-        made = self._numeric
-        first = made.denominator.LC()
+        numeric = self._numeric
+        first = numeric.denominator.LC()
         above, below = (
-            np.array([float(c / first) for c in p.all_coeffs()]) for p in (made.numerator, made.denominator)
+            np.array([float(c / first) for c in p.all_coeffs()]) for p in (numeric.numerator, numeric.denominator)
         )
         if not (np.isfinite(above).all() and np.isfinite(below).all()):
             raise ParameterError(
-                f"The denominator has degree {made.denominator.degree()}, and coefficients larger than floats are. "
+                f"The denominator has degree {numeric.denominator.degree()}, and coefficients larger than floats are. "
                 "Take poles() and zeros(), or values at s."
             )
         return above, below
@@ -143,30 +146,28 @@ class TransferFunction:
         Raises:
             ParameterError: one of them is a pole, or no finite number.
         """
-        made, at = self._numeric, np.asarray(s, dtype=complex)
+        numeric, at = self._numeric, np.asarray(s, dtype=complex)
         if not np.isfinite(at).all():
             raise ParameterError(f"s = {at[~np.isfinite(at)][0]} is no finite number.")
-        found = [_divided(made.numerator, made.denominator, complex(value)) for value in at.ravel()]
-        return np.array(found, dtype=complex).reshape(at.shape)
+        values = [_divided(numeric.numerator, numeric.denominator, complex(value)) for value in at.ravel()]
+        return np.array(values, dtype=complex).reshape(at.shape)
 
     def latex(self) -> str:
         """The equation for a LaTeX document (needs amsmath), and below it what the letters of slopes stand for."""
-        from shaftwork.equations.transfer_print import in_latex
-
-        return in_latex(self)
+        return f"\\begin{{align*}}\n{without_marks(aligned(tuple(_lines(self))))}\n\\end{{align*}}"
 
     _repr_latex_ = latex
 
     def __str__(self) -> str:
         above, below = self.printed
         lines = [f"{self.output} / {self.input} = ({above}) / ({below})"]
-        return "\n".join((*lines, *(f"  {letter} = {made.value}" for letter, made in self.slopes.items())))
+        return "\n".join((*lines, *(f"  {letter} = {slope.value}" for letter, slope in self.slopes.items())))
 
     __repr__ = __str__
 
 
 def transfer_function(
-    equations: Equations, names: tuple[str, str], *, values: bool, at: Values | None, t: float | None
+    equations: NetworkEquations, names: tuple[str, str], *, values: bool, at: Values | None, t: float | None
 ) -> TransferFunction:
     """The transfer function from an input to a quantity.
 
@@ -190,14 +191,9 @@ def transfer_function(
     tableau = Tableau(equations.assembly, slopes)
     read, direct = _output(equations, tableau, place, names[1])
     rows = tableau.rows(read)
-    known: dict[Symbol, Rational] | None = None
-    if values:
-        numbers = Numbers(equations, None, at, t)
-        numbers.add(slopes.letters)
-        known = numbers.known
-    entered = tableau.entered(place)
+    numbers = PointValues(equations, None, at, t).with_slopes(slopes.letters) if values else None
     try:
-        above, below = _reduced(*_quotient(_reached(rows, read), entered, (read, direct), known))
+        above, below = quotient(rows, tableau.entered(place), (read, direct), numbers)
     except TooManyTermsError:
         raise CompileError(
             "The network has too many loops for determinants in numbers. Take frequency_response."
@@ -211,11 +207,11 @@ def transfer_function(
             "torque undetermined. Take another point, or another phase."
         )
     left = above.as_expr().free_symbols | below.as_expr().free_symbols
-    kept = {letter: slope for letter, slope in slopes.letters.items() if letter in left}
-    return TransferFunction(*names, Poly(above.as_expr(), S), Poly(below.as_expr(), S), kept, equations)
+    standing = {letter: slope for letter, slope in slopes.letters.items() if letter in left}
+    return TransferFunction(*names, Poly(above.as_expr(), S), Poly(below.as_expr(), S), standing, equations)
 
 
-def _output(equations: Equations, tableau: Tableau, place: Place, name: str) -> tuple[Sum, int]:
+def _output(equations: NetworkEquations, tableau: Tableau, place: Place, name: str) -> tuple[Sum, int]:
     """A quantity as a sum of unknowns, and what the input itself adds to it.
 
     Raises:
@@ -236,87 +232,6 @@ def _output(equations: Equations, tableau: Tableau, place: Place, name: str) -> 
     if name in names.units:
         raise SignalError(f"'{name}' is a product of speeds and torques: it has no transfer function.")
     raise no_quantity(name, graph.name, names.units)
-
-
-def _reached(rows: Mapping[Unknown, Sum], read: Sum) -> Mapping[Unknown, Sum]:
-    """The rows of the unknowns on which those that are read depend, or which depend on these."""
-    trains: nx.Graph[Unknown] = nx.Graph()
-    trains.add_nodes_from(rows)
-    trains.add_edges_from((own, other) for own, row in rows.items() for other in row)
-    reached = set[Unknown]().union(*(nx.node_connected_component(trains, unknown) for unknown in read))
-    return {own: row for own, row in rows.items() if own in reached}
-
-
-def _quotient(
-    rows: Mapping[Unknown, Sum], entered: Mapping[Unknown, int], output: tuple[Sum, int], known: Values | None
-) -> tuple[Any, Any]:
-    """The output's determinant and that of the rows, as polynomials of one ring."""
-    columns = {unknown: k for k, unknown in enumerate(rows)}
-    read, direct = output
-    bordered = [
-        {columns[unknown]: entry for unknown, entry in row.items()}
-        | ({len(rows): Integer(entered[own])} if own in entered else {})
-        for own, row in rows.items()
-    ]
-    bordered.append({columns[unknown]: -entry for unknown, entry in read.items()})
-    if direct:
-        bordered[-1][len(rows)] = Integer(direct)
-    if known is None:
-        cleared = [_cleared(row) for row in bordered]
-    else:
-        cleared = [({k: _in_numbers(e, known).as_expr() for k, e in row.items()}, Integer(1)) for row in bordered]
-    entries = [entry for row, _ in cleared for entry in row.values()]
-    ring, (_, factor, *made) = sring([S, cleared[-1][1], *entries])
-    left = iter(made)
-    matrix = [{column: next(left) for column in row} for row, _ in cleared]
-    own = [{column: entry for column, entry in row.items() if column < len(rows)} for row in matrix[:-1]]
-    most = MOST_TERMS if known is None else MOST_NUMBERS
-    return determinant(matrix, ring.one, most), determinant(own, ring.one, most) * factor
-
-
-def _reduced(above: Any, below: Any) -> tuple[Any, Any]:
-    """The same quotient without common factors.
-
-    Of a long one only factors that hold s are looked for: where numerator and denominator have none in common for one
-    choice of the parameters, they have none at all.
-
-    Raises:
-        TooManyTermsError: a long one has such a factor.
-    """
-    ring = above.ring
-    if not (above and below) or len(above) + len(below) <= SHORT or ring.ngens == 1:
-        return above.cancel(below) if below else (above, below)
-    powers = np.min([*above.itermonoms(), *below.itermonoms()], axis=0)
-    above, below = (p.exquo(ring.term_new(tuple(powers.tolist()), ring.domain.one)) for p in (above, below))
-    place = ring.symbols.index(S)
-    numbers = [
-        (x, number)
-        for k, (x, number) in enumerate(zip(ring.gens, _distinct_primes(ring.ngens), strict=True))
-        if k != place
-    ]
-    tried = [p.evaluate(numbers) for p in (above, below)]
-    if tried[0].gcd(tried[1]).is_ground:
-        return above, below
-    raise TooManyTermsError
-
-
-def _distinct_primes(count: int) -> list[int]:
-    return [prime(7 + 3 * k) for k in range(count)]
-
-
-def _cleared(row: Mapping[int, Expr]) -> tuple[dict[int, Expr], Expr]:
-    """A row without fractions of symbols, and by what it has been multiplied."""
-    parts = {column: exact(together(entry)).as_numer_denom() for column, entry in row.items()}
-    common = Integer(1)
-    for _, below in parts.values():
-        common = lcm(common, below)
-    return {column: (above * (common / below).cancel()).expand() for column, (above, below) in parts.items()}, common
-
-
-def _in_numbers(expression: Expr, known: Mapping[Symbol, Rational]) -> Poly:
-    """A polynomial in s whose coefficients are fractions."""
-    found = Poly(exact(expression).xreplace(dict(known)), S)
-    return Poly([fraction(coefficient) for coefficient in found.all_coeffs()], S)
 
 
 def _divided(above: Poly, below: Poly, s: complex) -> complex:
@@ -341,20 +256,20 @@ def _roots(polynomial: Poly) -> Complex:
 
     Law: the eigenvalues of the companion matrix, improved by Durand's and Kerner's method in many digits.
     """
-    found = [root for factor, times in polynomial.sqf_list()[1] for root in _simple_roots(factor) * times]
-    return np.array(sorted(found, key=lambda root: (abs(root), root.imag)), dtype=complex)
+    roots = [root for factor, times in polynomial.sqf_list()[1] for root in _simple_roots(factor) * times]
+    return np.array(sorted(roots, key=lambda root: (abs(root), root.imag)), dtype=complex)
 
 
 def _simple_roots(polynomial: Poly) -> list[complex]:
     coefficients, degree = polynomial.all_coeffs(), polynomial.degree()
-    with workdps(DIGITS):
+    with workdps(FRACTION_DIGITS):
         numbers = [mpf(int(c.p)) / int(c.q) for c in coefficients]
         last = next(c for c in reversed(numbers) if c)
         size = (abs(last / numbers[0])) ** (mpf(1) / degree)  # of the roots, all in all
         scaled = [c * size ** (degree - k) for k, c in enumerate(numbers)]
         guesses = np.roots([float(c / scaled[0]) for c in scaled])
-        found = polyroots(scaled, maxsteps=STEPS, extraprec=EXTRA * degree, roots_init=guesses.tolist())
-        return [complex(root * size) for root in found]
+        roots = polyroots(scaled, maxsteps=STEPS, extraprec=EXTRA * degree, roots_init=guesses.tolist())
+        return [complex(root * size) for root in roots]
 
 
 def _readable(polynomial: Poly, first: Expr) -> Expr:
@@ -363,5 +278,62 @@ def _readable(polynomial: Poly, first: Expr) -> Expr:
 
 
 def _rounded(coefficient: Expr) -> Expr:
-    long = (number for number in coefficient.atoms(Rational) if number.q > FEW or abs(number.p) > FEW**2)
+    long = (number for number in coefficient.atoms(Rational) if number.q > LONGEST or abs(number.p) > LONGEST**2)
     return coefficient.xreplace({number: Float(number) for number in long})
+
+
+def _lines(function: TransferFunction) -> Iterator[Line]:
+    equations = function.equations
+    names, blocks = equations.symbol_names, Blocks(equations, values=False)
+    letters = _letters(function.slopes, set(names.values()))
+    printed = {**names, **letters, REAL.name: "s"}
+    writer = Writer(printed, {*equations.values, *letters}, (), {}, equations.inverses)
+    above, below = (writer.pieces(_powers(polynomial)) for polynomial in function.printed)
+    left = rf"\frac{{{_named(function.output, names)}}}{{{_named(function.input, names)}}}"
+    if 1.5 * max(printed_width(" ".join(pieces)) for pieces in (above, below)) < LINE_WIDTH:
+        yield Line(left, (rf"\frac{{{' '.join(above)}}}{{{' '.join(below)}}}",))
+    else:
+        yield Line(left, (r"\frac{Z(s)}{N(s)}",))
+        yield Line("Z(s)", above)
+        yield Line("N(s)", below)
+    for letter, slope in function.slopes.items():
+        yield Line(letters[letter.name], _derivative(slope, blocks.writer))
+
+
+def _named(name: str, names: Mapping[str, str]) -> str:
+    """The letter of a quantity, "line.tau_a" as tau with the name of its part, where no equation has one for it."""
+    part, _, quantity = name.rpartition(".")
+    stem, _, end = quantity.partition("_")
+    index = rf"\mathrm{{{escaped(part)}}}{f',{escaped(end)}' if end else ''}"
+    letter = QUANTITIES[stem].latex if stem in QUANTITIES else stem
+    return names.get(name, rf"{letter}_{{{index}}}")
+
+
+def _letters(slopes: Mapping[Symbol, Slope], taken: set[str]) -> dict[str, str]:
+    """A letter for each slope, with the name of its part: k, or another where the part has one."""
+    letters: dict[str, str] = {}
+    for symbol, slope in slopes.items():
+        number = symbol.name.partition("(")[0].partition("_")[2]
+        index = rf"\mathrm{{{escaped(slope.part)}}}{f',{number}' if number else ''}"
+        options = (rf"{base}_{{{index}}}" for base in ("k", r"\kappa", r"\lambda"))
+        whole = rf"\mathrm{{{escaped(symbol.name)}}}"
+        letters[symbol.name] = next((text for text in options if text not in taken), whole)
+    return letters
+
+
+def _powers(polynomial: Expr) -> list[FactoredTerms]:
+    """The terms of a polynomial in s, the highest power first."""
+    powers: dict[int, list[Expr]] = {}
+    for term in sorted(Add.make_args(polynomial.expand()), key=default_sort_key):  # else each process has its order
+        coefficient, power = term.as_independent(S)
+        powers.setdefault(int(power.as_base_exp()[1]) if power != 1 else 0, []).append(coefficient)
+    return [FactoredTerms(REAL**power, tuple(terms)) for power, terms in sorted(powers.items(), reverse=True)]
+
+
+def _derivative(slope: Slope, writer: Writer) -> tuple[str, ...]:
+    """How a torque changes with what its law reads, or the slope in full where the torque is no quantity by itself."""
+    sign, letter = slope.of.as_coeff_Mul()
+    if not (letter.is_Symbol and slope.by.is_Symbol):
+        return writer.pieces([FactoredTerms(Integer(1), Add.make_args(slope.value))])
+    minus = "-" if sign < 0 else ""
+    return (rf"{minus}\frac{{\partial {writer.latex(letter)}}}{{\partial {writer.latex(slope.by)}}}",)
