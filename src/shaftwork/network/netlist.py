@@ -94,8 +94,8 @@ class Netlist:
             )
         inside = dict.fromkeys(node for item in self.placed for node in item.nodes)
         if strange := [port for port in self.ports if port not in inside or port == REFERENCE]:
-            known = ", ".join(node for node in inside if node != REFERENCE)
-            raise ParameterError(f"Network '{self.name}': its port '{strange[0]}' is no node. Its nodes are: {known}.")
+            names = ", ".join(node for node in inside if node != REFERENCE)
+            raise ParameterError(f"Network '{self.name}': its port '{strange[0]}' is no node. Its nodes are: {names}.")
         outside = {**{node: f"{name}.{node}" for node in inside}, REFERENCE: REFERENCE}
         outside |= dict(zip(self.ports, nodes, strict=True))
 

@@ -73,14 +73,16 @@ def about(model: CompiledModel, at: Point, t: float) -> str:
     """A point in words, and the time in s where laws depend on it: "at J1.omega = 8, laws at t = 2 s"."""
     graph = model.form.graph
     laws = (
-        graph.in_network_symbols(made.template.law, made) for made in graph.branches if made.template.kind is Kind.LAW
+        graph.in_network_symbols(branch.template.law, branch)
+        for branch in graph.branches
+        if branch.template.kind is Kind.LAW
     )
     when = f"{diagram.LAWS}{t:g} s" if any(TIME in law.free_symbols for law in laws) else ""
     if isinstance(at, Solution):
         return f"at t = {at.t[0]:g} s of a motion" + ("" if t == at.t[0] else when)
-    given = [f"{name} = {briefly(value)}" for name, value in (at or {}).items()]
-    shown = ", ".join(given if len(given) <= NAMED else [*given[: NAMED - 1], "..."])
-    return (f"at {shown}" if given else "at rest") + when
+    entries = [f"{name} = {briefly(value)}" for name, value in (at or {}).items()]
+    shown = ", ".join(entries if len(entries) <= NAMED else [*entries[: NAMED - 1], "..."])
+    return (f"at {shown}" if entries else "at rest") + when
 
 
 def titled(name: str, point: str, phase: str = "") -> str:

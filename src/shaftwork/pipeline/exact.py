@@ -136,13 +136,13 @@ class ExactNetwork:
             SignalError: there is no such input.
             SimulationError: a law has no finite slope at the point.
         """
-        given = at
+        original = at
         if isinstance(at, Solution) and self._own is not self._model:
             time, _ = moment_of(at, self._model.states)
             t, at = time if t is None else t, _values_of(at, self.lines.names)
         p = self._own.vector()
         time, x = operating_point(self._own, p, at, t, self._own.settled(p))
-        return self.around(time, x, inputs, titled(self._model.name, near(self._own, given, time)))
+        return self.around(time, x, inputs, titled(self._model.name, near(self._own, original, time)))
 
     def around(self, time: float, x: Array, inputs: Names, title: str, phase: str = "") -> ExactModel:
         """The network near a point that is known.
@@ -170,14 +170,14 @@ class ExactNetwork:
 
     def _read(self, time: float, x: Array) -> dict[str, float]:
         """The states of the open network at the point, and speeds and torques of the ends of the shafts."""
-        own = {name: k for k, name in enumerate(self._own.states)}
+        places = {name: k for k, name in enumerate(self._own.states)}
         observer = ModelObserver(self._own.form, self._own.bind)
         ends = (
             f"{name}.{quantity}_{end}" for name in self.lines.names for quantity in ("omega", "tau") for end in "ab"
         )
         at = (np.array([time]), x[None, :])
         return {
-            name: float(x[own[name]]) if name in own else float(observer.signal(name, *at)[0])
+            name: float(x[places[name]]) if name in places else float(observer.signal(name, *at)[0])
             for name in (*self._open.states, *ends)
         }
 
@@ -186,11 +186,11 @@ class ExactNetwork:
     ) -> Linearization:
         """The open network at the point, its algebraic loops solved as they are there."""
         graph = self._open.form.graph
-        own = {part.name: part.branches for part in point.form.graph.parts}
+        branches = {part.name: part.branches for part in point.form.graph.parts}
         loops = self._open.bind().loops
         if loops is not None:
             parts = ((k, graph.part_of(k)) for k in self._open.form.loop_laws)
-            same = [own[part.name][part.branches.index(k)] for k, part in parts]
+            same = [branches[part.name][part.branches.index(k)] for k, part in parts]
             loops.start_from(point.through[same, 0])
         x = np.array([values[name] for name in self._open.states])
         arriving = [
@@ -204,8 +204,8 @@ class ExactNetwork:
         """The modes of the network with meshes that are right for |rate| up to a radius."""
         model = self._meshed(radius, attempt)
         torques = tuple(f"{name}.tau_{end}" for name in self.lines.names for end in "ab")
-        given = {name: value for name, value in values.items() if name not in torques}
-        x = np.zeros(len(model.states)) if model.linear else initial_state(model.bind(), given, time)
+        start = {name: value for name, value in values.items() if name not in torques}
+        x = np.zeros(len(model.states)) if model.linear else initial_state(model.bind(), start, time)
         return find_modes(model.name, Linearization(model, model.vector(), x, time, ()))
 
     def _meshed(self, radius: float, attempt: int) -> Model:
@@ -243,9 +243,9 @@ class ExactPhases:
             return self._model
         meshes = {name: dataclasses.replace(shaft, model=OWN) for name, shaft in waves.items()}
         with muted(NetworkWarning, AccuracyWarning):
-            made = self._compiled(_with_shafts(self._model.netlist, meshes))
-        assert isinstance(made, PhasedModel)  # noqa: S101 (its other parts are the same)
-        return made
+            model = self._compiled(_with_shafts(self._model.netlist, meshes))
+        assert isinstance(model, PhasedModel)  # noqa: S101 (its other parts are the same)
+        return model
 
     def near(self, at: Point, t: Time = None, inputs: Names = ()) -> ExactModel:
         """The network near a point, in the modes that go on there; arguments as for `Model.linearize`.
@@ -287,5 +287,5 @@ def _with_shafts(netlist: Netlist, shafts: Mapping[str, Shaft]) -> Netlist:
 def _values_of(motion: Solution, shafts: tuple[str, ...]) -> dict[str, float]:
     """The one time of a motion with waves, by speeds, twists and torques that a mesh has too."""
     names = (*motion.states, *(f"{name}.omega_{end}" for name in shafts for end in "ab"))
-    own = {name: k for k, name in enumerate(motion.states)}
-    return {name: float(motion.x[0, own[name]] if name in own else motion[name][0]) for name in names}
+    places = {name: k for k, name in enumerate(motion.states)}
+    return {name: float(motion.x[0, places[name]] if name in places else motion[name][0]) for name in names}

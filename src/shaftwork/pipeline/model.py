@@ -155,7 +155,7 @@ class Model(EngineModel):
 
     def _motion(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
         prepared = self.prepare(self.vector(values) if values else self.defaults)
-        return in_its_size(self.form, prepared, demand, lambda made: self._run(prepared, initial, made))
+        return in_its_size(self.form, prepared, demand, lambda sized: self._run(prepared, initial, sized))
 
     def _run(self, prepared: Prepared, initial: Given, demand: Demand) -> Solution:
         x0, waves = start_of(self, prepared, initial, demand.span)
@@ -260,10 +260,10 @@ class Model(EngineModel):
         return self._engine(prepared, self.problem(prepared, x0, demand), "auto")
 
     def _solve(
-        self, prepared: Prepared, problem: Problem, waves: WaveStart | CarriedWaves | None, asked: str
+        self, prepared: Prepared, problem: Problem, waves: WaveStart | CarriedWaves | None, engine: str
     ) -> tuple[Trajectory, str, str]:
         """The run, the engine that made it, and why that one."""
-        name, why = self._engine(prepared, problem, asked)
+        name, why = self._engine(prepared, problem, engine)
         if name == "wave":
             from shaftwork.pipeline.waves import solve_waves
 
@@ -275,19 +275,19 @@ class Model(EngineModel):
             start = start_of_loops(prepared.bound, problem)
             if name == "sundials":
                 return solve_loops(prepared.bound, problem, start), name, why
-        return choice.solve(problem, name, why, fallback=asked == "auto")
+        return choice.solve(problem, name, why, fallback=engine == "auto")
 
-    def _engine(self, prepared: Prepared, problem: Problem, asked: str) -> tuple[str, str]:
+    def _engine(self, prepared: Prepared, problem: Problem, engine: str) -> tuple[str, str]:
         """The engine for a motion, and why."""
         if self.form.waves:
             from shaftwork.pipeline.waves import engine_of_waves
 
-            return engine_of_waves(asked)
-        choice.check(asked)
+            return engine_of_waves(engine)
+        choice.check(engine)
         if not self.states:
             return "exact", PRESCRIBED
-        if asked != "auto":
-            return asked, "asked for"
+        if engine != "auto":
+            return engine, "asked for"
         if self.form.loop_laws:
             return "sundials" if available("sundials") else "scipy-radau", IMPLICIT
         key = (problem.t0, problem.t_end, problem.rtol)
@@ -307,8 +307,8 @@ class Model(EngineModel):
 
     def _changes_structure(self, values: Mapping[str, float]) -> bool:
         """Whether other equations hold for new values."""
-        own = changes_structure(self.form, values)
-        return own or (bool(values) and self.arrays.assembly.degenerates(self.vector(values)))
+        differs = changes_structure(self.form, values)
+        return differs or (bool(values) and self.arrays.assembly.degenerates(self.vector(values)))
 
     def _checked_all(self, parameters: Mapping[str, float] | None) -> dict[str, float]:
         if parameters is None:

@@ -149,8 +149,8 @@ class Network(NetworkBuilder):
             return self.expanded().compile(angles=angles, algebraic_loops=algebraic_loops)
         if algebraic_loops not in ("refuse", "solve"):
             raise ParameterError(f"algebraic_loops = {algebraic_loops!r} must be 'refuse' or 'solve'.")
-        asked = (angles,) if isinstance(angles, str) else tuple(angles)
-        return Compiler(asked, LOOP if algebraic_loops == "solve" else "")(self.netlist())
+        recorded = (angles,) if isinstance(angles, str) else tuple(angles)
+        return Compiler(recorded, LOOP if algebraic_loops == "solve" else "")(self.netlist())
 
     def simulate(
         self,
@@ -259,26 +259,26 @@ class Network(NetworkBuilder):
 
     @classmethod
     def _of(cls, netlist: Netlist) -> Self:
-        made = cls(netlist.name, netlist.ports, impacts=netlist.impacts)
-        made._placed += netlist.placed
-        return made
+        network = cls(netlist.name, netlist.ports, impacts=netlist.impacts)
+        network._placed += netlist.placed
+        return network
 
 
-def network_of(given: Any) -> Network:
+def network_of(network: Any) -> Network:
     """A network that a user gave.
 
     Raises:
         ParameterError: it is none.
     """
-    if not isinstance(given, Network):
-        raise ParameterError(f"{reprlib.repr(given)} is no network. Give the train, net = sw.Network('train').")
-    return given
+    if not isinstance(network, Network):
+        raise ParameterError(f"{reprlib.repr(network)} is no network. Give the train, net = sw.Network('train').")
+    return network
 
 
 def _sound(netlist: Netlist, accepted: str = "") -> StateForm:
     """The state form of a network without errors but for an accepted kind; warnings are issued."""
     _, form, problems = diagnose(netlist)
-    if errors := tuple(found for found in problems if found.severity == "error" and found.kind != accepted):
+    if errors := tuple(problem for problem in problems if problem.severity == "error" and problem.kind != accepted):
         raise NetworkError(f"'{netlist.name}' cannot be assembled", errors)
     for problem in problems:
         if problem.severity == "warning":

@@ -199,9 +199,9 @@ def warn_of_rest(graph: CircuitGraph, initial: Mapping[str, float]) -> None:
     moved = {str(name).rpartition(".")[0] for name, value in initial.items() if value}
     if (resting := _RESTING.get(graph)) is None:
         resting = _RESTING[graph] = resting_trains(graph)
-    for found in resting:
-        if moved.isdisjoint((*found.parts, *found.nodes)):
-            warn(f"'{graph.name}' has a train that stays at rest: {found}", NetworkWarning)
+    for train in resting:
+        if moved.isdisjoint((*train.parts, *train.nodes)):
+            warn(f"'{graph.name}' has a train that stays at rest: {train}", NetworkWarning)
 
 
 def start_of(
@@ -222,9 +222,9 @@ def start_of(
     if initial is None and not model.form.has_impulses:
         return np.zeros(len(model.states)), None
     _, after = model.switching.timeline(prepared.p, *span).sides(span[0])
-    given = dict(zip(model.parameters, prepared.p.tolist(), strict=True))
+    values = dict(zip(model.parameters, prepared.p.tolist(), strict=True))
     if isinstance(initial, Ending) and (initial.waves is not None or not model.form.waves):
-        return _taken_up(prepared, initial, after, changes=bool(initial.changed(given))), initial.waves
+        return _taken_up(prepared, initial, after, changes=bool(initial.changed(values))), initial.waves
     if not model.form.waves:
         return initial_state(prepared.bound, {} if initial is None else initial, after), None
     from shaftwork.pipeline.waves import start_of_waves
@@ -234,7 +234,7 @@ def start_of(
         initial = {name: initial[name] for name in model.states}
     elif initial and span[0] != 0:
         warn_of_lost_waves(span[0])
-    return start_of_waves(prepared.bound, model.twin.bind(model.twin.vector(given)), initial or {}, after)
+    return start_of_waves(prepared.bound, model.twin.bind(model.twin.vector(values)), initial or {}, after)
 
 
 def _taken_up(prepared: Prepared, ending: Ending, after: float, *, changes: bool) -> Array:

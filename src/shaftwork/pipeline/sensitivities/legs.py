@@ -162,12 +162,14 @@ def motion_of(model: Model, span: tuple[float, float], initial: Given, rtol: flo
         run = HybridRun(model.phases, {}, Demand(span, rtol, None, None, "auto", MOST_STEPS, None), own=True)
         run.march(initial)
         legs, changes = tuple(_legs_of_run(run)), tuple(run.changes)
-        made = DifferentiatedMotion(solution(run, model.name), legs, changes, _start(run, initial), model.phases)
+        differentiated = DifferentiatedMotion(
+            solution(run, model.name), legs, changes, _start(run, initial), model.phases
+        )
     else:
-        found = model.simulate(span[1], t_start=span[0], initial=initial, rtol=rtol, t_eval="steps")
-        made = DifferentiatedMotion(found, tuple(_legs_of_model(model, found)))
-    _refuse_impulses(made)
-    return made
+        motion = model.simulate(span[1], t_start=span[0], initial=initial, rtol=rtol, t_eval="steps")
+        differentiated = DifferentiatedMotion(motion, tuple(_legs_of_model(model, motion)))
+    _refuse_impulses(differentiated)
+    return differentiated
 
 
 def _start(run: HybridRun, initial: Given) -> Leg:
