@@ -34,11 +34,6 @@ Train = tuple[int, ...]
 """Numbers of the parts that hang together."""
 
 
-def declaration_problems(netlist: Netlist) -> tuple[Diagnostic, ...]:
-    """What is wrong with names, nodes, parameters and laws as they were typed: the problems of `examine`."""
-    return examine(netlist)[1]
-
-
 def examine(netlist: Netlist) -> tuple[Netlist, tuple[Diagnostic, ...]]:
     """Check every part by itself and against the names and nodes before it.
 

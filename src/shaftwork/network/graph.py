@@ -238,7 +238,7 @@ class _Table:
 
 
 def build_graph(netlist: Netlist) -> CircuitGraph:
-    """Netlist to graph. The netlist must have passed `checks.declaration_problems`."""
+    """Netlist to graph. The netlist must have passed `checks.examine`."""
     resolved = tuple(resolve(placed)[0] for placed in netlist.placed)
     table = _Table()
     for placed in netlist.placed:  # ports with a domain first, so that a Ground does not decide the domain of its node

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
@@ -111,12 +111,11 @@ class Netlist:
         for name, value in values.items():
             owner, _, parameter = name.rpartition(".")
             by_part.setdefault(owner, {})[parameter] = value
+        return self.with_parts(lambda part: replace(part, **by_part[part.name]) if part.name in by_part else part)
 
-        def changed(item: Placed) -> Placed:
-            new = by_part.get(item.part.name)
-            return item if new is None else replace(item, part=replace(item.part, **new))
-
-        return replace(self, placed=tuple(changed(item) for item in self.placed))
+    def with_parts(self, change: Callable[[Component], Component]) -> Netlist:
+        """The same network with what a function makes of each part, at the same nodes and in the same modes."""
+        return replace(self, placed=tuple(replace(item, part=change(item.part)) for item in self.placed))
 
     def with_choices(self, choices: Mapping[str, tuple[ModeChoice, ...]]) -> Netlist:
         """The same parts with what is chosen for those that have modes, by name of the part."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -57,20 +57,6 @@ class WaveStart:
 
     speeds: Array
     torques: Array
-
-
-@runtime_checkable
-class _Carries(Protocol):
-    """Dense output that knows the waves on their way."""
-
-    def carried(self, t: float) -> CarriedWaves | None:
-        """What is on its way at a time in s; None where leaps do not know it."""
-        ...
-
-
-def on_their_way(dense: object, t: float) -> CarriedWaves | None:
-    """The waves on their way at a time in s of a motion with this dense output; None where leaps do not know them."""
-    return dense.carried(t) if isinstance(dense, _Carries) else None
 
 
 def waving(graph: CircuitGraph) -> tuple[str, ...]:
@@ -156,7 +142,8 @@ def ending_of(motion: Solution, graph: CircuitGraph) -> Ending:
             "Or begin with start values, initial={name: sol[name][-1] for name in sol.states} and t_start=sol.t[-1]."
         )
     t, x = float(motion.t[-1]), motion.x[-1]
-    observer, waves = motion.observer, on_their_way(motion.dense, t) if waving(graph) else None
+    observer, carried = motion.observer, getattr(motion.dense, "carried", None)
+    waves = carried(t) if waving(graph) and carried is not None else None
     return Ending(observer.held(t, x), t, observer.read_at(t), observer.modes_at(t), motion.parameters, waves)
 
 

@@ -91,8 +91,7 @@ def twin(netlist: Netlist) -> Netlist:
             return part
         return dataclasses.replace(part, model=Lumped(1 if part.friction == 0 else 2))
 
-    placed = (dataclasses.replace(item, part=stiff(item.part)) for item in netlist.placed)
-    return Netlist(netlist.name, tuple(placed))
+    return netlist.with_parts(stiff)
 
 
 def start_of_waves(

@@ -21,8 +21,8 @@ from shaftwork.pipeline.phases.regimes import with_modes
 from shaftwork.pipeline.sensitivities.legs import Leg
 
 CLOSE = 1e-5
-"""The run took a path whose states differ from its own by no more than this part of their size: it meets hard stops late
-by what rounding moves them, which is much for what hardly moves any more."""
+"""The run took a path whose states differ from its own by no more than this part of their size: it meets hard stops
+late by what rounding moves them, which is much for what hardly moves any more."""
 ALIKE = 1e-10
 """Paths lead to the same states where these differ by no more than this part of their size."""
 
