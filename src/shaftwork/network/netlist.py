@@ -107,11 +107,8 @@ class Netlist:
 
     def with_values(self, values: Mapping[str, Any]) -> Netlist:
         """The same parts with some parameters, "part.name", replaced."""
-        by_part: dict[str, dict[str, Any]] = {}
-        for name, value in values.items():
-            owner, _, parameter = name.rpartition(".")
-            by_part.setdefault(owner, {})[parameter] = value
-        return self.with_parts(lambda part: replace(part, **by_part[part.name]) if part.name in by_part else part)
+        changed = by_part(values)
+        return self.with_parts(lambda part: replace(part, **changed[part.name]) if part.name in changed else part)
 
     def with_parts(self, change: Callable[[Component], Component]) -> Netlist:
         """The same network with what a function makes of each part, at the same nodes and in the same modes."""
@@ -121,6 +118,15 @@ class Netlist:
         """The same parts with what is chosen for those that have modes, by name of the part."""
         placed = (replace(item, choices=choices.get(item.part.name, item.choices)) for item in self.placed)
         return replace(self, placed=tuple(placed))
+
+
+def by_part(values: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Values of "part.parameter", for each part by parameter."""
+    parts: dict[str, dict[str, Any]] = {}
+    for name, value in values.items():
+        owner, _, parameter = name.rpartition(".")
+        parts.setdefault(owner, {})[parameter] = value
+    return parts
 
 
 def overview(netlist: Netlist) -> str:

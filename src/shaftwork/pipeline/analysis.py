@@ -18,6 +18,7 @@ from shaftwork.core.notices import once
 from shaftwork.core.parameters import briefly, in_si
 from shaftwork.network.kinds import Kind
 from shaftwork.network.wording import listed
+from shaftwork.pipeline.arguments import as_names
 from shaftwork.pipeline.point_speeds import as_multiple, speeds_to_give, warn_of_speeds_left, warn_of_turning_angles
 from shaftwork.pipeline.settled import SteadyState
 from shaftwork.reduction.inputs import source_inputs
@@ -61,7 +62,7 @@ def linearized(
     time, x = operating_point(model, p, point, t, settled)
     slopes = Linearization(model, p, x, time, named)
     title = titled(model.form.graph.name, near(model, at, time))
-    return linear_model(title, slopes, None if outputs is None else _listed(outputs), x, time)
+    return linear_model(title, slopes, None if outputs is None else as_names(outputs), x, time)
 
 
 def near(model: CompiledModel, at: Point, t: float) -> str:
@@ -92,7 +93,7 @@ def titled(name: str, point: str, phase: str = "") -> str:
 
 def input_names(model: CompiledModel, inputs: Names) -> tuple[str, ...]:
     """The inputs asked for; None asks for all sources."""
-    return source_inputs(model.form.graph) if inputs is None else _listed(inputs)
+    return source_inputs(model.form.graph) if inputs is None else as_names(inputs)
 
 
 def operating_point(model: CompiledModel, p: Array, at: Point, t: Time, settled: float) -> tuple[float, Array]:
@@ -188,10 +189,6 @@ def _refuse_no_point(model: CompiledModel) -> None:
             f"{options}; or one point for all speeds: --steady, or --at {first}=0 for rest.",
         )
     )
-
-
-def _listed(names: str | Sequence[str]) -> tuple[str, ...]:
-    return (names,) if isinstance(names, str) else tuple(names)
 
 
 def moment_of(motion: Solution, states: tuple[str, ...]) -> tuple[float, Array]:

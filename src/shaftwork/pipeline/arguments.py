@@ -14,7 +14,7 @@ from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si, numbers_in_si, whole
 from shaftwork.network.graph import CircuitGraph
-from shaftwork.network.netlist import Netlist
+from shaftwork.network.netlist import Netlist, by_part
 from shaftwork.reduction.form import StateForm
 
 OUTPUTS, MOST_OUTPUTS = 1001, 10_000_000
@@ -76,6 +76,11 @@ class Demand:
         if self.atol is None:
             return self.rtol * self.sizes.tolerances(ordinary, names)
         return absolute_tolerances(self.atol, len(names))
+
+
+def as_names(names: str | Sequence[str]) -> tuple[str, ...]:
+    """Names of which a single one may be given as a text."""
+    return (names,) if isinstance(names, str) else tuple(names)
 
 
 def time_span(t_start: Any, t_end: Any) -> tuple[float, float]:
@@ -181,11 +186,10 @@ def checked_parameters(netlist: Netlist, parameters: Mapping[str, Any]) -> dict[
             together.
     """
     values = {str(name): checked_parameter(netlist, str(name), value) for name, value in parameters.items()}
-    owners = {name.rpartition(".")[0] for name in values}
-    for part in (placed.part for placed in netlist.placed if placed.part.name in owners):
+    changed = by_part(values)
+    for part in (placed.part for placed in netlist.placed if placed.part.name in changed):
         if hasattr(part, "__post_init__"):  # what the part says of values that do not go together
-            changed = {key: values[f"{part.name}.{key}"] for key in part.declared if f"{part.name}.{key}" in values}
-            dataclasses.replace(part, **changed)  # type: ignore[arg-type]
+            dataclasses.replace(part, **changed[part.name])
     return values
 
 
@@ -235,10 +239,7 @@ def branches_anew(graph: CircuitGraph, values: Mapping[str, float]) -> bool:
     Raises:
         ParameterError: a shaft has become too long for one polynomial.
     """
-    changed: dict[str, dict[str, Any]] = {}
-    for name, value in values.items():
-        owner, _, parameter = name.rpartition(".")
-        changed.setdefault(owner, {})[parameter] = value
+    changed = by_part(values)
     consulting = (p for p in graph.parts if p.name in changed and not changed[p.name].keys().isdisjoint(p.consulted))
     return any(
         not isinstance(part.component, Shaft)

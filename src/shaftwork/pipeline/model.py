@@ -29,6 +29,7 @@ from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import (
     Demand,
     OutputTimes,
+    as_names,
     changes_structure,
     checked_parameters,
     output_times,
@@ -134,7 +135,7 @@ class Model(EngineModel):
             SimulationError: the integration failed; says when, in which state and why.
             MissingExtraError: the engine asked for is not installed.
         """
-        refuse_unrecorded(self.form, (angles,) if isinstance(angles, str) else tuple(angles))
+        refuse_unrecorded(self.form, as_names(angles))
         values = self._checked_all(parameters)
         if isinstance(initial, Solution):
             initial = ending_of(initial, self.form.graph)
