@@ -43,9 +43,7 @@ from shaftwork.pipeline.prepared import EngineModel, Prepared
 from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels
 from shaftwork.pipeline.sizes import in_its_size, with_accuracy
 from shaftwork.pipeline.start import (
-    CarriedWaves,
     Ending,
-    WaveStart,
     ending_of,
     refuse_motion,
     start_of,
@@ -58,6 +56,7 @@ from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.analysis import Given, Names, Point, Time
+    from shaftwork.pipeline.waves import CarriedWaves, WaveStart
     from shaftwork.results.linear import LinearModel
 
 VARIANTS = 8

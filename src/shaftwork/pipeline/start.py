@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
@@ -23,7 +22,7 @@ from shaftwork.pipeline.prepared import EngineModel, Prepared
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
-    from shaftwork.integrate.lossless.lines import Past
+    from shaftwork.pipeline.waves import CarriedWaves, WaveStart
 
 _RESTING: WeakKeyDictionary[CircuitGraph, tuple[Diagnostic, ...]] = WeakKeyDictionary()
 """What `resting_trains` gives: it takes as long as a short run."""
@@ -31,32 +30,6 @@ SAME_TIME = 1e-12
 """Times that differ by less than this fraction are one: units are converted."""
 NAMED = 3
 """Parts of another network that a message names."""
-
-
-@dataclass(frozen=True)
-class CarriedWaves:
-    """What is on its way in lines where a motion ended.
-
-    Args:
-        past: what has left their ends.
-        lines: by shaft (2, lines), impedances in N m s and delays in s.
-    """
-
-    past: Past
-    lines: Mapping[str, Array]
-
-
-@dataclass(frozen=True)
-class WaveStart:
-    """How lines start: their speed runs straight from end to end, their torque is the same all along.
-
-    Args:
-        speeds: (2 lines,) of the ends, rad/s.
-        torques: (lines,) that the first end takes in, N m.
-    """
-
-    speeds: Array
-    torques: Array
 
 
 def waving(graph: CircuitGraph) -> tuple[str, ...]:

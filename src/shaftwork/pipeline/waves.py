@@ -28,7 +28,6 @@ from shaftwork.integrate.lossless.waveforms import Polynomials
 from shaftwork.integrate.problem import Problem, Trajectory
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import Netlist
-from shaftwork.pipeline.start import CarriedWaves, WaveStart
 from shaftwork.reduction.form import StateForm
 
 WHY = "Shafts are travelling waves, so states and delays are solved together."
@@ -78,6 +77,32 @@ class _StatesAndWaves:
     def carried(self, t: float) -> CarriedWaves | None:
         """What is on its way at a time in s; None where leaps do not know it."""
         return None if self.found.past is None else CarriedWaves(self.found.past(t), self.lines)
+
+
+@dataclass(frozen=True)
+class CarriedWaves:
+    """What is on its way in lines where a motion ended.
+
+    Args:
+        past: what has left their ends.
+        lines: by shaft (2, lines), impedances in N m s and delays in s.
+    """
+
+    past: Past
+    lines: Mapping[str, Array]
+
+
+@dataclass(frozen=True)
+class WaveStart:
+    """How lines start: their speed runs straight from end to end, their torque is the same all along.
+
+    Args:
+        speeds: (2 lines,) of the ends, rad/s.
+        torques: (lines,) that the first end takes in, N m.
+    """
+
+    speeds: Array
+    torques: Array
 
 
 def twin(netlist: Netlist) -> Netlist:

@@ -35,7 +35,8 @@ from shaftwork.pipeline.phases.phases import FOLLOWING, Phases
 from shaftwork.pipeline.phases.regimes import with_modes
 from shaftwork.pipeline.phases.starts import refuse_incomplete, warn_of_what_may_have_begun
 from shaftwork.pipeline.phases.wave_run import WaveRun
-from shaftwork.pipeline.start import CarriedWaves, Ending, WaveStart, start_of
+from shaftwork.pipeline.start import Ending, start_of
+from shaftwork.pipeline.waves import CarriedWaves, WaveStart
 
 # So many changes of mode, each within this part of the run of the one before, are chatter. Rebounds come ever faster,
 # too, before they end: a thousand of them where nearly all speed is given back.
