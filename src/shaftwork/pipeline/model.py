@@ -39,10 +39,7 @@ from shaftwork.pipeline.arguments import (
     time_span,
 )
 from shaftwork.pipeline.implicit import IMPLICIT, PRESCRIBED, at_rest, solve_loops, start_of_loops
-from shaftwork.pipeline.prepared import EngineModel, Prepared
-from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels
-from shaftwork.pipeline.sizes import in_its_size, with_accuracy
-from shaftwork.pipeline.start import (
+from shaftwork.pipeline.motion_start import (
     Ending,
     ending_of,
     refuse_motion,
@@ -50,13 +47,16 @@ from shaftwork.pipeline.start import (
     time_of_start,
     warn_of_rest,
 )
+from shaftwork.pipeline.prepared import EngineModel, Prepared
+from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels
+from shaftwork.pipeline.sizes import in_its_size, with_accuracy
 from shaftwork.pipeline.stored import Repetition, call_of, model_again, remember
 from shaftwork.reduction.form import StateForm
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.analysis import Given, Names, Point, Time
-    from shaftwork.pipeline.waves import CarriedWaves, WaveStart
+    from shaftwork.pipeline.wave_motion import CarriedWaves, WaveStart
     from shaftwork.results.linear import LinearModel
 
 VARIANTS = 8
@@ -265,7 +265,7 @@ class Model(EngineModel):
         """The run, the engine that made it, and why that one."""
         name, why = self._engine(prepared, problem, engine)
         if name == "wave":
-            from shaftwork.pipeline.waves import solve_waves
+            from shaftwork.pipeline.wave_motion import solve_waves
 
             steady = self.degree == 0
             return solve_waves(prepared.bound, problem, waves, linear=self.linear, steady=steady), name, why
@@ -280,7 +280,7 @@ class Model(EngineModel):
     def _engine(self, prepared: Prepared, problem: Problem, engine: str) -> tuple[str, str]:
         """The engine for a motion, and why."""
         if self.form.waves:
-            from shaftwork.pipeline.waves import engine_of_waves
+            from shaftwork.pipeline.wave_motion import engine_of_waves
 
             return engine_of_waves(engine)
         choice.check(engine)
@@ -301,7 +301,7 @@ class Model(EngineModel):
     @cached_property
     def twin(self) -> Model:
         """The network with springs in place of its waves: it stands and turns steadily as they do."""
-        from shaftwork.pipeline.waves import twin
+        from shaftwork.pipeline.wave_motion import twin
 
         return self._rebuild(twin(self.netlist))
 

@@ -237,7 +237,7 @@ class Network(NetworkBuilder):
 
     @staticmethod
     def _small_motions(model: Model, *, exact: bool) -> SmallMotions:
-        from shaftwork.pipeline.exact import small_motions
+        from shaftwork.pipeline.exact_networks import small_motions
 
         return small_motions(model, Compiler((), LOOP), every=exact)
 

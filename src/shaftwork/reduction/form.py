@@ -20,7 +20,7 @@ from functools import cached_property
 
 from shaftwork.components.branches import RATE
 from shaftwork.core.domains import Domain
-from shaftwork.network.changing import is_bounded
+from shaftwork.network.changing_stores import is_bounded
 from shaftwork.network.controlled import Reading, readings_of
 from shaftwork.network.graph import CircuitGraph, GraphBranch
 from shaftwork.network.kinds import Kind

@@ -19,7 +19,7 @@ from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import CompileError, NetworkError
 from shaftwork.integrate.lanes import LaneRun, Room, Steps
 from shaftwork.network.graph import GraphPart
-from shaftwork.pipeline.ensemble.equations import (
+from shaftwork.pipeline.ensemble.ensemble_equations import (
     EXTREMES,
     POWERS,
     EnsembleCode,

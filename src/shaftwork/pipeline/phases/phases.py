@@ -23,7 +23,7 @@ from shaftwork.pipeline.phases.mode_machines import ModeNames, elements_of
 from shaftwork.pipeline.phases.regimes import with_modes
 from shaftwork.pipeline.phases.resting import at_rest
 from shaftwork.pipeline.phases.wave_assembly import WaveAssembly
-from shaftwork.pipeline.waves import engine_of_waves
+from shaftwork.pipeline.wave_motion import engine_of_waves
 from shaftwork.reduction.cancelling import self_locks
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from shaftwork.components.slopes import slope
 from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.pipeline.analysis import Given
 from shaftwork.pipeline.model import Model
+from shaftwork.pipeline.motion_start import start_of
 from shaftwork.pipeline.phases.model import PhasedModel
-from shaftwork.pipeline.start import start_of
 from shaftwork.reduction.rows import Rows
 
 NO_DERIVATIVE = {

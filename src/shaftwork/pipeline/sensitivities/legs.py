@@ -17,6 +17,7 @@ from shaftwork.core.errors import SimulationError
 from shaftwork.pipeline.analysis import Given
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.model import Model
+from shaftwork.pipeline.motion_start import start_of
 from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.hybrid_state import Change
 from shaftwork.pipeline.phases.mode_machines import ModeNames
@@ -24,7 +25,6 @@ from shaftwork.pipeline.phases.model import PhasedModel
 from shaftwork.pipeline.phases.phases import Phases
 from shaftwork.pipeline.phases.run import HybridRun, Span
 from shaftwork.pipeline.phases.solution import solution
-from shaftwork.pipeline.start import start_of
 from shaftwork.results.solution import Solution
 
 LOOKS = np.array([0.0, 0.004, 0.07, 0.19, 0.31, 0.42, 0.53, 0.61, 0.74, 0.83, 0.91, 0.996])

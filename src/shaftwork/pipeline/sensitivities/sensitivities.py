@@ -16,11 +16,11 @@ from shaftwork.core.errors import ParameterError, SimulationError
 from shaftwork.pipeline.analysis import Given, Point, Time, operating_point
 from shaftwork.pipeline.arguments import relative_tolerance, time_span
 from shaftwork.pipeline.model import Model
+from shaftwork.pipeline.motion_start import refuse_motion
 from shaftwork.pipeline.phases.model import PhasedModel
 from shaftwork.pipeline.sensitivities.differentiable import rows_of, smooth_parameters, without_start
 from shaftwork.pipeline.sensitivities.legs import motion_of
 from shaftwork.pipeline.sensitivities.motion_slopes import MotionSlopes
-from shaftwork.pipeline.start import refuse_motion
 from shaftwork.results.measures import KINDS, SMALLEST, Measure
 from shaftwork.results.sensitivities import FrequencySensitivities, MotionSensitivities
 from shaftwork.results.slopes import Complex
