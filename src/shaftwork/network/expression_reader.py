@@ -36,6 +36,8 @@ from shaftwork.network.grammar import (
 )
 
 _SIGNS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
+_LIST = re.compile(r"\[[^]]*\]")
+"""The numbers of a list are read from the text: of long tables a tree would take a second."""
 _BEFORE_OPERATOR = re.compile(r"[ )]*")
 
 
@@ -77,7 +79,7 @@ class _LawReader:
 
     def read(self) -> sympy.Expr:
         try:
-            tree = ast.parse(self.text, mode="eval").body
+            tree = ast.parse(_LIST.sub(lambda match: f"[{' ' * (len(match[0]) - 2)}]", self.text), mode="eval").body
         except SyntaxError as error:
             self.fail((error.offset or 1) - 1, f"cannot be read from here on ({error.msg})", ALLOWED)
         expression = _settled(self.value(tree).expression)
@@ -250,7 +252,7 @@ class _LawReader:
     def column(self, node: ast.expr) -> list[float]:
         if not isinstance(node, ast.List):
             self.fail(node, "needs a list of numbers in Table", "Write Table([x0, x1, ...], [y0, y1, ...]).")
-        items = [self.text[item.col_offset : item.end_col_offset] for item in node.elts]
+        items = [item.strip() for item in self.text[node.col_offset + 1 : (node.end_col_offset or 0) - 1].split(",")]
         if strange := [number for number, item in enumerate(items, 1) if not SIGNED_NUMBER.fullmatch(item)]:
             self.fail(node, f"has a list whose item {strange[0]} is no number", "Lists hold numbers alone.")
         return [float(item) for item in items]
