@@ -38,9 +38,9 @@ class NetworkBuilder:
 
     def __copy__(self) -> Self:
         """A network of the same parts, which are immutable; what is added, replaced or removed in one is so there."""
-        made = object.__new__(type(self))
-        vars(made).update(vars(self), _placed=[*self._placed])
-        return made
+        copy = object.__new__(type(self))
+        vars(copy).update(vars(self), _placed=[*self._placed])
+        return copy
 
     def __eq__(self, other: object) -> bool:
         """Whether name, ports, parts and nodes are equal, in their order; not from which file they come."""

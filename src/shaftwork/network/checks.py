@@ -34,11 +34,6 @@ Train = tuple[int, ...]
 """Numbers of the parts that hang together."""
 
 
-def declaration_problems(netlist: Netlist) -> tuple[Diagnostic, ...]:
-    """What is wrong with names, nodes, parameters and laws as they were typed: the problems of `examine`."""
-    return examine(netlist)[1]
-
-
 def examine(netlist: Netlist) -> tuple[Netlist, tuple[Diagnostic, ...]]:
     """Check every part by itself and against the names and nodes before it.
 
@@ -54,7 +49,7 @@ def examine(netlist: Netlist) -> tuple[Netlist, tuple[Diagnostic, ...]]:
         work.take(placed)
     if not netlist.placed:
         work.report("empty network", f"'{netlist.name}' has no parts.", "Add parts: net.add(part, 'node').")
-    return dataclasses.replace(netlist, placed=tuple(work.kept), ports=()), tuple(work.problems)
+    return dataclasses.replace(netlist, placed=tuple(work.usable), ports=()), tuple(work.problems)
 
 
 class _Examination:
@@ -63,7 +58,7 @@ class _Examination:
     def __init__(self, netlist: Netlist) -> None:
         self._parts = {placed.part.name for placed in netlist.placed if isinstance(placed.part.name, str)}
         self.problems: list[Diagnostic] = []
-        self.kept: list[Placed] = []
+        self.usable: list[Placed] = []
         self._named: dict[str, str] = {}
         self._domains: dict[str, tuple[Domain, str]] = {}
         self._dotted: dict[str, None] = {}
@@ -83,7 +78,7 @@ class _Examination:
         fits = self._stands(renamed)
         sound = self._with_values(renamed)
         if fits and sound is not None:
-            self.kept.append(dataclasses.replace(placed, part=sound))
+            self.usable.append(dataclasses.replace(placed, part=sound))
 
     def _with_name(self, placed: Placed) -> Component:
         """The part under a name that no other part has."""
@@ -162,10 +157,10 @@ class _Examination:
 
     def _check_effect(self, placed: Placed) -> None:
         part = placed.part
-        held = {*placed.nodes, *(REFERENCE for _ in part.ports[len(placed.nodes) :])}
+        places = {*placed.nodes, *(REFERENCE for _ in part.ports[len(placed.nodes) :])}
         single = len(part.ports) == 1
-        if len(held) == 1 and not (single and (REFERENCE not in held or part.ports[0].domain is None)):
-            (node,) = held
+        if len(places) == 1 and not (single and (REFERENCE not in places or part.ports[0].domain is None)):
+            (node,) = places
             stands = "stands" if single else "begins and ends"
             message = f"{title(part)} {stands} at node '{node}' and does nothing there."
             hint = "Move it to a node that can move." if single else "Join one of its ends to another node."
@@ -176,8 +171,8 @@ class _Examination:
         part = placed.part
         try:
             resolved, objections = resolve(placed)
-            for name, given, objection in objections:
-                self._report_value(placed, name, given, objection)
+            for name, value, objection in objections:
+                self._report_value(placed, name, value, objection)
             faults = self._faults_of(part, resolved.values)
         except ShaftworkError as error:
             self.report("component", f"{title(part)}: {error}", "Correct its branches().", placed)
@@ -194,12 +189,12 @@ class _Examination:
         usable: dict[str, Any] = {fault.parameter: 1.0 for fault in faults}
         return dataclasses.replace(part, **usable) if faults else part
 
-    def _report_value(self, placed: Placed, name: str, given: Any, objection: str) -> None:
+    def _report_value(self, placed: Placed, name: str, value: Any, objection: str) -> None:
         part, declared = placed.part, placed.part.declared[name]
-        kind = "wrong unit" if hasattr(given, "dimensionality") else "parameter"
+        kind = "wrong unit" if hasattr(value, "dimensionality") else "parameter"
         unit = " as a pure number" if declared.unit == "1" else f" in {declared.unit}"
         unit = "" if declared.record is not None else unit
-        shown = "" if kind == "wrong unit" else f" = {reprlib.repr(given)}"
+        shown = "" if kind == "wrong unit" else f" = {reprlib.repr(value)}"
         hint = f"Give {name} ({declared.meaning}){unit}{f', {declared.bounds}' if declared.bounds else ''}."
         self.report(kind, f"{title(part)}: {name}{shown} {objection}.", hint, placed, name)
 
@@ -221,9 +216,9 @@ def connection_problems(graph: CircuitGraph) -> tuple[Diagnostic, ...]:
     floating, main, others = _split(graph, ends)
     problems = [_floating_part(graph, number, spelling) for number in floating]
     alone = {*floating}
-    for node, found in enumerate(ends):
-        if len(found) == 1 and found[0][0] not in alone and not _is_complete(graph, found[0][0], node):
-            problems.append(_loose_end(graph, *found[0], node, spelling))
+    for node, meeting in enumerate(ends):
+        if len(meeting) == 1 and meeting[0][0] not in alone and not _is_complete(graph, meeting[0][0], node):
+            problems.append(_loose_end(graph, *meeting[0], node, spelling))
     problems += [_separate_train(graph, train, main, spelling) for train in others]
     return (*problems, *_nearly_reference(graph), *_shared_names(graph))
 
@@ -258,8 +253,8 @@ def _ends(graph: CircuitGraph) -> list[list[tuple[int, str]]]:
 def _trains(ends: list[list[tuple[int, str]]]) -> list[Train]:
     """The parts that hang together by nodes other than the frame; those that stand at the frame alone are left out."""
     joints: nx.Graph[int] = nx.Graph()
-    joints.add_nodes_from(number for found in ends for number, _ in found)
-    joints.add_edges_from((found[0][0], number) for found in ends for number, _ in found[1:])
+    joints.add_nodes_from(number for meeting in ends for number, _ in meeting)
+    joints.add_edges_from((meeting[0][0], number) for meeting in ends for number, _ in meeting[1:])
     return sorted(tuple(sorted(train)) for train in nx.connected_components(joints))
 
 
@@ -362,7 +357,7 @@ def _is_driven(graph: CircuitGraph, train: Train) -> bool:
     parts = [graph.parts[number] for number in train]
     laws = (graph.branches[k].template for part in parts for k in part.branches)
     return any(part.component.role == "source" for part in parts) or any(
-        made.law.xreplace(dict.fromkeys((ACROSS, INTEGRAL, *made.reads), Integer(0))) != 0
-        for made in laws
-        if made.kind in (Kind.LAW, Kind.THROUGH_SOURCE, Kind.ACROSS_SOURCE)
+        template.law.xreplace(dict.fromkeys((ACROSS, INTEGRAL, *template.reads), Integer(0))) != 0
+        for template in laws
+        if template.kind in (Kind.LAW, Kind.THROUGH_SOURCE, Kind.ACROSS_SOURCE)
     )

@@ -34,17 +34,17 @@ def readings_of(graph: CircuitGraph, branch: int) -> Mapping[Symbol, Reading]:
     if not reads:
         return {}
     part = graph.part_of(branch)
-    found: dict[Symbol, Reading] = {}
+    readings: dict[Symbol, Reading] = {}
     for symbol in reads:
         kind, name = named_in(symbol)
         if kind == "across":
-            found[symbol] = Reading("across", part.nodes[name])
+            readings[symbol] = Reading("across", part.nodes[name])
         elif kind == "rate":
-            found[symbol] = Reading("rate", branch)
+            readings[symbol] = Reading("rate", branch)
         else:
             of = next(k for k in part.branches if _stands_for(graph.branches[k].template, kind, name))
-            found[symbol] = Reading("through" if kind == "through" else "integral", of)
-    return found
+            readings[symbol] = Reading("through" if kind == "through" else "integral", of)
+    return readings
 
 
 def _stands_for(template: BranchTemplate, kind: str, label: str) -> bool:
@@ -60,10 +60,10 @@ def check_readings(part: Component, templates: tuple[BranchTemplate, ...]) -> No
         ValueError: the part has no such port, no such store, no such branch.
     """
     ports = {port.name for port in (*part.ports, *part.inner_ports())}
-    for symbol in dict.fromkeys(symbol for made in templates for symbol in made.reads):
+    for symbol in dict.fromkeys(symbol for template in templates for symbol in template.reads):
         kind, name = named_in(symbol)
         if kind == "across" and name not in ports:
             raise ValueError(f"a law reads across_of({name!r}), but the part has no such port")
-        if kind in ("through", "integral") and not any(_stands_for(made, kind, name) for made in templates):
+        if kind in ("through", "integral") and not any(_stands_for(template, kind, name) for template in templates):
             what = "spring or inductor" if kind == "through" else "branch between two nodes"
             raise ValueError(f"a law reads {kind}_of({name!r}), but the part has no {what} of that label")

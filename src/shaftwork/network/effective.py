@@ -21,9 +21,9 @@ def effective(graph: CircuitGraph) -> frozenset[str]:
 
 def _of_part(part: GraphPart, templates: Shared[Template]) -> Iterator[str]:
     values = resolve(Placed(part.component, ()))[0].values
-    found = [templates.of(part.component, values, choices)[0] for choices in _forms(part.modes)]
-    laws = {item.name: item.law for template in found for item in template.derived}
-    pending, read = list(_symbols(found)), set(part.consulted)
+    forms = [templates.of(part.component, values, choices)[0] for choices in _forms(part.modes)]
+    laws = {item.name: item.law for template in forms for item in template.derived}
+    pending, read = list(_symbols(forms)), set(part.consulted)
     while pending:
         name = pending.pop().name
         pending += laws.pop(name).free_symbols if name in laws else ()

@@ -36,17 +36,19 @@ from shaftwork.network.grammar import (
 )
 
 _SIGNS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
+_LIST = re.compile(r"\[[^]]*\]")
+"""The numbers of a list are read from the text: of long tables a tree would take a second."""
 _BEFORE_OPERATOR = re.compile(r"[ )]*")
 
 
-class _Term(NamedTuple):
+class _Parsed(NamedTuple):
     """An expression, and its value where it contains no symbols."""
 
     expression: Any
     value: float | None = None
 
 
-_MINUS_ONE = _Term(sympy.S.NegativeOne, -1.0)
+_MINUS_ONE = _Parsed(sympy.S.NegativeOne, -1.0)
 
 
 def parse(text: str, symbols: Iterable[sympy.Symbol] = SYMBOLS) -> sympy.Expr:
@@ -61,14 +63,14 @@ def parse(text: str, symbols: Iterable[sympy.Symbol] = SYMBOLS) -> sympy.Expr:
             what is allowed there, and the next step.
     """
     words_of(text)  # refuses most that is wrong, in plain words
-    reader = _Reader(re.sub(r"\s", " ", text).strip(), symbols)
+    reader = _LawReader(re.sub(r"\s", " ", text).strip(), symbols)
     try:
         return reader.read()
     except (RecursionError, MemoryError):
         return reader.fail(0, f"is nested deeper than {MAXIMUM_DEPTH}", "Use fewer signs in a row.")
 
 
-class _Reader:
+class _LawReader:
     """Goes through the tree of one text; all terms of a sum, and all factors of a product, are joined at once."""
 
     def __init__(self, text: str, symbols: Iterable[sympy.Symbol]) -> None:
@@ -77,7 +79,7 @@ class _Reader:
 
     def read(self) -> sympy.Expr:
         try:
-            tree = ast.parse(self.text, mode="eval").body
+            tree = ast.parse(_LIST.sub(lambda match: f"[{' ' * (len(match[0]) - 2)}]", self.text), mode="eval").body
         except SyntaxError as error:
             self.fail((error.offset or 1) - 1, f"cannot be read from here on ({error.msg})", ALLOWED)
         expression = _settled(self.value(tree).expression)
@@ -93,19 +95,19 @@ class _Reader:
         match = _BEFORE_OPERATOR.match(self.text, node.end_col_offset or 0)
         return match.end() if match else 0
 
-    def value(self, node: ast.expr) -> _Term:
+    def value(self, node: ast.expr) -> _Parsed:
         term = self.term(node)
         if isinstance(term.expression, Boolean):
             self.fail(node, "has a condition where a value is needed", "Write Piecewise((1, condition), (0, True)).")
         return term
 
-    def condition(self, node: ast.expr) -> _Term:
+    def condition(self, node: ast.expr) -> _Parsed:
         term = self.term(node)
         if not isinstance(term.expression, Boolean):
             self.fail(node, "has a value where a condition is needed", "Compare it, as omega > 0.")
         return term
 
-    def term(self, node: ast.expr) -> _Term:
+    def term(self, node: ast.expr) -> _Parsed:
         match node:
             case ast.Constant(value=int() | float() as value):
                 return self.literal(node, value)
@@ -128,27 +130,27 @@ class _Reader:
                 return self.comparison(node)
         return self.fail(node, f"contains {self.source(node)!r}, which is not allowed", ALLOWED)
 
-    def literal(self, node: ast.expr, value: float) -> _Term:
+    def literal(self, node: ast.expr, value: float) -> _Parsed:
         if isinstance(value, bool):
-            return _Term(sympy.true if value else sympy.false)
+            return _Parsed(sympy.true if value else sympy.false)
         if not math.isfinite(value) or (isinstance(value, int) and value > MAXIMUM_INTEGER):
             self.fail(node, "has a number that is too large", "Integers reach 1e40, numbers with a point 1.7e308.")
-        return _Term(sympy.Integer(value) if isinstance(value, int) else sympy.Float(value), float(value))
+        return _Parsed(sympy.Integer(value) if isinstance(value, int) else sympy.Float(value), float(value))
 
     def source(self, node: ast.expr) -> str:
         return self.text[node.col_offset : node.end_col_offset][:40]
 
-    def name(self, node: ast.expr, name: str) -> _Term:
+    def name(self, node: ast.expr, name: str) -> _Parsed:
         if name in self.symbols:
-            return _Term(self.symbols[name])
+            return _Parsed(self.symbols[name])
         if name == "pi":
-            return _Term(sympy.pi, math.pi)
+            return _Parsed(sympy.pi, math.pi)
         if name in (*FUNCTIONS, "Piecewise", "Table"):
             self.fail(node, f"uses the function {name} without arguments", f"Write {name}(...).")
         names = ", ".join([*self.symbols, "pi"])
         return self.fail(node, f"contains the unknown name {name[:40]!r}", f"Names here: {names}.")
 
-    def comparison(self, node: ast.Compare) -> _Term:
+    def comparison(self, node: ast.Compare) -> _Parsed:
         (right, *others), place = node.comparators, self.behind(node.left)
         if others:
             self.fail(self.behind(right), "compares twice", "Write (0 < t) and (t < 1).")
@@ -159,7 +161,7 @@ class _Reader:
             self.fail(place, "compares a Piecewise", "Write its cases as conditions joined by 'and' and 'or'.")
         return self.made(place, COMPARISONS[sign], sides)
 
-    def terms(self, node: ast.expr) -> list[_Term]:
+    def terms(self, node: ast.expr) -> list[_Parsed]:
         """The terms of a sum."""
         first, others = _chain(node, ast.Add, ast.Sub)
         terms = [self.value(first)]
@@ -168,10 +170,10 @@ class _Reader:
             terms.append(self.product(term, [_MINUS_ONE, *self.factors(term)]) if negative else self.value(term))
         return terms
 
-    def factors(self, node: ast.expr) -> list[_Term]:
+    def factors(self, node: ast.expr) -> list[_Parsed]:
         """The factors of a product; a sign is a factor, and a divisor a power."""
         first, others = _chain(node, ast.Mult, ast.Div)
-        factors: list[_Term] = []
+        factors: list[_Parsed] = []
         for operator, operand in ((ast.Mult(), first), *others):
             unsigned = operand
             while isinstance(unsigned, ast.UnaryOp) and isinstance(unsigned.op, ast.UAdd | ast.USub):
@@ -181,11 +183,11 @@ class _Reader:
             factors.append(self.raised(unsigned, factor, _MINUS_ONE) if isinstance(operator, ast.Div) else factor)
         return factors
 
-    def product(self, node: ast.expr, factors: list[_Term]) -> _Term:
+    def product(self, node: ast.expr, factors: list[_Parsed]) -> _Parsed:
         single = len(factors) == 1
         return factors[0] if single else self.made(node, sympy.Mul, factors, lambda *values: math.prod(values))
 
-    def power(self, node: ast.BinOp) -> _Term:
+    def power(self, node: ast.BinOp) -> _Parsed:
         place, base = self.behind(node.left), self.value(node.left)
         self.towers += 1
         if self.towers > MAXIMUM_DEPTH:
@@ -194,7 +196,7 @@ class _Reader:
         self.towers -= 1
         return self.raised(place, base, exponent)
 
-    def raised(self, place: ast.expr | int, base: _Term, exponent: _Term) -> _Term:
+    def raised(self, place: ast.expr | int, base: _Parsed, exponent: _Parsed) -> _Parsed:
         if exponent.value is not None and exponent.expression.count(sympy.Pow) > MAXIMUM_TOWER:
             self.fail(place, f"has more than {MAXIMUM_TOWER} powers of numbers in an exponent", "Write its number.")
         coefficient = base.expression.as_coeff_Mul()[0]
@@ -204,12 +206,12 @@ class _Reader:
                 self.fail(place, "has a power that is too large", "Integers reach 1e40; write 10.0**50 as 1e50.")
         return self.made(place, sympy.Pow, [base, exponent], math.pow)
 
-    def call(self, node: ast.Call) -> _Term:
+    def call(self, node: ast.Call) -> _Parsed:
         match node.func:
             case ast.Name(id="Piecewise"):
                 return self.piecewise(node)
             case ast.Name(id="Table"):
-                return _Term(as_expression(self.table(node)))
+                return _Parsed(as_expression(self.table(node)))
             case ast.Call(func=ast.Name(id="Table"), keywords=[]) as table:
                 if len(node.args) != 1:
                     self.fail(node, f"gives Table {len(node.args)} arguments", "It takes 1.")
@@ -221,7 +223,7 @@ class _Reader:
         number = self.source(node.func)
         return self.fail(node, f"calls {number}, which is no function", f"Multiply: {number}*(...).")
 
-    def function(self, node: ast.Call, name: str) -> _Term:
+    def function(self, node: ast.Call, name: str) -> _Parsed:
         function, arguments = FUNCTIONS[name], [self.value(argument) for argument in node.args]
         if not function.fewest <= len(arguments) <= function.most:
             numbers = " to ".join(str(number) for number in dict.fromkeys((function.fewest, function.most)))
@@ -231,8 +233,8 @@ class _Reader:
             self.fail(node, f"gives Max and Min more than {MAXIMUM_EXTREMA} arguments", "Use a Table or Piecewise.")
         return self.made(node, function.make, arguments, function.value)
 
-    def piecewise(self, node: ast.Call) -> _Term:
-        values, conditions = list[_Term](), list[Any]()
+    def piecewise(self, node: ast.Call) -> _Parsed:
+        values, conditions = list[_Parsed](), list[Any]()
         for pair in node.args:
             if not isinstance(pair, ast.Tuple) or len(pair.elts) != 2:
                 self.fail(pair, "needs a pair (value, condition)", "Write Piecewise((1, t > 0), (0, True)).")
@@ -250,7 +252,7 @@ class _Reader:
     def column(self, node: ast.expr) -> list[float]:
         if not isinstance(node, ast.List):
             self.fail(node, "needs a list of numbers in Table", "Write Table([x0, x1, ...], [y0, y1, ...]).")
-        items = [self.text[item.col_offset : item.end_col_offset] for item in node.elts]
+        items = [item.strip() for item in self.text[node.col_offset + 1 : (node.end_col_offset or 0) - 1].split(",")]
         if strange := [number for number, item in enumerate(items, 1) if not SIGNED_NUMBER.fullmatch(item)]:
             self.fail(node, f"has a list whose item {strange[0]} is no number", "Lists hold numbers alone.")
         return [float(item) for item in items]
@@ -259,9 +261,9 @@ class _Reader:
         self,
         place: ast.expr | int,
         make: Callable[..., Any],
-        parts: Sequence[_Term],
+        parts: Sequence[_Parsed],
         value: Callable[..., float] | None = None,
-    ) -> _Term:
+    ) -> _Parsed:
         """The expression of its parts; computed with plain floats first, so that nothing huge or imaginary is built."""
         number: float | None = None
         try:
@@ -274,12 +276,12 @@ class _Reader:
         if fault is not None:
             self.fail(place, fault, "Change that part; it may not overflow, divide by zero or be imaginary.")
         if expression.is_Number:
-            return _Term(expression, float(expression))
+            return _Parsed(expression, float(expression))
         if number is None and isinstance(expression, sympy.Expr) and not expression.free_symbols:
             number = next((part.value for part in parts if part.expression == expression), None)
             if number is None:
                 self.fail(place, "has symbols that cancel", "Write the number that remains.")
-        return _Term(expression, number)
+        return _Parsed(expression, number)
 
 
 def _chain(node: ast.expr, *operators: type[ast.operator]) -> tuple[ast.expr, list[tuple[ast.operator, ast.expr]]]:

@@ -72,8 +72,8 @@ def _written(node: sympy.Basic) -> tuple[str, int]:
 
 def _at(binding: int, node: sympy.Basic) -> str:
     """Text of a node for a place that asks for a binding at least so strong."""
-    text, own = _written(node)
-    return text if own >= binding else f"({text})"
+    text, strength = _written(node)
+    return text if strength >= binding else f"({text})"
 
 
 def _float(number: sympy.Float) -> str:

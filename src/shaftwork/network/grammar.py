@@ -108,14 +108,16 @@ def words_of(text: str) -> list[str]:
         raise ModelFileError(
             f"the expression of {len(text)} characters is longer than {MAXIMUM_LENGTH}. Use a Table of fewer points."
         )
+    matches = list(_WORD.finditer(text))
+    if other := next((match for match in matches if match["other"]), None):
+        word = other["other"]
+        fail(text, other.start("other"), f"contains {word!r}, which is not allowed", _HINTS.get(word, ALLOWED))
     words: list[str] = []
     depth, follows_value = 0, False
-    for match in _WORD.finditer(text):
+    for match in matches:
         kind = str(match.lastgroup)
         word, place, ends = match[kind], match.start(kind), kind == "end"
         shown = "but the expression ends" if ends else f"not {word[:20]!r}"
-        if kind == "other":
-            fail(text, place, f"contains {word!r}, which is not allowed", _HINTS.get(word, ALLOWED))
         if ends and not words:
             fail(text, place, "is empty", "Write a number or an expression.")
         if len(words) == MAXIMUM_WORDS:

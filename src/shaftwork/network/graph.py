@@ -114,12 +114,14 @@ class CircuitGraph:
     @cached_property
     def multigraph(self) -> nx.MultiDiGraph:
         """Nodes by name, an edge for each branch term from its first to its second node, keyed by branch and term."""
-        made = nx.MultiDiGraph(name=self.name)
-        made.add_nodes_from(self.nodes)
+        multigraph = nx.MultiDiGraph(name=self.name)
+        multigraph.add_nodes_from(self.nodes)
         for branch in self.branches:
             for key, plus, minus in ends_of(branch):
-                made.add_edge(self.node_name(plus), self.node_name(minus), key=key, part=self.parts[branch.part].name)
-        return made
+                multigraph.add_edge(
+                    self.node_name(plus), self.node_name(minus), key=key, part=self.parts[branch.part].name
+                )
+        return multigraph
 
     @cached_property
     def integrated(self) -> tuple[tuple[int, ...], ...]:
@@ -127,22 +129,22 @@ class CircuitGraph:
         return tuple(tuple(self._integrated_in(part)) for part in self.parts)
 
     def _integrated_in(self, part: GraphPart) -> Iterator[int]:
-        own = [(index, self.branches[index].template) for index in part.branches]
-        named = {name for _, made in own for kind, name in map(named_in, made.reads) if kind == "integral"}
-        for index, made in own:
-            if made.has_integral or (made.label in named and made.kind is not Kind.COUPLING):
+        laws = [(index, self.branches[index].template) for index in part.branches]
+        named = {name for _, template in laws for kind, name in map(named_in, template.reads) if kind == "integral"}
+        for index, template in laws:
+            if template.has_integral or (template.label in named and template.kind is not Kind.COUPLING):
                 yield index
 
     @property
     def wiring(self) -> dict[str, str]:
         """By part, what it is, where it is, and what is no number of it: its laws, tables and models."""
-        made = {}
+        descriptions = {}
         for part in self.parts:
             nodes = ", ".join(f"{end} {self.node_name(number)}" for end, number in part.nodes.items())
             values = part.component.values.items()
             laws = (f"{name} = {value}" for name, value in values if not isinstance(value, float | None))
-            made[part.name] = "; ".join((f"{type(part.component).__name__} ({nodes})", *laws))
-        return made
+            descriptions[part.name] = "; ".join((f"{type(part.component).__name__} ({nodes})", *laws))
+        return descriptions
 
     def node_name(self, number: int) -> str:
         """Name of a node by its number."""
@@ -178,10 +180,10 @@ def signals_of(graph: CircuitGraph, part: GraphPart) -> Mapping[str, Signal]:
     """
     stores = any(graph.branches[k].template.kind is Kind.THROUGH_STORE for k in part.branches)
     declared = part.component.signals()
-    signals = {name: made for name, made in declared.items() if stores or made.kind not in ("twist", "store")}
+    signals = {name: signal for name, signal in declared.items() if stores or signal.kind not in ("twist", "store")}
     ports = part.component.ports
     if any(port.optional for port in ports) and any(part.nodes[port.name] == GROUND for port in ports):
-        signals |= {name.removesuffix("_rel"): made for name, made in signals.items()}
+        signals |= {name.removesuffix("_rel"): signal for name, signal in signals.items()}
     return signals
 
 
@@ -209,12 +211,12 @@ def resolve(placed: Placed) -> tuple[ResolvedPart, tuple[tuple[str, Any, str], .
     values: dict[str, Any] = {}
     objections: list[tuple[str, Any, str]] = []
     for name, declared in placed.part.declared.items():
-        given = getattr(placed.part, name)
-        value, objection = declared.magnitude(given)
+        entry = getattr(placed.part, name)
+        value, objection = declared.magnitude(entry)
         if objection is None and not isinstance(value, float):
             value = as_expression(value) if isinstance(value, Table | Expr) else value  # the checks name the rest
         if objection is not None:
-            objections.append((name, given, objection))
+            objections.append((name, entry, objection))
             value = 1.0 if declared.record is None or declared.required else declared.magnitude(declared.default)[0]
         values[name] = value
     return ResolvedPart(placed, values), tuple(objections)
@@ -236,7 +238,7 @@ class _Table:
 
 
 def build_graph(netlist: Netlist) -> CircuitGraph:
-    """Netlist to graph. The netlist must have passed `checks.declaration_problems`."""
+    """Netlist to graph. The netlist must have passed `checks.examine`."""
     resolved = tuple(resolve(placed)[0] for placed in netlist.placed)
     table = _Table()
     for placed in netlist.placed:  # ports with a domain first, so that a Ground does not decide the domain of its node
@@ -257,7 +259,7 @@ def build_graph(netlist: Netlist) -> CircuitGraph:
         zeros.extend(f"{part.name}.{name}" for name, value in values.items() if isinstance(value, float) and not value)
         nodes = _port_nodes(item.placed, table)
         first = len(branches)
-        branches.extend(_place(made, first + k, len(parts), nodes) for k, made in enumerate(template.branches))
+        branches.extend(_place(branch, first + k, len(parts), nodes) for k, branch in enumerate(template.branches))
         numbers = tuple(range(first, len(branches)))
         consulted = tuple(name for name in read if isinstance(values.get(name), float))
         parts.append(GraphPart(part, nodes, places, numbers, template.derived, template.modes, consulted))

@@ -48,12 +48,12 @@ def law_of(law: Any, branch: Branch, number: int) -> Expr:
         ShaftworkError: it is no number or expression, or has no finite real value.
     """
     try:
-        made = as_expression(law)
+        expression = as_expression(law)
     except ParameterError:
         objection = "not a number or an expression of p.name, ACROSS, INTEGRAL and t"
     else:
-        if not made.has(nan, I, -oo) and (not made.has(oo, zoo) or _is_rigid(branch, made)):
-            return made
+        if not expression.has(nan, I, -oo) and (not expression.has(oo, zoo) or _is_rigid(branch, expression)):
+            return expression
         objection = "which has no finite real value: look for a division by zero"
     label = f" {branch.label!r}" if branch.label else ""
     raise ShaftworkError(f"branch {number} ({type(branch).__name__}{label}) has {reprlib.repr(law)}, {objection}.")
@@ -62,8 +62,8 @@ def law_of(law: Any, branch: Branch, number: int) -> Expr:
 def _is_rigid(branch: Branch, law: Expr) -> bool:
     """Whether an infinite law stands for a rigid joint: an infinite store, or a conductance such as 1/R with R = 0."""
     if isinstance(branch, ThroughLaw):
-        found = slope(law, ACROSS)
-        return bool(found.has(oo, zoo)) and not found.has(ACROSS, INTEGRAL, TIME) and not readings_in(law)
+        conductance = slope(law, ACROSS)
+        return bool(conductance.has(oo, zoo)) and not conductance.has(ACROSS, INTEGRAL, TIME) and not readings_in(law)
     return isinstance(branch, AcrossStore | ThroughStore)
 
 

@@ -19,6 +19,7 @@ from shaftwork.components.tables import Interpolation, InterpolationSlope, Table
 from shaftwork.core.domains import ROTATION
 from shaftwork.core.parameters import is_label
 from shaftwork.network.changing import StoreFaultError
+from shaftwork.network.changing_stores import StoreFaultError
 from shaftwork.network.controlled import check_readings
 from shaftwork.network.grammar import FUNCTION_NAMES, FUNCTIONS
 from shaftwork.network.kinds import Kind
@@ -65,15 +66,15 @@ def law_faults(part: Component, values: Mapping[str, Any]) -> Iterator[Fault]:
     yield from faults
     sound = {**values, **dict.fromkeys((fault.parameter for fault in faults), 1.0)}
     try:
-        made = make_template(part, sound)
+        part_template = make_template(part, sound)
     except StoreFaultError as error:
         moving = [name for name, law in laws.items() if law.free_symbols]
         yield Fault(moving[0] if len(moving) == 1 else "", str(error), error.hint)
         return
-    templates = made.branches
+    templates = part_template.branches
     _check_branch_ends(part, templates)
     check_readings(part, templates)
-    _check_declared(part, made)
+    _check_declared(part, part_template)
     for template in {(x.kind, x.law, x.terms, x.through, x.stored): x for x in templates}.values():
         if unreadable := _unreadable("", template.law) or _unreadable("", template.stored):
             yield unreadable._replace(what=f"a branch law {unreadable.what}")
@@ -104,7 +105,7 @@ def _fault_of_law(part: Component, name: str, law: sympy.Expr) -> Fault | None:
     symbol, able = strange[0], f"this part can read {', '.join(str(symbol) for symbol in readable)}"
     if symbol in SYMBOLS:
         return Fault(name, f"reads {symbol}, which belongs to another domain", f"Note that {able}.")
-    if symbol.name in {known.name for known in SYMBOLS}:
+    if symbol.name in {other.name for other in SYMBOLS}:
         what = f"contains a symbol {symbol} of your own, which is not Shaftwork's"
         return Fault(name, what, f"Take the symbols from the package (shaftwork.{symbol}); {able}.")
     return Fault(name, f"contains the symbol {symbol}, which has no value", f"Put its number in; {able}.")
@@ -127,10 +128,10 @@ def _unreadable(name: str, law: sympy.Expr) -> Fault | None:
 
 def _strange_symbols(template: BranchTemplate) -> set[sympy.Symbol]:
     factors = (*(coefficient for coefficient, _, _ in template.terms), *template.through)
-    found = template.law.free_symbols.union(*(factor.free_symbols for factor in factors))
-    found -= {HISTORY} if template.is_history else set()
-    found -= {*template.reads} if template.kind in (Kind.LAW, Kind.ACROSS_SOURCE) else set()
-    return set(found - {*template.symbols} - _READS.get(template.kind, frozenset()))
+    symbols = template.law.free_symbols.union(*(factor.free_symbols for factor in factors))
+    symbols -= {HISTORY} if template.is_history else set()
+    symbols -= {*template.reads} if template.kind in (Kind.LAW, Kind.ACROSS_SOURCE) else set()
+    return set(symbols - {*template.symbols} - _READS.get(template.kind, frozenset()))
 
 
 def _check_declared(part: Component, template: Template) -> None:
@@ -152,16 +153,16 @@ def _check_declared(part: Component, template: Template) -> None:
 def _check_stores(ports: Mapping[str, Port], branches: tuple[BranchTemplate, ...]) -> None:
     """No two stores of a part have one name: it is that of a state."""
     names: set[str] = set()  # only asked for membership
-    for made in (made for made in branches if made.kind in (Kind.ACROSS_STORE, Kind.THROUGH_STORE)):
-        domain = next((ports[end].domain for end in made.ends if end is not None), None) or ROTATION
-        name = made.label or (domain.across if made.kind is Kind.ACROSS_STORE else domain.through).name
+    for branch in (branch for branch in branches if branch.kind in (Kind.ACROSS_STORE, Kind.THROUGH_STORE)):
+        domain = next((ports[end].domain for end in branch.ends if end is not None), None) or ROTATION
+        name = branch.label or (domain.across if branch.kind is Kind.ACROSS_STORE else domain.through).name
         if name in names:
             raise ValueError(f"two of its stores have the name {name!r}; give each branch a label of its own")
         names.add(name)
 
 
 def _check_signals(part: Component, ports: Mapping[str, Port], branches: tuple[BranchTemplate, ...]) -> None:
-    stores = {made.label for made in branches if made.kind is Kind.THROUGH_STORE}
+    stores = {branch.label for branch in branches if branch.kind is Kind.THROUGH_STORE}
     for name, signal in _records("signals", part.signals(), Signal):
         _check_ends(f"signal {name!r}", signal.ends, ports)
         if signal.kind in ("twist", "store") and stores and signal.label and signal.label not in stores:
@@ -174,8 +175,8 @@ def _check_signals(part: Component, ports: Mapping[str, Port], branches: tuple[B
 def _check_modes(part: Component, ports: Mapping[str, Port], template: Template, element: Modes) -> None:
     _check_ends("element with modes", element.ends or (), ports)
     readable = {str(symbol.name) for symbol in (ACROSS, THROUGH, INTEGRAL, t)}
-    readable |= {*part.declared, *(made.name for made in template.derived), *template.parameters}
-    readable |= {made.symbol for made in template.modes}
+    readable |= {*part.declared, *(item.name for item in template.derived), *template.parameters}
+    readable |= {item.symbol for item in template.modes}
     names = [mode.name for mode in element.options]
     for leave in (leave for mode in element.options for leave in mode.leaves):
         if leave.to not in (*names, ANEW):
@@ -190,14 +191,14 @@ def _check_ends(what: str, ends: tuple[End, ...], ports: Mapping[str, Port]) -> 
         raise ValueError(f"its {what} is of {strange[0]!r}, which is no port")
 
 
-def _records(what: str, made: Any, kind: type) -> ItemsView[str, Any]:
+def _records(what: str, records: Any, kind: type) -> ItemsView[str, Any]:
     """The pairs of a mapping from names to records of a kind."""
-    if not isinstance(made, Mapping):
-        raise TypeError(f"{what}() gives {made!r}, not names with a {kind.__name__} each")
-    for name, record in made.items():
+    if not isinstance(records, Mapping):
+        raise TypeError(f"{what}() gives {records!r}, not names with a {kind.__name__} each")
+    for name, record in records.items():
         if not is_label(name) or not isinstance(record, kind):
             raise TypeError(f"{what}() has {name!r}: {record!r}, not a name without dots with a {kind.__name__}")
-    return made.items()
+    return records.items()
 
 
 def _check_branch_ends(part: Component, templates: tuple[BranchTemplate, ...]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
@@ -94,8 +94,8 @@ class Netlist:
             )
         inside = dict.fromkeys(node for item in self.placed for node in item.nodes)
         if strange := [port for port in self.ports if port not in inside or port == REFERENCE]:
-            known = ", ".join(node for node in inside if node != REFERENCE)
-            raise ParameterError(f"Network '{self.name}': its port '{strange[0]}' is no node. Its nodes are: {known}.")
+            names = ", ".join(node for node in inside if node != REFERENCE)
+            raise ParameterError(f"Network '{self.name}': its port '{strange[0]}' is no node. Its nodes are: {names}.")
         outside = {**{node: f"{name}.{node}" for node in inside}, REFERENCE: REFERENCE}
         outside |= dict(zip(self.ports, nodes, strict=True))
 
@@ -107,21 +107,26 @@ class Netlist:
 
     def with_values(self, values: Mapping[str, Any]) -> Netlist:
         """The same parts with some parameters, "part.name", replaced."""
-        by_part: dict[str, dict[str, Any]] = {}
-        for name, value in values.items():
-            owner, _, parameter = name.rpartition(".")
-            by_part.setdefault(owner, {})[parameter] = value
+        changed = by_part(values)
+        return self.with_parts(lambda part: replace(part, **changed[part.name]) if part.name in changed else part)
 
-        def changed(item: Placed) -> Placed:
-            new = by_part.get(item.part.name)
-            return item if new is None else replace(item, part=replace(item.part, **new))
-
-        return replace(self, placed=tuple(changed(item) for item in self.placed))
+    def with_parts(self, change: Callable[[Component], Component]) -> Netlist:
+        """The same network with what a function makes of each part, at the same nodes and in the same modes."""
+        return replace(self, placed=tuple(replace(item, part=change(item.part)) for item in self.placed))
 
     def with_choices(self, choices: Mapping[str, tuple[ModeChoice, ...]]) -> Netlist:
         """The same parts with what is chosen for those that have modes, by name of the part."""
         placed = (replace(item, choices=choices.get(item.part.name, item.choices)) for item in self.placed)
         return replace(self, placed=tuple(placed))
+
+
+def by_part(values: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Values of "part.parameter", for each part by parameter."""
+    parts: dict[str, dict[str, Any]] = {}
+    for name, value in values.items():
+        owner, _, parameter = name.rpartition(".")
+        parts.setdefault(owner, {})[parameter] = value
+    return parts
 
 
 def overview(netlist: Netlist) -> str:

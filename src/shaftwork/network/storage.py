@@ -159,12 +159,12 @@ def _placed(part: PartText, path: str) -> Placed:
         )
     values = {name: _read(part, cls, name, value) for name, value in part.parameters.items()}
     try:
-        made = cls(part.name, symbol=part.symbol, **values)
+        component = cls(part.name, symbol=part.symbol, **values)
     except ParameterError as error:
         reason = str(error).removeprefix(f"{part.type} '{part.name}': ")
         named = [name for name in values if name not in cls.declared] or [reason.split(maxsplit=1)[0]]
         raise _fault(part, named[0], reason) from None
-    return Placed(made, part.nodes, origin=Origin(path, part.lines))
+    return Placed(component, part.nodes, origin=Origin(path, part.lines))
 
 
 def _read(part: PartText, cls: type[Component], name: str, value: Any) -> Any:

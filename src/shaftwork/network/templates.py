@@ -39,7 +39,7 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import ModeChoice, Modes, has_mode, mode_symbol
 from shaftwork.core.domains import DOMAINS
 from shaftwork.core.errors import ShaftworkError
-from shaftwork.network.changing import CHANGE, beyond_constant, changes, spring
+from shaftwork.network.changing_stores import CHANGE, beyond_constant, changes, spring
 from shaftwork.network.kinds import Kind, Resolved, law_of, resolved
 
 T = TypeVar("T")
@@ -144,15 +144,17 @@ def make_template(part: Component, values: Mapping[str, Any], choices: tuple[Mod
             placed[name] = Symbol(name, real=True) if value else Integer(0)
         else:
             placed[name] = value.xreplace(translate) if isinstance(value, Expr) else value
-    known = {Symbol(name, real=True): name for name, value in values.items() if isinstance(value, float) and value}
+    symbols = {Symbol(name, real=True): name for name, value in values.items() if isinstance(value, float) and value}
     p = symbols_of(placed | {"form": None, "mode": mode_symbol("mode")})
     derived = tuple(_derived(part, p))
     modes = tuple(part.modes(p))
-    known |= _choose(p, modes, choices)
-    resolver = _Resolver(_default_ends(part), tuple(known), _in_parameters(derived))
+    symbols |= _choose(p, modes, choices)
+    resolver = _Resolver(_default_ends(part), tuple(symbols), _in_parameters(derived))
     yielded = _without_absent(tuple(part.branches(p)))
-    branches = tuple(made for number, branch in enumerate(yielded, 1) for made in resolver.templates(branch, number))
-    return Template(branches, tuple(known.values()), _occurring(derived, resolver.printed), modes)
+    branches = tuple(
+        template for number, branch in enumerate(yielded, 1) for template in resolver.templates(branch, number)
+    )
+    return Template(branches, tuple(symbols.values()), _occurring(derived, resolver.printed), modes)
 
 
 def _choose(p: Any, modes: tuple[Modes, ...], choices: tuple[ModeChoice, ...]) -> dict[Symbol, str]:
@@ -174,7 +176,7 @@ def _without_absent(branches: tuple[Branch, ...]) -> tuple[Branch, ...]:
     stores = (branch for branch in branches if isinstance(branch, ThroughStore))
     absent = {through_of(store.label): Integer(0) for store in stores if store.stiffness == 0}
 
-    def known(branch: Branch) -> Branch:
+    def with_zeros(branch: Branch) -> Branch:
         match branch:
             case ThroughLaw(Expr() as law):
                 return dataclasses.replace(branch, through=law.xreplace(absent))
@@ -182,35 +184,35 @@ def _without_absent(branches: tuple[Branch, ...]) -> tuple[Branch, ...]:
                 return dataclasses.replace(branch, across=law.xreplace(absent))
         return branch
 
-    return tuple(map(known, branches)) if absent else branches
+    return tuple(map(with_zeros, branches)) if absent else branches
 
 
 def _derived(part: Component, p: Any) -> Iterator[Derived]:
     """The derived quantities of a part, each given to `p` as a symbol, or as the number 0 where it is that."""
-    for made in part.derived(p):
-        if hasattr(p, made.name):
-            raise ShaftworkError(f"{type(part).__name__}: {made.name!r} is derived, but exists already. Rename it.")
-        setattr(p, made.name, Symbol(made.name, real=True) if made.law != 0 else Integer(0))
-        if made.law != 0:
-            yield made
+    for quantity in part.derived(p):
+        if hasattr(p, quantity.name):
+            raise ShaftworkError(f"{type(part).__name__}: {quantity.name!r} is derived, but exists already. Rename it.")
+        setattr(p, quantity.name, Symbol(quantity.name, real=True) if quantity.law != 0 else Integer(0))
+        if quantity.law != 0:
+            yield quantity
 
 
 def _in_parameters(derived: tuple[Derived, ...]) -> dict[Symbol, Expr]:
     laws: dict[Symbol, Expr] = {}
-    for made in derived:
-        laws[Symbol(made.name, real=True)] = made.law.xreplace(laws)
+    for quantity in derived:
+        laws[Symbol(quantity.name, real=True)] = quantity.law.xreplace(laws)
     return laws
 
 
 def _occurring(derived: tuple[Derived, ...], laws: Iterable[Expr]) -> tuple[Derived, ...]:
     """Those that stand in the laws, or in the law of one that does."""
     symbols = set[Symbol]().union(*(law.free_symbols for law in laws))  # only asked for membership
-    kept: list[Derived] = []
+    occurring: list[Derived] = []
     for item in reversed(derived):
         if Symbol(item.name, real=True) in symbols:
             symbols |= item.law.free_symbols
-            kept.append(item)
-    return tuple(reversed(kept))
+            occurring.append(item)
+    return tuple(reversed(occurring))
 
 
 class _Resolver:
@@ -224,7 +226,7 @@ class _Resolver:
 
     def __init__(self, default: tuple[End, End], symbols: tuple[Symbol, ...], derived: Mapping[Symbol, Expr]) -> None:
         self._default, self._symbols, self._derived = default, symbols, derived
-        self._known: dict[Any, tuple[Resolved, ...]] = {}
+        self._reduced: dict[Any, tuple[Resolved, ...]] = {}
         self._read: dict[Any, tuple[tuple[Expr, ...], tuple[Symbol, ...]]] = {}
 
     @property
@@ -245,11 +247,11 @@ class _Resolver:
             case AcrossStore(law) | ThroughStore(law) if self._changes(branch, law, number):
                 yield from self._changing(branch, law_of(law, branch, number), number)
             case AcrossStore(law, ends, label) | ThroughStore(law, ends, label) | ThroughLaw(law, ends, label):
-                for kind, found in self._resolved(branch, law, number):
+                for kind, reduced in self._resolved(branch, law, number):
                     joint = rigid(ends or self._default).terms if kind is Kind.COUPLING else ()
                     where = (None, None) if joint else ends or self._default
-                    made = self._template(kind, found, where, joint, label)
-                    yield self._with_energy(made, branch, number) if isinstance(branch, ThroughLaw) else made
+                    template = self._template(kind, reduced, where, joint, label)
+                    yield self._with_energy(template, branch, number) if isinstance(branch, ThroughLaw) else template
             case DelayLine(impedance, delay, ends, label):
                 impedance, delay = law_of(impedance, branch, number), law_of(delay, branch, number)
                 line, symbols = self._in_parameters(impedance, delay)
@@ -260,8 +262,8 @@ class _Resolver:
                     yield dataclasses.replace(impedes, line=(line[0], line[1]))
                     yield dataclasses.replace(history, symbols=symbols, printed=arrived, line=(line[0], line[1]))
             case AcrossLaw(law, ends, label):
-                made = law_of(law, branch, number)
-                yield self._template(Kind.ACROSS_SOURCE, made, ends or self._default, (), label)
+                across = law_of(law, branch, number)
+                yield self._template(Kind.ACROSS_SOURCE, across, ends or self._default, (), label)
             case _:
                 kinds = ", ".join(kind.__name__ for kind in get_args(Branch))
                 raise ShaftworkError(
@@ -271,7 +273,7 @@ class _Resolver:
     def _changes(self, branch: Branch, law: Any, number: int) -> bool:
         """Whether a store depends on its angle or on time."""
         try:
-            if (type(branch), law) in self._known:
+            if (type(branch), law) in self._reduced:
                 return False
         except TypeError:  # no expression, as `law_of` says
             pass
@@ -286,13 +288,13 @@ class _Resolver:
         ends, label = branch.ends or self._default, branch.label
         if isinstance(branch, ThroughStore):
             through, stored = spring(law)
-            made = ThroughLaw(through, ends, label, stored is None, Integer(0) if stored is None else stored)
-            yield from self.templates(made, number)
+            piece = ThroughLaw(through, ends, label, stored is None, Integer(0) if stored is None else stored)
+            yield from self.templates(piece, number)
             return
         constant, beyond, energy = beyond_constant(law)
         store, rest = (
-            self._template(kind, made, ends, (), f"{label}{ending}")
-            for kind, made, ending in ((Kind.ACROSS_STORE, constant, ""), (Kind.LAW, beyond, CHANGE))
+            self._template(kind, piece, ends, (), f"{label}{ending}")
+            for kind, piece, ending in ((Kind.ACROSS_STORE, constant, ""), (Kind.LAW, beyond, CHANGE))
         )
         yield dataclasses.replace(store, printed=law)
         yield dataclasses.replace(
@@ -302,11 +304,11 @@ class _Resolver:
     def _resolved(self, branch: Branch, law: Any, number: int) -> tuple[Resolved, ...]:
         key = (type(branch), law)
         try:
-            return self._known[key]
+            return self._reduced[key]
         except (KeyError, TypeError):  # a law that is no expression may have no hash
-            made = tuple(resolved(branch, law_of(law, branch, number)))
-        self._known[key] = made
-        return made
+            kinds = tuple(resolved(branch, law_of(law, branch, number)))
+        self._reduced[key] = kinds
+        return kinds
 
     def _template(
         self,
@@ -317,11 +319,13 @@ class _Resolver:
         label: str,
         through: tuple[Expr, ...] = (),
     ) -> BranchTemplate:
-        (known, *factors), symbols = self._in_parameters(law, *(coefficient for coefficient, _, _ in terms), *through)
+        (explicit, *factors), symbols = self._in_parameters(
+            law, *(coefficient for coefficient, _, _ in terms), *through
+        )
         placed, others = with_factors(terms, tuple(factors[: len(terms)])), tuple(factors[len(terms) :])
-        return BranchTemplate(kind, known, ends, placed, label, symbols, law, through=others)
+        return BranchTemplate(kind, explicit, ends, placed, label, symbols, law, through=others)
 
-    def _with_energy(self, made: BranchTemplate, branch: ThroughLaw, number: int) -> BranchTemplate:
+    def _with_energy(self, template: BranchTemplate, branch: ThroughLaw, number: int) -> BranchTemplate:
         """A through law with what it says of its energy, which the part of it has that is not linear in the speed.
 
         Raises:
@@ -334,18 +338,18 @@ class _Resolver:
                 f"branch {number} (ThroughLaw) has stored = {reprlib.repr(stored)}. Write it in p.name and "
                 "in INTEGRAL, which its law must read, for all modes alike."
             )
-        if stored == 0 or made.kind is Kind.CONDUCTANCE:
-            return dataclasses.replace(made, conservative=True) if branch.conservative else made
-        read = made.law.free_symbols | stored.free_symbols
+        if stored == 0 or template.kind is Kind.CONDUCTANCE:
+            return dataclasses.replace(template, conservative=True) if branch.conservative else template
+        read = template.law.free_symbols | stored.free_symbols
         symbols = tuple(symbol for symbol in self._symbols if symbol in read)
-        return dataclasses.replace(made, conservative=branch.conservative, stored=stored, symbols=symbols)
+        return dataclasses.replace(template, conservative=branch.conservative, stored=stored, symbols=symbols)
 
     def _in_parameters(self, *laws: Expr) -> tuple[tuple[Expr, ...], tuple[Symbol, ...]]:
         """Laws without derived quantities, and the symbols in them."""
         if laws not in self._read:
-            known = tuple(law.xreplace(self._derived) for law in laws)
-            found = frozenset().union(*(law.free_symbols for law in known))
-            self._read[laws] = known, tuple(made for made in self._symbols if made in found)
+            explicit = tuple(law.xreplace(self._derived) for law in laws)
+            symbols = frozenset().union(*(law.free_symbols for law in explicit))
+            self._read[laws] = explicit, tuple(symbol for symbol in self._symbols if symbol in symbols)
         return self._read[laws]
 
 

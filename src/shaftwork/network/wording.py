@@ -36,19 +36,19 @@ class Spelling:
 
     @cached_property
     def _by_variant(self) -> dict[str, list[str]]:
-        made: dict[str, list[str]] = {}
+        names: dict[str, list[str]] = {}
         for name in self._names:
             for variant in _variants(name):
-                made.setdefault(variant, []).append(name)
-        return made
+                names.setdefault(variant, []).append(name)
+        return names
 
     def suggestion(self, names: Sequence[str]) -> str:
         """A question in parentheses for the first of the names that is like another node, else nothing."""
-        own = frozenset(names)
+        excluded = frozenset(names)
         for name in names:
             likes = (other for variant in _variants(name) for other in self._by_variant.get(variant, ()))
             for other in chain(likes, self._begun_alike(_plain(name))):
-                if other not in own and _digits(other) == _digits(name):  # n1 and n2 are two nodes, not a slip
+                if other not in excluded and _digits(other) == _digits(name):  # n1 and n2 are two nodes, not a slip
                     return f" (did you mean node '{other}'?)"
         return ""
 

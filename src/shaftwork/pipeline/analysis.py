@@ -17,6 +17,7 @@ from shaftwork.core.notices import hint, once
 from shaftwork.core.parameters import briefly, in_si
 from shaftwork.network.kinds import Kind
 from shaftwork.network.wording import listed
+from shaftwork.pipeline.arguments import as_names
 from shaftwork.pipeline.point_speeds import as_multiple, speeds_to_give, warn_of_speeds_left, warn_of_turning_angles
 from shaftwork.pipeline.settled import SteadyState
 from shaftwork.reduction.source_inputs import source_inputs
@@ -59,7 +60,7 @@ def linearized(
     time, x = operating_point(model, p, point, t, settled)
     slopes = Linearization(model, p, x, time, named)
     title = titled(model.form.graph.name, near(model, at, time))
-    return linear_model(title, slopes, None if outputs is None else _listed(outputs), x, time)
+    return linear_model(title, slopes, None if outputs is None else as_names(outputs), x, time)
 
 
 def near(model: CompiledModel, at: Point, t: float) -> str:
@@ -71,14 +72,16 @@ def about(model: CompiledModel, at: Point, t: float) -> str:
     """A point in words, and the time in s where laws depend on it: "at J1.omega = 8, laws at t = 2 s"."""
     graph = model.form.graph
     laws = (
-        graph.in_network_symbols(made.template.law, made) for made in graph.branches if made.template.kind is Kind.LAW
+        graph.in_network_symbols(branch.template.law, branch)
+        for branch in graph.branches
+        if branch.template.kind is Kind.LAW
     )
     when = f"{diagram.LAWS}{t:g} s" if any(TIME in law.free_symbols for law in laws) else ""
     if isinstance(at, Solution):
         return f"at t = {at.t[0]:g} s of a motion" + ("" if t == at.t[0] else when)
-    given = [f"{name} = {briefly(value)}" for name, value in (at or {}).items()]
-    shown = ", ".join(given if len(given) <= NAMED else [*given[: NAMED - 1], "..."])
-    return (f"at {shown}" if given else "at rest") + when
+    entries = [f"{name} = {briefly(value)}" for name, value in (at or {}).items()]
+    shown = ", ".join(entries if len(entries) <= NAMED else [*entries[: NAMED - 1], "..."])
+    return (f"at {shown}" if entries else "at rest") + when
 
 
 def titled(name: str, point: str, phase: str = "") -> str:
@@ -88,7 +91,7 @@ def titled(name: str, point: str, phase: str = "") -> str:
 
 def input_names(model: CompiledModel, inputs: Names) -> tuple[str, ...]:
     """The inputs asked for; None asks for all sources."""
-    return source_inputs(model.form.graph) if inputs is None else _listed(inputs)
+    return source_inputs(model.form.graph) if inputs is None else as_names(inputs)
 
 
 def operating_point(model: CompiledModel, p: Array, at: Point, t: Time, settled: float) -> tuple[float, Array]:
@@ -184,10 +187,6 @@ def _refuse_no_point(model: CompiledModel) -> None:
             f"{options}; or one point for all speeds: --steady, or --at {first}=0 for rest.",
         )
     )
-
-
-def _listed(names: str | Sequence[str]) -> tuple[str, ...]:
-    return (names,) if isinstance(names, str) else tuple(names)
 
 
 def moment_of(motion: Solution, states: tuple[str, ...]) -> tuple[float, Array]:

@@ -48,10 +48,12 @@ def _instead(form: StateForm, branch: int) -> str:
     for tree, gain in zip(row, exact_of(row.values()), strict=True):
         part, template = form.graph.part_of(tree), form.graph.branches[tree].template
         kind = "twist" if tree in form.dependent_through else "across"
-        own = (
-            name for name, made in part.component.signals().items() if (made.kind, made.ends) == (kind, template.ends)
+        names = (
+            name
+            for name, signal in part.component.signals().items()
+            if (signal.kind, signal.ends) == (kind, template.ends)
         )
-        name = next(own, None)
+        name = next(names, None)
         if name is None or (kind == "across" and "_" in name) or template.terms:
             return ""
         if kind == "across":
@@ -60,8 +62,8 @@ def _instead(form: StateForm, branch: int) -> str:
                 max(form.graph.branches[tree].plus, form.graph.branches[tree].minus)
             ].integral.name
         terms.append(gain * Symbol(f"sol['{part.name}.{name}']"))
-    asked = f", with angles={stores}" if stores else ""
-    return f"{Add(*terms)}{asked}, less what that is at the start"
+    request = f", with angles={stores}" if stores else ""
+    return f"{Add(*terms)}{request}, less what that is at the start"
 
 
 def _with_meters(graph: CircuitGraph, names: Sequence[str]) -> tuple[CircuitGraph, tuple[int, ...]]:
@@ -87,8 +89,8 @@ def _with_meters(graph: CircuitGraph, names: Sequence[str]) -> tuple[CircuitGrap
             raise SignalError(f"There is no angle of '{name}'. Parts with an angle are: {listed(able)}.")
         for label, ends in speeds.items():
             part, read = parts[places[name]], graph.integrated[places[name]]
-            own = (k for k in read if graph.branches[k].template.ends == ends and not label)
-            index = next(own, len(branches))
+            integrals = (k for k in read if graph.branches[k].template.ends == ends and not label)
+            index = next(integrals, len(branches))
             if index == len(branches):
                 template = BranchTemplate(Kind.THROUGH_SOURCE, Integer(0), ends, (), label, (), Integer(0), meter=True)
                 plus, minus = map(part.node_at, ends)
@@ -100,8 +102,10 @@ def _with_meters(graph: CircuitGraph, names: Sequence[str]) -> tuple[CircuitGrap
 
 def _speeds(part: Component) -> Iterator[tuple[str, tuple[End, End]]]:
     """What tells the speeds of a part apart, nothing or the name of a side, and the ends of each; else its voltages."""
-    signals = {name: made for name, made in part.signals().items() if made.kind == "across" and made.domain is not None}
-    mechanical = {name: made for name, made in signals.items() if made.domain is not ELECTRICAL}
-    for name, made in (mechanical or signals).items():
+    signals = {
+        name: signal for name, signal in part.signals().items() if signal.kind == "across" and signal.domain is not None
+    }
+    mechanical = {name: signal for name, signal in signals.items() if signal.domain is not ELECTRICAL}
+    for name, signal in (mechanical or signals).items():
         _, _, side = name.partition("_")
-        yield "" if side == "rel" else side, made.ends
+        yield "" if side == "rel" else side, signal.ends

@@ -14,7 +14,7 @@ from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si, numbers_in_si, whole
 from shaftwork.network.graph import CircuitGraph
-from shaftwork.network.netlist import Netlist
+from shaftwork.network.netlist import Netlist, by_part
 from shaftwork.reduction.form import StateForm
 
 OUTPUTS, MOST_OUTPUTS = 1001, 10_000_000
@@ -76,6 +76,11 @@ class Demand:
         if self.atol is None:
             return self.rtol * self.sizes.tolerances(ordinary, names)
         return absolute_tolerances(self.atol, len(names))
+
+
+def as_names(names: str | Sequence[str]) -> tuple[str, ...]:
+    """Names of which a single one may be given as a text."""
+    return (names,) if isinstance(names, str) else tuple(names)
 
 
 def time_span(t_start: Any, t_end: Any) -> tuple[float, float]:
@@ -173,19 +178,18 @@ def output_times(t_eval: OutputTimes, start: float, end: float) -> Array | None:
     return times
 
 
-def checked_parameters(netlist: Netlist, given: Mapping[str, Any]) -> dict[str, float]:
+def checked_parameters(netlist: Netlist, parameters: Mapping[str, Any]) -> dict[str, float]:
     """New values of parameters "part.name", in SI and within their bounds.
 
     Raises:
         ParameterError: there is no such parameter, a value is not admissible, or the values of a part do not go
             together.
     """
-    values = {str(name): checked_parameter(netlist, str(name), value) for name, value in given.items()}
-    owners = {name.rpartition(".")[0] for name in values}
-    for part in (placed.part for placed in netlist.placed if placed.part.name in owners):
+    values = {str(name): checked_parameter(netlist, str(name), value) for name, value in parameters.items()}
+    changed = by_part(values)
+    for part in (placed.part for placed in netlist.placed if placed.part.name in changed):
         if hasattr(part, "__post_init__"):  # what the part says of values that do not go together
-            changed = {key: values[f"{part.name}.{key}"] for key in part.declared if f"{part.name}.{key}" in values}
-            dataclasses.replace(part, **changed)  # type: ignore[arg-type]
+            dataclasses.replace(part, **changed[part.name])
     return values
 
 
@@ -199,17 +203,17 @@ def checked_parameter(netlist: Netlist, name: str, value: Any) -> float:
     part = next((placed.part for placed in netlist.placed if placed.part.name == owner), None)
     if part is None or parameter not in part.declared:
         parts = [placed.part for placed in netlist.placed] if part is None else [part]
-        known = ", ".join(f"{other.name}.{key}" for other in parts for key in _numbers(other))
-        raise ParameterError(f"There is no parameter '{name}'. There are: {known or 'none'}.")
+        names = ", ".join(f"{other.name}.{key}" for other in parts for key in _numbers(other))
+        raise ParameterError(f"There is no parameter '{name}'. There are: {names or 'none'}.")
     number, objection = part.declared[parameter].magnitude(value)
     if objection is None and not isinstance(number, float):
         objection = "must be a number here: a law is part of the network, so build another network with it"
     if objection is not None:
         raise ParameterError(f"{type(part).__name__} '{owner}': {parameter} = {value!r} {objection}.")
     if parameter not in _numbers(part):
-        given = "was not given" if getattr(part, parameter) is None else "is no number"
+        reason = "was not given" if getattr(part, parameter) is None else "is no number"
         raise ParameterError(
-            f"{type(part).__name__} '{owner}': {parameter} {given} when the part was made, so that the equations have "
+            f"{type(part).__name__} '{owner}': {parameter} {reason} when the part was made, so that the equations have "
             f"no place for one. Give a number there, {parameter}=..., and set it anew here. Of '{owner}' there are: "
             f"{', '.join(f'{owner}.{key}' for key in _numbers(part)) or 'none'}."
         )
@@ -218,7 +222,9 @@ def checked_parameter(netlist: Netlist, name: str, value: Any) -> float:
 
 def _numbers(part: Component) -> tuple[str, ...]:
     """The parameters of a part that were given as numbers, which may be set anew."""
-    return tuple(key for key, given in part.declared.items() if isinstance(given.magnitude(part.values[key])[0], float))
+    return tuple(
+        key for key, declared in part.declared.items() if isinstance(declared.magnitude(part.values[key])[0], float)
+    )
 
 
 def changes_structure(form: StateForm, values: Mapping[str, float]) -> bool:
@@ -233,10 +239,7 @@ def branches_anew(graph: CircuitGraph, values: Mapping[str, float]) -> bool:
     Raises:
         ParameterError: a shaft has become too long for one polynomial.
     """
-    changed: dict[str, dict[str, Any]] = {}
-    for name, value in values.items():
-        owner, _, parameter = name.rpartition(".")
-        changed.setdefault(owner, {})[parameter] = value
+    changed = by_part(values)
     consulting = (p for p in graph.parts if p.name in changed and not changed[p.name].keys().isdisjoint(p.consulted))
     return any(
         not isinstance(part.component, Shaft)

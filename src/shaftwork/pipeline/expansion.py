@@ -27,10 +27,10 @@ def expanded(netlist: Netlist, graph: CircuitGraph) -> Netlist:
     Raises:
         ParameterError: a shaft is no chain of springs.
     """
-    made: list[Placed] = []
+    placed: list[Placed] = []
     for item, part in zip(netlist.placed, graph.parts, strict=True):
-        made += _chain(item, part, graph)
-    return replace(netlist, placed=tuple(made))
+        placed += _chain(item, part, graph)
+    return replace(netlist, placed=tuple(placed))
 
 
 def _chain(item: Placed, part: GraphPart, graph: CircuitGraph) -> list[Placed]:
@@ -52,9 +52,9 @@ def _chain(item: Placed, part: GraphPart, graph: CircuitGraph) -> list[Placed]:
         here = joined.setdefault((branch.plus, branch.minus), {})
         here[branch.template.kind] = here.get(branch.template.kind, 0.0) + coefficients[branch.index]
     return [
-        Placed(made, (names[plus],) if isinstance(made, Inertia) else (names[plus], names[minus]))
+        Placed(component, (names[plus],) if isinstance(component, Inertia) else (names[plus], names[minus]))
         for (plus, minus), laws in joined.items()
-        for made in _parts(item.part, names[plus], names[minus], laws)
+        for component in _parts(item.part, names[plus], names[minus], laws)
     ]
 
 
@@ -74,12 +74,12 @@ def _parts(whole: Shaft, plus: str, minus: str, laws: Mapping[Kind, float]) -> I
 
 def _coefficients(branches: list[GraphBranch], graph: CircuitGraph) -> dict[int, float]:
     """The value of each branch's capacity, stiffness or conductance; laws that many share are evaluated once."""
-    known: dict[Expr, float] = {}
+    values: dict[Expr, float] = {}
     for branch in branches:
         law = branch.template.law
-        if law not in known:
+        if law not in values:
             in_network = graph.in_network_symbols(law, branch)
-            known[law] = float(
+            values[law] = float(
                 in_network.evalf(25, subs={s: graph.parameters[s.name] for s in in_network.free_symbols})
             )
-    return {branch.index: known[branch.template.law] for branch in branches}
+    return {branch.index: values[branch.template.law] for branch in branches}

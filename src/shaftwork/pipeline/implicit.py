@@ -102,7 +102,7 @@ def solve_loops(bound: BoundArrays, problem: Problem, start: Array) -> Trajector
 
     look, explain = problem.switches, problem.explain
     size = float(np.abs(start).max()) or 1.0
-    found = solve_dae(
+    trajectory = solve_dae(
         DaeProblem(
             residual=residual,
             x0=np.concatenate([problem.x0, start]),
@@ -124,4 +124,4 @@ def solve_loops(bound: BoundArrays, problem: Problem, start: Array) -> Trajector
         )
     )
     loops.start_from(start)
-    return Trajectory(found.t, found.x[:, :states], _States(found.dense, states), found.statistics)
+    return Trajectory(trajectory.t, trajectory.x[:, :states], _States(trajectory.dense, states), trajectory.statistics)

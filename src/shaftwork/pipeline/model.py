@@ -29,6 +29,7 @@ from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import (
     Demand,
     OutputTimes,
+    as_names,
     changes_structure,
     checked_parameters,
     output_times,
@@ -38,25 +39,24 @@ from shaftwork.pipeline.arguments import (
     time_span,
 )
 from shaftwork.pipeline.implicit import IMPLICIT, PRESCRIBED, at_rest, solve_loops, start_of_loops
-from shaftwork.pipeline.prepared import EngineModel, Prepared
-from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels
-from shaftwork.pipeline.sizes import in_its_size, with_accuracy
-from shaftwork.pipeline.start import (
-    CarriedWaves,
+from shaftwork.pipeline.motion_start import (
     Ending,
-    WaveStart,
     ending_of,
     refuse_motion,
     start_of,
     time_of_start,
     warn_of_rest,
 )
+from shaftwork.pipeline.prepared import EngineModel, Prepared
+from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels
+from shaftwork.pipeline.sizes import in_its_size, with_accuracy
 from shaftwork.pipeline.stored import Repetition, call_of, model_again, remember
 from shaftwork.reduction.form import StateForm
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.analysis import Given, Names, Point, Time
+    from shaftwork.pipeline.wave_motion import CarriedWaves, WaveStart
     from shaftwork.results.linear import LinearModel
 
 VARIANTS = 8
@@ -133,7 +133,7 @@ class Model(EngineModel):
             SimulationError: the integration failed; says when, in which state and why.
             MissingExtraError: the engine asked for is not installed.
         """
-        refuse_unrecorded(self.form, (angles,) if isinstance(angles, str) else tuple(angles))
+        refuse_unrecorded(self.form, as_names(angles))
         values = self._checked_all(parameters)
         if isinstance(initial, Solution):
             initial = ending_of(initial, self.form.graph)
@@ -154,7 +154,7 @@ class Model(EngineModel):
 
     def _motion(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
         prepared = self.prepare(self.vector(values) if values else self.defaults)
-        return in_its_size(self.form, prepared, demand, lambda made: self._run(prepared, initial, made))
+        return in_its_size(self.form, prepared, demand, lambda sized: self._run(prepared, initial, sized))
 
     def _run(self, prepared: Prepared, initial: Given, demand: Demand) -> Solution:
         x0, waves = start_of(self, prepared, initial, demand.span)
@@ -259,12 +259,12 @@ class Model(EngineModel):
         return self._engine(prepared, self.problem(prepared, x0, demand), "auto")
 
     def _solve(
-        self, prepared: Prepared, problem: Problem, waves: WaveStart | CarriedWaves | None, asked: str
+        self, prepared: Prepared, problem: Problem, waves: WaveStart | CarriedWaves | None, engine: str
     ) -> tuple[Trajectory, str, str]:
         """The run, the engine that made it, and why that one."""
-        name, why = self._engine(prepared, problem, asked)
+        name, why = self._engine(prepared, problem, engine)
         if name == "wave":
-            from shaftwork.pipeline.waves import solve_waves
+            from shaftwork.pipeline.wave_motion import solve_waves
 
             steady = self.degree == 0
             return solve_waves(prepared.bound, problem, waves, linear=self.linear, steady=steady), name, why
@@ -274,19 +274,19 @@ class Model(EngineModel):
             start = start_of_loops(prepared.bound, problem)
             if name == "sundials":
                 return solve_loops(prepared.bound, problem, start), name, why
-        return choice.solve(problem, name, why, fallback=asked == "auto")
+        return choice.solve(problem, name, why, fallback=engine == "auto")
 
-    def _engine(self, prepared: Prepared, problem: Problem, asked: str) -> tuple[str, str]:
+    def _engine(self, prepared: Prepared, problem: Problem, engine: str) -> tuple[str, str]:
         """The engine for a motion, and why."""
         if self.form.waves:
-            from shaftwork.pipeline.waves import engine_of_waves
+            from shaftwork.pipeline.wave_motion import engine_of_waves
 
-            return engine_of_waves(asked)
-        choice.check(asked)
+            return engine_of_waves(engine)
+        choice.check(engine)
         if not self.states:
             return "exact", PRESCRIBED
-        if asked != "auto":
-            return asked, "asked for"
+        if engine != "auto":
+            return engine, "asked for"
         if self.form.loop_laws:
             return "sundials" if available("sundials") else "scipy-radau", IMPLICIT
         key = (problem.t0, problem.t_end, problem.rtol)
@@ -300,14 +300,14 @@ class Model(EngineModel):
     @cached_property
     def twin(self) -> Model:
         """The network with springs in place of its waves: it stands and turns steadily as they do."""
-        from shaftwork.pipeline.waves import twin
+        from shaftwork.pipeline.wave_motion import twin
 
         return self._rebuild(twin(self.netlist))
 
     def _changes_structure(self, values: Mapping[str, float]) -> bool:
         """Whether other equations hold for new values."""
-        own = changes_structure(self.form, values)
-        return own or (bool(values) and self.arrays.assembly.degenerates(self.vector(values)))
+        differs = changes_structure(self.form, values)
+        return differs or (bool(values) and self.arrays.assembly.degenerates(self.vector(values)))
 
     def _checked_all(self, parameters: Mapping[str, float] | None) -> dict[str, float]:
         if parameters is None:

@@ -8,6 +8,7 @@ import reprlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self
 
@@ -20,6 +21,7 @@ from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.netlist import Netlist
 from shaftwork.network.storage import read_netlist, write_netlist
 from shaftwork.pipeline.angles import with_angles
+from shaftwork.pipeline.arguments import as_names
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.model import PhasedModel
 from shaftwork.pipeline.phases.names import in_phase, meant, whole_name, words_of
@@ -98,7 +100,7 @@ class Network(NetworkBuilder):
         form = _sound(netlist)
         if not any(part.modes for part in form.graph.parts) and phase is None:
             return kirchhoff(form)
-        return _InPhase(netlist, form)("" if phase is None else phase)
+        return _equations_in(netlist, form, "" if phase is None else phase)
 
     def start_phase(self) -> str:
         """The phase in which a motion from rest begins, "gap open, load stuck"; empty where no part changes its mode.
@@ -149,8 +151,7 @@ class Network(NetworkBuilder):
             return self.expanded().compile(angles=angles, algebraic_loops=algebraic_loops)
         if algebraic_loops not in ("refuse", "solve"):
             raise ParameterError(f"algebraic_loops = {algebraic_loops!r} must be 'refuse' or 'solve'.")
-        asked = (angles,) if isinstance(angles, str) else tuple(angles)
-        return Compiler(asked, LOOP if algebraic_loops == "solve" else "")(self.netlist())
+        return Compiler(as_names(angles), LOOP if algebraic_loops == "solve" else "")(self.netlist())
 
     def simulate(
         self,
@@ -236,7 +237,7 @@ class Network(NetworkBuilder):
 
     @staticmethod
     def _small_motions(model: Model, *, exact: bool) -> SmallMotions:
-        from shaftwork.pipeline.exact import small_motions
+        from shaftwork.pipeline.exact_networks import small_motions
 
         return small_motions(model, Compiler((), LOOP), every=exact)
 
@@ -259,26 +260,26 @@ class Network(NetworkBuilder):
 
     @classmethod
     def _of(cls, netlist: Netlist) -> Self:
-        made = cls(netlist.name, netlist.ports, impacts=netlist.impacts)
-        made._placed += netlist.placed
-        return made
+        network = cls(netlist.name, netlist.ports, impacts=netlist.impacts)
+        network._placed += netlist.placed
+        return network
 
 
-def network_of(given: Any) -> Network:
+def network_of(network: Any) -> Network:
     """A network that a user gave.
 
     Raises:
         ParameterError: it is none.
     """
-    if not isinstance(given, Network):
-        raise ParameterError(f"{reprlib.repr(given)} is no network. Give the train, net = sw.Network('train').")
-    return given
+    if not isinstance(network, Network):
+        raise ParameterError(f"{reprlib.repr(network)} is no network. Give the train, net = sw.Network('train').")
+    return network
 
 
 def _sound(netlist: Netlist, accepted: str = "") -> StateForm:
     """The state form of a network without errors but for an accepted kind; warnings are issued."""
     _, form, problems = diagnose(netlist)
-    if errors := tuple(found for found in problems if found.severity == "error" and found.kind != accepted):
+    if errors := tuple(problem for problem in problems if problem.severity == "error" and problem.kind != accepted):
         raise NetworkError(f"'{netlist.name}' cannot be assembled", errors)
     for problem in problems:
         if problem.severity == "warning":
@@ -314,22 +315,12 @@ class Compiler:
             return kind(form, netlist, self)
 
 
-@dataclass(frozen=True, eq=False)
-class _InPhase:
-    """The equations of a network in any phase of its motion.
-
-    Args:
-        netlist: the network.
-        form: its state form in the first mode of every part.
-    """
-
-    netlist: Netlist
-    form: StateForm
-
-    def __call__(self, phase: str | NamedPhase) -> Equations:
-        name = words_of(phase)
-        form = _in_phase(self.netlist, self.form.graph, name) if name else self.form
-        return dataclasses.replace(kirchhoff(form), phase=whole_name(self.form.graph, name), in_phase=self)
+def _equations_in(netlist: Netlist, form: StateForm, phase: str | NamedPhase) -> Equations:
+    """The equations of a network in a phase of its motion; its state form is that in the first mode of every part."""
+    name = words_of(phase)
+    then = _in_phase(netlist, form.graph, name) if name else form
+    again = partial(_equations_in, netlist, form)
+    return dataclasses.replace(kirchhoff(then), phase=whole_name(form.graph, name), in_phase=again)
 
 
 def _in_phase(netlist: Netlist, graph: CircuitGraph, phase: str) -> StateForm:

@@ -50,12 +50,12 @@ def _joints(graph: CircuitGraph) -> Iterator[Mapping[int, float]]:
     """Speeds of nodes that depend on each other while no twist changes: node to factor, in sums that are zero."""
     for part in graph.parts:
         branches = [graph.branches[k] for k in part.branches]
-        kinds = {made.template.kind for made in branches}
-        if (part.modes and Kind.COUPLING not in kinds) or any(made.template.is_history for made in branches):
+        kinds = {branch.template.kind for branch in branches}
+        if (part.modes and Kind.COUPLING not in kinds) or any(branch.template.is_history for branch in branches):
             yield dict(zip((part.nodes[port.name] for port in part.component.ports), (1.0, -1.0), strict=False))
-        for made in branches:
-            if made.template.kind in (Kind.THROUGH_STORE, Kind.COUPLING):
-                yield {node: value_of(factor) for node, factor in column_of(graph, made).items()}
+        for branch in branches:
+            if branch.template.kind in (Kind.THROUGH_STORE, Kind.COUPLING):
+                yield {node: value_of(factor) for node, factor in column_of(graph, branch).items()}
 
 
 def as_multiple(ratio: float | None) -> str:
@@ -124,14 +124,14 @@ def warn_of_turning_angles(bound: BoundArrays, t: float, x: Array) -> None:
 
 def _readers(form: StateForm, integral: int) -> tuple[str, ...]:
     """The parts with a law whose slopes depend on the integral of a branch, or that jumps with it."""
-    graph, found = form.graph, dict[str, None]()
+    graph, names = form.graph, dict[str, None]()
     for branch in form.laws:
         template = graph.branches[branch].template
-        own = [INTEGRAL] if branch == integral else []
-        for symbol in (*own, *(one for one, of in readings_of(graph, branch).items() if of == _integral(integral))):
+        symbols = [INTEGRAL] if branch == integral else []
+        for symbol in (*symbols, *(one for one, of in readings_of(graph, branch).items() if of == _integral(integral))):
             if slope(template.law, symbol).has(ACROSS, INTEGRAL, *template.reads) or jumps(template.law, symbol):
-                found[graph.part_of(branch).name] = None
-    return tuple(found)
+                names[graph.part_of(branch).name] = None
+    return tuple(names)
 
 
 def _integral(branch: int) -> Reading:

@@ -110,8 +110,8 @@ class EngineModel(CompiledModel, ABC):
         n, bound, straight = len(self.states), self.bind(p), self.degree is not None
 
         def fractions() -> Fractions | None:
-            found = bound.rational()
-            return None if found is None else Fractions(*found)
+            polynomials = bound.rational()
+            return None if polynomials is None else Fractions(*polynomials)
 
         matrix = bound.jacobian(0.0, np.zeros(n)).tocsr()
         return LinearInputs(matrix, lambda t: bound.rhs(t, np.zeros((n, *np.shape(t)))), fractions, straight)

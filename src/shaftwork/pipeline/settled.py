@@ -58,11 +58,13 @@ def refuse_moving(bound: BoundArrays, t: float, switching: Switching) -> None:
         SimulationError: there is one.
     """
     graph, endless = bound.program.form.graph, switching.endless(bound.p)
-    of_endless = (made.index for made in graph.branches if graph.parts[made.part].name in endless and _of_time(made))
+    of_endless = (
+        branch.index for branch in graph.branches if graph.parts[branch.part].name in endless and _of_time(branch)
+    )
     moving = [graph.branches[k] for k in dict.fromkeys((*bound.moving_laws(t), *of_endless))]
     if not moving:
         return
-    laws = [*dict.fromkeys(in_words(graph.parts[made.part], made.template.law) for made in moving)]
+    laws = [*dict.fromkeys(in_words(graph.parts[branch.part], branch.template.law) for branch in moving)]
     shown = "; ".join(laws[:NAMED]) + (f" and {len(laws) - NAMED} more" if len(laws) > NAMED else "")
     noise = ", or take the noise out (std = 0 for its mean)" if any(map(_is_noise, moving)) else ""
     raise SimulationError(
@@ -98,12 +100,12 @@ def warn_of_earlier_levels(bound: BoundArrays, x: Array, when: float, switching:
     ]
     times = np.array(spans)
     changes = [(part, time) for part, time in switching.clocks(bound.p) if 0.0 < time < when]
-    found = list(_levels(bound, x, times, dict(sorted(changes, key=itemgetter(1)))))
+    levels = list(_levels(bound, x, times, dict(sorted(changes, key=itemgetter(1)))))
     for part, time in changes:
         before = max(edge for edge in edges if edge < time)
-        found.append((f"'{part}' changes its mode at t = {time:.6g} s", (before + time) / 2))
-    if found:
-        said, other = "; ".join(words for words, _ in found), found[0][1]
+        levels.append((f"'{part}' changes its mode at t = {time:.6g} s", (before + time) / 2))
+    if levels:
+        said, other = "; ".join(words for words, _ in levels), levels[0][1]
         warn(
             f"steady_state() of '{bound.program.form.graph.name}' reads its laws after their last change, at "
             f"t = {when:.6g} s, and they were others before: {said}. Name the time that is meant, "
@@ -126,9 +128,9 @@ def warn_of_held_torques(regime: Regime, elements: Sequence[ModeMachine], x: Arr
         when: time at which laws are read, s.
     """
     holding = [
-        (elements[k].name, made.guard)
-        for k, made in regime.watched
-        if made.leave.by_torque and len(elements[k].modes[regime.modes[k]].gives_way) == BOTH
+        (elements[k].name, watched.guard)
+        for k, watched in regime.watched
+        if watched.leave.by_torque and len(elements[k].modes[regime.modes[k]].gives_way) == BOTH
     ]
     if not (holding and x.size):
         return
@@ -155,9 +157,9 @@ def _levels(bound: BoundArrays, x: Array, times: Array, since: Mapping[str, floa
     """
     inputs, graph = bound.program.assembly.inputs, bound.program.form.graph
     values = bound.values(times.ravel(), np.tile(x[:, None], times.size))[1].reshape(len(inputs), *times.shape)
-    for branch, found in zip(inputs.tolist(), values, strict=True):
-        own = times[:, 0] >= since.get(graph.part_of(branch).name, 0.0)
-        final, courses = found[-1, 1], np.where(own[:, None], found, np.nan)
+    for branch, history in zip(inputs.tolist(), values, strict=True):
+        valid = times[:, 0] >= since.get(graph.part_of(branch).name, 0.0)
+        final, courses = history[-1, 1], np.where(valid[:, None], history, np.nan)
         size = np.nanmax(np.abs(courses), initial=0.0)
         close = SAME * size
         lasting = np.ptp(courses, axis=1, keepdims=True) <= close
@@ -177,6 +179,6 @@ def _quantity(graph: CircuitGraph, branch: GraphBranch) -> tuple[str, int, str]:
     part, domain = graph.part_of(branch.index), graph.domains[max(branch.plus, branch.minus)]
     if branch.template.kind is Kind.ACROSS_SOURCE:
         return part.name, 1, domain.across.unit
-    shown = (made for made in part.component.signals().values() if made.kind == "through")
-    sign = next((made.sign for made in shown if made.ends == branch.template.ends), 1)
+    shown = (signal for signal in part.component.signals().values() if signal.kind == "through")
+    sign = next((signal.sign for signal in shown if signal.ends == branch.template.ends), 1)
     return part.name, sign, domain.through.unit.replace("*", " ")

@@ -14,7 +14,7 @@ from shaftwork.core.errors import AccuracyWarning, NetworkWarning
 from shaftwork.core.notices import muted
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import Demand
-from shaftwork.pipeline.start import Ending
+from shaftwork.pipeline.motion_start import Ending
 from shaftwork.results.solution import Solution
 
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from shaftwork.core.errors import ParameterError
 from shaftwork.pipeline.analysis import Given, Point, Time
 from shaftwork.pipeline.network import Network, network_of
-from shaftwork.pipeline.sensitivities.derivatives import frequency_sensitivities as of_frequencies
-from shaftwork.pipeline.sensitivities.derivatives import motion_sensitivities as of_motion
+from shaftwork.pipeline.sensitivities.sensitivities import frequency_sensitivities as of_frequencies
+from shaftwork.pipeline.sensitivities.sensitivities import motion_sensitivities as of_motion
 from shaftwork.results.measures import Measure
 from shaftwork.results.sensitivities import FrequencySensitivities, MotionSensitivities
 from shaftwork.studies.study_arguments import by_name

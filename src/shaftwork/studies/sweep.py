@@ -17,8 +17,8 @@ from shaftwork.core.parameters import whole, without_unit
 from shaftwork.core.screen import progress
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import OutputTimes, checked_parameter, relative_tolerance, time_span
+from shaftwork.pipeline.motion_start import ending_of, refuse_motion, time_of_start
 from shaftwork.pipeline.network import Network, network_of
-from shaftwork.pipeline.start import ending_of, refuse_motion, time_of_start
 from shaftwork.results.fatigue import SNLine
 from shaftwork.results.measures import Measure
 from shaftwork.results.observer import Array

@@ -35,8 +35,8 @@ from shaftwork.core.notices import muted
 from shaftwork.integrate.engines import available
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.model import steady_start
+from shaftwork.pipeline.motion_start import Ending
 from shaftwork.pipeline.network import Network
-from shaftwork.pipeline.start import Ending
 from shaftwork.results.fatigue import SNLine
 from shaftwork.results.measures import Measure
 from shaftwork.results.observer import Array

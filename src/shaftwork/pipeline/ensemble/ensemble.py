@@ -19,7 +19,7 @@ from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import CompileError, NetworkError
 from shaftwork.integrate.lanes import LaneRun, Room, Steps
 from shaftwork.network.graph import GraphPart
-from shaftwork.pipeline.ensemble.equations import (
+from shaftwork.pipeline.ensemble.ensemble_equations import (
     EXTREMES,
     POWERS,
     EnsembleCode,
@@ -143,8 +143,8 @@ class Ensemble:
                 self._equations[modes] = EnsembleEquations(code, assembly, modes, self._first, self.names, self.span)
             except (CompileError, NetworkError) as error:
                 self._equations[modes] = str(error)
-        made = self._equations[modes]
-        return None if isinstance(made, str) else made
+        equations = self._equations[modes]
+        return None if isinstance(equations, str) else equations
 
     def _code(self, assembly: ModeEquations | None) -> EnsembleCode:
         """The programs of a set of equations, which several combinations of modes may share."""
@@ -179,7 +179,9 @@ class Ensemble:
         if self.phased is None:
             return False
         elements = self.phased.phases.elements
-        symbols = {f"{made.part.name}.{symbol.name}" for made in elements for symbol in conditional(made.modes)}
+        symbols = {
+            f"{element.part.name}.{symbol.name}" for element in elements for symbol in conditional(element.modes)
+        }
         return not symbols.isdisjoint(self.names)
 
     def after(self, group: VariantGroup, guard: int, p: Array) -> list[tuple[ModeNames, Mask]]:
@@ -193,11 +195,11 @@ class Ensemble:
         (number, ended), count = pairs[0], group.lanes.size
         names = [ended.leave.to] * count
         if not ended.leave.to:
-            before, own = group.modes[number], p[: len(assembly.model.parameters)]
-            starts = zip(group.t.tolist(), group.x.T, own.T, strict=True)
+            before, parameters = group.modes[number], p[: len(assembly.model.parameters)]
+            starts = zip(group.t.tolist(), group.x.T, parameters.T, strict=True)
             names = [assembly.start_of(number, before, *start) for start in starts]
-        found = dict.fromkeys(names)
-        return [(with_modes(group.modes, {number: to}), np.array([name == to for name in names])) for to in found]
+        targets = dict.fromkeys(names)
+        return [(with_modes(group.modes, {number: to}), np.array([name == to for name in names])) for to in targets]
 
 
 class _VariantCourse:
@@ -218,7 +220,7 @@ class _VariantCourse:
             for _ in range(MOST_ROUNDS):
                 if not waiting:
                     break
-                waiting = [made for group in joined(waiting) for made in self._stretch(group)]
+                waiting = [following for group in joined(waiting) for following in self._stretch(group)]
         return self._results(), self.done
 
     def _begin(self) -> list[VariantGroup]:
@@ -239,16 +241,16 @@ class _VariantCourse:
         if equations is None or not group.lanes.size:
             return []
         p = equations.parameters(self.columns[:, group.lanes])
-        group, p, entry = _kept(group, p, equations.entered(group.t, group.x, p))
+        group, p, entry = _consistent(group, p, equations.entered(group.t, group.x, p))
         if not group.lanes.size:
             return []
         ends = self._followed(equations, group, p, entry)
         over = ends.met == OVER
         self._end(equations, ends.group, p, over)
-        made = []
+        following = []
         for guard in np.unique(ends.met[ends.met >= 0]).tolist():
-            made += self._changed(equations, ends.group.some(ends.met == guard), guard)
-        return made
+            following += self._changed(equations, ends.group.some(ends.met == guard), guard)
+        return following
 
     def _followed(self, equations: EnsembleEquations, group: VariantGroup, p: Array, entry: PhaseEntry) -> _Ends:
         """Lanes up to their guards or the end of the motion."""
@@ -260,15 +262,15 @@ class _VariantCourse:
         )
         ends = _Ends(replace(group, t=group.t.copy(), x=group.x.copy()), np.full(group.lanes.size, LOST))
         while run.lanes.size:
-            own = run.lanes
+            lanes = run.lanes
             steps, good = run.go()
-            met, rows = _met(equations, entry.offsets[:, own], steps)
+            met, rows = _met(equations, entry.offsets[:, lanes], steps)
             rows = np.where(met >= 0, rows, steps.last)
             good |= met >= 0
             met[good & (met < 0) & (rows[-2] >= span[1])] = OVER
-            self._measure(equations, steps, group.lanes[own], good, met >= 0)
+            self._measure(equations, steps, group.lanes[lanes], good, met >= 0)
             done = good & (met != ON)
-            there = own[done]
+            there = lanes[done]
             ends.met[there], ends.group.t[there], ends.group.x[:, there] = met[done], rows[-2, done], rows[:size, done]
             for row, place in code.integral_of.items():
                 self.values[row, group.lanes[there]] += rows[size + place, done]
@@ -278,19 +280,19 @@ class _VariantCourse:
     def _changed(self, before: EnsembleEquations, group: VariantGroup, guard: int) -> list[VariantGroup]:
         """Past a guard: what is stored goes over to the equations that follow, where it goes over unchanged."""
         p = before.parameters(self.columns[:, group.lanes])
-        held, made = before.code.stored(group.t, group.x, p), []
+        stored, groups = before.code.stored(group.t, group.x, p), []
         for modes, there in self.ensemble.after(group, guard, p):
             after = self.ensemble.equations(modes)
             if after is None or not after.leaves_behind(before, guard):
                 continue
-            t, own, x = group.t[there], held[:, there], held[after.code.state_rows][:, there]
-            given = after.parameters(self.columns[:, group.lanes[there]])
-            new, same = after.code.stored(t, x, given), np.ones(t.size, dtype=bool)
+            t, old, x = group.t[there], stored[:, there], stored[after.code.state_rows][:, there]
+            parameters = after.parameters(self.columns[:, group.lanes[there]])
+            new, same = after.code.stored(t, x, parameters), np.ones(t.size, dtype=bool)
             for kind in after.code.kinds:
-                size = np.maximum(np.abs(own[kind]).max(axis=0, initial=0.0), 1.0)
-                same &= (np.abs(new[kind] - own[kind]) <= SAME * size).all(axis=0)
-            made.append(VariantGroup(modes, group.lanes[there], t, x).some(same))
-        return made
+                size = np.maximum(np.abs(old[kind]).max(axis=0, initial=0.0), 1.0)
+                same &= (np.abs(new[kind] - old[kind]) <= SAME * size).all(axis=0)
+            groups.append(VariantGroup(modes, group.lanes[there], t, x).some(same))
+        return groups
 
     def _measure(self, equations: EnsembleEquations, steps: Steps, lanes: Index, good: Mask, ended: Mask) -> None:
         """What some steps of lanes (k,) add to the extremes: of those that go well, and those that end at a guard."""
@@ -301,8 +303,8 @@ class _VariantCourse:
                 if not near.size:
                     continue
                 quantity = _Quantity(steps, equations.code.step.jet(number), sign, 0.0, near)
-                found = largest(quantity.t, quantity.jets, self.values[row, lanes[near]], quantity.at)
-                self.values[row, lanes[near]] = np.where(good[near], found, self.values[row, lanes[near]])
+                tops = largest(quantity.t, quantity.jets, self.values[row, lanes[near]], quantity.at)
+                self.values[row, lanes[near]] = np.where(good[near], tops, self.values[row, lanes[near]])
 
     def _end(self, equations: EnsembleEquations, group: VariantGroup, p: Array, over: Mask) -> None:
         """The variants that have come to the end of their motion."""
@@ -315,15 +317,15 @@ class _VariantCourse:
 
     def _results(self) -> Array:
         duration = self.ensemble.span[1] - self.ensemble.span[0]
-        made = self.values + 0.0  # without zeros of the other sign
+        values = self.values + 0.0  # without zeros of the other sign
         for row, measure in enumerate(self.ensemble.measures):
             if measure.kind == "min":
-                made[row] = 0.0 - made[row]
+                values[row] = 0.0 - values[row]
             elif measure.kind in ("mean", "rms"):
-                made[row] /= duration
-                made[row] = np.sqrt(np.maximum(made[row], 0.0)) if measure.kind == "rms" else made[row]
-        self.done &= np.isfinite(made).all(axis=0)
-        return made
+                values[row] /= duration
+                values[row] = np.sqrt(np.maximum(values[row], 0.0)) if measure.kind == "rms" else values[row]
+        self.done &= np.isfinite(values).all(axis=0)
+        return values
 
 
 @dataclass(frozen=True, eq=False)
@@ -351,13 +353,13 @@ def _met(equations: EnsembleEquations, offsets: Array, steps: Steps) -> tuple[In
         quantity = _Quantity(steps, equations.code.step.jet(number), side, offsets[guard, near], near)
         rises = first_rises(quantity.t, quantity.jets, quantity.at)
         earlier = rises.t < first[near]
-        own = near[earlier]
-        met[own], first[own], at[own] = guard, rises.t[earlier], rises.at[earlier]
-    own = np.flatnonzero(met >= 0)
-    if own.size:
+        columns = near[earlier]
+        met[columns], first[columns], at[columns] = guard, rises.t[earlier], rises.at[earlier]
+    columns = np.flatnonzero(met >= 0)
+    if columns.size:
         shown, start = np.empty((len(steps.jets), met.size)), np.full(met.size, len(steps.t))
-        rows[:, own], shown[:, own] = steps.at(at[own], own, first[own])
-        start[own] = at[own]
+        rows[:, columns], shown[:, columns] = steps.at(at[columns], columns, first[columns])
+        start[columns] = at[columns]
         steps.cut(start, first, shown)
     return met, rows
 
@@ -376,21 +378,21 @@ class _Quantity:
     def __init__(self, steps: Steps, place: slice, sign: float, offsets: Array | float, lanes: Index) -> None:
         self._steps, self._place, self._sign, self._lanes = steps, place, sign, lanes
         self._offsets = np.broadcast_to(offsets, lanes.size)
-        own = lanes if lanes.size < steps.t.shape[1] else slice(None)
-        self.t: Array = steps.t[:, own]
+        columns = lanes if lanes.size < steps.t.shape[1] else slice(None)
+        self.t: Array = steps.t[:, columns]
         """(m, k) times of the samples, s."""
-        self.jets: Array = sign * steps.jets[place][:, :, own]
+        self.jets: Array = sign * steps.jets[place][:, :, columns]
         """(3, m, k) values and their first two derivatives by time."""
         self.jets[0] -= self._offsets
 
-    def at(self, start: Index, own: Index, t: Array) -> Array:
+    def at(self, start: Index, columns: Index, t: Array) -> Array:
         """(3, c) jets at times (c,) in s, from samples (c,) of the lanes (c,)."""
-        jet = np.array(self._sign * self._steps.at(start, self._lanes[own], t)[1][self._place])
-        jet[0] -= self._offsets[own]
+        jet = np.array(self._sign * self._steps.at(start, self._lanes[columns], t)[1][self._place])
+        jet[0] -= self._offsets[columns]
         return jet
 
 
-def _kept(group: VariantGroup, p: Array, entry: PhaseEntry) -> tuple[VariantGroup, Array, PhaseEntry]:
+def _consistent(group: VariantGroup, p: Array, entry: PhaseEntry) -> tuple[VariantGroup, Array, PhaseEntry]:
     """Those of a group whose modes are consistent with their motion."""
     if entry.good.all():
         return group, p, entry

@@ -52,32 +52,32 @@ def largest(t: Array, jets: Array, best: Array, there: There) -> Array:
         there: follows the motion from a sample.
     """
     top, bottom = jets[0].max(axis=0), jets[0].min(axis=0)
-    found, size = np.maximum(best, top), top - bottom
-    at, own = likely(t, jets, found, found - NEARLY * size)
-    left, right = (np.array([t[k, own], *jets[:, k, own]]) for k in (at, at + 1))
+    tops, size = np.maximum(best, top), top - bottom
+    at, lanes = likely(t, jets, tops, tops - NEARLY * size)
+    left, right = (np.array([t[k, lanes], *jets[:, k, lanes]]) for k in (at, at + 1))
     times, height = peak(left, right)
-    missed, surely = beyond(left, right), found.copy()
-    np.maximum.at(surely, own, height - missed)
-    on = np.isfinite(height) & (height + missed >= surely[own])
+    missed, surely = beyond(left, right), tops.copy()
+    np.maximum.at(surely, lanes, height - missed)
+    on = np.isfinite(height) & (height + missed >= surely[lanes])
     for _ in range(MOST_ROUNDS):
-        at, own, left, right, times, height = at[on], own[on], left[:, on], right[:, on], times[on], height[on]
-        if not own.size:
-            return np.asarray(found)
-        middle = np.array([times, *there(at, own, times)])
-        np.maximum.at(found, own, middle[1])
+        at, lanes, left, right, times, height = at[on], lanes[on], left[:, on], right[:, on], times[on], height[on]
+        if not lanes.size:
+            return np.asarray(tops)
+        middle = np.array([times, *there(at, lanes, times)])
+        np.maximum.at(tops, lanes, middle[1])
         missed, room = np.abs(height - middle[1]), np.minimum(times - left[0], right[0] - times)
         # on either side of what is known now
-        at, own, missed, room, before = (np.tile(values, 2) for values in (at, own, missed, room, times))
+        at, lanes, missed, room, before = (np.tile(values, 2) for values in (at, lanes, missed, room, times))
         left, right = np.concatenate([left, middle], axis=1), np.concatenate([middle, right], axis=1)
         times, height = peak(left, right)
-        near = NEAR * size[own]
+        near = NEAR * size[lanes]
         # what a polynomial misses grows with the cube of the distance from a point that it goes through
         part = np.abs(times - before) / room
         sure = (part < CLOSE) & (missed * part**3 < near)
-        np.maximum.at(found, own[sure], height[sure])
-        on = ~sure & (height + beyond(left, right) > found[own] + near)
-    found[own[on]] = np.nan
-    return np.asarray(found)
+        np.maximum.at(tops, lanes[sure], height[sure])
+        on = ~sure & (height + beyond(left, right) > tops[lanes] + near)
+    tops[lanes[on]] = np.nan
+    return np.asarray(tops)
 
 
 def likely(t: Array, jets: Array, least: Array, near: Array) -> tuple[Index, Index]:
@@ -87,13 +87,13 @@ def likely(t: Array, jets: Array, least: Array, near: Array) -> tuple[Index, Ind
     polynomial is no higher than the highest of its Bernstein coefficients.
     """
     up, high = jets[1] > 0, jets[0] >= near
-    at, own = np.divmod(np.flatnonzero((up[:-1] & ~up[1:]) | high[:-1] | high[1:]), t.shape[1])
-    left, right = (np.array([t[k, own], *jets[:, k, own]]) for k in (at, at + 1))
+    at, lanes = np.divmod(np.flatnonzero((up[:-1] & ~up[1:]) | high[:-1] | high[1:]), t.shape[1])
+    left, right = (np.array([t[k, lanes], *jets[:, k, lanes]]) for k in (at, at + 1))
     length = right[0] - left[0]
     highest = reduce(np.maximum, inner(length, left[1:], right[1:]))
-    kept = (length > SHORT * np.abs(left[0])) & (highest > np.maximum(left[1], right[1]))
-    kept &= highest + beyond(left, right) >= least[own]
-    return at[kept], own[kept]
+    chosen = (length > SHORT * np.abs(left[0])) & (highest > np.maximum(left[1], right[1]))
+    chosen &= highest + beyond(left, right) >= least[lanes]
+    return at[chosen], lanes[chosen]
 
 
 def beyond(left: Array, right: Array) -> Array:
@@ -161,10 +161,10 @@ def first_rises(t: Array, jets: Array, there: There) -> Rises:
     for sample, lane, time in zip(*_hidden(t, jets, at, there), strict=True):
         if time < upper[lane]:
             at[lane], upper[lane] = sample, time
-    own = np.flatnonzero(np.isfinite(upper))
+    lanes = np.flatnonzero(np.isfinite(upper))
     times = np.full(t.shape[1], np.inf)
-    if own.size:
-        times[own] = _rise(t[at[own], own], upper[own], at[own], own, there)
+    if lanes.size:
+        times[lanes] = _rise(t[at[lanes], lanes], upper[lanes], at[lanes], lanes, there)
     return Rises(at, times)
 
 
@@ -172,34 +172,34 @@ def _hidden(t: Array, jets: Array, until: Index, there: There) -> tuple[list[int
     """Samples, lanes and times of values above zero between samples that are not, up to samples (k,)."""
     top, bottom = jets[0].max(axis=0), jets[0].min(axis=0)
     size = top - bottom
-    at, own = likely(t, jets, np.zeros_like(top), top - NEARLY * size)
-    early = at < until[own]
-    at, own = at[early], own[early]
-    left, right = (np.array([t[k, own], *jets[:, k, own]]) for k in (at, at + 1))
-    found: tuple[list[int], list[int], list[float]] = [], [], []
+    at, lanes = likely(t, jets, np.zeros_like(top), top - NEARLY * size)
+    early = at < until[lanes]
+    at, lanes = at[early], lanes[early]
+    left, right = (np.array([t[k, lanes], *jets[:, k, lanes]]) for k in (at, at + 1))
+    rises: tuple[list[int], list[int], list[float]] = [], [], []
     for _ in range(MOST_ROUNDS):
-        if not own.size:
+        if not lanes.size:
             break
         times, height = peak(left, right)
-        on = height + beyond(left, right) > NEAR * size[own]
-        at, own, left, right, times = at[on], own[on], left[:, on], right[:, on], times[on]
-        if not own.size:
+        on = height + beyond(left, right) > NEAR * size[lanes]
+        at, lanes, left, right, times = at[on], lanes[on], left[:, on], right[:, on], times[on]
+        if not lanes.size:
             break
-        middle = np.array([times, *there(at, own, times)])
+        middle = np.array([times, *there(at, lanes, times)])
         rose = middle[1] > 0.0
-        for place, more in enumerate((at, own, times)):
-            found[place].extend(more[rose].tolist())
-        at, own = (np.tile(values[~rose], 2) for values in (at, own))
+        for place, more in enumerate((at, lanes, times)):
+            rises[place].extend(more[rose].tolist())
+        at, lanes = (np.tile(values[~rose], 2) for values in (at, lanes))
         left = np.concatenate([left[:, ~rose], middle[:, ~rose]], axis=1)
         right = np.concatenate([middle[:, ~rose], right[:, ~rose]], axis=1)
-    return found
+    return rises
 
 
-def _rise(low: Array, high: Array, at: Index, own: Index, there: There) -> Array:
+def _rise(low: Array, high: Array, at: Index, lanes: Index, there: There) -> Array:
     """Times (c,) of a rise between two times (c,)."""
 
     def course(chosen: Chosen, times: Array) -> tuple[Array, Array]:
-        value, slope, _ = there(at[chosen], own[chosen], times)
+        value, slope, _ = there(at[chosen], lanes[chosen], times)
         return value, slope
 
     nothing = ROUNDING * (np.abs(high) + ROUNDINGS * (high - low))

@@ -25,6 +25,8 @@ from shaftwork.pipeline.phases.resting import at_rest
 from shaftwork.pipeline.phases.wave_assembly import WaveAssembly
 from shaftwork.pipeline.waves import engine_of_waves
 from shaftwork.reduction.value_diagnosis import self_locks
+from shaftwork.pipeline.wave_motion import engine_of_waves
+from shaftwork.reduction.cancelling import self_locks
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.model import Model

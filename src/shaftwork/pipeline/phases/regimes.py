@@ -12,11 +12,13 @@ from sympy import Integer
 from shaftwork.codegen.elements import Array
 from shaftwork.components.branches import INTEGRAL
 from shaftwork.core.errors import NetworkError, ParameterError, SimulationError
+from shaftwork.pipeline.motion_start import Ending
 from shaftwork.pipeline.phases.hybrid_state import AHEAD_OF_RUN, ROUNDINGS, HybridState, Regime
 from shaftwork.pipeline.phases.mode_machines import ModeMachine, ModeNames
 from shaftwork.pipeline.phases.starts import begins_anew
 from shaftwork.pipeline.start import Ending
 from shaftwork.reduction.value_diagnosis import jamming
+from shaftwork.reduction.cancelling import jamming
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.phases.assemblies import ModeEquations

@@ -25,6 +25,7 @@ from shaftwork.integrate import choice
 from shaftwork.integrate.problem import Problem, SeriesError, StickingError, Trajectory, changed
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.implicit import PRESCRIBED, at_rest
+from shaftwork.pipeline.motion_start import Ending, start_of
 from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.commutation import is_switch, takeovers
 from shaftwork.pipeline.phases.event_iteration import EventIteration
@@ -35,7 +36,7 @@ from shaftwork.pipeline.phases.phases import FOLLOWING, Phases
 from shaftwork.pipeline.phases.regimes import with_modes
 from shaftwork.pipeline.phases.starts import refuse_incomplete, warn_of_what_may_have_begun
 from shaftwork.pipeline.phases.wave_run import WaveRun
-from shaftwork.pipeline.start import CarriedWaves, Ending, WaveStart, start_of
+from shaftwork.pipeline.wave_motion import CarriedWaves, WaveStart
 
 # So many changes of mode, each within this part of the run of the one before, are chatter. Rebounds come ever faster,
 # too, before they end: a thousand of them where nearly all speed is given back.

@@ -16,8 +16,7 @@ from shaftwork.integrate.lossless.march import March, MarchEquations
 from shaftwork.integrate.lossless.waveforms import Left
 from shaftwork.integrate.problem import Problem, Trajectory
 from shaftwork.pipeline.phases.hybrid_state import Regime
-from shaftwork.pipeline.start import CarriedWaves, WaveStart
-from shaftwork.pipeline.waves import checked_lines, lines_by_shaft
+from shaftwork.pipeline.wave_motion import CarriedWaves, WaveStart, checked_lines, lines_by_shaft
 
 
 class WaveRun:

@@ -21,10 +21,10 @@ from shaftwork.pipeline.phases.regimes import with_modes
 from shaftwork.pipeline.sensitivities.legs import Leg
 
 CLOSE = 1e-5
-"""The run went a way whose states differ from its own by no more than this part of their size: it meets hard stops late
-by what rounding moves them, which is much for what hardly moves any more."""
+"""The run took a path whose states differ from its own by no more than this part of their size: it meets hard stops
+late by what rounding moves them, which is much for what hardly moves any more."""
 ALIKE = 1e-10
-"""Ways lead to the same states where these differ by no more than this part of their size."""
+"""Paths lead to the same states where these differ by no more than this part of their size."""
 
 
 class _ModeStep(NamedTuple):
@@ -82,7 +82,7 @@ class SensitivityTransfer:
         """Which of the ends it was, and the total derivatives (n', m) of the new states.
 
         The modes that a run goes through within an instant are tried as they may follow each other; what leads to the
-        states of the run is the way that it went.
+        states of the run is the path that it took.
 
         Args:
             before: the leg that ends.
@@ -93,36 +93,36 @@ class SensitivityTransfer:
         Raises:
             SimulationError: none of them leads there.
         """
-        sizes, ways = self._sizes(after.model), list[tuple[float, int, Array]]()
-        for (k, end), steps in product(enumerate(ends), self._ways(before, after, changes)):
+        sizes, candidates = self._sizes(after.model), list[tuple[float, int, Array]]()
+        for (k, end), steps in product(enumerate(ends), self._paths(before, after, changes)):
             try:
-                found, made = self._along(steps, before, after.low, end)
+                states, slopes = self._along(steps, before, after.low, end)
             except NetworkError:
                 continue
-            ways.append((float((np.abs(found - end.after) / sizes).max(initial=0.0)), k, made))
-        nearest = min((away for away, *_ in ways), default=np.inf)
+            candidates.append((float((np.abs(states - end.after) / sizes).max(initial=0.0)), k, slopes))
+        nearest = min((away for away, *_ in candidates), default=np.inf)
         if nearest <= CLOSE:
-            return next((k, made) for away, k, made in ways if away <= nearest + ALIKE)
+            return next((k, slopes) for away, k, slopes in candidates if away <= nearest + ALIKE)
         names = ", ".join(dict.fromkeys(f"'{change.element.name}'" for change in changes)) or "parts"
         raise SimulationError(
             f"At t = {after.start:.9g} s {names} change together, and how the derivatives pass that is not known here. "
             "Take the difference of two variants, studies.sweep(...)."
         )
 
-    def _ways(self, before: Leg, after: Leg, changes: Sequence[Change]) -> Iterator[tuple[_ModeStep, ...]]:
-        """Ways to the modes that follow, the plainest first."""
+    def _paths(self, before: Leg, after: Leg, changes: Sequence[Change]) -> Iterator[tuple[_ModeStep, ...]]:
+        """Paths to the modes that follow, the plainest first."""
         seen: list[tuple[_ModeStep, ...]] = []
         for every in (False, True):
             for besides in (False, True):
-                made = self._way(before.modes, after.modes, changes, every=every, besides=besides)
-                if made not in seen:
-                    seen.append(made)
-                    yield made
+                steps = self._path(before.modes, after.modes, changes, every=every, besides=besides)
+                if steps not in seen:
+                    seen.append(steps)
+                    yield steps
 
-    def _way(
+    def _path(
         self, modes: ModeNames, last: ModeNames, changes: Sequence[Change], *, every: bool, besides: bool
     ) -> tuple[_ModeStep, ...]:
-        """One way.
+        """One path.
 
         Args:
             modes: before.
@@ -139,7 +139,7 @@ class SensitivityTransfer:
                 modes = with_modes(modes, {number: change.after})
                 steps += [_ModeStep(modes)] if every else []
                 continue
-            others = {numbers[id(made.element)]: made.after for made in changes[place + 1 :] if not made.impact}
+            others = {numbers[id(later.element)]: later.after for later in changes[place + 1 :] if not later.impact}
             modes = with_modes(modes, {**(others if besides else {}), number: change.after})
             if not change.rebound:
                 steps.append(_ModeStep(modes))
@@ -154,46 +154,48 @@ class SensitivityTransfer:
         return tuple(steps)
 
     def _along(self, steps: Sequence[_ModeStep], before: Leg, t: float, end: End) -> tuple[Array, Array]:
-        """States (n',) and their total derivatives (n', m) at the end of a way."""
+        """States (n',) and their total derivatives (n', m) at the end of a path."""
         model, p, (x, _, slopes, shift) = before.model, before.p, end
         for step in steps:
             assembly, old = self._phases.assembly(step.modes), p
             p = assembly.vector({}, self._phases.numbers(step.modes))
             if assembly.model is model and step.rebound is None:
                 continue
-            stored = self._held(model, t, x, old, slopes, shift)
-            x, slopes = self._taken(assembly, t, p, stored, shift)
+            stored = self._stored(model, t, x, old, slopes, shift)
+            x, slopes = self._taken_over(assembly, t, p, stored, shift)
             if step.rebound is not None:
                 stored = self._thrown(
-                    assembly, p, stored, self._held(assembly.model, t, x, p, slopes, shift), step.rebound
+                    assembly, p, stored, self._stored(assembly.model, t, x, p, slopes, shift), step.rebound
                 )
                 assembly = self._phases.assembly(step.parted)
                 p = assembly.vector({}, self._phases.numbers(step.parted))
-                x, slopes = self._taken(assembly, t, p, stored, shift)
+                x, slopes = self._taken_over(assembly, t, p, stored, shift)
             model = assembly.model
         return x, slopes
 
-    def _held(self, model: Model, t: float, x: Array, p: Array, slopes: Array, shift: Array) -> _StoredWithDerivatives:
+    def _stored(
+        self, model: Model, t: float, x: Array, p: Array, slopes: Array, shift: Array
+    ) -> _StoredWithDerivatives:
         takeover = self._equations(model).takeover
-        values, made = takeover.given(t, x, p, slopes, shift)
+        values, derivatives = takeover.given(t, x, p, slopes, shift)
         return _StoredWithDerivatives(
-            dict(zip(takeover.names, values.tolist(), strict=True)), dict(zip(takeover.names, made, strict=True))
+            dict(zip(takeover.names, values.tolist(), strict=True)), dict(zip(takeover.names, derivatives, strict=True))
         )
 
-    def _taken(
-        self, assembly: ModeEquations, t: float, p: Array, held: _StoredWithDerivatives, shift: Array
+    def _taken_over(
+        self, assembly: ModeEquations, t: float, p: Array, stored: _StoredWithDerivatives, shift: Array
     ) -> tuple[Array, Array]:
         takeover = self._equations(assembly.model).takeover
-        x = assembly.stores.states(assembly.bound(p), t, held.values)
-        values = np.array([held.values[name] for name in takeover.names])
-        slopes = np.array([held.slopes[name] for name in takeover.names]).reshape(len(values), shift.size)
+        x = assembly.stores.states(assembly.bound(p), t, stored.values)
+        values = np.array([stored.values[name] for name in takeover.names])
+        slopes = np.array([stored.slopes[name] for name in takeover.names]).reshape(len(values), shift.size)
         return x, takeover.taken(t, x, p, values, slopes, shift)
 
     def _thrown(
         self,
         assembly: ModeEquations,
         p: Array,
-        held: _StoredWithDerivatives,
+        before: _StoredWithDerivatives,
         joined: _StoredWithDerivatives,
         rebound: tuple[int, Expr],
     ) -> _StoredWithDerivatives:
@@ -202,10 +204,10 @@ class SensitivityTransfer:
         shown, nowhere = self._equations(assembly.model).shown(expression), np.zeros(len(assembly.model.states))
         share = float(shown.value(np.zeros(1), nowhere[None, :], p)[0, 0])
         by_parameters = shown.slopes(0.0, nowhere, p)[1]
-        change = {name: value - held.values[name] for name, value in joined.values.items()}
+        change = {name: value - before.values[name] for name, value in joined.values.items()}
         values = {name: value + share * change[name] for name, value in joined.values.items()}
         slopes = {
-            name: slope + share * (slope - held.slopes[name]) + by_parameters * change[name]
+            name: slope + share * (slope - before.slopes[name]) + by_parameters * change[name]
             for name, slope in joined.slopes.items()
         }
         return _StoredWithDerivatives(values, slopes)

@@ -14,9 +14,11 @@ from shaftwork.components.slopes import slope
 from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.pipeline.analysis import Given
 from shaftwork.pipeline.model import Model
+from shaftwork.pipeline.motion_start import start_of
 from shaftwork.pipeline.phases.model import PhasedModel
 from shaftwork.pipeline.start import start_of
 from shaftwork.reduction.explicit_rows import Rows
+from shaftwork.reduction.rows import Rows
 
 NO_DERIVATIVE = {
     "decisive": "decides which equations hold, so nothing is smooth in it. Give it a value that is not exactly zero, "
@@ -47,13 +49,13 @@ def rows_of(model: Model) -> Rows:
 
 
 def smooth_parameters(
-    model: Model, asked: Sequence[str] | None, used: Sequence[Model], span: tuple[float, float] | None = None
+    model: Model, names: Sequence[str] | None, used: Sequence[Model], span: tuple[float, float] | None = None
 ) -> tuple[str, ...]:
     """The parameters by which to differentiate.
 
     Args:
         model: the compiled network.
-        asked: names; None for all in which the equations are smooth.
+        names: of parameters; None for all in which the equations are smooth.
         used: models of all equations that hold on the way.
         span: start and end of the motion, s; None where there is none.
 
@@ -61,25 +63,25 @@ def smooth_parameters(
         ParameterError: there is no such parameter, or nothing is smooth in it.
     """
     declared = {
-        f"{placed.part.name}.{name}": made
+        f"{placed.part.name}.{name}": parameter
         for placed in model.netlist.placed
-        for name, made in placed.part.declared.items()
+        for name, parameter in placed.part.declared.items()
     }
-    known = [name for name in model.parameters if name in declared]
-    reasons = {name: "whole" for name in known if declared[name].whole}
+    numbers = [name for name in model.parameters if name in declared]
+    reasons = {name: "whole" for name in numbers if declared[name].whole}
     for one in used:
         reasons |= dict.fromkeys((*one.form.graph.zeros, *one.form.tree.frozen), "decisive")
         reasons |= dict.fromkeys(_seeds(one), "seed")
         if span is not None:
             reasons |= dict.fromkeys(_at_edges(one, span), "edge")
-    if asked is None:
-        return tuple(name for name in known if name not in reasons)
-    for name in asked:
+    if names is None:
+        return tuple(name for name in numbers if name not in reasons)
+    for name in names:
         if name in reasons:
             raise ParameterError(f"'{name}' {NO_DERIVATIVE[reasons[name]]}")
-        if name not in known:
-            raise ParameterError(f"There is no parameter '{name}' with a number. There are: {', '.join(known)}.")
-    return tuple(asked)
+        if name not in numbers:
+            raise ParameterError(f"There is no parameter '{name}' with a number. There are: {', '.join(numbers)}.")
+    return tuple(names)
 
 
 def _seeds(model: Model) -> Iterator[str]:

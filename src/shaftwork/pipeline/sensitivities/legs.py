@@ -17,6 +17,7 @@ from shaftwork.numerics.zeros import LOOKS, zero
 from shaftwork.pipeline.analysis import Given
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.model import Model
+from shaftwork.pipeline.motion_start import start_of
 from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.hybrid_state import Change
 from shaftwork.pipeline.phases.mode_machines import ModeNames
@@ -24,7 +25,6 @@ from shaftwork.pipeline.phases.model import PhasedModel
 from shaftwork.pipeline.phases.phases import Phases
 from shaftwork.pipeline.phases.run import HybridRun, Span
 from shaftwork.pipeline.phases.solution import solution
-from shaftwork.pipeline.start import start_of
 from shaftwork.results.solution import Solution
 
 SILENT = 1e-12
@@ -155,12 +155,14 @@ def motion_of(model: Model, span: tuple[float, float], initial: Given, rtol: flo
         run = HybridRun(model.phases, {}, Demand(span, rtol, None, None, "auto", MOST_STEPS, None), own=True)
         run.march(initial)
         legs, changes = tuple(_legs_of_run(run)), tuple(run.changes)
-        made = DifferentiatedMotion(solution(run, model.name), legs, changes, _start(run, initial), model.phases)
+        differentiated = DifferentiatedMotion(
+            solution(run, model.name), legs, changes, _start(run, initial), model.phases
+        )
     else:
-        found = model.simulate(span[1], t_start=span[0], initial=initial, rtol=rtol, t_eval="steps")
-        made = DifferentiatedMotion(found, tuple(_legs_of_model(model, found)))
-    _refuse_impulses(made)
-    return made
+        motion = model.simulate(span[1], t_start=span[0], initial=initial, rtol=rtol, t_eval="steps")
+        differentiated = DifferentiatedMotion(motion, tuple(_legs_of_model(model, motion)))
+    _refuse_impulses(differentiated)
+    return differentiated
 
 
 def _start(run: HybridRun, initial: Given) -> Leg:

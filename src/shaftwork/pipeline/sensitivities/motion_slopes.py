@@ -65,7 +65,7 @@ class MotionSlopes:
         self._symbols = tuple(Symbol(name, real=True) for name in parameters)
         self._quantities, self._integrands = tuple(quantities), tuple(integrands)
         self._equations: dict[Model, Differentiated] = {}
-        self.legs = tuple(made for leg in motion.legs for made in parted(leg, self.equations(leg.model)))
+        self.legs = tuple(part for leg in motion.legs for part in parted(leg, self.equations(leg.model)))
         self._sizes: dict[Model, Array] = {}
         self._swiftest: dict[Model, Array] = {}
         for leg in self.legs:
@@ -79,23 +79,23 @@ class MotionSlopes:
         if model not in self._equations:
             rows = rows_of(model)
             expressed = Observables(model.form, rows)
-            found = {name: _known(name, expressed) for name in self._quantities}
-            integrands = [found[name] ** power for name, power in self._integrands]
-            self._equations[model] = Differentiated(model.form, rows, self._symbols, found, integrands)
+            quantities = {name: _expression_of(name, expressed) for name in self._quantities}
+            integrands = [quantities[name] ** power for name, power in self._integrands]
+            self._equations[model] = Differentiated(model.form, rows, self._symbols, quantities, integrands)
         return self._equations[model]
 
     def _measure(self, leg: Leg) -> None:
         """Sizes of states, and of rates, as far as they go in a leg."""
         times, states = leg.read(leg.steps)
         rates = self.equations(leg.model).rates(times, states, leg.p)
-        for known, seen in ((self._sizes, states), (self._swiftest, rates)):
+        for sizes, seen in ((self._sizes, states), (self._swiftest, rates)):
             largest = np.abs(seen).max(axis=0, initial=0.0)
-            known[leg.model] = np.maximum(known.get(leg.model, 0.0), largest)
+            sizes[leg.model] = np.maximum(sizes.get(leg.model, 0.0), largest)
 
     def sizes(self, model: Model) -> Array:
         """(n,) of the states of a model: the largest values, one where it is zero throughout."""
-        found = self._sizes.get(model, np.zeros(len(model.states)))
-        return np.where(found > 0, found, 1.0)
+        largest = self._sizes.get(model, np.zeros(len(model.states)))
+        return np.where(largest > 0, largest, 1.0)
 
     def _integrate(self) -> None:
         motion, count = self._motion, len(self._symbols)
@@ -166,12 +166,12 @@ class MotionSlopes:
 
     def values(self, quantity: str, times: Array) -> Array:
         """(k,) a quantity at times (k,) in s; where two legs meet, in the later one."""
-        made, index = np.empty(len(times)), self._leg_at(times)
+        values, index = np.empty(len(times)), self._leg_at(times)
         for number in np.unique(index).tolist():
             leg, here = self.legs[number], index == number
             times_there, states = leg.read(times[here])
-            made[here] = self._shown(quantity, leg).value(times_there, states, leg.p)[:, 0]
-        return made
+            values[here] = self._shown(quantity, leg).value(times_there, states, leg.p)[:, 0]
+        return values
 
     def slopes(self, quantity: str, t: float) -> Array:
         """(m,) derivatives of a quantity at a time in s; at the end of a leg, of what is there, whenever that is.
@@ -184,17 +184,17 @@ class MotionSlopes:
         times, states = leg.read(np.array([t]))
         shown = self._shown(quantity, leg)
         by_states, by_parameters, _ = shown.slopes(float(times[0]), states[0], leg.p)
-        made = by_states @ self._variations[number].at(t)[: len(by_states)] + by_parameters
+        total = by_states @ self._variations[number].at(t)[: len(by_states)] + by_parameters
         end = number if t - leg.start <= near else number + 1 if leg.end - t <= near else None
         if end is None or not (rate := self._rate(quantity, leg, t)):
-            return np.asarray(made)
+            return np.asarray(total)
         shift = self._shifts[end]
         if shift is None:
             raise SimulationError(
                 f"'{quantity}' has its extreme at t = {t:.9g} s, where several things change together, and there is no "
                 f"derivative. {ADVICE}"
             )
-        return np.asarray(made + rate * shift)
+        return np.asarray(total + rate * shift)
 
     def turning(self, quantity: str, t: float) -> float:
         """The time in s at which a quantity turns, from one that is near it; this one where it does not turn there.
@@ -233,8 +233,8 @@ def _warn(doubt: float, t: float) -> None:
         )
 
 
-def _known(name: str, expressed: Observables) -> Expr:
-    found = expressed.quantity(name)
-    if found is None:
+def _expression_of(name: str, expressed: Observables) -> Expr:
+    expression = expressed.quantity(name)
+    if expression is None:
         raise ParameterError(f"'{name}' has no derivative here. Take a speed, a torque or a twist.")
-    return found
+    return expression

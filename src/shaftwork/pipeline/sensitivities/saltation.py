@@ -176,9 +176,9 @@ class JumpConditions:
         if self._carrying is not None and not adds:
             k, carried = self._carrying.over(before, after, [one.end for one in single], changes)
             end, total = single[k], np.concatenate([carried, single[k].total[len(old.x) :]])
-        made = self._later(end.new, total - np.outer(end.new.rates, end.shift), end.late)
-        share = self._share(before.model, slopes, made) if adds else 1.0
-        return Jump(made, end.shift, adds, EXACT / end.pace * share)
+        new_slopes = self._later(end.new, total - np.outer(end.new.rates, end.shift), end.late)
+        share = self._share(before.model, slopes, new_slopes) if adds else 1.0
+        return Jump(new_slopes, end.shift, adds, EXACT / end.pace * share)
 
     def _crossing(self, old: _Side, new: _Side, slopes: Array, causes: Sequence[_Cause], late: float) -> _Crossing:
         """The instant as it is when both sides are gone back by so much, in s."""
@@ -225,7 +225,7 @@ class JumpConditions:
                 raise _touched(new.leg, f"a law that changes with the sign of {argument}")
             yield _Cause(argument)
         instant = leg.model.switching.passed(leg.p, leg.high, new.leg.low, modes=True)
-        met = sorted(self._met(old, changes), key=lambda found: found[0])
+        met = sorted(self._met(old, changes), key=lambda pair: pair[0])
         near = [TOGETHER if instant or k else CAUSED for k in range(len(met))]
         caused = [cause for (away, cause), most in zip(met, near, strict=True) if away <= most * self._span]
         if changes and not (caused or instant):
@@ -243,13 +243,13 @@ class JumpConditions:
         for change in changes:
             first.setdefault(id(change.element), change)
         for number, watched in leg.assembly.watched(leg.modes):
-            found = first.get(id(leg.assembly.elements[number]))
-            if found is not None:
+            ended = first.get(id(leg.assembly.elements[number]))
+            if ended is not None:
                 guard = leg.assembly.guards_shown[watched.guard]
                 value, rate = self._course(old, guard)
                 if watched.side * rate > 0:
                     back = 0.0 if watched.leave.rebound is None else max(value / rate, 0.0)
-                    yield abs(value / rate), _Cause(guard, found, back)
+                    yield abs(value / rate), _Cause(guard, ended, back)
 
     def _course(self, side: _Side, argument: Expr) -> tuple[float, float]:
         """Value and rate of an argument."""

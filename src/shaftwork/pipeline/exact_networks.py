@@ -94,24 +94,14 @@ class ExactNetwork:
     @cached_property
     def _own(self) -> Model:
         """The network with meshes, as it is but for waves."""
-        waves = {name: shaft for name, shaft in self._shafts.items() if isinstance(shaft.resolved, Wave)}
-        return self._with({name: dataclasses.replace(shaft, model=OWN) for name, shaft in waves.items()})
+        return _without_waves(self._model, self._compiled, self._shafts)
 
     @cached_property
     def _open(self) -> Model:
         """The network in which the exact shafts are lossless waves: an impedance beside a history at each end."""
         lossless: dict[str, Any] = {"model": Wave(), "damping": 0.0, "friction": 0.0}
-        return self._with({name: dataclasses.replace(shaft, **lossless) for name, shaft in self._shafts.items()})
-
-    def _with(self, shafts: Mapping[str, Shaft]) -> Model:
-        """The network with shafts replaced, in the modes that are chosen.
-
-        Its warnings are those of the network itself, already given.
-        """
-        if not shafts:
-            return self._model
-        with muted(NetworkWarning, AccuracyWarning):
-            return self._compiled(_with_shafts(self._model.netlist, shafts))
+        changed = {name: dataclasses.replace(shaft, **lossless) for name, shaft in self._shafts.items()}
+        return _with_shafts(self._model, self._compiled, changed)
 
     @cached_property
     def _values(self) -> tuple[Mapping[str, float], ...]:
@@ -136,13 +126,10 @@ class ExactNetwork:
             SignalError: there is no such input.
             SimulationError: a law has no finite slope at the point.
         """
-        given = at
-        if isinstance(at, Solution) and self._own is not self._model:
-            time, _ = moment_of(at, self._model.states)
-            t, at = time if t is None else t, _values_of(at, self.lines.names)
+        point, t = _on_meshes(at, t, self._model, self._own, self.lines.names)
         p = self._own.vector()
-        time, x = operating_point(self._own, p, at, t, self._own.settled(p))
-        return self.around(time, x, inputs, titled(self._model.name, near(self._own, given, time)))
+        time, x = operating_point(self._own, p, point, t, self._own.settled(p))
+        return self.around(time, x, inputs, titled(self._model.name, near(self._own, at, time)))
 
     def around(self, time: float, x: Array, inputs: Names, title: str, phase: str = "") -> ExactModel:
         """The network near a point that is known.
@@ -170,14 +157,14 @@ class ExactNetwork:
 
     def _read(self, time: float, x: Array) -> dict[str, float]:
         """The states of the open network at the point, and speeds and torques of the ends of the shafts."""
-        own = {name: k for k, name in enumerate(self._own.states)}
+        places = {name: k for k, name in enumerate(self._own.states)}
         observer = ModelObserver(self._own.form, self._own.bind)
         ends = (
             f"{name}.{quantity}_{end}" for name in self.lines.names for quantity in ("omega", "tau") for end in "ab"
         )
         at = (np.array([time]), x[None, :])
         return {
-            name: float(x[own[name]]) if name in own else float(observer.signal(name, *at)[0])
+            name: float(x[places[name]]) if name in places else float(observer.signal(name, *at)[0])
             for name in (*self._open.states, *ends)
         }
 
@@ -186,11 +173,11 @@ class ExactNetwork:
     ) -> Linearization:
         """The open network at the point, its algebraic loops solved as they are there."""
         graph = self._open.form.graph
-        own = {part.name: part.branches for part in point.form.graph.parts}
+        branches = {part.name: part.branches for part in point.form.graph.parts}
         loops = self._open.bind().loops
         if loops is not None:
             parts = ((k, graph.part_of(k)) for k in self._open.form.loop_laws)
-            same = [own[part.name][part.branches.index(k)] for k, part in parts]
+            same = [branches[part.name][part.branches.index(k)] for k, part in parts]
             loops.start_from(point.through[same, 0])
         x = np.array([values[name] for name in self._open.states])
         arriving = [
@@ -204,8 +191,8 @@ class ExactNetwork:
         """The modes of the network with meshes that are right for |rate| up to a radius."""
         model = self._meshed(radius, attempt)
         torques = tuple(f"{name}.tau_{end}" for name in self.lines.names for end in "ab")
-        given = {name: value for name, value in values.items() if name not in torques}
-        x = np.zeros(len(model.states)) if model.linear else initial_state(model.bind(), given, time)
+        start = {name: value for name, value in values.items() if name not in torques}
+        x = np.zeros(len(model.states)) if model.linear else initial_state(model.bind(), start, time)
         return find_modes(model.name, Linearization(model, model.vector(), x, time, ()))
 
     def _meshed(self, radius: float, attempt: int) -> Model:
@@ -219,7 +206,7 @@ class ExactNetwork:
             )
         shafts = zip(self._shafts.items(), degrees, strict=True)
         changed = {name: dataclasses.replace(shaft, model=Spectral(degree)) for (name, shaft), degree in shafts}
-        return self._meshes(degrees, lambda: self._with(changed))
+        return self._meshes(degrees, lambda: _with_shafts(self._model, self._compiled, changed))
 
 
 class ExactPhases:
@@ -238,14 +225,9 @@ class ExactPhases:
     @cached_property
     def _own(self) -> PhasedModel:
         """The network with meshes in place of waves, which tells the modes at a point."""
-        waves = {name: shaft for name, shaft in self._shafts.items() if isinstance(shaft.resolved, Wave)}
-        if not waves:
-            return self._model
-        meshes = {name: dataclasses.replace(shaft, model=OWN) for name, shaft in waves.items()}
-        with muted(NetworkWarning, AccuracyWarning):
-            made = self._compiled(_with_shafts(self._model.netlist, meshes))
-        assert isinstance(made, PhasedModel)  # noqa: S101 (its other parts are the same)
-        return made
+        model = _without_waves(self._model, self._compiled, self._shafts)
+        assert isinstance(model, PhasedModel)  # noqa: S101 (its other parts are the same)
+        return model
 
     def near(self, at: Point, t: Time = None, inputs: Names = ()) -> ExactModel:
         """The network near a point, in the modes that go on there; arguments as for `Model.linearize`.
@@ -254,10 +236,7 @@ class ExactPhases:
             SignalError: there is no such input.
             SimulationError: a law has no finite slope at the point.
         """
-        point = at
-        if isinstance(at, Solution) and self._own is not self._model:
-            time, _ = moment_of(at, self._model.states)
-            t, point = time if t is None else t, _values_of(at, tuple(self._shafts))
+        point, t = _on_meshes(at, t, self._model, self._own, tuple(self._shafts))
         time, moment = self._own.point({}, point, t)
         modes = moment.regime.modes
         network = self._networks(modes, lambda: ExactNetwork(self._in(modes), self._compiled, self._shafts))
@@ -278,14 +257,27 @@ class ExactPhases:
             return self._compiled(netlist.with_choices(chosen))
 
 
-def _with_shafts(netlist: Netlist, shafts: Mapping[str, Shaft]) -> Netlist:
-    """The network with some shafts replaced, by name."""
-    placed = (dataclasses.replace(item, part=shafts.get(item.part.name, item.part)) for item in netlist.placed)
-    return Netlist(netlist.name, tuple(placed))
+def _with_shafts(model: Model, compiled: Compile, shafts: Mapping[str, Shaft]) -> Model:
+    """The network with some shafts replaced, by name, in the modes that are chosen.
+
+    Its warnings are those of the network itself, already given.
+    """
+    if not shafts:
+        return model
+    with muted(NetworkWarning, AccuracyWarning):
+        return compiled(model.netlist.with_parts(lambda part: shafts.get(part.name, part)))
 
 
-def _values_of(motion: Solution, shafts: tuple[str, ...]) -> dict[str, float]:
-    """The one time of a motion with waves, by speeds, twists and torques that a mesh has too."""
-    names = (*motion.states, *(f"{name}.omega_{end}" for name in shafts for end in "ab"))
-    own = {name: k for k, name in enumerate(motion.states)}
-    return {name: float(motion.x[0, own[name]] if name in own else motion[name][0]) for name in names}
+def _without_waves(model: Model, compiled: Compile, shafts: Mapping[str, Shaft]) -> Model:
+    """The network with meshes in place of its waves."""
+    waves = {name: shaft for name, shaft in shafts.items() if isinstance(shaft.resolved, Wave)}
+    return _with_shafts(model, compiled, {name: dataclasses.replace(shaft, model=OWN) for name, shaft in waves.items()})
+
+
+def _on_meshes(at: Point, t: Time, model: Model, meshed: Model, shafts: tuple[str, ...]) -> tuple[Point, Time]:
+    """A point and its time for a network with meshes: of a motion with waves the speeds and torques that these have."""
+    if not isinstance(at, Solution) or meshed is model:
+        return at, t
+    time, x = moment_of(at, model.states)
+    ends = {name: float(at[name][0]) for shaft in shafts for name in (f"{shaft}.omega_a", f"{shaft}.omega_b")}
+    return {**dict(zip(model.states, x.tolist(), strict=True)), **ends}, time if t is None else t

@@ -28,7 +28,6 @@ from shaftwork.integrate.lossless.waveforms import Polynomials
 from shaftwork.integrate.problem import Problem, Trajectory
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import Netlist
-from shaftwork.pipeline.start import CarriedWaves, WaveStart
 from shaftwork.reduction.form import StateForm
 
 WHY = "Shafts are travelling waves, so states and delays are solved together."
@@ -80,6 +79,32 @@ class _StatesAndWaves:
         return None if self.found.past is None else CarriedWaves(self.found.past(t), self.lines)
 
 
+@dataclass(frozen=True)
+class CarriedWaves:
+    """What is on its way in lines where a motion ended.
+
+    Args:
+        past: what has left their ends.
+        lines: by shaft (2, lines), impedances in N m s and delays in s.
+    """
+
+    past: Past
+    lines: Mapping[str, Array]
+
+
+@dataclass(frozen=True)
+class WaveStart:
+    """How lines start: their speed runs straight from end to end, their torque is the same all along.
+
+    Args:
+        speeds: (2 lines,) of the ends, rad/s.
+        torques: (lines,) that the first end takes in, N m.
+    """
+
+    speeds: Array
+    torques: Array
+
+
 def twin(netlist: Netlist) -> Netlist:
     """The network with a spring or two in place of every wave, which stands and turns steadily as the waves do.
 
@@ -91,12 +116,11 @@ def twin(netlist: Netlist) -> Netlist:
             return part
         return dataclasses.replace(part, model=Lumped(1 if part.friction == 0 else 2))
 
-    placed = (dataclasses.replace(item, part=stiff(item.part)) for item in netlist.placed)
-    return Netlist(netlist.name, tuple(placed))
+    return netlist.with_parts(stiff)
 
 
 def start_of_waves(
-    bound: BoundArrays, twin: BoundArrays, given: Mapping[str, float], t0: float
+    bound: BoundArrays, twin: BoundArrays, initial: Mapping[str, float], t0: float
 ) -> tuple[Array, WaveStart]:
     """States (n,) and waves from which a network starts: those of its twin, at rest its own.
 
@@ -105,7 +129,7 @@ def start_of_waves(
     Args:
         bound: array program of the network.
         twin: that of its twin.
-        given: start values by name, also those that the twin alone knows: the torque along a shaft.
+        initial: start values by name, also those that the twin alone knows: the torque along a shaft.
         t0: start time, s; where something jumps there, a time after it.
 
     Raises:
@@ -113,7 +137,7 @@ def start_of_waves(
         ParameterError: values are not finite or contradict each other, or the ends of a wave are given two torques.
     """
     form, graph = bound.program.form, twin.program.form.graph
-    start = Start(twin, _all_along(form, given), t0)
+    start = Start(twin, _all_along(form, initial), t0)
     times, x = np.array([just_after(t0)]), start.states[None, :]
     stores = StateTransfer(twin.program.form)
     stored = dict(zip(stores.names, stores.of(lambda: twin, times, x)[0], strict=True))
@@ -128,9 +152,9 @@ def start_of_waves(
     return states, WaveStart(np.array(speeds), np.array([through[spring.index, 0] for spring in springs]))
 
 
-def _all_along(form: StateForm, given: Mapping[str, float]) -> dict[str, float]:
+def _all_along(form: StateForm, initial: Mapping[str, float]) -> dict[str, float]:
     """Start values of the twin: a torque of an end stands all along the wave."""
-    values = dict(given)
+    values = dict(initial)
     for name in dict.fromkeys(form.graph.part_of(end).name for end in form.waves):
         ends = {end: values.pop(end) for end in (f"{name}.tau", f"{name}.tau_a", f"{name}.tau_b") if end in values}
         if len({*ends.values()}) > 1:
@@ -147,15 +171,15 @@ def _is_wave(form: StateForm, part: int) -> bool:
     return any(form.graph.branches[end].part == part for end in form.waves)
 
 
-def engine_of_waves(asked: str) -> tuple[str, str]:
+def engine_of_waves(engine: str) -> tuple[str, str]:
     """The engine of a model with lines, and why.
 
     Raises:
         ParameterError: another one was asked for.
     """
-    if asked not in ("auto", "wave"):
+    if engine not in ("auto", "wave"):
         raise ParameterError(
-            f"engine = {asked!r} knows no travelling waves. Take the engine 'auto', or another model of the shaft: "
+            f"engine = {engine!r} knows no travelling waves. Take the engine 'auto', or another model of the shaft: "
             "model=Spectral(16) or Lumped(100)."
         )
     return "wave", WHY
@@ -210,10 +234,10 @@ def solve_waves(
         torque0=start.torques if isinstance(start, WaveStart) else None,
         past=None if carried is None else carried.past,
     )
-    found = solve(delayed)
-    x = np.hstack([found.x, found.h])
-    dense = _StatesAndWaves(found, past_of(delayed), impedances, lines_by_shaft(bound, system))
-    return Trajectory(found.t, x, dense, found.statistics)
+    trajectory = solve(delayed)
+    x = np.hstack([trajectory.x, trajectory.h])
+    dense = _StatesAndWaves(trajectory, past_of(delayed), impedances, lines_by_shaft(bound, system))
+    return Trajectory(trajectory.t, x, dense, trajectory.statistics)
 
 
 def checked_lines(

@@ -16,6 +16,7 @@ from shaftwork.core.errors import ParameterError, SimulationError
 from shaftwork.pipeline.analysis import Given, Point, Time, operating_point
 from shaftwork.pipeline.arguments import relative_tolerance, time_span
 from shaftwork.pipeline.model import Model
+from shaftwork.pipeline.motion_start import refuse_motion
 from shaftwork.pipeline.phases.model import PhasedModel
 from shaftwork.pipeline.sensitivities.differentiable import rows_of, smooth_parameters, without_start
 from shaftwork.pipeline.sensitivities.legs import motion_of
@@ -23,6 +24,7 @@ from shaftwork.pipeline.sensitivities.motion_slopes import MotionSlopes
 from shaftwork.pipeline.start import refuse_motion
 from shaftwork.results.course import SMALLEST, turning_points
 from shaftwork.results.measures import KINDS, Measure
+from shaftwork.results.measures import KINDS, SMALLEST, Measure
 from shaftwork.results.sensitivities import FrequencySensitivities, MotionSensitivities
 from shaftwork.results.slopes import Complex
 from shaftwork.results.solution import Solution
@@ -71,14 +73,14 @@ def frequency_sensitivities(
     changes = derivatives.jacobian_slopes(time, x, p)
     slopes = np.array([_slope(left[:, k], changes, right[:, k]) for k in swinging]).reshape(len(swinging), len(names))
     values = dict(zip(equations.parameters, p.tolist(), strict=True))
-    given = {name: values.get(name, model.parameters[name]) for name in names}
-    return FrequencySensitivities(model.name, given, rates[swinging], slopes)
+    nominal = {name: values.get(name, model.parameters[name]) for name in names}
+    return FrequencySensitivities(model.name, nominal, rates[swinging], slopes)
 
 
 def _slope(left: Complex, changes: Array, right: Complex) -> Complex:
     """(parameters,) derivative of one rate."""
-    made: Complex = np.einsum("i,pij,j->p", left.conj(), changes, right) / (left.conj() @ right)
-    return made
+    slope: Complex = np.einsum("i,pij,j->p", left.conj(), changes, right) / (left.conj() @ right)
+    return slope
 
 
 def _roundings(matrix: Array, left: Complex, right: Complex) -> Array:
@@ -141,19 +143,19 @@ def motion_sensitivities(
         )
     rows_of(model)
     smooth_parameters(model, parameters, (model,), span)  # what is wrong with them is said before the motion is made
-    integrands = dict.fromkeys(made for measure in measures.values() if (made := integrand(measure)) is not None)
+    integrands = dict.fromkeys(item for measure in measures.values() if (item := integrand(measure)) is not None)
     motion = motion_of(model, span, initial, max(TIGHTER * tolerance, TIGHTEST))
     names = smooth_parameters(model, parameters, motion.models, span)
     names = without_start(model, names, initial, span, are_asked=parameters is not None)
-    given = {name: model.parameters[name] for name in names}
+    nominal = {name: model.parameters[name] for name in names}
     quantities = dict.fromkeys(measure.quantity for measure in measures.values())
     if unknown := [name for name in quantities if name not in motion.solution]:
         _ = motion.solution[unknown[0]]  # raises, with what there is
-    slopes = MotionSlopes(motion, given, tuple(quantities), tuple(integrands), tolerance)
+    slopes = MotionSlopes(motion, nominal, tuple(quantities), tuple(integrands), tolerance)
     integrals = dict(zip(integrands, slopes.integrals(), strict=True))
-    found = {name: measured(made, motion.solution, slopes, integrals) for name, made in measures.items()}
-    values = {name: value for name, (value, _) in found.items()}
-    return MotionSensitivities(model.name, given, values, {name: by for name, (_, by) in found.items()})
+    results = {name: measured(item, motion.solution, slopes, integrals) for name, item in measures.items()}
+    values = {name: value for name, (value, _) in results.items()}
+    return MotionSensitivities(model.name, nominal, values, {name: by for name, (_, by) in results.items()})
 
 
 def _near(model: Model, at: Point, t: Time) -> tuple[Model, Array, Array, float]:
@@ -212,12 +214,12 @@ def _extreme(measure: Measure, slopes: MotionSlopes) -> tuple[float, Array]:
     highest = np.flatnonzero(heights >= level).tolist()
     signs = np.sign(turns.values) if measure.kind == "peak" else np.ones(len(turns.values))
     times = [slopes.turning(measure.quantity, float(turns.t[k])) for k in highest]
-    found = np.array([signs[k] * slopes.slopes(measure.quantity, t) for k, t in zip(highest, times, strict=True)])
-    if (np.ptp(found, axis=0) * np.abs(slopes.parameters) > ALIKE * np.abs(turns.values).max()).any():
+    derivatives = np.array([signs[k] * slopes.slopes(measure.quantity, t) for k, t in zip(highest, times, strict=True)])
+    if (np.ptp(derivatives, axis=0) * np.abs(slopes.parameters) > ALIKE * np.abs(turns.values).max()).any():
         words = " and ".join(f"{time:.9g}" for time in times[:2])
         raise SimulationError(
             f"'{measure}' is reached at t = {words} s alike, and which of them is higher depends on the parameters: "
             "there is no derivative. Take a shorter or a longer motion."
         )
     best = int(heights.argmax())
-    return float(signs[best] * turns.values[best]), np.asarray(found[highest.index(best)])
+    return float(signs[best] * turns.values[best]), np.asarray(derivatives[highest.index(best)])

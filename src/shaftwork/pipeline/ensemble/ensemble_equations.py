@@ -51,7 +51,7 @@ class EnsembleCode:
         self.model, self._rows, self._stores = model, model.rows, stores
         self._expressed = Observables(model.form, model.rows)
         quantities = [self._expressed.quantity(measure.quantity) for measure in measures]
-        read = [found for found in quantities if found is not None]
+        read = [expression for expression in quantities if expression is not None]
         if len(read) < len(quantities):
             raise CompileError("A measure is of a power, an energy or a place along a shaft.")
         self._extremes = [row for row, measure in enumerate(measures) if measure.kind in EXTREMES]
@@ -64,8 +64,8 @@ class EnsembleCode:
         self._parts = {"rates": self.program.rates, "guards": self.program.guards, "shown": self.program.quantities}
         stored = [self._expressed.store(name) for name in stores.names] if self.program.guards else []
         self._parts["stored"] = lane_expressions(self._rows, stored)
-        made = tuple(one for part in self._parts.values() for one in part)
-        self._points = lane_function(made, self.program.variables)
+        expressions = tuple(one for part in self._parts.values() for one in part)
+        self._points = lane_function(expressions, self.program.variables)
         """What is asked for at the ends of phases."""
 
     def extreme(self, row: int) -> int:
@@ -78,8 +78,8 @@ class EnsembleCode:
 
     def motion(self, t: Array, x: Array, p: Array) -> tuple[Array, Array]:
         """Rates (n, k) and guards (guards, k) at times (k,), states (n, k), parameters (parameters, k)."""
-        made = self._part(t, x, p)
-        return made["rates"], made["guards"]
+        parts = self._part(t, x, p)
+        return parts["rates"], parts["guards"]
 
     def stored(self, t: Array, x: Array, p: Array) -> Array:
         """All that is stored, in the order of the names of `codegen.stores.Stores`; arguments as for `motion`."""
@@ -145,7 +145,8 @@ class EnsembleEquations:
             self.sides, sizes = np.zeros(0), model.prepare(self._base).atol.tolist()
         else:
             pairs = zip(assembly.elements, modes, strict=True)
-            self._base = assembly.vector(first, {made.number: made.modes[name].value for made, name in pairs})
+            numbers = {element.number: element.modes[name].value for element, name in pairs}
+            self._base = assembly.vector(first, numbers)
             self.sides, sizes = assembly.sides(modes), assembly.sizes(self._base)
         places = {name: k for k, name in enumerate(model.parameters)}
         self._places = [(places[name], column) for column, name in enumerate(names) if name in places]
@@ -175,24 +176,24 @@ class EnsembleEquations:
         near_rates, near = self.code.motion(t + self._tick, moved, p)
         side, bands, step = self.sides[:, None], np.abs(near - now), self._step(rates)
         value = side * now
-        falls, known = np.zeros_like(value, dtype=bool), np.zeros_like(value, dtype=bool)
+        falls, decided = np.zeros_like(value, dtype=bool), np.zeros_like(value, dtype=bool)
         here, beside = (t, x, rates, now), (t + self._tick, moved, near_rates, near)
         for _ in range(2):  # where nothing moves yet, its acceleration tells
             here, beside = self._later(step, here, p), self._later(step, beside, p)
             gain, other = side * (here[3] - now), side * (beside[3] - near)
             sure = np.abs(gain) > np.maximum(np.abs(gain - other), FEW * bands / ROUNDINGS)
-            falls |= ~known & sure & (gain < 0)
-            known |= sure
+            falls |= ~decided & sure & (gain < 0)
+            decided |= sure
         good = (value < -bands) | ((value <= bands) & falls)
         clear = np.where(2 * value > -CLEAR * bands, np.maximum(value, 0.0) + CLEAR * bands, bands)
         return PhaseEntry(np.all(good[self.watched], axis=0), np.maximum(clear, NOTHING))
 
     def _rounded(self, x: Array, rates: Array) -> Array:
         """The states so far away as rounding may move them, and the time by a tick; see `moments.Regime.rounded`."""
-        way = np.array([(-1.0) ** k for k in range(len(x))])[:, None]
-        part = way * np.array([(0.5 + k * GOLDEN % 1) * ROUNDINGS * EPS for k in range(len(x))])[:, None]
+        signs = np.array([(-1.0) ** k for k in range(len(x))])[:, None]
+        part = signs * np.array([(0.5 + k * GOLDEN % 1) * ROUNDINGS * EPS for k in range(len(x))])[:, None]
         least = part * self.sizes[:, None] / NOMINAL
-        return np.asarray(x + part * np.abs(x) + least + way * self._tick * np.abs(rates))
+        return np.asarray(x + part * np.abs(x) + least + signs * self._tick * np.abs(rates))
 
     def _step(self, rates: Array) -> Array:
         """(k,) how far in s the further course is looked at."""

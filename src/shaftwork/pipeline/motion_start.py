@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -23,7 +22,7 @@ from shaftwork.pipeline.prepared import EngineModel, Prepared
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
-    from shaftwork.integrate.lossless.lines import Past
+    from shaftwork.pipeline.wave_motion import CarriedWaves, WaveStart
 
 _RESTING: WeakKeyDictionary[CircuitGraph, tuple[Diagnostic, ...]] = WeakKeyDictionary()
 """What `resting_trains` gives: it takes as long as a short run."""
@@ -31,46 +30,6 @@ SAME_TIME = 1e-12
 """Times that differ by less than this fraction are one: units are converted."""
 NAMED = 3
 """Parts of another network that a message names."""
-
-
-@dataclass(frozen=True)
-class CarriedWaves:
-    """What is on its way in lines where a motion ended.
-
-    Args:
-        past: what has left their ends.
-        lines: by shaft (2, lines), impedances in N m s and delays in s.
-    """
-
-    past: Past
-    lines: Mapping[str, Array]
-
-
-@dataclass(frozen=True)
-class WaveStart:
-    """How lines start: their speed runs straight from end to end, their torque is the same all along.
-
-    Args:
-        speeds: (2 lines,) of the ends, rad/s.
-        torques: (lines,) that the first end takes in, N m.
-    """
-
-    speeds: Array
-    torques: Array
-
-
-@runtime_checkable
-class _Carries(Protocol):
-    """Dense output that knows the waves on their way."""
-
-    def carried(self, t: float) -> CarriedWaves | None:
-        """What is on its way at a time in s; None where leaps do not know it."""
-        ...
-
-
-def on_their_way(dense: object, t: float) -> CarriedWaves | None:
-    """The waves on their way at a time in s of a motion with this dense output; None where leaps do not know them."""
-    return dense.carried(t) if isinstance(dense, _Carries) else None
 
 
 def waving(graph: CircuitGraph) -> tuple[str, ...]:
@@ -156,7 +115,8 @@ def ending_of(motion: Solution, graph: CircuitGraph) -> Ending:
             "Or begin with start values, initial={name: sol[name][-1] for name in sol.states} and t_start=sol.t[-1]."
         )
     t, x = float(motion.t[-1]), motion.x[-1]
-    observer, waves = motion.observer, on_their_way(motion.dense, t) if waving(graph) else None
+    observer, carried = motion.observer, getattr(motion.dense, "carried", None)
+    waves = carried(t) if waving(graph) and carried is not None else None
     return Ending(observer.held(t, x), t, observer.read_at(t), observer.modes_at(t), motion.parameters, waves)
 
 
@@ -199,9 +159,9 @@ def warn_of_rest(graph: CircuitGraph, initial: Mapping[str, float]) -> None:
     moved = {str(name).rpartition(".")[0] for name, value in initial.items() if value}
     if (resting := _RESTING.get(graph)) is None:
         resting = _RESTING[graph] = resting_trains(graph)
-    for found in resting:
-        if moved.isdisjoint((*found.parts, *found.nodes)):
-            warn(f"'{graph.name}' has a train that stays at rest: {found}", NetworkWarning)
+    for train in resting:
+        if moved.isdisjoint((*train.parts, *train.nodes)):
+            warn(f"'{graph.name}' has a train that stays at rest: {train}", NetworkWarning)
 
 
 def start_of(
@@ -222,19 +182,19 @@ def start_of(
     if initial is None and not model.form.has_impulses:
         return np.zeros(len(model.states)), None
     _, after = model.switching.timeline(prepared.p, *span).sides(span[0])
-    given = dict(zip(model.parameters, prepared.p.tolist(), strict=True))
+    values = dict(zip(model.parameters, prepared.p.tolist(), strict=True))
     if isinstance(initial, Ending) and (initial.waves is not None or not model.form.waves):
-        return _taken_up(prepared, initial, after, changes=bool(initial.changed(given))), initial.waves
+        return _taken_up(prepared, initial, after, changes=bool(initial.changed(values))), initial.waves
     if not model.form.waves:
         return initial_state(prepared.bound, {} if initial is None else initial, after), None
-    from shaftwork.pipeline.waves import start_of_waves
+    from shaftwork.pipeline.wave_motion import start_of_waves
 
     if isinstance(initial, Ending):
         warn_of_lost_waves(span[0], in_leaps=True)
         initial = {name: initial[name] for name in model.states}
     elif initial and span[0] != 0:
         warn_of_lost_waves(span[0])
-    return start_of_waves(prepared.bound, model.twin.bind(model.twin.vector(given)), initial or {}, after)
+    return start_of_waves(prepared.bound, model.twin.bind(model.twin.vector(values)), initial or {}, after)
 
 
 def _taken_up(prepared: Prepared, ending: Ending, after: float, *, changes: bool) -> Array:

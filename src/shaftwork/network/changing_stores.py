@@ -131,7 +131,9 @@ def _boundary(node: Basic) -> tuple[Symbol, Expr] | None:
 def _sides(capacity: Expr, symbol: Symbol, place: float) -> tuple[Expr, Expr]:
     """A capacity in one variable just below and just above a boundary: its conditions read there, the rest at it."""
     low, high = (
-        capacity.xreplace({node: node.subs(symbol, place + way) for node in capacity.atoms(*STEPS)}).subs(symbol, place)
-        for way in (-BESIDE * max(1, abs(place)), BESIDE * max(1, abs(place)))
+        capacity.xreplace({node: node.subs(symbol, place + offset) for node in capacity.atoms(*STEPS)}).subs(
+            symbol, place
+        )
+        for offset in (-BESIDE * max(1, abs(place)), BESIDE * max(1, abs(place)))
     )
     return low, high
