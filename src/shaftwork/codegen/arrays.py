@@ -205,9 +205,7 @@ class BoundArrays:
             across: (k,) what is across the branch, where the expression reads it.
         """
         form, template = self.program.form, self.program.form.graph.branches[branch].template
-        angle: Any = 0.0
-        if branch in form.integrals:
-            angle = x[len(form.states) - len(form.integrals) + form.integrals.index(branch)]
+        angle: Any = x[form.integral_places[branch]] if branch in form.integral_places else 0.0
         names = form.graph.part_of(branch).parameters
         values = self.p[[names[symbol.name] for symbol in template.symbols]]
         return np.asarray(vectorised((TIME, ACROSS, INTEGRAL, *template.symbols), law)(t, across, angle, *values))

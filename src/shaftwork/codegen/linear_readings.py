@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -134,6 +135,21 @@ class GivenSpeeds:
     def move(self, read: Read) -> Any:
         """Whether start values have a part in speeds."""
         return ~_is_nothing(read(self.states), self.states)[..., 2]
+
+    @cached_property
+    def _at_nodes(self) -> tuple[Array, Any]:
+        return self.of(lambda history: history.potentials), self.move(lambda history: history.potentials)
+
+    def at_ends(self, first: int, last: int) -> tuple[float, float]:
+        """The speeds in rad/s at the first and the last node of a shaft, between which those along it run.
+
+        A speed that start values and sources give counts as it is. What a source has jolted at the start is at rest
+        here: that has not yet run along the shaft. Of a shaft with no given speed at either end both are at rest.
+        """
+        speeds, are_given = self._at_nodes
+        if not (are_given[first] or are_given[last]):
+            return 0.0, 0.0
+        return float(speeds[first]), float(speeds[last])
 
 
 def _is_nothing(speeds: Array, history: BranchHistory) -> Any:

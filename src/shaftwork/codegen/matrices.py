@@ -226,7 +226,7 @@ class _MatrixBlocks:
         self._loops = self.own(loops)
         self._cutsets = self._loops if cutsets is loops else self.own(cutsets)
         self._cache: dict[tuple[bool, str, str], Any] = {}
-        self._integrals, self._readings = form.integrals, form.readings
+        self._integral_places, self._readings = form.integral_places, form.readings
         self._states, self._inputs = len(form.states), inputs
 
     def __getattr__(self, name: str) -> NDArray[np.intp]:
@@ -303,8 +303,8 @@ class _MatrixBlocks:
         across_x, across_u = self._of_tree(self.own(potentials[nodes]), g_x, g_u)
         carried = self._selection(stores, self._loops.shape[0]) - self._cutsets[stores]  # -Q in a tree
         through_x, through_u = carried[:, self.L] @ self.pick("L"), carried[:, self.W] @ self.input("W")
-        place = {branch: len(self.C) + len(self.L) + k for k, branch in enumerate(self._integrals)}
-        angles = self._selection(np.array([place[int(branch)] for branch in integrals], dtype=np.intp), self._states)
+        places = np.array([self._integral_places[int(branch)] for branch in integrals], dtype=np.intp)
+        angles = self._selection(places, self._states)
         none = self.nothing(len(integrals), self._inputs)
         return self.stack([C, across_x, through_x, angles]), self.stack([D, across_u, through_u, none])
 
@@ -318,7 +318,7 @@ class _MatrixBlocks:
     def integral_rows(self, outputs: NDArray[np.intp], C: Any, D: Any) -> tuple[Any, Any]:
         """The rows z' = y of the integrals."""
         place = {int(branch): k for k, branch in enumerate(outputs)}
-        rows = np.array([place[branch] for branch in self._integrals], dtype=np.intp)
+        rows = np.array([place[branch] for branch in self._integral_places], dtype=np.intp)
         return C[rows], D[rows]
 
     def _selection(self, columns: NDArray[np.intp], width: int) -> Any:

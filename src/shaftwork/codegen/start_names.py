@@ -111,15 +111,14 @@ class StartNames:
     def ties(self) -> Any:
         """(tied stores, n) what each of them is of the states, sparse, in the order of `tied`."""
         form, part, n = self._form, self._bound.part, len(self.places)
-        first = len(form.across_states)
         ties = sparse.lil_array((len(self.tied), n))
         blocks = (
-            (part.loops.T, form.dependent_across, form.across_states, slice(0, first), 0),
+            (part.loops.T, form.dependent_across, form.across_states, form.speeds, 0),
             (
                 -part.cutsets,
                 form.dependent_through,
                 form.through_states,
-                slice(first, first + len(form.through_states)),
+                form.torques,
                 len(form.dependent_across),
             ),
         )

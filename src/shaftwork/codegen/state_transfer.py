@@ -202,8 +202,6 @@ class _Maps:
         self.part, self._form, self._branches, self._columns = part, form, branches, columns
         self._loops: Array = part.loops.toarray()
         self._cutsets: Array = self._loops if part.cutsets is part.loops else part.cutsets.toarray()
-        across, through = len(form.across_states), len(form.through_states)
-        self._speeds, self._torques = slice(across), slice(across, across + through)
 
     @cached_property
     def to_stores(self) -> Array:
@@ -215,9 +213,9 @@ class _Maps:
                 continue
             branch = self._branches[column]
             if branch in form.tree.loops:
-                matrix[self._speeds, column] = self._loops[list(form.across_states), branch]
+                matrix[form.speeds, column] = self._loops[list(form.across_states), branch]
             else:
-                matrix[self._torques, column] = -self._cutsets[branch, list(form.through_states)]
+                matrix[form.torques, column] = -self._cutsets[branch, list(form.through_states)]
         return matrix
 
     @cached_property
@@ -227,7 +225,7 @@ class _Maps:
         size, angles, stores = len(form.states), len(form.integrals), len(self._branches)
         by_branches, by_inputs = np.zeros((size, len(k))), np.zeros((size, laws + len(form.across_inputs)))
         across, through = list(form.across_states), list(form.through_states)
-        speeds, torques = self._speeds, self._torques
+        speeds, torques = form.speeds, form.torques
         by_branches[speeds, across], by_branches[torques, through] = np.eye(len(across)), np.eye(len(through))
         if other := list(form.dependent_across):
             F, Q = (matrix[np.ix_(across, other)] for matrix in (self._loops, self._cutsets))

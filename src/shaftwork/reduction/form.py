@@ -15,6 +15,7 @@ eliminated quantity comes back from F and Q.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -174,6 +175,21 @@ class StateForm:
             *(_through_state(self.graph, self.graph.branches[index]) for index in self.through_states),
             *(_integral_state(self.graph, self.graph.branches[index]) for index in self.integrals),
         )
+
+    @cached_property
+    def speeds(self) -> slice:
+        """Where across variables are among the states."""
+        return slice(len(self.across_states))
+
+    @cached_property
+    def torques(self) -> slice:
+        """Where through variables are among the states."""
+        return slice(self.speeds.stop, self.speeds.stop + len(self.through_states))
+
+    @cached_property
+    def integral_places(self) -> Mapping[int, int]:
+        """Where the integrals are among the states, by branch."""
+        return {branch: k for k, branch in enumerate(self.integrals, self.torques.stop)}
 
 
 def state_form(graph: CircuitGraph, angles: tuple[int, ...] = ()) -> StateForm:
