@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -28,6 +28,14 @@ LINEAR = (Kind.ACROSS_STORE, Kind.THROUGH_STORE, Kind.CONDUCTANCE)
 FARTHEST = 1e100
 """Sizes of coefficients in SI up to it, and down to its reciprocal: products of a few leave the range of floating-point
 numbers, as that of a shaft of 1e60 m, whose diameter counts to the fourth power."""
+AT_ONCE = 2_000_000
+"""Numbers of many instants or columns that are made at once, 16 MB."""
+
+
+def blocks(count: int, width: int) -> Iterator[slice]:
+    """Places 0 to `count` in blocks, of as many as are made at once where each holds `width` numbers; at least one."""
+    size = max(1, AT_ONCE // max(1, width))
+    return (slice(first, min(first + size, count)) for first in range(0, max(count, 1), size))
 
 
 @dataclass(frozen=True, eq=False)

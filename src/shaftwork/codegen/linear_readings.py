@@ -11,12 +11,10 @@ import numpy as np
 from scipy import sparse
 
 from shaftwork.codegen.arrays import BoundArrays
-from shaftwork.codegen.elements import Array
+from shaftwork.codegen.elements import Array, blocks
 from shaftwork.codegen.products import Factor
 from shaftwork.codegen.recovery import BranchHistory, GivenHistory
 
-LARGEST_BLOCK = 2_000_000
-"""Values, branches by columns, that are made at once."""
 ROUNDING = 1e-12
 """A part of the largest value that is rounding."""
 GOLDEN = (5**0.5 - 1) / 2
@@ -97,9 +95,7 @@ class ReadingMatrices:
 
 def _units(bound: BoundArrays, size: int) -> Iterator[Array]:
     """The columns of a unit matrix, in blocks of which all branch quantities may be made at once."""
-    width = max(1, LARGEST_BLOCK // max(1, len(bound.program.form.graph.branches)))
-    for first in range(0, max(size, 1), width):
-        yield np.eye(size)[:, first : first + width]
+    return (np.eye(size)[:, block] for block in blocks(size, len(bound.program.form.graph.branches)))
 
 
 @dataclass(frozen=True)
