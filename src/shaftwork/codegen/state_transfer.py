@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
-from shaftwork.codegen.elements import Array, GainMatrix, potential_matrix, share_matrix
+from shaftwork.codegen.elements import Array
 from shaftwork.codegen.matrices import LinearPart
 from shaftwork.codegen.mobility import Mobility
 from shaftwork.codegen.recovery import BranchHistory
@@ -131,12 +131,9 @@ class StateTransfer:
         if self._form.inertial:
             part = self._form.graph.part_of(self._form.inertial[0]).name
             raise CompileError(f"An impulse meets '{part}', whose inertia changes: no impact can be told there.")
-        nodes, shares = (matrix(bound.p).toarray() for matrix in self._nodes)
+        program = bound.program
+        nodes, shares = (matrix(bound.p).toarray() for matrix in (program.potentials, program.shares))
         return Mobility(self._form, bound, nodes, shares, pairs)
-
-    @cached_property
-    def _nodes(self) -> tuple[GainMatrix, GainMatrix]:
-        return potential_matrix(self._form), share_matrix(self._form)
 
     def impulses(self, bound: BoundArrays, gained: Mapping[str, float]) -> Array:
         """(branches,) what passes through every branch at once where stores gain so much; of a coupling its lambda.
