@@ -1,4 +1,4 @@
-"""What quantities are made of: of which states, of what sources prescribe, or of laws and accelerations."""
+"""How quantities follow from states, from what sources prescribe, and from laws and accelerations."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ class Steps:
     """Some steps of lanes.
 
     Args:
-        step: a `codegen.lanes.LaneStep`.
+        step: a `codegen.lane_step.LaneStep`.
         taken: (used, k) what it takes of the parameters.
         made: (m + 1, height, k) columns: at the start, and what each of m steps has written.
     """
@@ -101,7 +101,7 @@ class LaneRun:
     """Lanes on their way.
 
     Args:
-        step: a `codegen.lanes.LaneStep`.
+        step: a `codegen.lane_step.LaneStep`.
         room: for its steps.
         x: (n, k) states.
         rates: (n, k) theirs.
