@@ -11,7 +11,7 @@ from scipy import sparse
 from sympy import Expr
 
 from shaftwork.codegen.code import vectorised
-from shaftwork.codegen.elements import Array, GainMatrix, potential_matrix, rationals
+from shaftwork.codegen.elements import Array, GainMatrix, node_matrix, rationals
 from shaftwork.codegen.inputs import Inputs, where
 from shaftwork.codegen.loops import LoopSolver
 from shaftwork.codegen.matrices import LinearPart, MatrixAssembly
@@ -41,10 +41,15 @@ class ArrayProgram:
     def __reduce__(self) -> tuple[Any, ...]:
         return ArrayProgram, (self.form,)  # compiled code cannot be stored
 
-    @cached_property
+    @property
     def potentials(self) -> GainMatrix:
         """(nodes, branches): the across variable of every node from those of the tree branches."""
-        return potential_matrix(self.form)
+        return self.assembly.potentials
+
+    @cached_property
+    def shares(self) -> GainMatrix:
+        """(nodes, branches): what passes through the tree branches where a unit is put in at a node."""
+        return node_matrix(self.form, self.form.tree.shares)
 
     def bind(self, p: Array) -> BoundArrays:
         """The program with its matrices made for one parameter vector."""
@@ -205,9 +210,7 @@ class BoundArrays:
             across: (k,) what is across the branch, where the expression reads it.
         """
         form, template = self.program.form, self.program.form.graph.branches[branch].template
-        angle: Any = 0.0
-        if branch in form.integrals:
-            angle = x[len(form.states) - len(form.integrals) + form.integrals.index(branch)]
+        angle: Any = x[form.integral_places[branch]] if branch in form.integral_places else 0.0
         names = form.graph.part_of(branch).parameters
         values = self.p[[names[symbol.name] for symbol in template.symbols]]
         return np.asarray(vectorised((TIME, ACROSS, INTEGRAL, *template.symbols), law)(t, across, angle, *values))

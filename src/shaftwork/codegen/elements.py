@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -28,6 +28,14 @@ LINEAR = (Kind.ACROSS_STORE, Kind.THROUGH_STORE, Kind.CONDUCTANCE)
 FARTHEST = 1e100
 """Sizes of coefficients in SI up to it, and down to its reciprocal: products of a few leave the range of floating-point
 numbers, as that of a shaft of 1e60 m, whose diameter counts to the fourth power."""
+AT_ONCE = 2_000_000
+"""Numbers of many instants or columns that are made at once, 16 MB."""
+
+
+def blocks(count: int, width: int) -> Iterator[slice]:
+    """Places 0 to `count` in blocks, of as many as are made at once where each holds `width` numbers; at least one."""
+    size = max(1, AT_ONCE // max(1, width))
+    return (slice(first, min(first + size, count)) for first in range(0, max(count, 1), size))
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,33 +180,23 @@ class GainMatrix:
         return sparse.csr_array((data, (self._rows, self._columns)), shape=self._shape)
 
 
-def loop_matrix(form: StateForm) -> GainMatrix:
-    """F, (branches, branches): entry (tree branch, link) is the factor of the tree branch in the loop of the link."""
-    return _of_links(form, form.tree.loops)
+def link_matrix(form: StateForm, rows: Mapping[int, Row]) -> GainMatrix:
+    """(branches, branches) from the rows of links: of loops F, of cutsets Q.
 
-
-def cutset_matrix(form: StateForm) -> GainMatrix:
-    """Q, (branches, branches): entry (tree branch, link) is the factor of the link in the cutset of the tree branch."""
-    return _of_links(form, form.tree.cutsets)
-
-
-def _of_links(form: StateForm, rows: Mapping[int, Row]) -> GainMatrix:
+    The entry (tree branch, link) is the factor of the tree branch in the loop of the link, or that of the link in the
+    cutset of the tree branch.
+    """
     size = len(form.graph.branches)
     entries = [(tree, link, gain) for link, row in rows.items() for tree, gain in row.items()]
     return GainMatrix(form.graph, entries, (size, size))
 
 
-def potential_matrix(form: StateForm) -> GainMatrix:
-    """(nodes, branches): the across variable of every node from those of the tree branches."""
-    return _of_nodes(form, form.tree.potentials)
+def node_matrix(form: StateForm, rows: Sequence[Row | None]) -> GainMatrix:
+    """(nodes, branches) from the rows of nodes, which hold factors of tree branches.
 
-
-def share_matrix(form: StateForm) -> GainMatrix:
-    """(nodes, branches): what passes through the tree branches where a unit is put in at a node."""
-    return _of_nodes(form, form.tree.shares)
-
-
-def _of_nodes(form: StateForm, rows: Sequence[Row | None]) -> GainMatrix:
+    Of potentials: the across variable of every node from those of the tree branches. Of shares: what passes through the
+    tree branches where a unit is put in at a node.
+    """
     shape = (len(form.graph.nodes), len(form.graph.branches))
     entries = [(node, tree, gain) for node, row in enumerate(rows) if row is not None for tree, gain in row.items()]
     return GainMatrix(form.graph, entries, shape)

@@ -252,16 +252,9 @@ class HeyokaProgram:
         import heyoka
 
         size = heyoka.par[self.weights.start + number] * (value**2 + NEAR**2)
-        weakly = ref(self)
-
-        def weigh(integrator: Any, _direction: int) -> bool:
-            program = weakly()
-            assert program is not None  # noqa: S101 (whose run it is)
-            program.weigh(integrator)
-            return True
-
+        callback = self._callback(HeyokaProgram.weigh)
         return heyoka.t_event(
-            (size - WEIGHT**2) * (1.0 - size), direction=heyoka.event_direction.negative, callback=weigh
+            (size - WEIGHT**2) * (1.0 - size), direction=heyoka.event_direction.negative, callback=callback
         )
 
     def _end(self, number: int, guard: Any, listeners: list[Listener]) -> Any:
@@ -293,19 +286,27 @@ class HeyokaProgram:
 
     def _passed(self, number: int) -> Callable[[Any, int], bool]:
         """What happens where a switch leaves its side: it has the other, or a whole number gives way to the next."""
-        place, weakly = self.signs.start + number, ref(self)
+        if self.held is not None and number in self.held.by_switch:
+            return self._callback(lambda program, integrator: program.step(number, integrator))
+        place = self.signs.start + number
 
         def turn(integrator: Any, _direction: int) -> bool:
             integrator.pars[place] = -integrator.pars[place]
             return True
 
-        def step(integrator: Any, _direction: int) -> bool:
+        return turn
+
+    def _callback(self, change: Callable[[HeyokaProgram, Any], None]) -> Callable[[Any, int], bool]:
+        """What an event calls that changes an integrator, and lets it go on; it does not lead back to the program."""
+        weakly = ref(self)
+
+        def callback(integrator: Any, _direction: int) -> bool:
             program = weakly()
             assert program is not None  # noqa: S101 (whose run it is)
-            program.step(number, integrator)
+            change(program, integrator)
             return True
 
-        return step if self.held is not None and number in self.held.by_switch else turn
+        return callback
 
 
 @dataclass(frozen=True)
@@ -349,19 +350,20 @@ def build(
     translator = Translator(states, time, parameters, stepping, fixed)
     translated = tuple(translator.expression(row) for row in rows)
     watched = tuple(translator.expression(guard) for guard in guards)
+    moving = frozenset(states)
     return HeyokaProgram(
         translator.variables,
         translated,
-        tuple(translator.switches),
-        tuple(translator.conditions),
-        np.array(translator.timed, dtype=bool),
-        first + stepping,
-        fixed,
-        tuple(translator.fading.values()),
-        watched,
-        HeldParameters(translator.held, translator.variables, first) if stepping else None,
-        np.array(translator.stepping, dtype=bool),
-        any(_singular(node, frozenset(states), time) for row in rows for node in row.atoms(sympy.Pow, *POLES)),
+        switches=tuple(translator.switches),
+        conditions=tuple(translator.conditions),
+        timed=np.array(translator.timed, dtype=bool),
+        parameter_count=first + stepping,
+        fixed=fixed,
+        fading=tuple(translator.fading.values()),
+        guards=watched,
+        held=HeldParameters(translator.held, translator.variables, first) if stepping else None,
+        stepping=np.array(translator.stepping, dtype=bool),
+        singular=any(_singular(node, moving, time) for row in rows for node in row.atoms(sympy.Pow, *POLES)),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -77,9 +77,7 @@ class Inputs:
         place = {int(branch): k for k, branch in enumerate(order)}
         rows: tuple[int | Reading, ...] = (*form.outputs, *form.readings)
         output = {row: k for k, row in enumerate(rows)}
-        first = self.states - len(form.integrals)
-        integral = {branch: first + k for k, branch in enumerate(form.integrals)}
-        integral |= {branch: self.states + k for k, branch in enumerate(form.waves)}
+        integral = {**form.integral_places, **{branch: self.states + k for k, branch in enumerate(form.waves)}}
         self._graph = form.graph
         self._groups = tuple(self._group(alike, place, output, integral) for alike in groups_of(form.graph, order))
         self.of_time = np.ones(self.size, dtype=bool)
@@ -143,22 +141,11 @@ class Inputs:
 
     def slopes(self, t: Any, y: Array, x: Array, p: Array) -> tuple[Any, Any]:
         """The partial derivatives of u by y (m, outputs) and by the integrals among the states (m, n), sparse."""
-        by_y: list[tuple[Array, Index, Index]] = []
-        by_x: list[tuple[Array, Index, Index]] = []
-        t = np.float64(t)
+        entries: dict[bool, list[tuple[Array, Index, Index]]] = {False: [], True: []}
         with np.errstate(all="ignore"):
-            for group, parameters in zip(self._groups, self._parameters(p), strict=True):
-                if not (group.outputs.size or group.reads.size):
-                    continue
-                read, free = _read(group, y, x, parameters), np.zeros(group.inputs.size)
-                _, across, integral, *others = (None if f is None else f(t, *read) + free for f in group.slopes)
-                if across is not None:
-                    by_y.append((across, group.inputs, group.outputs))
-                if integral is not None:
-                    by_x.append((integral, group.inputs, group.integrals))
-                pairs = zip(others, group.reads, strict=True)
-                by_y += [(slopes, group.inputs, places) for slopes, places in pairs if slopes is not None]
-        return _matrix(by_y, (self.size, self.outputs)), _matrix(by_x, (self.size, self.states))
+            for inputs, by_states, places, function, read in self._partial_slopes(t, y, x, p):
+                entries[by_states].append((function(*read) + np.zeros(inputs.size), inputs, places))
+        return _matrix(entries[False], (self.size, self.outputs)), _matrix(entries[True], (self.size, self.states))
 
     def along(self, t: Any, y: Array, x: Array, p: Array, by_y: Array, by_x: Array | None = None) -> Array:
         """The slopes of u by q variables, (m, q); with t (k,), y (outputs, k) and x (n, k) it is (m, q, k).
@@ -172,20 +159,27 @@ class Inputs:
             by_x: (n, q) those of the states; None where they are zero.
         """
         result = np.zeros((self.size, by_y.shape[1], *x.shape[1:]))
-        t = np.float64(t)
         with np.errstate(all="ignore"):
-            for group, parameters in zip(self._groups, self._parameters(p), strict=True):
-                if not (group.outputs.size or group.reads.size):
-                    continue
-                _, across, integral, *others = group.slopes
-                moved = ((across, group.outputs, by_y), (integral, group.integrals, by_x))
-                reads = ((function, places, by_y) for function, places in zip(others, group.reads, strict=True))
-                read = _read(group, y, x, parameters)
-                for function, places, by in (*moved, *reads):
-                    if function is not None and places.size and by is not None:
-                        slopes = function(t, *read) + np.zeros((group.inputs.size, *x.shape[1:]))
-                        result[group.inputs] += np.einsum("i...,iq->iq...", slopes, by[places])
+            for inputs, by_states, places, function, read in self._partial_slopes(t, y, x, p):
+                if (by := by_x if by_states else by_y) is not None:
+                    slopes = function(*read) + np.zeros((inputs.size, *x.shape[1:]))
+                    result[inputs] += np.einsum("i...,iq->iq...", slopes, by[places])
         return result
+
+    def _partial_slopes(
+        self, t: Any, y: Array, x: Array, p: Array
+    ) -> Iterator[tuple[Index, bool, Index, Function, tuple[Any, ...]]]:
+        """Inputs, whether the slope is by states and no outputs, by which, the function of the slope, what it takes."""
+        t = np.float64(t)
+        for group, parameters in zip(self._groups, self._parameters(p), strict=True):
+            if group.outputs.size or group.reads.size:
+                read = (t, *_read(group, y, x, parameters))
+                _, across, integral, *others = group.slopes
+                moving = ((across, False, group.outputs), (integral, True, group.integrals))
+                reads = ((function, False, places) for function, places in zip(others, group.reads, strict=True))
+                for function, by_states, places in (*moving, *reads):
+                    if function is not None and places.size:
+                        yield group.inputs, by_states, places, function, read
 
     @cached_property
     def constant(self) -> bool:

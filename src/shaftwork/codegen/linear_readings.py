@@ -1,21 +1,20 @@
-"""What quantities are made of: of which states, of what sources prescribe, or of laws and accelerations."""
+"""How quantities follow from states, from what sources prescribe, and from laws and accelerations."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy import sparse
 
 from shaftwork.codegen.arrays import BoundArrays
-from shaftwork.codegen.elements import Array
+from shaftwork.codegen.elements import Array, blocks
 from shaftwork.codegen.products import Factor
 from shaftwork.codegen.recovery import BranchHistory, GivenHistory
 
-LARGEST_BLOCK = 2_000_000
-"""Values, branches by columns, that are made at once."""
 ROUNDING = 1e-12
 """A part of the largest value that is rounding."""
 GOLDEN = (5**0.5 - 1) / 2
@@ -96,9 +95,7 @@ class ReadingMatrices:
 
 def _units(bound: BoundArrays, size: int) -> Iterator[Array]:
     """The columns of a unit matrix, in blocks of which all branch quantities may be made at once."""
-    width = max(1, LARGEST_BLOCK // max(1, len(bound.program.form.graph.branches)))
-    for first in range(0, max(size, 1), width):
-        yield np.eye(size)[:, first : first + width]
+    return (np.eye(size)[:, block] for block in blocks(size, len(bound.program.form.graph.branches)))
 
 
 @dataclass(frozen=True)
@@ -134,6 +131,21 @@ class GivenSpeeds:
     def move(self, read: Read) -> Any:
         """Whether start values have a part in speeds."""
         return ~_is_nothing(read(self.states), self.states)[..., 2]
+
+    @cached_property
+    def _at_nodes(self) -> tuple[Array, Any]:
+        return self.of(lambda history: history.potentials), self.move(lambda history: history.potentials)
+
+    def at_ends(self, first: int, last: int) -> tuple[float, float]:
+        """The speeds in rad/s at the first and the last node of a shaft, between which those along it run.
+
+        A speed that start values and sources give counts as it is. What a source has jolted at the start is at rest
+        here: that has not yet run along the shaft. Of a shaft with no given speed at either end both are at rest.
+        """
+        speeds, are_given = self._at_nodes
+        if not (are_given[first] or are_given[last]):
+            return 0.0, 0.0
+        return float(speeds[first]), float(speeds[last])
 
 
 def _is_nothing(speeds: Array, history: BranchHistory) -> Any:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from shaftwork.codegen.elements import Array, Index
+from shaftwork.codegen.elements import Array, Index, blocks
 from shaftwork.codegen.inputs import Inputs
 from shaftwork.codegen.matrices import LinearPart
 from shaftwork.core.errors import SimulationError
@@ -31,8 +31,6 @@ NEARLY = 1e4 * ROUNDING
 """Residuals and steps up to which they are rounding where no step makes the residual smaller, as parts of the terms."""
 SAME = 1e-9
 """Part of the largest unknowns by which two starts may differ and be the same."""
-AT_ONCE = 2_000_000
-"""Slopes, inputs by loops by instants, that are made at once."""
 
 
 class LoopSolver:
@@ -84,9 +82,8 @@ class LoopSolver:
             return self.values(t, x)[1][self.places]
         if x.ndim == 1:
             return self._followed(np.array([t]), x[:, None])[:, 0]
-        size = max(1, AT_ONCE // (self._inputs.size * len(self.places)))
-        blocks = (slice(first, first + size) for first in range(0, len(t), size))
-        return np.concatenate([self._followed(t[block], x[:, block]) for block in blocks], axis=1)
+        parts = blocks(len(t), self._inputs.size * len(self.places))  # of slopes, inputs by loops
+        return np.concatenate([self._followed(t[part], x[:, part]) for part in parts], axis=1)
 
     def values(self, t: Any, x: Array) -> tuple[Array, Array]:
         """Outputs y and inputs u at states x, (n,) or (n, k) with t (k,)."""

@@ -10,7 +10,7 @@ equations are those of `reduction.form`.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -21,13 +21,12 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from shaftwork.codegen.elements import Coefficients, cutset_matrix, inverse_of_fractions, loop_matrix, potential_matrix
+from shaftwork.codegen.elements import Array, Coefficients, GainMatrix, inverse_of_fractions, link_matrix, node_matrix
 from shaftwork.codegen.products import Factor
 from shaftwork.core.errors import CompileError
 from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm
 
-Array = NDArray[np.float64]
 SINGULAR = 1e-13
 """Reciprocal condition below which a block of algebraic equations has no solution to speak of."""
 SMALL = 96
@@ -81,10 +80,14 @@ class MatrixAssembly:
         self.form = form
         self.outputs = np.array(outputs, dtype=np.intp)
         self.coefficients = Coefficients(form.graph)
-        self.loops = loop_matrix(form)
-        self.cutsets = self.loops if form.tree.cutsets is form.tree.loops else cutset_matrix(form)
-        self.potentials = potential_matrix(form) if form.readings else None
+        self.loops = link_matrix(form, form.tree.loops)
+        self.cutsets = self.loops if form.tree.cutsets is form.tree.loops else link_matrix(form, form.tree.cutsets)
         self.inputs = np.array([*form.laws, *form.across_inputs], dtype=np.intp)
+
+    @cached_property
+    def potentials(self) -> GainMatrix:
+        """(nodes, branches): the across variable of every node from those of the tree branches."""
+        return node_matrix(self.form, self.form.tree.potentials)
 
     def degenerates(self, p: Array) -> bool:
         """Whether ratios meet at p that differ in the network, so that other equations hold there."""
@@ -96,10 +99,7 @@ class MatrixAssembly:
         Raises:
             CompileError: a block of the algebraic equations is singular for these values; names its branches.
         """
-        loops = self.loops(p)
-        cutsets = loops if self.cutsets is self.loops else self.cutsets(p)
-        potentials = None if self.potentials is None else self.potentials(p)
-        part = self._assembled(loops, cutsets, self.coefficients(p), potentials)
+        part = self._assembled(lambda entries: entries(p))
         fields = {field.name: getattr(part, field.name) for field in dataclasses.fields(part)}
         return LinearPart(
             **{name: matrix if name == "coefficients" else sparse.csr_array(matrix) for name, matrix in fields.items()}
@@ -107,17 +107,17 @@ class MatrixAssembly:
 
     def rational(self, p: Array) -> LinearPart:
         """The same as full arrays of fractions: nothing is rounded, so nothing cancels."""
-        loops = self.loops.rational(p)
-        cutsets = loops if self.cutsets is self.loops else self.cutsets.rational(p)
-        potentials = None if self.potentials is None else self.potentials.rational(p)
-        return self._assembled(loops, cutsets, self.coefficients.rational(p), potentials)
+        return self._assembled(lambda entries: entries.rational(p))
 
-    def _assembled(self, F: Any, Q: Any, k: Array, potentials: Any) -> LinearPart:
-        form = self.form
-        blocks = _MatrixBlocks(form, F, Q, len(self.inputs))
-        solve_conductances = self._inverse_of_conductances(blocks, k)
-        link_g = blocks.diagonal(k[blocks.R])
+    def _assembled(self, evaluated: Callable[[Any], Any]) -> LinearPart:
+        """The matrices from evaluated coefficients, loops and cutsets."""
+        F, k = evaluated(self.loops), evaluated(self.coefficients)
+        Q = F if self.cutsets is self.loops else evaluated(self.cutsets)
+        blocks = _MatrixBlocks(self.form, F, Q, len(self.inputs))
         # across variables of the tree conductances from states and inputs
+        link_g = blocks.diagonal(k[blocks.R])
+        conductance = blocks.diagonal(k[blocks.G]) + blocks.Q("G", "R") @ link_g @ blocks.F("G", "R").T
+        solve_conductances = self._inverse(blocks, conductance, blocks.G, "conductance")
         drive_x = blocks.Q("G", "R") @ link_g @ blocks.across_x("R") + blocks.Q("G", "L") @ blocks.pick("L")
         drive_u = blocks.Q("G", "R") @ link_g @ blocks.across_u("R") + blocks.Q("G", "W") @ blocks.input("W")
         g_x, g_u = -solve_conductances @ drive_x, -solve_conductances @ drive_u
@@ -142,8 +142,8 @@ class MatrixAssembly:
         t_u = -(blocks.Q("T", "R") @ r_u + blocks.Q("T", "W") @ blocks.input("W"))
         C, D = blocks.output_rows(self.outputs, g_x, g_u)
         z_x, z_u = blocks.integral_rows(self.outputs, C, D)
-        if potentials is not None:
-            C, D = blocks.with_readings(C, D, potentials, g_x, g_u)
+        if self.form.readings:
+            C, D = blocks.with_readings(C, D, evaluated(self.potentials), g_x, g_u)
         rate_x, rate_u, rate_du = blocks.rate_rows(c_x, c_u, c_du)
         D1 = blocks.stack([blocks.nothing(*D.shape), rate_du])
         return LinearPart(
@@ -161,11 +161,6 @@ class MatrixAssembly:
             cutsets=Q,
             coefficients=k,
         )
-
-    def _inverse_of_conductances(self, blocks: _MatrixBlocks, k: Array) -> Any:
-        links = blocks.diagonal(k[blocks.R])
-        matrix = blocks.diagonal(k[blocks.G]) + blocks.Q("G", "R") @ links @ blocks.F("G", "R").T
-        return self._inverse(blocks, matrix, blocks.G, "conductance")
 
     def _inverse(self, blocks: _MatrixBlocks, matrix: Any, branches: NDArray[np.intp], what: str) -> Any:
         """The inverse, block by block of connected unknowns; diagonal where nothing is coupled."""
@@ -226,7 +221,7 @@ class _MatrixBlocks:
         self._loops = self.own(loops)
         self._cutsets = self._loops if cutsets is loops else self.own(cutsets)
         self._cache: dict[tuple[bool, str, str], Any] = {}
-        self._integrals, self._readings = form.integrals, form.readings
+        self._integral_places, self._readings = form.integral_places, form.readings
         self._states, self._inputs = len(form.states), inputs
 
     def __getattr__(self, name: str) -> NDArray[np.intp]:
@@ -303,8 +298,8 @@ class _MatrixBlocks:
         across_x, across_u = self._of_tree(self.own(potentials[nodes]), g_x, g_u)
         carried = self._selection(stores, self._loops.shape[0]) - self._cutsets[stores]  # -Q in a tree
         through_x, through_u = carried[:, self.L] @ self.pick("L"), carried[:, self.W] @ self.input("W")
-        place = {branch: len(self.C) + len(self.L) + k for k, branch in enumerate(self._integrals)}
-        angles = self._selection(np.array([place[int(branch)] for branch in integrals], dtype=np.intp), self._states)
+        places = np.array([self._integral_places[int(branch)] for branch in integrals], dtype=np.intp)
+        angles = self._selection(places, self._states)
         none = self.nothing(len(integrals), self._inputs)
         return self.stack([C, across_x, through_x, angles]), self.stack([D, across_u, through_u, none])
 
@@ -318,7 +313,7 @@ class _MatrixBlocks:
     def integral_rows(self, outputs: NDArray[np.intp], C: Any, D: Any) -> tuple[Any, Any]:
         """The rows z' = y of the integrals."""
         place = {int(branch): k for k, branch in enumerate(outputs)}
-        rows = np.array([place[branch] for branch in self._integrals], dtype=np.intp)
+        rows = np.array([place[branch] for branch in self._integral_places], dtype=np.intp)
         return C[rows], D[rows]
 
     def _selection(self, columns: NDArray[np.intp], width: int) -> Any:

@@ -30,6 +30,7 @@ ROUNDED = 1e-9
 LEAST = 1e-10
 """What is added to the diagonal of a matrix of ones, so that of many solutions the least one is found."""
 WITHOUT_INERTIA = (Kind.CONDUCTANCE, Kind.LAW, Kind.THROUGH_STORE)
+"""Kinds of tree branches whose across variables follow from torques."""
 
 
 class Mobility:
@@ -47,7 +48,8 @@ class Mobility:
         self, form: StateForm, bound: BoundArrays, nodes: Array, shares: Array, pairs: Sequence[tuple[int, int]]
     ) -> None:
         part, k = bound.part, bound.part.coefficients
-        across, links, massless = list(form.across_states), list(form.dependent_across), _massless(form)
+        across, links = list(form.across_states), list(form.dependent_across)
+        massless = [branch for kind in WITHOUT_INERTIA for branch in form.tree.tree[kind]]
         rows, pushes = _rows(nodes, pairs), _rows(shares, pairs)
         self.has_inertia: NDArray[np.bool_] = ~(rows[:, massless] != 0).any(axis=1)
         """(pairs,) whether the speeds of inertias and prescribed ones tell the speed across; else no impulse passes."""
@@ -70,17 +72,10 @@ class Mobility:
 
 
 def _rows(nodes: Array, pairs: Sequence[tuple[int, int]]) -> Array:
-    rows = [_row(nodes, plus) - _row(nodes, minus) for plus, minus in pairs]
-    return np.array(rows).reshape(len(pairs), nodes.shape[1])
-
-
-def _row(nodes: Array, node: int) -> Array:
-    return np.zeros(nodes.shape[1]) if node == GROUND else nodes[node]
-
-
-def _massless(form: StateForm) -> list[int]:
-    """Tree branches whose across variables follow from torques."""
-    return [branch for kind in WITHOUT_INERTIA for branch in form.tree.tree[kind]]
+    """(pairs, branches) differences of the rows of nodes; that of the ground is zero."""
+    ground = np.zeros(nodes.shape[1])
+    ends = [[ground if node == GROUND else nodes[node] for node in pair] for pair in pairs]
+    return np.array([plus - minus for plus, minus in ends]).reshape(len(pairs), nodes.shape[1])
 
 
 def complementary(W: Array, q: Array) -> Array | None:

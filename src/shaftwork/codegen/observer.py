@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
-from shaftwork.codegen.elements import Array
+from shaftwork.codegen.elements import Array, blocks
 from shaftwork.codegen.recovery import BranchHistory, branches_with_power
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.codegen.timeline import NOTHING, Timeline
@@ -19,9 +19,6 @@ from shaftwork.core.errors import SignalError
 from shaftwork.network.graph import CircuitGraph, GraphPart
 from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import Names, StateForm
-
-LARGEST_HISTORY = 2_000_000
-"""Values, branches by times, of a trajectory whose branch quantities are made all at once."""
 
 
 class Impact(NamedTuple):
@@ -85,12 +82,11 @@ class ModelObserver:
 
     def _read(self, t: Array, x: Array, read: Callable[[BranchHistory], Array]) -> Array:
         """What is read of a trajectory; of a large one in blocks of times, since all branches take much memory."""
-        rows = max(1, LARGEST_HISTORY // max(1, len(self._graph.branches)))
-        if len(t) <= rows:
+        parts = [*blocks(len(t), len(self._graph.branches))]
+        if len(parts) == 1:
             return read(self.history(t, x))
         times, bound = self._instants.one_sided(t), self._bind()
-        blocks = (slice(first, first + rows) for first in range(0, len(t), rows))
-        return np.concatenate([read(BranchHistory(bound, times[block], x[block])) for block in blocks])
+        return np.concatenate([read(BranchHistory(bound, times[part], x[part])) for part in parts])
 
     def signal(self, name: str, t: Array, x: Array, dense: DenseWaves | None = None) -> Array:
         """(k,) a quantity by its name in `units`; the energy of waves is read from the motion behind the states.

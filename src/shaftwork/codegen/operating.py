@@ -102,7 +102,7 @@ def _still_changing(form: StateForm, x: Array, rate: Array, worst: int) -> Simul
         f"No steady state was found: '{form.states[worst].name}' still changes by {rate[worst]:.3g} per second at "
         f"{x[worst]:.6g}."
     )
-    if worst >= len(x) - len(form.integrals):
+    if worst >= form.torques.stop:
         return SimulationError(
             f"{message} A law reads it, so nothing is steady while it changes. Where a torque pulsates with the angle "
             "of what turns, write its mean over a turn; or run simulate(...) until it repeats itself, and take means."

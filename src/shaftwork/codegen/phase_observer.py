@@ -68,7 +68,7 @@ class Stretches:
 
         A time between two phases belongs to the later one; of one that is listed twice in a row the first does not.
         """
-        index = np.clip(np.searchsorted(self.starts, t, side="right") - 1, 0, None)
+        index = self._numbers(t)
         twice = np.append(t[1:] == t[:-1], False) & (self.starts[index] == t) & (index > 0)
         index = index - twice
         keys: dict[Any, list[int]] = {}
@@ -82,12 +82,17 @@ class Stretches:
         """The phase at a time in s; of a time between two the later one."""
         return self[max(int(np.searchsorted(self.starts, t, side="right")) - 1, 0)]
 
+    def _numbers(self, t: Array) -> Index:
+        """The numbers of the phases at times (k,), of a time between two that of the later one."""
+        numbers: Index = np.clip(np.searchsorted(self.starts, t, side="right") - 1, 0, None)
+        return numbers
+
     def dense(self, t: Array) -> Array:
         """(k, stores) all that is stored at times (k,), and behind it what arrives by waves."""
         t = np.atleast_1d(np.asarray(t, dtype=float))
         count = len(self[0].stores.names)
         stored = np.empty((t.size, count + self[0].ends))
-        index = np.clip(np.searchsorted(self.starts, t, side="right") - 1, 0, None)
+        index = self._numbers(t)
         for number in np.unique(index).tolist():
             stretch, places = self[number], np.flatnonzero(index == number)
             read_at = stretch.instants.one_sided(t[places])

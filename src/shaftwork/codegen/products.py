@@ -22,8 +22,6 @@ FULL = 16_000
 """Multiplications up to which a full array is quicker: a product of scipy.sparse takes 5 us before it begins."""
 FEW, MOST = 3, 32
 """The diagonals may hold so many times the entries of a matrix, and be so many; beyond that its rows are quicker."""
-Values = Callable[[Array, Array], Array]
-"""From times (k,) and quantities (m, k) to expressions (k, n)."""
 
 
 class Diagonals:
@@ -106,8 +104,8 @@ class ManyExpressions:
         others = [expressions[row] for row in self._others]
         self._function = vectorised_list((TIME, *quantities, *parameters), others)
 
-    def bind(self, p: Array) -> Values:
-        """The expressions with a parameter vector."""
+    def bind(self, p: Array) -> Callable[[Array, Array], Array]:
+        """From times (k,) and quantities (m, k) to expressions (k, n), with a parameter vector."""
         sums, others, function, parameters = self._sums(p), self._others, self._function, p.tolist()
         if not others:
             return lambda _, quantities: sums(quantities).T

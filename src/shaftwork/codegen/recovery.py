@@ -66,13 +66,12 @@ class BranchHistory:
         u, slopes, rate = self.inputs
         laws = len(form.laws)
         tree = np.zeros((len(form.graph.branches), len(self.t)))
-        first, last = len(form.across_states), len(form.across_states) + len(form.through_states)
-        tree[list(form.across_states)] = self.x[:first]
+        tree[list(form.across_states)] = self.x[form.speeds]
         tree[list(form.across_inputs)] = u[laws:]
         tree[list(form.tree_conductances)] = part.conductance_x @ self.x[: len(form.states)] + part.conductance_u @ u
         if series := list(form.dependent_through):
             rates = np.zeros_like(tree)
-            rates[list(form.through_states)] = rate[first:last]
+            rates[list(form.through_states)] = rate[form.torques]
             rates[list(form.laws)] = slopes[:laws]
             tree[series] = -(part.cutsets[series] @ rates) / part.coefficients[series][:, None]
         return np.asarray(tree + part.loops.T @ tree)
@@ -84,14 +83,13 @@ class BranchHistory:
         u, slopes, rate = self.inputs
         laws = len(form.laws)
         links = np.zeros((len(form.graph.branches), len(self.t)))
-        first, last = len(form.across_states), len(form.across_states) + len(form.through_states)
-        links[list(form.through_states)] = self.x[first:last]
+        links[list(form.through_states)] = self.x[form.torques]
         links[list(form.laws)] = u[:laws]
         conductances = list(form.link_conductances)
         links[conductances] = part.coefficients[conductances][:, None] * self.across[conductances]
         if dependent := list(form.dependent_across):
             rates = np.zeros_like(links)
-            rates[list(form.across_states)] = rate[:first]
+            rates[list(form.across_states)] = rate[form.speeds]
             rates[list(form.across_inputs)] = slopes[laws:]
             links[dependent] = part.coefficients[dependent][:, None] * (part.loops.T @ rates)[dependent]
         return np.asarray(links - part.cutsets @ links)

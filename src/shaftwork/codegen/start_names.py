@@ -110,23 +110,17 @@ class StartNames:
     @cached_property
     def ties(self) -> Any:
         """(tied stores, n) what each of them is of the states, sparse, in the order of `tied`."""
-        form, part, n = self._form, self._bound.part, len(self.places)
-        first = len(form.across_states)
-        ties = sparse.lil_array((len(self.tied), n))
+        form, part = self._form, self._bound.part
         blocks = (
-            (part.loops.T, form.dependent_across, form.across_states, slice(0, first), 0),
-            (
-                -part.cutsets,
-                form.dependent_through,
-                form.through_states,
-                slice(first, first + len(form.through_states)),
-                len(form.dependent_across),
-            ),
+            (part.loops.T, form.dependent_across, form.across_states),
+            (-part.cutsets, form.dependent_through, form.through_states),
         )
-        for matrix, rows, columns, states, above in blocks:
-            if rows and columns:
-                ties[above : above + len(rows), states] = sparse.csr_array(matrix)[list(rows)][:, list(columns)]
-        return sparse.csr_array(ties)
+        ties = [
+            sparse.csr_array(matrix)[np.array(tied, dtype=np.intp)][:, np.array(states, dtype=np.intp)]
+            for matrix, tied, states in blocks
+        ]
+        no_angles = sparse.csr_array((0, len(form.integrals)))
+        return sparse.csr_array(sparse.block_diag((*ties, no_angles)))
 
     def advice(self, name: str) -> str:
         """The start values to give instead of one, in words."""

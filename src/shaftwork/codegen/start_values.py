@@ -16,7 +16,7 @@ from shaftwork.codegen.linear_readings import GivenSpeeds, LinearQuantity, Linea
 from shaftwork.codegen.operating import energy_weights
 from shaftwork.codegen.recovery import BranchHistory
 from shaftwork.codegen.start_names import StartNames
-from shaftwork.codegen.wound_shafts import EndSpeeds, speeds_inside
+from shaftwork.codegen.wound_shafts import speeds_inside
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.times import just_after
 
@@ -107,8 +107,10 @@ class Start:
         self._names = StartNames(bound, self._t)
         self._values = self._names.checked(given)
         form, numbers = bound.program.form, np.arange(self._rest.size)
-        first, last = len(form.across_states), len(form.across_states) + len(form.through_states)
-        self._of_kind = {True: numbers < first, False: (numbers >= first) & (numbers < last)}
+        self._of_kind = {
+            True: numbers < form.speeds.stop,
+            False: (numbers >= form.torques.start) & (numbers < form.torques.stop),
+        }
         self._x, self._fixed = self._rest.copy(), np.zeros(numbers.size, dtype=bool)
         self._prescribed: list[LinearQuantity] = []
         direct = {self._names.places[name]: v for name, v in self._values.items() if name in self._names.places}
@@ -199,7 +201,7 @@ class Start:
             raise self._refused(name, "follows from laws or accelerations")
         sizes = np.abs(row.by_state) / energy_weights(self._bound)
         sizes = np.where(sizes > INDEPENDENT * sizes.max(initial=0.0), sizes, 0.0)
-        if quantity.is_across and sizes[len(form.across_states) :].any():
+        if quantity.is_across and sizes[form.speeds.stop :].any():
             raise self._refused(name, "follows from torques, too")
         if not quantity.is_across and sizes.any() and not sizes[self._of_kind[False]].any():
             raise self._refused(name, "follows from speeds")
@@ -258,8 +260,8 @@ class Start:
 
     def _fill_shafts(self) -> None:
         """Let the speeds inside a shaft run straight between those of its ends, where nothing else is given."""
-        speeds = self._names.readings.given_speeds(self._x, self._rest, self._fixed, self._prescribed)
-        for place, speed in speeds_inside(self._bound.program.form, EndSpeeds(speeds)).items():
+        start = self._names.readings.given_speeds(self._x, self._rest, self._fixed, self._prescribed)
+        for place, speed in speeds_inside(self._bound.program.form, start).items():
             if not self._fixed[place]:
                 self._x[place], self._fixed[place] = speed, True
 

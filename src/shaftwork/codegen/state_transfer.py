@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
-from shaftwork.codegen.elements import Array, GainMatrix, potential_matrix, share_matrix
+from shaftwork.codegen.elements import Array
 from shaftwork.codegen.matrices import LinearPart
 from shaftwork.codegen.mobility import Mobility
 from shaftwork.codegen.recovery import BranchHistory
@@ -131,12 +131,9 @@ class StateTransfer:
         if self._form.inertial:
             part = self._form.graph.part_of(self._form.inertial[0]).name
             raise CompileError(f"An impulse meets '{part}', whose inertia changes: no impact can be told there.")
-        nodes, shares = (matrix(bound.p).toarray() for matrix in self._nodes)
+        program = bound.program
+        nodes, shares = (matrix(bound.p).toarray() for matrix in (program.potentials, program.shares))
         return Mobility(self._form, bound, nodes, shares, pairs)
-
-    @cached_property
-    def _nodes(self) -> tuple[GainMatrix, GainMatrix]:
-        return potential_matrix(self._form), share_matrix(self._form)
 
     def impulses(self, bound: BoundArrays, gained: Mapping[str, float]) -> Array:
         """(branches,) what passes through every branch at once where stores gain so much; of a coupling its lambda.
@@ -202,8 +199,6 @@ class _Maps:
         self.part, self._form, self._branches, self._columns = part, form, branches, columns
         self._loops: Array = part.loops.toarray()
         self._cutsets: Array = self._loops if part.cutsets is part.loops else part.cutsets.toarray()
-        across, through = len(form.across_states), len(form.through_states)
-        self._speeds, self._torques = slice(across), slice(across, across + through)
 
     @cached_property
     def to_stores(self) -> Array:
@@ -215,9 +210,9 @@ class _Maps:
                 continue
             branch = self._branches[column]
             if branch in form.tree.loops:
-                matrix[self._speeds, column] = self._loops[list(form.across_states), branch]
+                matrix[form.speeds, column] = self._loops[list(form.across_states), branch]
             else:
-                matrix[self._torques, column] = -self._cutsets[branch, list(form.through_states)]
+                matrix[form.torques, column] = -self._cutsets[branch, list(form.through_states)]
         return matrix
 
     @cached_property
@@ -227,7 +222,7 @@ class _Maps:
         size, angles, stores = len(form.states), len(form.integrals), len(self._branches)
         by_branches, by_inputs = np.zeros((size, len(k))), np.zeros((size, laws + len(form.across_inputs)))
         across, through = list(form.across_states), list(form.through_states)
-        speeds, torques = self._speeds, self._torques
+        speeds, torques = form.speeds, form.torques
         by_branches[speeds, across], by_branches[torques, through] = np.eye(len(across)), np.eye(len(through))
         if other := list(form.dependent_across):
             F, Q = (matrix[np.ix_(across, other)] for matrix in (self._loops, self._cutsets))

@@ -1,4 +1,4 @@
-"""What has no value at a time and a state, such as a root of what is below zero, and inertias that vanish: whose."""
+"""Laws that have no value at a time and a state, as the root of a negative number, and inertias that vanish."""
 
 from __future__ import annotations
 

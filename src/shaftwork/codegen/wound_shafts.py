@@ -56,7 +56,7 @@ def wound_shafts(form: StateForm) -> Mapping[str, WoundShaft]:
 
 
 def _wound_shafts(form: StateForm) -> Iterator[tuple[str, WoundShaft]]:
-    state = {branch: k for k, branch in enumerate(form.through_states, len(form.across_states))}
+    state = {branch: k for k, branch in enumerate(form.through_states, form.torques.start)}
     for part in form.graph.parts:
         stores = [k for k in part.branches if form.graph.branches[k].template.kind is Kind.THROUGH_STORE]
         for name, profile in part.component.profiles().items():
@@ -64,36 +64,12 @@ def _wound_shafts(form: StateForm) -> Iterator[tuple[str, WoundShaft]]:
                 yield f"{part.name}.{name}", WoundShaft(part, profile, tuple(state[k] for k in stores))
 
 
-class EndSpeeds:
-    """The speeds between which those along a shaft run at the start.
-
-    A speed that start values and sources give counts as it is. What a source has jolted at the start is at rest here:
-    that has not yet run along the shaft. Of a shaft with no given speed at either end both are at rest.
-
-    Args:
-        given: the speeds that start values give.
-    """
-
-    def __init__(self, given: GivenSpeeds) -> None:
-        self._speeds, self._is_given = given.of(_potentials), given.move(_potentials)
-
-    def of(self, first: int, last: int) -> tuple[float, float]:
-        """Those of a shaft between two nodes, rad/s."""
-        if not (self._is_given[first] or self._is_given[last]):
-            return 0.0, 0.0
-        return float(self._speeds[first]), float(self._speeds[last])
-
-
-def _potentials(history: BranchHistory) -> Array:
-    return history.potentials
-
-
-def speeds_inside(form: StateForm, ends: EndSpeeds) -> dict[int, float]:
+def speeds_inside(form: StateForm, given: GivenSpeeds) -> dict[int, float]:
     """For each state that is a speed inside a shaft, what lies on the straight line between those of its ends."""
     owner = {form.graph.branches[branch].plus: k for k, branch in enumerate(form.across_states)}
     speeds: dict[int, float] = {}
     for nodes, places in _along(form):
-        first, last = ends.of(nodes[0], nodes[-1])
+        first, last = given.at_ends(nodes[0], nodes[-1])
         for node, share in zip(nodes[1:-1], places[1:-1], strict=True):
             if node in owner:
                 speeds[owner[node]] = first + share * (last - first)

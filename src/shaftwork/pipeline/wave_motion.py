@@ -14,7 +14,6 @@ from shaftwork.codegen.recovery import BranchHistory
 from shaftwork.codegen.start_values import Start, at_rest
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.codegen.waves import WaveSystem
-from shaftwork.codegen.wound_shafts import EndSpeeds
 from shaftwork.components.base import Component
 from shaftwork.components.shaft_models import Lumped, Wave
 from shaftwork.components.shafts import Shaft
@@ -147,8 +146,8 @@ def start_of_waves(
         lambda history: history.across[inertias], at_rest(bound, t0)[: len(inertias)]
     )
     springs = [b for b in graph.branches if b.template.kind is Kind.THROUGH_STORE and _is_wave(form, b.part)]
-    ends, through = EndSpeeds(start.given_speeds), BranchHistory(twin, times, x).through
-    speeds = [speed for spring in springs for speed in ends.of(spring.plus, spring.minus)]
+    through = BranchHistory(twin, times, x).through
+    speeds = [speed for spring in springs for speed in start.given_speeds.at_ends(spring.plus, spring.minus)]
     return states, WaveStart(np.array(speeds), np.array([through[spring.index, 0] for spring in springs]))
 
 

@@ -185,6 +185,21 @@ class StateForm:
             *(_integral_state(self.graph, self.graph.branches[index]) for index in self.integrals),
         )
 
+    @cached_property
+    def speeds(self) -> slice:
+        """Where across variables are among the states."""
+        return slice(len(self.across_states))
+
+    @cached_property
+    def torques(self) -> slice:
+        """Where through variables are among the states."""
+        return slice(self.speeds.stop, self.speeds.stop + len(self.through_states))
+
+    @cached_property
+    def integral_places(self) -> Mapping[int, int]:
+        """Where the integrals are among the states, by branch."""
+        return {branch: k for k, branch in enumerate(self.integrals, self.torques.stop)}
+
 
 def state_form(graph: CircuitGraph, angles: tuple[int, ...] = ()) -> StateForm:
     """Graph to state form. Whether the form is solvable is for `diagnosis` to say."""

@@ -82,7 +82,7 @@ class EnsembleCode:
         return parts["rates"], parts["guards"]
 
     def stored(self, t: Array, x: Array, p: Array) -> Array:
-        """All that is stored, in the order of the names of `codegen.stores.Stores`; arguments as for `motion`."""
+        """All that is stored, in the order of the names of `StateTransfer`; arguments as for `motion`."""
         return self._part(t, x, p)["stored"]
 
     def shown(self, t: Array, x: Array, p: Array) -> Array:
