@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 import shaftwork as sw
 from shaftwork.core.errors import ParameterError, SimulationError
-from shaftwork.integrate import banded, choice, exact, scipy_ivp
+from shaftwork.integrate import banded, choice, propagation, scipy_ivp
 from shaftwork.integrate.banded_matrix import ShiftedMatrix
 from shaftwork.integrate.banded_method import shifted_collocation
 from shaftwork.integrate.problem import LinearInputs, Problem
@@ -196,14 +196,14 @@ def test_a_singular_matrix_is_told(size):
 @pytest.mark.parametrize("linear", [True, False])
 @pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8])
 def test_the_error_of_a_damped_chain_follows_the_tolerance(rtol, linear):
-    truth = torques(exact.solve(shaft(60)).x)
+    truth = torques(propagation.solve(shaft(60)).x)
     trajectory = banded.solve(shaft(60, rtol=rtol, linear=linear))
     error = np.abs(torques(trajectory.x) - truth).max() / np.abs(truth).max()
     # The tolerance bounds the error of a step; some hundred steps have about 2 of it, and a factor of 5 for safety.
     assert error < 10 * rtol
     assert trajectory.statistics["steps"] < 1500
     times = np.random.default_rng(2).uniform(0.0, 0.2, 50)
-    between = torques(exact.solve(replace(shaft(60), t_eval=np.sort(times))).x)
+    between = torques(propagation.solve(replace(shaft(60), t_eval=np.sort(times))).x)
     assert np.abs(torques(trajectory.dense(np.sort(times))) - between).max() < 10 * rtol * np.abs(truth).max()
 
 
@@ -339,7 +339,17 @@ def against_a_stop(m=20) -> Problem:
         return touched.tocsc()
 
     size = np.concatenate([np.ones(m + 1), np.full(m, max(1.0, DAMPING_TIME * stiffness)), [1.0]])
-    return Problem(rhs, jacobian, np.zeros(n), 0.0, 0.1, (), 1e-9 * size, 1e-6, t_eval=np.linspace(0.0, 0.1, 101))
+    return Problem(
+        rhs=rhs,
+        jacobian=jacobian,
+        x0=np.zeros(n),
+        t0=0.0,
+        t_end=0.1,
+        names=(),
+        atol=1e-9 * size,
+        rtol=1e-6,
+        t_eval=np.linspace(0.0, 0.1, 101),
+    )
 
 
 @pytest.mark.slow
@@ -383,6 +393,11 @@ def test_a_network_of_shaft_and_motor_agrees_with_another_stiff_engine():
 
 
 @pytest.mark.slow
+def one_speed(rhs, jacobian, **options) -> Problem:
+    given = {"x0": np.zeros(1), "t0": 0.0, "t_end": 3.0, "names": ("motor.omega",), "atol": np.array([1e-9])}
+    return Problem(rhs=rhs, jacobian=jacobian, **(given | options))
+
+
 @pytest.mark.parametrize(
     ("rhs", "reason"),
     [
@@ -392,18 +407,15 @@ def test_a_network_of_shaft_and_motor_agrees_with_another_stiff_engine():
 )
 def test_a_motion_that_cannot_go_on_is_named(rhs, reason):
     slope = sparse.csc_array(np.array([[1.0]]))
-    problem = Problem(rhs, lambda _t, _x: slope.copy(), np.zeros(1), 0.0, 3.0, ("motor.omega",), np.array([1e-9]))
     with pytest.raises(SimulationError, match=reason):
-        banded.solve(problem)
+        banded.solve(one_speed(rhs, lambda _t, _x: slope.copy()))
 
 
 @pytest.mark.slow
 def test_a_motion_that_two_laws_drive_back_to_their_jump_is_named(monkeypatch):
-    monkeypatch.setattr("shaftwork.integrate.pieces.STALL_STEPS", 100)
-    problem = Problem(
-        lambda _t, x: -np.sign(x) - 0.5, lambda _t, _x: sparse.csc_array((1, 1)), np.ones(1), 0.0, 3.0,
-        ("motor.omega",), np.array([1e-9]), max_steps=20_000,
-    )  # fmt: skip
+    monkeypatch.setattr("shaftwork.integrate.smooth_intervals.STALL_STEPS", 100)
+    jacobian, start = sparse.csc_array((1, 1)), np.ones(1)
+    problem = one_speed(lambda _t, x: -np.sign(x) - 0.5, lambda _t, _x: jacobian, x0=start, max_steps=20_000)
     with pytest.raises(SimulationError, match=r"banded engine failed at t = 0\.66666.*both sides of a jump"):
         banded.solve(problem)
 

@@ -9,12 +9,12 @@ from functools import partial
 import numpy as np
 import pytest
 
-from shaftwork.integrate import exact, heyoka_taylor, scipy_ivp, sundials
+from shaftwork.integrate import heyoka_taylor, propagation, scipy_ivp, sundials
 from shaftwork.integrate.problem import Problem, Trajectory
 
 Solve = Callable[[Problem], Trajectory]
 ENGINES: dict[str, Solve] = {
-    "exact": exact.solve,
+    "exact": propagation.solve,
     "heyoka": heyoka_taylor.solve,
     "DOP853": partial(scipy_ivp.solve, method="DOP853"),
     "Radau": partial(scipy_ivp.solve, method="Radau"),

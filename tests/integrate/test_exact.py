@@ -11,7 +11,7 @@ import pytest
 from scipy import sparse
 
 import shaftwork as sw
-from shaftwork.integrate import exact, linear_system
+from shaftwork.integrate import linear_system, propagation
 from shaftwork.integrate.modal import find_modes
 from shaftwork.integrate.precise import FixedPoint
 from shaftwork.integrate.problem import LinearInputs, Problem
@@ -59,7 +59,7 @@ def chain_solution(n, stiffness, times):
 def test_a_chain_is_right_after_thousands_of_periods(n, end):
     # The fastest mode turns through 2e4 rad; rounding its frequency alone (1e-16) costs 2e-12 of that.
     times = np.linspace(0.0, end, 201)
-    trajectory = exact.solve(chain(n, 1e4, times))
+    trajectory = propagation.solve(chain(n, 1e4, times))
     speeds, torques = chain_solution(n, 1e4, times)
     assert np.abs(trajectory.x[:, :n] - speeds).max() < 1e-11 * np.abs(speeds).max()
     assert np.abs(trajectory.x[:, n:] - torques).max() < 1e-11 * np.abs(torques).max()
@@ -70,8 +70,8 @@ def test_a_long_chain_is_solved_by_sparse_products():
     times = np.linspace(0.0, 0.2, 201)
     problem = chain(1000, 1e6, times)
     assert problem.linear is not None
-    assert not exact.prefers_dense(problem, problem.linear)
-    trajectory = exact.solve(problem)
+    assert not propagation.prefers_dense(problem, problem.linear)
+    trajectory = propagation.solve(problem)
     speeds, torques = chain_solution(1000, 1e6, times)
     assert np.abs(trajectory.x[:, :1000] - speeds).max() < 1e-11 * np.abs(speeds).max()
     assert np.abs(trajectory.x[:, 1000:] - torques).max() < 1e-11 * np.abs(torques).max()
@@ -96,7 +96,7 @@ def test_a_ramp_is_propagated_as_in_arbitrary_precision(name):
     level, slope, start = np.arange(1.0, n + 1), np.arange(n, 0.0, -1), np.ones(n)
     # Steps that are neither equal nor round, and a pair of equal ones.
     times = np.array([0.0, 0.3, 0.61, 0.92, 1.7, 2.0])
-    trajectory = exact.solve(linear_problem(matrix, lambda t: level + slope * t, start, times))
+    trajectory = propagation.solve(linear_problem(matrix, lambda t: level + slope * t, start, times))
     augmented = mpmath.matrix(n + 2)
     for i in range(n):
         for j in range(n):
@@ -115,17 +115,17 @@ def test_dense_and_sparse_propagation_agree(monkeypatch):
     problem = chain(15, 1e3, times, damping=0.5)
     found = []
     for dense in (True, False):
-        monkeypatch.setattr(exact, "prefers_dense", lambda *_, dense=dense: dense)
-        found.append(exact.solve(problem).x)
+        monkeypatch.setattr(propagation, "prefers_dense", lambda *_, dense=dense: dense)
+        found.append(propagation.solve(problem).x)
     assert np.abs(found[0] - found[1]).max() < 1e-11 * np.abs(found[0]).max()
 
 
 def test_the_matrix_exponential_replaces_modes_that_are_of_no_use(monkeypatch):
     times = np.linspace(0.0, 2.0, 101)
     problem = chain(15, 1e3, times, damping=0.5)
-    by_modes = exact.solve(problem)
+    by_modes = propagation.solve(problem)
     monkeypatch.setattr(linear_system, "find_modes", lambda _matrix: None)
-    by_exponential = exact.solve(problem)
+    by_exponential = propagation.solve(problem)
     assert np.abs(by_modes.x - by_exponential.x).max() < 1e-11 * np.abs(by_modes.x).max()
     asked = np.linspace(0.013, 1.99, 57)
     assert np.abs(by_modes.dense(asked) - by_exponential.dense(asked)).max() < 1e-11 * np.abs(by_modes.x).max()
@@ -136,14 +136,14 @@ def test_output_times_whose_steps_grow_by_a_rounding_each_are_met(monkeypatch):
     times = np.linspace(0.0, 1.0, 20001)
     times += 1e-16 * np.arange(times.size) ** 2
     monkeypatch.setattr(linear_system, "find_modes", lambda _matrix: None)
-    trajectory = exact.solve(chain(3, 1e4, times))
+    trajectory = propagation.solve(chain(3, 1e4, times))
     speeds, _ = chain_solution(3, 1e4, times)
     assert np.abs(trajectory.x[:, :3] - speeds).max() < 1e-11 * np.abs(speeds).max()
 
 
 def test_its_own_grid_is_refined_nowhere_and_needs_no_output_times():
     problem = chain(3, 1e2, np.linspace(0.0, 1.0, 11))
-    trajectory = exact.solve(replace(problem, t_eval=None))
+    trajectory = propagation.solve(replace(problem, t_eval=None))
     speeds, _ = chain_solution(3, 1e2, trajectory.t)
     assert np.abs(trajectory.x[:, :3] - speeds).max() < 1e-12
 

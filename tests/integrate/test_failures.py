@@ -19,7 +19,8 @@ NUMERIC = ["scipy", "scipy-radau", "sundials"]
 
 
 def problem(rhs, x0=0.0, **options) -> Problem:
-    return Problem(rhs, None, np.array([x0]), 0.0, 3.0, ("motor.omega",), np.array([1e-9]), **options)
+    names, span = ("motor.omega",), {"t0": 0.0, "t_end": 3.0}
+    return Problem(rhs=rhs, jacobian=None, x0=np.array([x0]), names=names, atol=np.array([1e-9]), **span, **options)
 
 
 def symbolic(row, start):

@@ -9,7 +9,7 @@ import pytest
 from scipy import sparse
 
 from shaftwork.core.errors import SimulationError
-from shaftwork.integrate import exact, sundials
+from shaftwork.integrate import propagation, sundials
 from shaftwork.integrate.problem import DaeProblem, LinearInputs, Problem
 
 
@@ -20,8 +20,17 @@ def loop(**options) -> DaeProblem:
         return np.array([derivative[0] + x[1], x[1] + x[1] ** 3 - x[0] - (0.0 if t < 1.0 else 0.5)])
 
     settings = {"breakpoints": (1.0,), "t_eval": np.linspace(0.0, 3.0, 13), "rtol": 1e-9} | options
-    start, guess = np.array([2.0, 0.5]), np.zeros(2)
-    return DaeProblem(residual, start, guess, (1,), 0.0, 3.0, ("J1.omega", "clutch.tau"), np.full(2, 1e-11), **settings)
+    return DaeProblem(
+        residual=residual,
+        x0=np.array([2.0, 0.5]),
+        derivative0=np.zeros(2),
+        algebraic=(1,),
+        t0=0.0,
+        t_end=3.0,
+        names=("J1.omega", "clutch.tau"),
+        atol=np.full(2, 1e-11),
+        **settings,
+    )
 
 
 def elapsed(y):
@@ -70,7 +79,7 @@ def test_a_large_stiff_chain_uses_the_sparse_jacobian():
         t_eval=np.linspace(0.0, 0.05, 11),
         linear=LinearInputs(matrix.tocsr(), lambda _t: force),
     )
-    run, reference = sundials.solve(problem), exact.solve(problem)
+    run, reference = sundials.solve(problem), propagation.solve(problem)
     assert asked
     assert np.abs(run.x - reference.x).max() < 1e-6 * np.abs(reference.x).max()
 
@@ -85,13 +94,13 @@ def test_steps_are_counted_alike_with_and_without_output_times():
 def test_step_ends_that_were_kept_are_those_of_the_dense_output_also_where_the_state_jumps():
     run = sundials.solve(
         Problem(
-            lambda _t, x: -x,
-            None,
-            np.array([1.0, 2.0]),
-            0.0,
-            1.0,
-            ("a", "b"),
-            np.full(2, 1e-9),
+            rhs=lambda _t, x: -x,
+            jacobian=None,
+            x0=np.array([1.0, 2.0]),
+            t0=0.0,
+            t_end=1.0,
+            names=("a", "b"),
+            atol=np.full(2, 1e-9),
             breakpoints=(0.5,),
             jump=lambda _t, x: x + 1.0,
             t_eval=np.array([0.0, 1.0]),

@@ -12,8 +12,8 @@ from scipy.integrate import solve_ivp
 import shaftwork as sw
 from shaftwork.integrate.crossings import Crossings
 from shaftwork.integrate.engines import available
-from shaftwork.integrate.pieces import pieces
 from shaftwork.integrate.problem import Problem
+from shaftwork.integrate.smooth_intervals import pieces
 
 ENGINES = ["heyoka", "scipy", "scipy-radau", "sundials", "banded"]
 RTOLS = [1e-4, 1e-6, 1e-9]
@@ -152,9 +152,15 @@ def test_every_engine_follows_a_motion_through_its_switches(motion: str, engine:
 def falling(switches: Callable | None) -> Problem:
     """Free flight: x'' = -2 from x = 1 with x' = -2 + a little, which just touches zero at about 1 s."""
     return Problem(
-        lambda _t, x: np.array([x[1], 2.0]), None, np.array([1.0, -2.0]), 0.0, 3.0, ("x", "v"), np.full(2, 1e-9),
+        rhs=lambda _t, x: np.array([x[1], 2.0]),
+        jacobian=None,
+        x0=np.array([1.0, -2.0]),
+        t0=0.0,
+        t_end=3.0,
+        names=("x", "v"),
+        atol=np.full(2, 1e-9),
         switches=switches,
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize("depth", [1e-2, 1e-4, 1e-6])

@@ -19,7 +19,8 @@ from shaftwork.integrate.banded_method import ShiftedCollocation, shifted_colloc
 from shaftwork.integrate.banded_stages import BandedStages, LinearStages, NewtonStages, StepStart, shifted
 from shaftwork.integrate.crossings import Crossings
 from shaftwork.integrate.engines import ENGINES
-from shaftwork.integrate.pieces import (
+from shaftwork.integrate.problem import Array, Problem, Trajectory
+from shaftwork.integrate.smooth_intervals import (
     Pace,
     SmoothInterval,
     both_sides,
@@ -29,7 +30,6 @@ from shaftwork.integrate.pieces import (
     start_of_piece,
     used_up,
 )
-from shaftwork.integrate.problem import Array, Problem, Trajectory
 
 STAGES = 6
 # A step grows at least by the first factor, because its factors are made anew, and at most by the second.

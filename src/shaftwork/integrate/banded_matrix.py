@@ -86,13 +86,13 @@ class ShiftedMatrix:
         values -= self._direct
         values[self._diagonal] += shift
         inner = self._inner(values)
-        kept, gone, B, C = self._kept, self._gone, self._B, self._C
+        rest, gone, B, C = self._rest, self._gone, self._B, self._C
 
         def solve(right: Complex) -> Complex:
             second = right[gone]
             solution = np.empty_like(right)
-            remaining = inner(right[kept] + inverse * _times(B, second))
-            solution[kept] = remaining
+            remaining = inner(right[rest] + inverse * _times(B, second))
+            solution[rest] = remaining
             solution[gone] = inverse * (second + _times(C, remaining))
             return solution
 
@@ -112,13 +112,13 @@ class ShiftedMatrix:
         diagonal = np.arange(self._count)
         self._diagonal = self._place(diagonal, diagonal)
 
-    def _order(self, kept: Indices, gone: Indices) -> None:
-        order = np.concatenate([kept, gone])
-        self._count, self._rank = kept.size, np.argsort(order)
+    def _order(self, rest: Indices, gone: Indices) -> None:
+        order = np.concatenate([rest, gone])
+        self._count, self._rank = rest.size, np.argsort(order)
         in_order = np.array_equal(order, np.arange(order.size))
         # A slice is read without a copy.
-        self._kept: Any = slice(0, kept.size) if in_order else kept
-        self._gone: Any = slice(kept.size, None) if in_order else gone
+        self._rest: Any = slice(0, rest.size) if in_order else rest
+        self._gone: Any = slice(rest.size, None) if in_order else gone
 
     def _split(self, rows: Indices, columns: Indices, values: Array) -> tuple[Any, Any]:
         """A and B C of the entries of J; B and C are kept."""

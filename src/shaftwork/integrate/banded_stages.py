@@ -11,8 +11,8 @@ from scipy import sparse
 
 from shaftwork.integrate.banded_matrix import ShiftedMatrix, Solver
 from shaftwork.integrate.banded_method import ShiftedCollocation
-from shaftwork.integrate.pieces import GuardedFunctions, SmoothInterval
 from shaftwork.integrate.problem import Array, LinearInputs, Problem
+from shaftwork.integrate.smooth_intervals import GuardedFunctions, SmoothInterval
 
 MOST_ITERATIONS = 10
 # Newton's method ends at this part of the tolerance: the error estimate, a difference of slopes, amplifies the rest.
@@ -78,7 +78,7 @@ class BandedStages(Protocol):
 
 def shifted(linear: LinearInputs) -> ShiftedMatrix:
     """The matrix of a linear system, arranged once for all runs."""
-    return linear.kept("banded", lambda: ShiftedMatrix(linear.A))
+    return linear.cached("banded", lambda: ShiftedMatrix(linear.A))
 
 
 class _Factors:
@@ -89,7 +89,7 @@ class _Factors:
         self._matrix = matrix
         self._step = 0.0
         self._solvers: list[Solver] = []
-        self.made = 0
+        self.count = 0
 
     def load(self, matrix: Any) -> None:
         """Take another Jacobian."""
@@ -100,13 +100,13 @@ class _Factors:
         """The modes (s, n) for right sides (s, n), real parts above imaginary parts as they are."""
         if step != self._step:
             self._solvers = [self._matrix.factor(pole / step) for pole in self._poles]
-            self._step, self.made = step, self.made + 1
-        found, vector = np.empty_like(right), np.empty(right.shape[1], dtype=complex)
+            self._step, self.count = step, self.count + 1
+        modes, vector = np.empty_like(right), np.empty(right.shape[1], dtype=complex)
         for number, solver in enumerate(self._solvers):
             vector.real, vector.imag = right[number], right[len(self._poles) + number]
             solution = solver(vector)
-            found[number], found[len(self._poles) + number] = solution.real, solution.imag
-        return found
+            modes[number], modes[len(self._poles) + number] = solution.real, solution.imag
+        return modes
 
     def quieted(self, defect: Array, step: float, scale: Array, jacobian: Any) -> Array:
         """F(h J) of a defect (n,), see `ShiftedCollocation.quieting`, by the factors of the last step."""
@@ -135,7 +135,7 @@ class LinearStages(BandedStages):
 
     @property
     def counts(self) -> dict[str, int]:
-        return {"factorisations": self._factors.made}
+        return {"factorisations": self._factors.count}
 
     @property
     def noisy(self) -> bool:
@@ -188,7 +188,7 @@ class NewtonStages(BandedStages):
 
     @property
     def counts(self) -> dict[str, int]:
-        return {"rhs": self._rhs, "jacobians": self._jacobians, "factorisations": self._factors.made}
+        return {"rhs": self._rhs, "jacobians": self._jacobians, "factorisations": self._factors.count}
 
     @property
     def noisy(self) -> bool:
@@ -207,13 +207,13 @@ class NewtonStages(BandedStages):
         outdated = not self._wanted
         if self._wanted:
             self._load(start)
-        found = self._iterate(start, step, first)
-        if found is None and outdated:
+        modes = self._iterate(start, step, first)
+        if modes is None and outdated:
             self._load(start)
-            found = self._iterate(start, step, first)
-        if found is not None:
-            self._last = start.t, step, found
-        return found
+            modes = self._iterate(start, step, first)
+        if modes is not None:
+            self._last = start.t, step, modes
+        return modes
 
     def quieted(self, defect: Array, step: float, scale: Array) -> Array:
         return self._factors.quieted(defect, step, scale, self._jacobian)

@@ -92,7 +92,7 @@ def _parts(problem: Problem, times: Array, states: Array) -> list[_Part]:
     """Of the Jacobian at each time, all in one scale; of a linear system once for all runs."""
     linear = problem.linear
     if linear is not None:
-        return [linear.kept("cancellation", lambda: _split([linear.A])[0])] * times.size
+        return [linear.cached("cancellation", lambda: _split([linear.A])[0])] * times.size
     if problem.jacobian is None:
         nothing = np.zeros((problem.x0.size, problem.x0.size))
         return [_Part(nothing, nothing, nothing.sum(axis=0), nothing.sum(axis=0) + 1)] * times.size

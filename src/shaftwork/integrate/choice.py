@@ -44,7 +44,7 @@ def choose(problem: Problem) -> tuple[str, str]:
     It looks at eigenvalues at a few states (milliseconds), so keep the answer where many similar problems are solved.
     """
     if problem.straight is not None:
-        from shaftwork.integrate.exact import cost
+        from shaftwork.integrate.propagation import cost
 
         seconds = cost(problem, problem.straight)
         longest = LONGEST_EXACT_CHAIN if seconds > LONGEST_EXACT_CHAIN and _is_damped_chain(problem) else LONGEST_EXACT
@@ -53,7 +53,7 @@ def choose(problem: Problem) -> tuple[str, str]:
         if _is_chain(problem):
             return "banded", f"The system is a long linear chain: exact propagation would take about {seconds:.2g} s."
     elif problem.linear is not None:
-        from shaftwork.integrate.exact import drivable
+        from shaftwork.integrate.propagation import drivable
 
         if drivable(problem):
             return "exact", "The system is linear with smooth inputs, so its modes are propagated without a step error."
@@ -103,7 +103,7 @@ def solve(
     try:
         return _guarded(problem, load(name)(problem), name), name, why or reason
     except SeriesError as error:
-        if isinstance(error, StickingError) and error.held:
+        if isinstance(error, StickingError) and error.driven_back:
             raise
         failed = error
         *tried, (last, _) = without_series(problem.max_steps)
@@ -125,7 +125,7 @@ def without_series(most: int) -> list[tuple[str, int]]:
 
 def no_series(failed: SeriesError, name: str) -> str:
     """Why another engine is taken where heyoka cannot go on."""
-    return NO_SERIES.format(failed.found, IN_WORDS[name])
+    return NO_SERIES.format(failed.obstacle, IN_WORDS[name])
 
 
 def _guarded(problem: Problem, trajectory: Trajectory, name: str) -> Trajectory:
@@ -184,20 +184,21 @@ def _stiff(problem: Problem, *, compiled: bool) -> tuple[str, str] | None:
     most = bound_of_decay(matrices) * duration / STABLE
     if problem.x0.size <= LARGEST_NOT_BANDED and most * explicit_step <= TRANSIENT_STEPS * implicit_step:
         return None
-    found = rates(matrices)
-    problem.found.setdefault("decay", found.decay)
-    explicit_steps = max(found.decay, found.oscillation) * duration / STABLE
+    fastest = rates(matrices)
+    problem.estimates.setdefault("decay", fastest.decay)
+    explicit_steps = max(fastest.decay, fastest.oscillation) * duration / STABLE
     if problem.x0.size > LARGEST_NOT_BANDED and explicit_steps > FEWEST_NOT_BANDED and _is_damped_chain(problem):
         return "banded", (
             f"The system is a long damped chain: an explicit method would need about {explicit_steps:.2g} steps, "
             "and the equations of an implicit one are banded."
         )
-    stable_steps = found.decay * duration / STABLE
-    implicit_steps = TRANSIENT_STEPS * (1 + len(problem.breakpoints)) + STEPS_PER_RADIAN * found.oscillation * duration
+    stable_steps = fastest.decay * duration / STABLE
+    transients, radians = 1 + len(problem.breakpoints), fastest.oscillation * duration
+    implicit_steps = TRANSIENT_STEPS * transients + STEPS_PER_RADIAN * radians
     if stable_steps * explicit_step <= implicit_steps * implicit_step:
         return None
     return name, (
-        f"The system is stiff: its fastest decay ({found.decay:.3g} 1/s) would force an explicit method to about "
+        f"The system is stiff: its fastest decay ({fastest.decay:.3g} 1/s) would force an explicit method to about "
         f"{stable_steps:.2g} steps, and an implicit one needs about {implicit_steps:.2g}."
     )
 

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from shaftwork.integrate.pieces import SmoothInterval
 from shaftwork.integrate.problem import Array, DaeProblem, Problem
+from shaftwork.integrate.smooth_intervals import SmoothInterval
 from shaftwork.numerics.zeros import LOOKS, zero
 
 Dense = Callable[[Array], Array]
@@ -35,8 +35,8 @@ def tolerance(problem: Problem | DaeProblem, x: Array) -> Array:
     """How far the tolerance moves states (..., n): to both sides, and not alike."""
     places = np.arange(x.shape[-1]) * np.sqrt(2.0) % 1.0
     # of different sizes, lest the tolerances of two ends cancel in the twist between them
-    ways = (0.5 + places) * np.where(places * 16 % 2 < 1, 1.0, -1.0)
-    return np.asarray((problem.atol + problem.rtol * np.abs(x)) * ways)
+    signed = (0.5 + places) * np.where(places * 16 % 2 < 1, 1.0, -1.0)
+    return np.asarray((problem.atol + problem.rtol * np.abs(x)) * signed)
 
 
 class Crossings:
@@ -117,8 +117,8 @@ class Crossings:
     def _longest(self, look: Look, row: int) -> float:
         """The time in s in which no state moves by more than its tolerance, near a row of a look."""
         first = max(row - 2, 0)
-        times, kept = np.unique(look.times[first : row + 2], return_index=True)  # of a tiny step some are equal
-        rates = np.abs(np.diff(look.states[first + kept], axis=0) / np.diff(times)[:, None]).max(axis=0, initial=0.0)
+        times, rows = np.unique(look.times[first : row + 2], return_index=True)  # of a tiny step some are equal
+        rates = np.abs(np.diff(look.states[first + rows], axis=0) / np.diff(times)[:, None]).max(axis=0, initial=0.0)
         with np.errstate(divide="ignore"):
             return float(np.min(self._scale(look.states[row]) / rates, initial=np.inf))
 

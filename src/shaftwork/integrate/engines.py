@@ -48,7 +48,7 @@ WAVE = EngineEntry("shaftwork.integrate.lossless.engine:solve", "travelling wave
 """The engine of networks with waves, which no others can take."""
 
 ENGINES: dict[str, EngineEntry] = {
-    "exact": EngineEntry("shaftwork.integrate.exact:solve", "linear systems, without a step error"),
+    "exact": EngineEntry("shaftwork.integrate.propagation:solve", "linear systems, without a step error"),
     "heyoka": EngineEntry(
         "shaftwork.integrate.heyoka_taylor:solve",
         "smooth and piecewise laws, compiled",

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
 
 import numpy as np
 
-from shaftwork.integrate.crossings import FIRST, Look, tolerance
-from shaftwork.integrate.problem import Array, DaeProblem, Explain, Guards, Problem
+from shaftwork.integrate.crossings import FIRST, Dense, Look, tolerance
+from shaftwork.integrate.problem import Array, DaeProblem, Problem, TimedProblem
 from shaftwork.numerics.polynomials import Interpolant, interpolation_times
 from shaftwork.numerics.zeros import LOOKS, zero
-
-Dense = Callable[[Array], Array]
 
 # What the tolerance moves a guard, as part of its course in a run of a few steps, may be no more.
 KNOWN, BRIEF = 1e-5, 100
@@ -31,20 +28,6 @@ DEGREE, BESIDE = 12, 8
 NEARER = 0.5 ** np.arange(1, 41)
 
 
-class Guarded(Protocol):
-    """What a problem of any kind says of its guards; see `Problem`."""
-
-    @property
-    def guards(self) -> Guards | None:
-        """What ends the run."""
-        ...
-
-    @property
-    def explain(self) -> Explain | None:
-        """Which law has no value."""
-        ...
-
-
 class GuardWatch:
     """Finds the first guard of a problem that a step meets; the last one found is `met`.
 
@@ -54,7 +37,7 @@ class GuardWatch:
         high: the latest.
     """
 
-    def __init__(self, problem: Guarded, low: float, high: float) -> None:
+    def __init__(self, problem: TimedProblem, low: float, high: float) -> None:
         guards = problem.guards
         self._columns = np.zeros(0, dtype=np.intp) if guards is None else np.flatnonzero(guards.sides)
         self._offsets = np.zeros(0) if guards is None else guards.offsets[self._columns]
@@ -90,11 +73,11 @@ class GuardWatch:
         look.values[0] = np.minimum(look.values[0], 0.0)
         look.follow(every=True)
         risen = np.flatnonzero((look.values > 0).any(axis=0)).tolist()
-        found = [(self._time(look, column, 2 * float(noise[column])), column) for column in risen]
-        known = [(time, int(self._columns[column])) for time, column in found if time is not None]
-        if not known:
+        rises = [(self._time(look, column, 2 * float(noise[column])), column) for column in risen]
+        events = [(time, int(self._columns[column])) for time, column in rises if time is not None]
+        if not events:
             return None
-        time, self.met = min(known)
+        time, self.met = min(events)
         return min(max(time, start + CLEARANCE * float(np.spacing(abs(end)))), end)
 
     def beyond(self, t: float, x: Array) -> int | None:
@@ -124,9 +107,9 @@ class GuardWatch:
         times = (edges[:-1, None] + half * (NODES + 1)).ravel()
         states = dense(times)
         rates = self._rates(self._problem, np.clip(times, self._low, self._high), states)
-        wanted, found = (half * WEIGHTS).ravel() @ rates, dense(np.array([end]))[0] - x
+        by_rates, by_step = (half * WEIGHTS).ravel() @ rates, dense(np.array([end]))[0] - x
         size = self._problem.rtol * np.abs(states).max(axis=0) + self._problem.atol
-        return bool((np.abs(wanted - found) <= APART * size).all())
+        return bool((np.abs(by_rates - by_step) <= APART * size).all())
 
     @staticmethod
     def _rates(problem: Problem, times: Array, states: Array) -> Array:

@@ -12,8 +12,8 @@ import numpy as np
 
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.heyoka_switches import SOMEWHERE, SwitchWatch, keeps_sides, settle
-from shaftwork.integrate.pieces import SmoothInterval, failure, start_of_piece, used_up
 from shaftwork.integrate.problem import Array, Problem, SeriesError, StickingError
+from shaftwork.integrate.smooth_intervals import SmoothInterval, failure, start_of_piece, used_up
 
 # What heyoka's outcomes are called here where a guard ended the run.
 GUARD = "guard"
@@ -215,7 +215,7 @@ class TaylorRun:
         time, state = self._last_good(piece, watch)
         error = failure(self.problem, "heyoka", time, state, self._reason(outcome, watch))
         if watch is not None and watch.reason is not None:
-            return StickingError(str(error), watch.reason.partition(", because")[0], held=watch.held)
+            return StickingError(str(error), watch.reason.partition(", because")[0], driven_back=watch.driven_back)
         obstacle = f"after t = {time:.9g} s a law, or one of its derivatives, is not finite, as a root's at zero"
         return SeriesError(str(error), obstacle) if outcome == "err_nf_state" else error
 

@@ -150,7 +150,7 @@ class SwitchWatch:
         self._turns = self._moving & ~np.isin(np.arange(size.size), counting)
         self._cooled = np.full(size.size, -np.inf)
         self.reason: str | None = None
-        self.held = False
+        self.driven_back = False
         """Whether what has stopped the run would stop any."""
         self.leaves = False
         """Whether a switch that rested at zero has stopped the run."""
@@ -212,7 +212,7 @@ class SwitchWatch:
         elif self._short_steps > CHATTER_STEPS:
             stuck = np.argmin(np.where(self._moving, np.abs(values), np.inf))
         if stuck is not None:
-            self.held = self._is_held(integrator, int(stuck))
+            self.driven_back = self._drives_back(integrator, int(stuck))
             condition = self._program.conditions[int(stuck)]
             self.reason = (
                 f"from t = {before:.9g} s on the motion sticks where the condition {condition} changes, because "
@@ -232,7 +232,7 @@ class SwitchWatch:
         )
         return not np.allclose(here, there, rtol=WRONG_SIDE, atol=0.0)
 
-    def _is_held(self, integrator: Any, number: int) -> bool:
+    def _drives_back(self, integrator: Any, number: int) -> bool:
         """Whether the motion on either side of a switch comes back to it: neither as a touch, nor along it."""
         time, state, program = integrator.time, integrator.state, self._program
         speeds = []

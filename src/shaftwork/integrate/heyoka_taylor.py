@@ -14,8 +14,8 @@ from shaftwork.core.errors import MissingExtraError, SimulationError
 from shaftwork.integrate.engines import ENGINES
 from shaftwork.integrate.heyoka_run import GUARD, TaylorRun
 from shaftwork.integrate.heyoka_switches import SwitchWatch
-from shaftwork.integrate.pieces import PiecewiseDense, both_sides, failure, pieces, reached
 from shaftwork.integrate.problem import Array, Problem, Trajectory
+from shaftwork.integrate.smooth_intervals import PiecewiseDense, both_sides, failure, pieces, reached
 
 # The cost grows only with the logarithm of the tolerance, and a loose one loses events.
 LOOSEST_TOLERANCE = 1e-10

@@ -15,8 +15,8 @@ from scipy.sparse.linalg import expm_multiply
 from shaftwork.core.calls import interruptible
 from shaftwork.core.errors import ParameterError
 from shaftwork.integrate.modal import Eigensystem, find_modes
-from shaftwork.integrate.pieces import SmoothInterval
 from shaftwork.integrate.problem import Array, LinearInputs, Problem
+from shaftwork.integrate.smooth_intervals import SmoothInterval
 from shaftwork.integrate.stiffness import balance, norm, scale_by
 
 # From so many states on LAPACK may take so long for the modes that Ctrl-C must not wait for it.
@@ -49,7 +49,7 @@ class LinearSystem:
 
 def system_of(linear: LinearInputs) -> LinearSystem:
     """The system of a linear form, made once."""
-    return linear.kept("exact", lambda: LinearSystem(linear))
+    return linear.cached("exact", lambda: LinearSystem(linear))
 
 
 def are_even(times: Array) -> bool:

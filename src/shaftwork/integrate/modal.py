@@ -82,9 +82,9 @@ def find_modes(matrix: Any) -> Eigensystem | None:
     if condition > LARGEST_CONDITION:
         return None
     inverse = np.linalg.inv(vectors).astype(complex)
-    kept = values.imag >= 0
-    weights = np.where(values.imag > 0, 2.0, 1.0)[kept]
-    return Eigensystem(values[kept].astype(complex), vectors[:, kept] * weights, inverse[kept], condition)
+    upper = values.imag >= 0
+    weights = np.where(values.imag > 0, 2.0, 1.0)[upper]
+    return Eigensystem(values[upper].astype(complex), vectors[:, upper] * weights, inverse[upper], condition)
 
 
 def _lossless_halves(matrix: Array) -> tuple[Array, NDArray[np.bool_]] | None:
@@ -102,10 +102,10 @@ def _lossless_halves(matrix: Array) -> tuple[Array, NDArray[np.bool_]] | None:
         reached[first] = True
         while waiting:
             i = waiting.pop()
-            found = np.flatnonzero((matrix[i] != 0) & ~reached)
-            scale[found] = scale[i] * np.sqrt(-matrix[found, i] / matrix[i, found])
-            speeds[found], reached[found] = not speeds[i], True
-            waiting.extend(found.tolist())
+            neighbours = np.flatnonzero((matrix[i] != 0) & ~reached)
+            scale[neighbours] = scale[i] * np.sqrt(-matrix[neighbours, i] / matrix[i, neighbours])
+            speeds[neighbours], reached[neighbours] = not speeds[i], True
+            waiting.extend(neighbours.tolist())
     scaled = matrix * scale / scale[:, None]
     if (np.abs(scaled + scaled.T) > SKEW * np.abs(scaled)).any() or scaled[np.equal.outer(speeds, speeds)].any():
         return None
@@ -146,11 +146,11 @@ def phi(z: Complex, exponential: Complex, count: int) -> Complex:
     """
     small = np.abs(z) < NEAR
     inverse = 1.0 / np.where(small, NEAR, z)  # one division for all: a complex one costs as much as five products
-    found = np.empty((count, *z.shape), dtype=complex)
-    np.multiply(exponential - 1.0, inverse, out=found[0])
+    values = np.empty((count, *z.shape), dtype=complex)
+    np.multiply(exponential - 1.0, inverse, out=values[0])
     for k in range(1, count):
-        np.subtract(found[k - 1], 1 / math.factorial(k), out=found[k])
-        found[k] *= inverse
+        np.subtract(values[k - 1], 1 / math.factorial(k), out=values[k])
+        values[k] *= inverse
     near = z[small]
     series = np.ones_like(near)
     for term in range(count + SERIES_TERMS, count, -1):
@@ -158,9 +158,9 @@ def phi(z: Complex, exponential: Complex, count: int) -> Complex:
         series += 1.0
     series /= math.factorial(count)
     for k in range(count, 0, -1):
-        found[k - 1][small] = series
+        values[k - 1][small] = series
         series = 1 / math.factorial(k - 1) + near * series
-    return found
+    return values
 
 
 @dataclass(frozen=True)

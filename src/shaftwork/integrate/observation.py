@@ -68,11 +68,11 @@ def rounding(observed: Observed, times: Array, states: Array) -> tuple[Array, Ar
     """All values (k, m), and what one rounding of each state changes (m,)."""
     patterns = np.concatenate([np.zeros((1, states.shape[1])), _patterns(states.shape[1])])
     moved = np.concatenate([states * (1 + np.finfo(float).eps * pattern) for pattern in patterns])
-    found = observed.values(np.tile(times, len(patterns)), moved).reshape(len(patterns), len(times), -1)
-    changed = np.abs(found - found[0])
+    values = observed.values(np.tile(times, len(patterns)), moved).reshape(len(patterns), len(times), -1)
+    changed = np.abs(values - values[0])
     first = observed.first_left
-    changed[..., first:] = np.abs(found[..., first:])
-    return found[0], changed.max(axis=(0, 1))
+    changed[..., first:] = np.abs(values[..., first:])
+    return values[0], changed.max(axis=(0, 1))
 
 
 def largest_part(observed: Observed, errors: Array, values: Array) -> tuple[float, str]:

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from shaftwork.integrate.linear_system import are_even, straight_line
-from shaftwork.integrate.pieces import PiecewiseDense, SmoothInterval, pieces
 from shaftwork.integrate.problem import Array, Fractions, LinearInputs, Problem
+from shaftwork.integrate.smooth_intervals import PiecewiseDense, SmoothInterval, pieces
 from shaftwork.integrate.stiffness import balance, scale_by
 from shaftwork.numerics.polynomials import Interpolant, chebyshev_nodes, interpolation_times, to_chebyshev
 
@@ -65,16 +65,16 @@ class FixedPoint:
     def whole(self, values: Any) -> Integers:
         """Floats or fractions as numbers of this point."""
         one = 1 << self.bits
-        found = np.empty(np.shape(values), dtype=object)
-        found.ravel()[:] = [round(Fraction(value) * one) if value else 0 for value in np.ravel(values).tolist()]
-        return found
+        integers = np.empty(np.shape(values), dtype=object)
+        integers.ravel()[:] = [round(Fraction(value) * one) if value else 0 for value in np.ravel(values).tolist()]
+        return integers
 
     def floats(self, block: Integers) -> Array:
         """Numbers of this point as the nearest floats; infinite where one is too large."""
         one = 1 << self.bits
-        found = np.empty(block.shape)
-        found.ravel()[:] = [_quotient(value, one) for value in block.ravel().tolist()]
-        return found
+        values = np.empty(block.shape)
+        values.ravel()[:] = [_quotient(value, one) for value in block.ravel().tolist()]
+        return values
 
     def advance(self, block: Integers, times: list[Fraction]) -> Integers:
         """The columns (m, k) of a block, each moved by its own time in s.
@@ -211,12 +211,12 @@ class PrecisePiece:
 
         The last panel comes first: what still moves fast there does so all the time.
         """
-        starts, found = [self.piece.start], list[Interpolant]()
+        starts, panels = [self.piece.start], list[Interpolant]()
         end, largest = self.piece.end, np.zeros(len(self.system.scale) - 2 * len(self.system.active))
         while starts:
             start = starts[-1]
             shares = (self.piece.end - self.piece.start) / (end - start)
-            if len(found) > MOST_PANELS or (not found and shares > MOST_PANELS):
+            if len(panels) > MOST_PANELS or (not panels and shares > MOST_PANELS):
                 return None
             states = self.exactly(interpolation_times(start, end, DEGREE))
             largest = np.maximum(largest, np.abs(states).max(axis=0))
@@ -225,11 +225,11 @@ class PrecisePiece:
             if (missing > LEFT_OUT * largest).any() and start < middle < end:
                 starts.append(middle)
                 continue
-            found.append(Interpolant(start, end, states))
+            panels.append(Interpolant(start, end, states))
             end = starts.pop()
-        found.reverse()
-        steps = np.array([*(each.start for each in found), self.piece.end])
-        return PiecewiseDense(steps[:-1], tuple(found), steps, largest.size)
+        panels.reverse()
+        steps = np.array([*(each.start for each in panels), self.piece.end])
+        return PiecewiseDense(steps[:-1], tuple(panels), steps, largest.size)
 
     @cached_property
     def _nodes(self) -> tuple[Array, Array]:
@@ -260,14 +260,14 @@ class PrecisePiece:
 
 def precise_system(problem: Problem, linear: LinearInputs) -> PreciseSystem | None:
     """The system of a problem, which is kept for its next run; None where it has no exact form."""
-    fractions = linear.kept("fractions", linear.fractions)
+    fractions = linear.cached("fractions", linear.fractions)
     if fractions is None:
         return None
     spans = pieces(problem)
     lines = [straight_line(problem, fractions.inputs, piece) for piece in spans]
     active = np.flatnonzero(np.any([(level != 0) | (slope != 0) for level, slope in lines], axis=0)).tolist()
     length = max(piece.end - piece.start for piece in spans)
-    return linear.kept("precise", lambda: PreciseSystem(linear, fractions, length, active), (length, active))
+    return linear.cached("precise", lambda: PreciseSystem(linear, fractions, length, active), (length, active))
 
 
 def precise_piece(

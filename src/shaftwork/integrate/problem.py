@@ -14,7 +14,7 @@ from shaftwork.core.errors import SimulationError
 from shaftwork.core.times import around
 
 Array = NDArray[np.float64]
-Made = TypeVar("Made")
+Cached = TypeVar("Cached")
 Explain = Callable[[Array, Array], SimulationError | None]
 
 
@@ -69,15 +69,15 @@ class LinearInputs:
     forcing: Callable[[Any], Array]
     fractions: Callable[[], Fractions | None] = lambda: None
     straight: bool = True
-    _kept: dict[str, tuple[object, Any]] = field(default_factory=dict, init=False, repr=False, compare=False)
+    _cache: dict[str, tuple[object, Any]] = field(default_factory=dict, init=False, repr=False, compare=False)
 
-    def kept(self, name: str, make: Callable[[], Made], key: object = None) -> Made:
-        """What engines make of the system, kept for the next run with the same parameters; for the last key alone."""
-        entry = self._kept.get(name)
+    def cached(self, name: str, make: Callable[[], Cached], key: object = None) -> Cached:
+        """What engines make of the system, for the next run with the same parameters; for the last key of a name."""
+        entry = self._cache.get(name)
         if entry is None or entry[0] != key:
-            entry = self._kept[name] = key, make()
-        made: Made = entry[1]
-        return made
+            entry = self._cache[name] = key, make()
+        value: Cached = entry[1]
+        return value
 
 
 @dataclass(frozen=True)
@@ -128,25 +128,25 @@ class SeriesError(SimulationError):
 
     Args:
         message: of the error.
-        found: what is in the way, without the next step.
+        obstacle: what is in the way, without the next step.
     """
 
-    def __init__(self, message: str, found: str = "a law is not smooth where the motion passes") -> None:
+    def __init__(self, message: str, obstacle: str = "a law is not smooth where the motion passes") -> None:
         super().__init__(message)
-        self.found = found
+        self.obstacle = obstacle
 
 
 class StickingError(SeriesError):
     """A motion sticks where laws on both sides drive it back, or only touches the place: another engine can tell.
 
     Args:
-        message, found: as for `SeriesError`.
-        held: whether both sides drive it back there, so that no engine goes on.
+        message, obstacle: as for `SeriesError`.
+        driven_back: whether both sides drive it back there, so that no engine goes on.
     """
 
-    def __init__(self, message: str, found: str, *, held: bool) -> None:
-        super().__init__(message, found)
-        self.held = held
+    def __init__(self, message: str, obstacle: str, *, driven_back: bool) -> None:
+        super().__init__(message, obstacle)
+        self.driven_back = driven_back
 
 
 class React(Protocol):
@@ -172,13 +172,11 @@ class React(Protocol):
         ...
 
 
-@dataclass(frozen=True)
-class Problem:
-    """An initial value problem x' = rhs(t, x) on [t0, t_end], smooth between its breakpoints.
+@dataclass(frozen=True, kw_only=True)
+class TimedProblem:
+    """What every problem says of its span of time, its states and its run.
 
     Args:
-        rhs: right-hand side, (time, (n,)) to a new (n,) array.
-        jacobian: d rhs / d x as a scipy.sparse.csc_array (n, n), or None.
         x0: (n,) start state.
         t0: start time in s.
         t_end: end time in s, greater than t0.
@@ -186,35 +184,20 @@ class Problem:
         atol: (n,) absolute tolerances, in the units of the states.
         rtol: relative tolerance.
         breakpoints: strictly increasing times in (t0, t_end) where an input jumps or kinks. An engine ends a step there
-            and starts anew; inside a piece it never evaluates `rhs` at or past the piece's end.
+            and starts anew; inside a piece it never evaluates the equations at or past the piece's end.
         jump: state after a breakpoint from (breakpoint, state before it), or None where the state is continuous.
         sides: from t0, a breakpoint or t_end to the times in s at which inputs are read just before and just after it.
-        switches: what makes the right-hand side jump or bend where its sign changes with the motion, from times (k,)
-            and states (k, n) to (k, m), or None where nothing does. An engine ends a step at such a change
-            (`Crossings`), or finds it by its own means.
         guards: what ends the run before `t_end`, or None where nothing does. An engine then returns what it has, up to
             the time at which the first guard is met, located as exactly as its solution allows; see `Trajectory.met`.
-        react: how the run goes on past guards, or None where each of them ends it.
         t_eval: strictly increasing output times in [t0, t_end], or None for the engine's own steps. At a breakpoint the
             state after the jump is the output.
-        linear: the same system in linear form, where it is one; else None.
-        observed: all quantities of a linear network, or None.
-        symbolic: the same system as a heyoka program with its parameters (`codegen.heyoka.BoundProgram`), a function
-            that makes this where an engine asks for it, or None where there is none.
         explain: from times (k,) and states (k, n) to the error of the first of these times at which a law has no value,
             or None where all have one.
-        rough: from the same to the first time at which any part of a law has no value or no slope, be it in a branch
-            that does not hold, and that law in words.
         max_steps: an engine gives up, with a reason, after this many steps.
         earlier_steps: of the same motion, before this part of it; they are told with the reason.
         progress: told again and again the time in s that an engine has reached, or None. What it raises ends the run.
-        overall: the size of the largest state where it stays below one: so much smaller is a tolerance for all states.
-        found: what an engine has found out about the equations, for its next run with them.
-        rates: the right-hand side from times (k,) and states (k, n) to (k, n), or None where there is only `rhs`.
     """
 
-    rhs: Callable[[float, Array], Array]
-    jacobian: Callable[[float, Array], Any] | None
     x0: Array
     t0: float
     t_end: float
@@ -224,20 +207,46 @@ class Problem:
     breakpoints: tuple[float, ...] = ()
     jump: Callable[[float, Array], Array] | None = None
     sides: Callable[[float], tuple[float, float]] = around
-    switches: Callable[[Array, Array], Array] | None = None
     guards: Guards | None = None
-    react: React | None = None
     t_eval: Array | None = None
-    linear: LinearInputs | None = None
-    observed: Observed | None = None
-    symbolic: Any = None
     explain: Explain | None = None
-    rough: Callable[[Array, Array], tuple[float, str] | None] | None = None
     max_steps: int = 10_000_000
     earlier_steps: int = 0
     progress: Callable[[float], None] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Problem(TimedProblem):
+    """An initial value problem x' = rhs(t, x) on [t0, t_end], smooth between its breakpoints.
+
+    Args:
+        rhs: right-hand side, (time, (n,)) to a new (n,) array.
+        jacobian: d rhs / d x as a scipy.sparse.csc_array (n, n), or None.
+        switches: what makes the right-hand side jump or bend where its sign changes with the motion, from times (k,)
+            and states (k, n) to (k, m), or None where nothing does. An engine ends a step at such a change
+            (`Crossings`), or finds it by its own means.
+        react: how the run goes on past guards, or None where each of them ends it.
+        linear: the same system in linear form, where it is one; else None.
+        observed: all quantities of a linear network, or None.
+        symbolic: the same system as a heyoka program with its parameters (`codegen.heyoka.BoundProgram`), a function
+            that makes this where an engine asks for it, or None where there is none.
+        rough: from times (k,) and states (k, n) to the first time at which any part of a law has no value or no slope,
+            be it in a branch that does not hold, and that law in words.
+        overall: the size of the largest state where it stays below one: so much smaller is a tolerance for all states.
+        estimates: of decay rates by name, which an engine keeps for its next run with these equations.
+        rates: the right-hand side from times (k,) and states (k, n) to (k, n), or None where there is only `rhs`.
+    """
+
+    rhs: Callable[[float, Array], Array]
+    jacobian: Callable[[float, Array], Any] | None
+    switches: Callable[[Array, Array], Array] | None = None
+    react: React | None = None
+    linear: LinearInputs | None = None
+    observed: Observed | None = None
+    symbolic: Any = None
+    rough: Callable[[Array, Array], tuple[float, str] | None] | None = None
     overall: float = 1.0
-    found: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
+    estimates: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
     rates: Callable[[Array, Array], Array] | None = None
 
     @property
@@ -251,102 +260,38 @@ class Problem:
         return self.symbolic() if callable(self.symbolic) else self.symbolic
 
 
-@dataclass(frozen=True)
-class DaeProblem:
+@dataclass(frozen=True, kw_only=True)
+class DaeProblem(TimedProblem):
     """An implicit problem residual(t, x, dx/dt) = 0 of index 1 on [t0, t_end]; x holds states and algebraic unknowns.
+
+    The algebraic ones of `x0` are a first guess.
 
     Args:
         residual: (time, x (n,), dx/dt (n,)) to a new (n,) array.
-        x0: (n,) start values; the algebraic ones are a first guess.
         derivative0: (n,) first guess of dx/dt at the start.
         algebraic: indices of the unknowns whose derivative does not appear.
-        t0, t_end, names, atol, rtol, breakpoints, jump, sides, switches, guards, t_eval, explain, max_steps,
-            earlier_steps, progress: as in `Problem`.
+        switches: as in `Problem`.
     """
 
     residual: Callable[[float, Array, Array], Array]
-    x0: Array
     derivative0: Array
     algebraic: tuple[int, ...]
-    t0: float
-    t_end: float
-    names: tuple[str, ...]
-    atol: Array
-    rtol: float = 1e-8
-    breakpoints: tuple[float, ...] = ()
-    jump: Callable[[float, Array], Array] | None = None
-    sides: Callable[[float], tuple[float, float]] = around
     switches: Callable[[Array, Array], Array] | None = None
-    guards: Guards | None = None
-    t_eval: Array | None = None
-    explain: Explain | None = None
-    max_steps: int = 10_000_000
-    earlier_steps: int = 0
-    progress: Callable[[float], None] | None = None
 
 
-AnyProblem = TypeVar("AnyProblem", bound=Problem | DaeProblem)
+AnyProblem = TypeVar("AnyProblem", bound=TimedProblem)
 
 
 def changed(problem: AnyProblem, **values: Any) -> AnyProblem:
     """The same problem with other values; `dataclasses.replace` takes longer than many a phase of a motion."""
-    made = object.__new__(type(problem))
-    vars(made).update(vars(problem), **values)
-    return made
+    copy = object.__new__(type(problem))
+    vars(copy).update(vars(problem), **values)
+    return copy
 
 
 def tightened(problem: AnyProblem, share: float) -> AnyProblem:
     """The same problem with a part of its tolerances."""
     return changed(problem, rtol=share * problem.rtol, atol=share * problem.atol)
-
-
-class Timed(Protocol):
-    """What every problem says of its times, states and tolerances; see `Problem`."""
-
-    @property
-    def t0(self) -> float:
-        """Start, s."""
-        ...
-
-    @property
-    def t_end(self) -> float:
-        """End, s."""
-        ...
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the states, for messages."""
-        ...
-
-    @property
-    def atol(self) -> Array:
-        """Absolute tolerances."""
-        ...
-
-    @property
-    def breakpoints(self) -> tuple[float, ...]:
-        """Where a step must end, s."""
-        ...
-
-    @property
-    def jump(self) -> Callable[[float, Array], Array] | None:
-        """The state after a breakpoint."""
-        ...
-
-    @property
-    def sides(self) -> Callable[[float], tuple[float, float]]:
-        """Times just before and after a breakpoint."""
-        ...
-
-    @property
-    def explain(self) -> Explain | None:
-        """Finds laws without a value."""
-        ...
-
-    @property
-    def progress(self) -> Callable[[float], None] | None:
-        """Told the time that is reached, s."""
-        ...
 
 
 class DenseOutput(Protocol):

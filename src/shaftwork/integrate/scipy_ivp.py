@@ -14,7 +14,8 @@ from shaftwork.integrate.cancellation import cancellation
 from shaftwork.integrate.crossings import Crossings
 from shaftwork.integrate.engines import ENGINES
 from shaftwork.integrate.guards import LEAST, SHORTER, GuardWatch
-from shaftwork.integrate.pieces import (
+from shaftwork.integrate.problem import Array, Problem, Trajectory, tightened
+from shaftwork.integrate.smooth_intervals import (
     GuardedFunctions,
     Pace,
     PiecewiseDense,
@@ -26,7 +27,6 @@ from shaftwork.integrate.pieces import (
     start_of_piece,
     used_up,
 )
-from shaftwork.integrate.problem import Array, Problem, Trajectory, tightened
 from shaftwork.integrate.stiffness import bound_of_decay, jacobians, rates
 
 Method = Literal["DOP853", "Radau"]
@@ -114,15 +114,15 @@ def _on_edge(problem: Problem, runs: list[_SolvedInterval]) -> bool:
 
     The decay is looked at once for many brief phases in the same modes, and anew for a long one.
     """
-    longest, found = max(float(np.diff(run.times).max()) for run in runs), problem.found
+    longest, estimates = max(float(np.diff(run.times).max()) for run in runs), problem.estimates
     long = sum(run.counts["steps"] for run in runs) > BRIEF
-    if long or "decay" not in found:
-        if long or "bound" not in found:
-            found["bound"] = bound_of_decay(jacobians(problem))
-        if longest * found["bound"] <= INSIDE:
+    if long or "decay" not in estimates:
+        if long or "bound" not in estimates:
+            estimates["bound"] = bound_of_decay(jacobians(problem))
+        if longest * estimates["bound"] <= INSIDE:
             return False
-        found["decay"] = rates(jacobians(problem)).decay
-    return bool(longest * found["decay"] > INSIDE)
+        estimates["decay"] = rates(jacobians(problem)).decay
+    return bool(longest * estimates["decay"] > INSIDE)
 
 
 def _samples(runs: list[_SolvedInterval]) -> tuple[Array, Array]:

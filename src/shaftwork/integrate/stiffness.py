@@ -10,8 +10,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from shaftwork.integrate.pieces import pieces
 from shaftwork.integrate.problem import Array, Problem
+from shaftwork.integrate.smooth_intervals import pieces
 
 # Up to here all eigenvalues are computed; beyond, norms of the balanced Jacobian bound them.
 LARGEST_EIGENVALUES = 200
@@ -34,8 +34,8 @@ class Rates:
 
 def rates(matrices: Iterable[Any]) -> Rates:
     """Fastest decay and oscillation of Jacobians."""
-    found = [Rates(0.0, 0.0), *map(_rates_of, matrices)]
-    return Rates(max(rate.decay for rate in found), max(rate.oscillation for rate in found))
+    all_rates = [Rates(0.0, 0.0), *map(_rates_of, matrices)]
+    return Rates(max(rate.decay for rate in all_rates), max(rate.oscillation for rate in all_rates))
 
 
 def bound_of_decay(matrices: Iterable[Any]) -> float:
@@ -45,7 +45,7 @@ def bound_of_decay(matrices: Iterable[Any]) -> float:
 
 def jacobians(problem: Problem) -> Iterator[Any]:
     """Those at the start of a problem and at a few states that it may soon reach."""
-    return (made for made in _jacobians(problem) if np.isfinite(made.data).all())
+    return (matrix for matrix in _jacobians(problem) if np.isfinite(matrix.data).all())
 
 
 def _jacobians(problem: Problem) -> Iterator[Any]:

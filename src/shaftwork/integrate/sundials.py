@@ -14,7 +14,8 @@ from shaftwork.core.calls import unprinted
 from shaftwork.core.errors import MissingExtraError
 from shaftwork.integrate.crossings import Crossings
 from shaftwork.integrate.guards import LEAST, SHORTER, GuardWatch, share_of_tolerance
-from shaftwork.integrate.pieces import (
+from shaftwork.integrate.problem import Array, DaeProblem, Problem, Trajectory, tightened
+from shaftwork.integrate.smooth_intervals import (
     Pace,
     PiecewiseDense,
     SmoothInterval,
@@ -25,7 +26,6 @@ from shaftwork.integrate.pieces import (
     start_of_piece,
     used_up,
 )
-from shaftwork.integrate.problem import Array, DaeProblem, Problem, Trajectory, tightened
 from shaftwork.integrate.sundials_solvers import (
     DEGREES,
     JacobianPattern,

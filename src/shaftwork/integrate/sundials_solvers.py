@@ -15,8 +15,8 @@ from shaftwork.core.calls import unprinted
 from shaftwork.core.notices import FILTERS
 from shaftwork.integrate.engines import ENGINES
 from shaftwork.integrate.guards import CLEARANCE
-from shaftwork.integrate.pieces import GuardedFunctions, SmoothInterval, failure
 from shaftwork.integrate.problem import Array, DaeProblem, Problem
+from shaftwork.integrate.smooth_intervals import GuardedFunctions, SmoothInterval, failure
 from shaftwork.numerics.polynomials import Interpolant, interpolation_times
 
 Method = Literal["BDF", "Adams"]

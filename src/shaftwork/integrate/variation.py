@@ -84,8 +84,8 @@ def variation(
         errors = np.abs(_stepped(steps.maps[~steps.right], values[whole]) - values[whole + 2])
         largest = np.maximum.accumulate((np.abs(values) / sizes[:, None]).max(axis=1, initial=0.0), axis=0)
         scale = sizes[:, None] * np.maximum(largest, least)[:, None]
-        found = (errors <= CLOSER * rtol * scale[whole + 2]).all(axis=(1, 2))
-        parts.right[whole] = parts.right[whole + 1] = found
+        accurate = (errors <= CLOSER * rtol * scale[whole + 2]).all(axis=(1, 2))
+        parts.right[whole] = parts.right[whole + 1] = accurate
         if parts.right.all():
             return Variation(coefficients, np.append(parts.begins, ends[-1]), values)
         if len(parts.begins) > MOST_STEPS or not np.isfinite(values).all():
@@ -141,11 +141,11 @@ def _maps(coefficients: Coefficients, begins: Array, lengths: Array) -> Array:
     A, B = coefficients((begins[:, None] + lengths[:, None] * NODES).ravel())
     (_, every, size), columns = A.shape, A.shape[2] + B.shape[2]
     both = np.concatenate([A, B], axis=2).reshape(len(begins), STAGES, every, columns)
-    made = np.empty((len(begins), every, columns))
+    maps = np.empty((len(begins), every, columns))
     count = max(1, MOST_AT_ONCE // max(1, (STAGES * size) ** 2))
     for k in range(0, len(begins), count):
-        made[k : k + count] = _solved(both[k : k + count], size, lengths[k : k + count])
-    return made
+        maps[k : k + count] = _solved(both[k : k + count], size, lengths[k : k + count])
+    return maps
 
 
 def _solved(both: Array, size: int, lengths: Array) -> Array:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from shaftwork.core.errors import SimulationError
-from shaftwork.integrate import exact
+from shaftwork.integrate import propagation
 from shaftwork.integrate.cancellation import REMEDY
 from shaftwork.integrate.observation import largest_part, outlook, rounding, samples
 from shaftwork.integrate.problem import TOLERATED, UNSURPRISING, Array, Observed, Problem, Trajectory
@@ -47,7 +47,7 @@ def objection(problem: Problem, trajectory: Trajectory, engine: str) -> str | No
         )
     if engine == "exact":
         return _doubt(trajectory)
-    run = exact.reference(replace(problem, t_eval=times, progress=None))
+    run = propagation.reference(replace(problem, t_eval=times, progress=None))
     if run is None:
         return None
     added_up = min(trajectory.statistics.get("steps", 0) * problem.rtol, UNSURPRISING)

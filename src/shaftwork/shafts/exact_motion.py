@@ -354,12 +354,12 @@ class _March:
         values = np.zeros((times.shape[0], self.load.size, times.shape[1]))
         for torque in self.torques:
             if not torque.of_speed:
-                given = torque.law(times) if callable(torque.law) else torque.law
-                if not np.isfinite(given).all():
+                applied = torque.law(times) if callable(torque.law) else torque.law
+                if not np.isfinite(applied).all():
                     raise SimulationError(
                         f"The torque on junction {torque.junction} is not finite near t = {times[0, 0]:.9g} s."
                     )
-                values[:, torque.junction] += given
+                values[:, torque.junction] += applied
         return values
 
     def _add_speed_torques(self, panel: int, times: Array, speeds: Array) -> None:

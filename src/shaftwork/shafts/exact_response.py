@@ -164,9 +164,9 @@ class _ResponseSweep:
 
 def _sweep(line: SectionLine, s: Complex, junction: int) -> _ResponseSweep:
     """Sweep from the left end to a junction."""
-    held = line.clamped[0]
-    speed = np.full_like(s, 0.0 if held else 1.0)
-    torque = np.full_like(s, -1.0 if held else 0.0)
+    clamped = line.clamped[0]
+    speed = np.full_like(s, 0.0 if clamped else 1.0)
+    torque = np.full_like(s, -1.0 if clamped else 0.0)
     sections = line.sections[:junction]
     starts, growths = [], []
     for section, disc, damper in zip(sections, line.discs, line.dampers, strict=False):

@@ -57,6 +57,11 @@ GAUSS = _scheme(POINTS)
 RADAU = _scheme(radau_nodes(STAGES))
 
 
+def values_at(powers: Array, places: Array) -> Array:
+    """Values (..., k) at places (k,) of [-1, 1] of polynomials, by their coefficients (..., s) of the powers."""
+    return np.asarray(powers @ np.vander(places, powers.shape[-1], increasing=True).T)
+
+
 def squared(powers: Array, to: Array) -> Array:
     """Integrals (k, q) from -1 to some places (k,) of squares of polynomials, of coefficients (k, q, s)."""
     half = (to + 1) / 2

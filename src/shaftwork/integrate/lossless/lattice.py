@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.core.errors import SimulationError
-from shaftwork.integrate.lossless.collocation import GAUSS, POWERS, STAGES, STATE_POWERS, WEIGHTS
+from shaftwork.integrate.lossless.collocation import GAUSS, POWERS, STAGES, STATE_POWERS, WEIGHTS, values_at
 from shaftwork.integrate.lossless.lines import DelayProblem, DelayTrajectory, Past, past_of
 from shaftwork.integrate.lossless.scales import RESOLVED, Scales, left_out
 from shaftwork.integrate.lossless.waveforms import WavePanels, trajectory
-from shaftwork.integrate.pieces import SmoothInterval, failure, pieces, start_of_piece
 from shaftwork.integrate.problem import Array
+from shaftwork.integrate.smooth_intervals import SmoothInterval, failure, pieces, start_of_piece
 
 # Numbers of panels.
 Numbers = NDArray[np.intp]
@@ -160,7 +160,7 @@ class Lattice:
         panels = np.arange(-self.reach, 0)
         nodes = self.times(panels)[:, None] + self.lengths[panels % self.size, None] * GAUSS.nodes
         places = 2 * (nodes - past.starts[0]) / past.lengths[0] - 1
-        values = (past.waves[0] @ POWERS) @ np.vander(places.ravel(), STAGES, increasing=True).T
+        values = values_at(past.waves[0] @ POWERS, places.ravel())
         return np.asarray(values.reshape(self._q, self.reach, STAGES).swapaxes(0, 1))
 
     @property

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shaftwork.core.times import around
 from shaftwork.integrate.lossless.collocation import POINTS
-from shaftwork.integrate.problem import Array, Explain, Guards, Trajectory
+from shaftwork.integrate.problem import Array, TimedProblem, Trajectory
 
 
 @dataclass(frozen=True)
@@ -29,12 +28,13 @@ class Past:
     waves: Array
 
 
-@dataclass(frozen=True)
-class DelayProblem:
+@dataclass(frozen=True, kw_only=True)
+class DelayProblem(TimedProblem):
     """A network x' = rhs(t, x, h), v = speeds(t, x, h) whose lossless lines join the ends of speeds v by delays.
 
     Law: an end of a line of impedance Z and delay T takes the torque Z v + h from its node, and what leaves the one end
-    arrives at the other: h_b(t) = -(2 Z v_a + h_a)(t - T), h_a(t) = -(2 Z v_b + h_b)(t - T).
+    arrives at the other: h_b(t) = -(2 Z v_a + h_a)(t - T), h_a(t) = -(2 Z v_b + h_b)(t - T). There may be no states; a
+    step is a panel; guards are of the states with the history torques behind them (k, n + q), see `March`.
 
     Args:
         rhs: (times (k,), states (n, k), history torques (q, k)) to a new (n, k) array.
@@ -42,15 +42,11 @@ class DelayProblem:
         jacobian: (time, state (n,), history torques (q,)) to d rhs / d x, an array or a scipy.sparse array (n, n).
         delays: (q / 2,) delays in s; the ends are numbered a and b of the first line, a and b of the second, ...
         impedances: (q / 2,) impedances in N m s.
-        x0: (n,) start state; n may be 0.
-        t0, t_end, names, atol, rtol, breakpoints, jump, sides, t_eval, explain, max_steps, earlier_steps, progress: as
-            in `Problem`; a step is a panel.
-        guards: as in `Problem`, of the states with the history torques behind them (k, n + q); see `March`.
         timed: guards that change with time by themselves, so that panels must be short enough to see them.
         linear: whether rhs and speeds are affine in x and h, with constant matrices.
         steady: whether, between breakpoints, rhs and speeds do not depend on the time.
         speeds0: (q,) speed of each end at t0 in rad/s, along a line straight from the one to the other; None for rest.
-        torque0: (q / 2,) torque along each line at t0 in N m, that which its node a gives to it; None for none.
+        torque0: (q / 2,) torque along each line at t0 in N m, that which its node gives to it; None for none.
         past: what left the ends before t0, in place of speeds0 and torque0: a run goes on where another one ended.
         atol_waves: absolute tolerance of 2 Z v + h in N m; rtol is relative to the largest of each line so far.
     """
@@ -60,21 +56,6 @@ class DelayProblem:
     jacobian: Callable[[float, Array, Array], Any]
     delays: Array
     impedances: Array
-    x0: Array
-    t0: float
-    t_end: float
-    names: tuple[str, ...]
-    atol: Array
-    rtol: float = 1e-8
-    breakpoints: tuple[float, ...] = ()
-    jump: Callable[[float, Array], Array] | None = None
-    sides: Callable[[float], tuple[float, float]] = around
-    t_eval: Array | None = None
-    explain: Explain | None = None
-    max_steps: int = 10_000_000
-    earlier_steps: int = 0
-    progress: Callable[[float], None] | None = None
-    guards: Guards | None = None
     timed: tuple[int, ...] = ()
     linear: bool = False
     steady: bool = False

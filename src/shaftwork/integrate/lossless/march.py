@@ -17,8 +17,8 @@ from shaftwork.integrate.lossless.scales import RESOLVED, Scales, left_out
 from shaftwork.integrate.lossless.stages import CollocationStages
 from shaftwork.integrate.lossless.wave_history import WaveHistory
 from shaftwork.integrate.lossless.waveforms import Polynomials, Restriction, StatesDense, WavePanels
-from shaftwork.integrate.pieces import PiecewiseDense, failure, pieces, reached, start_of_piece
 from shaftwork.integrate.problem import Array, Trajectory
+from shaftwork.integrate.smooth_intervals import PiecewiseDense, failure, pieces, reached, start_of_piece
 
 # The shortest panel takes this part of rtol times the shortest delay.
 SHORTEST = 1e-2

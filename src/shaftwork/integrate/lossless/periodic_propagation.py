@@ -8,8 +8,8 @@ from shaftwork.integrate.lossless.collocation import POWERS, STAGES, STATE_POWER
 from shaftwork.integrate.lossless.lattice import Lattice, LatticeRun, Numbers
 from shaftwork.integrate.lossless.lines import DelayTrajectory
 from shaftwork.integrate.lossless.waveforms import one_sided
-from shaftwork.integrate.pieces import pieces
 from shaftwork.integrate.problem import Array
+from shaftwork.integrate.smooth_intervals import pieces
 
 # Periods of the first leap. It is marched, since every rounding of it is doubled with every power.
 LEAP = 256

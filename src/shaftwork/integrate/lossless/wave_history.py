@@ -7,7 +7,7 @@ from bisect import bisect_left, bisect_right
 import numpy as np
 from numpy.typing import NDArray
 
-from shaftwork.integrate.lossless.collocation import POINTS, POWERS, STAGES
+from shaftwork.integrate.lossless.collocation import POINTS, POWERS, STAGES, values_at
 from shaftwork.integrate.lossless.lines import Lines, Past
 from shaftwork.integrate.problem import Array
 
@@ -71,7 +71,7 @@ class WaveHistory:
                 arrived[ends] = -self.waves[first][partners]
             else:
                 points = 2 * shift / self.lengths[first] - 1 + (1 + POINTS) * stretch
-                arrived[ends] = -_values(self.waves[first][partners], points)
+                arrived[ends] = -values_at(self.waves[first][partners] @ POWERS, points)
         return arrived, cut
 
     def _several(self, low: float, high: float, span: tuple[int, int], rows: NDArray[np.intp]) -> tuple[Array, Array]:
@@ -84,19 +84,14 @@ class WaveHistory:
         for number in dict.fromkeys(index.tolist()):
             chosen = index == number
             points = 2 * (times[chosen] - starts[number]) / lengths[number] - 1
-            arrived[:, chosen] = -_values(self.waves[panels[number]][rows], points)
+            arrived[:, chosen] = -values_at(self.waves[panels[number]][rows] @ POWERS, points)
         nodes = (np.array(starts)[:, None] + np.multiply.outer(lengths, (1 + POINTS) / 2)).ravel()
         values = np.concatenate([self.waves[k][rows] for k in panels], axis=1)
         inside = (nodes >= low) & (nodes <= high)
         points = 2 * (nodes[inside] - low) / (high - low) - 1
-        return arrived, np.abs(_values(arrived, points) + values[:, inside])
+        return arrived, np.abs(values_at(arrived @ POWERS, points) + values[:, inside])
 
     def _divide(self, low: float, high: float, span: tuple[int, int]) -> float:
         # What a polynomial cannot follow lies where two panels meet.
         meetings = np.array(self.starts[span[0] + 1 : span[1] + 1])
         return float(meetings[np.argmin(np.abs(meetings - (low + high) / 2))])
-
-
-def _values(waves: Array, points: Array) -> Array:
-    """Values (r, k) at points (k,) of [-1, 1] of polynomials that are given at the Gauss points (r, s)."""
-    return np.asarray(waves @ POWERS @ np.vander(points, STAGES, increasing=True).T)

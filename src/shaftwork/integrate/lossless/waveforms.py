@@ -9,10 +9,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from shaftwork.integrate.lossless.collocation import POINTS, POWERS, STAGES, STATE_POWERS, squared
+from shaftwork.integrate.lossless.collocation import POINTS, POWERS, STATE_POWERS, squared, values_at
 from shaftwork.integrate.lossless.lines import DelayProblem, DelayTrajectory, Lines, Past, past_of
-from shaftwork.integrate.pieces import both_sides
 from shaftwork.integrate.problem import Array
+from shaftwork.integrate.smooth_intervals import both_sides
 
 
 @dataclass(frozen=True)
@@ -33,11 +33,15 @@ class Polynomials:
 
     def __call__(self, times: Array, *, left: bool = False) -> Array:
         """Values (k, r) at times (k,) in s; where panels meet those of the later one, or of the `left` one."""
+        index, places = self.located(times, left=left)
+        powers = np.vander(places, self.powers.shape[2], increasing=True)
+        return np.asarray(np.einsum("krp,kp->kr", self.powers[index], powers))
+
+    def located(self, times: Array, *, left: bool = False) -> tuple[NDArray[np.intp], Array]:
+        """The panels (k,) in which times (k,) lie, and the places in these from -1 to 1."""
         side = -self.merge if left else self.merge
         index = np.clip(np.searchsorted(self.starts, times + side, side="right") - 1, 0, None)
-        points = 2 * (times - self.starts[index]) / self.lengths[index] - 1
-        powers = np.vander(points, self.powers.shape[2], increasing=True)
-        return np.asarray(np.einsum("krp,kp->kr", self.powers[index], powers))
+        return index, np.asarray(2 * (times - self.starts[index]) / self.lengths[index] - 1)
 
 
 class Restriction:
@@ -58,8 +62,7 @@ class Restriction:
 
     def __call__(self, times: Array) -> Array:
         places = 2 * (np.atleast_1d(times) - self._start) / self._length - 1
-        powers = np.vander(places, STAGES + 1, increasing=True)
-        return np.hstack([powers @ self._states.T, powers[:, :STAGES] @ self._arrived.T])
+        return np.vstack([values_at(self._states, places), values_at(self._arrived, places)]).T
 
     def at(self, time: float) -> Array:
         """(n + q,) at one time in s."""
@@ -67,14 +70,14 @@ class Restriction:
 
     def arriving(self, place: float) -> Array:
         """(q,) what arrives at a place of [-1, 1]."""
-        return np.asarray(self._arrived @ place ** np.arange(STAGES))
+        return values_at(self._arrived, np.array([place]))[:, 0]
 
     def up_to(self, length: float) -> tuple[Array, Array, Array]:
         """The part of the panel of a length in s: the state (n,) at its end, rows and what arrives as in the panel."""
         share = length / self._length
-        powers = np.vander(np.append((1 + POINTS) * share - 1, 2 * share - 1), STAGES + 1, increasing=True).T
-        states, waves = self._states @ powers, self._waves @ powers[:STAGES, :-1]
-        return states[:, -1], np.concatenate([waves, states[:, :-1]]), self._arrived @ powers[:STAGES, :-1]
+        points = (1 + POINTS) * share - 1
+        waves, states, arrived = (values_at(each, points) for each in (self._waves, self._states, self._arrived))
+        return values_at(self._states, np.array([2 * share - 1]))[:, 0], np.concatenate([waves, states]), arrived
 
 
 @dataclass(frozen=True)
@@ -123,8 +126,7 @@ class Left:
     def _begun(self, times: Array) -> tuple[NDArray[np.intp], Array]:
         """The panels (k,) in which times lie, and the integrals (k, q) of squares from their starts up to the times."""
         waves = self.waves
-        index = np.clip(np.searchsorted(waves.starts, times + waves.merge, side="right") - 1, 0, None)
-        places = 2 * (times - waves.starts[index]) / waves.lengths[index] - 1
+        index, places = waves.located(times)
         return index, squared(waves.powers[index], places) * waves.lengths[index, None] / 2
 
     def past(self, time: float) -> Past:
@@ -134,10 +136,10 @@ class Left:
         last = int(np.searchsorted(waves.starts, time - waves.merge))
         chosen = slice(max(first, 0), last)
         starts, lengths = waves.starts[chosen], waves.lengths[chosen].copy()
-        values = waves.powers[chosen] @ np.vander(POINTS, STAGES, increasing=True).T
+        values = values_at(waves.powers[chosen], POINTS)
         part = (time - starts[-1]) / lengths[-1]
         lengths[-1] *= part
-        values[-1] = waves.powers[last - 1] @ np.vander((1 + POINTS) * part - 1, STAGES, increasing=True).T
+        values[-1] = values_at(waves.powers[last - 1], (1 + POINTS) * part - 1)
         return Past(starts, lengths, values)
 
 

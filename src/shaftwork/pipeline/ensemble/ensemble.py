@@ -17,7 +17,7 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import CompileError, NetworkError
-from shaftwork.integrate.lanes import LaneRun, Room, Steps
+from shaftwork.integrate.lane_steps import LaneRun, Room, Steps
 from shaftwork.network.graph import GraphPart
 from shaftwork.pipeline.ensemble.ensemble_equations import (
     EXTREMES,

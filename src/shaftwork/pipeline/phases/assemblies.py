@@ -244,7 +244,7 @@ class ModeEquations:
             symbolic=cache(lambda: None if self.program is None else self.program.bind(self.values(p))),
             explain=lambda t, y: self.without_value(p, modes, t, y[:, :size]),
             rough=lambda t, y: self._rough(p, modes, t, y[:, :size]),
-            found=known,
+            estimates=known,
             rates=None if self.model.form.loop_laws else partial(self._many_rates, p),
         )
 

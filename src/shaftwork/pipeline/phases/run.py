@@ -339,7 +339,7 @@ class HybridRun:
                 sticks = error if isinstance(error, StickingError) else sticks
                 if engine == "heyoka" and not stiff and not isinstance(error, SeriesError):
                     raise
-                if isinstance(error, StickingError) and error.held:
+                if isinstance(error, StickingError) and error.driven_back:
                     raise
             if engine == "heyoka" and not stiff:
                 *others, (last, _) = choice.without_series(most)

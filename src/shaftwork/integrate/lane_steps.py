@@ -51,20 +51,20 @@ class Steps:
     Args:
         step: a `codegen.lane_step.LaneStep`.
         taken: (used, k) what it takes of the parameters.
-        made: (m + 1, height, k) columns: at the start, and what each of m steps has written.
+        columns: (m + 1, height, k) at the start, and what each of m steps has written.
     """
 
-    def __init__(self, step: Any, taken: Array, made: Array) -> None:
-        self._step, self._taken, self._made = step, taken, made
-        self.t: Array = made[:-1, step.rows - 2]
+    def __init__(self, step: Any, taken: Array, columns: Array) -> None:
+        self._step, self._taken, self._columns = step, taken, columns
+        self.t: Array = columns[:-1, step.rows - 2]
         """(m, k) times in s at the start of each step; a lane that is at its end stays there."""
-        self.jets: Array = made[1:, step.jets].swapaxes(0, 1)
+        self.jets: Array = columns[1:, step.jets].swapaxes(0, 1)
         """(jets, m, k) what the step shows there."""
 
     @property
     def columns(self) -> Array:
         """(height, k) at the start of the last step."""
-        return np.asarray(self._made[-2])
+        return np.asarray(self._columns[-2])
 
     @property
     def last(self) -> Array:
@@ -73,18 +73,18 @@ class Steps:
 
     def reach(self, number: int, sign: float) -> Array:
         """(k,) how far a quantity can have come in these steps, times a sign."""
-        return np.asarray(self._made[-1, self._step.reach(number, sign)])
+        return np.asarray(self._columns[-1, self._step.reach(number, sign)])
 
-    def at(self, start: Index, own: Index, t: Array) -> tuple[Array, Array]:
+    def at(self, start: Index, lanes: Index, t: Array) -> tuple[Array, Array]:
         """Rows (rows, c) and jets (jets, c) at times (c,) in s, from the starts (c,) of steps of lanes (c,)."""
-        step, count = self._step, own.size
+        step, count = self._step, lanes.size
         every = _padded(count)
-        start, own, t = start[every], own[every], t[every]
-        columns = np.ascontiguousarray(self._made[start, :, own].T)
+        start, lanes, t = start[every], lanes[every], t[every]
+        columns = np.ascontiguousarray(self._columns[start, :, lanes].T)
         columns[step.rows - 1] = WITHOUT_LIMIT
-        taken = np.ascontiguousarray(self._taken[:, own])
+        taken = np.ascontiguousarray(self._taken[:, lanes])
         step.limit(taken, WITHOUT_LIMIT, t, WITHOUT_LIMIT)
-        there, here = np.empty((2, step.height, own.size))
+        there, here = np.empty((2, step.height, lanes.size))
         step(columns, taken, there)
         step(there, taken, here)
         return there[: step.rows, :count], here[step.jets, :count]
@@ -93,8 +93,8 @@ class Steps:
         """Let lanes stay at times (k,) in s with jets (jets, k), from behind the starts (k,) of steps on."""
         later = np.arange(len(self.t))[:, None] > start
         np.copyto(self.t, t, where=later)
-        for own, jet in zip(self.jets, jets, strict=True):
-            np.copyto(own, jet, where=later)
+        for row, jet in zip(self.jets, jets, strict=True):
+            np.copyto(row, jet, where=later)
 
 
 class LaneRun:
@@ -132,9 +132,9 @@ class LaneRun:
         step.limit(taken, min(max(OF_A_STEP * rtol, TIGHTEST_TOLERANCE), LOOSEST_TOLERANCE), *limits)
         self._count = 0
         self._take(np.arange(t.size), columns, taken)
-        made = np.empty_like(self._columns)
-        step(self._columns, self._taken, made)
-        self._columns[step.jets] = made[step.jets]
+        first_columns = np.empty_like(self._columns)
+        step(self._columns, self._taken, first_columns)
+        self._columns[step.jets] = first_columns[step.jets]
 
     def _take(self, lanes: Index, columns: Array, taken: Array) -> None:
         """Go on with some lanes (k,) from columns (height, k), with what is `taken` (used, k) of their parameters."""
@@ -150,16 +150,16 @@ class LaneRun:
         """
         step, count = self._step, self.lanes.size
         most = min(max(ROWS_AT_ONCE // step.height, LOOK), MOST_AT_ONCE)
-        made = self._room(most + 1, *self._columns.shape)
-        made[0] = self._columns
-        step.forget(made[0])
+        columns = self._room(most + 1, *self._columns.shape)
+        columns[0] = self._columns
+        step.forget(columns[0])
         for k in range(most):
-            step(made[k], self._taken, made[k + 1])
-            if k % LOOK == LOOK - 1 and (made[k, step.rows - 2] >= self._end).all():
-                made = made[: k + 2]
+            step(columns[k], self._taken, columns[k + 1])
+            if k % LOOK == LOOK - 1 and (columns[k, step.rows - 2] >= self._end).all():
+                columns = columns[: k + 2]
                 break
-        self._count += len(made) - 1
-        steps = Steps(step, self._taken[:, :count], made[:, :, :count])
+        self._count += len(columns) - 1
+        steps = Steps(step, self._taken[:, :count], columns[:, :, :count])
         t, size = steps.last[-2:]
         good = np.isfinite(steps.last).all(axis=0) & ((t >= self._end) | (size > STILL * np.abs(t)))
         if self._count > LOOKS * most:

@@ -14,9 +14,9 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.integrate.linear_system import LinearSystem, are_even, propagator_of, straight_line, system_of
 from shaftwork.integrate.modal import FEWEST, MOST_VALUES, driven, polynomials
 from shaftwork.integrate.observation import difference, doubt
-from shaftwork.integrate.pieces import SmoothInterval, both_sides, failure, pieces, piecewise, start_of_piece
 from shaftwork.integrate.precise import Nearby, PrecisePiece, PreciseSystem, precise_piece, precise_system, seconds
 from shaftwork.integrate.problem import Array, LinearInputs, Problem, Trajectory
+from shaftwork.integrate.smooth_intervals import SmoothInterval, both_sides, failure, pieces, piecewise, start_of_piece
 
 # Intervals of the engine's own output grid, which no accuracy depends on.
 OWN_INTERVALS = 500
@@ -104,11 +104,11 @@ def _nearby(problem: Problem, system: LinearSystem, piece: SmoothInterval) -> Ne
 
     def between(nodes: Array, states: Array, times: Array) -> Array:
         index = np.clip(np.searchsorted(nodes, times, side="right") - 1, 0, nodes.size - 1)
-        found = np.empty((times.size, states.shape[1]))
+        values = np.empty((times.size, states.shape[1]))
         for k in np.unique(index):
             line = (level + slope * (nodes[k] - nodes[0])) / scale, slope / scale
-            found[index == k] = modes.response(states[k] / scale, *line, times[index == k] - nodes[k]) * scale
-        return found
+            values[index == k] = modes.response(states[k] / scale, *line, times[index == k] - nodes[k]) * scale
+        return values
 
     return between
 
@@ -189,7 +189,7 @@ def _inputs(problem: Problem, linear: LinearInputs) -> dict[SmoothInterval, Arra
             values[piece], left = nodes, left - nodes.size
         return values
 
-    return linear.kept("inputs", resolved, spans)
+    return linear.cached("inputs", resolved, spans)
 
 
 def _inside(linear: LinearInputs, piece: SmoothInterval, elapsed: Array) -> Array:
@@ -282,9 +282,9 @@ def _in_floats(problem: Problem, system: LinearSystem) -> Callable[[SmoothInterv
         else:
             motion = driven(modes, inputs[piece] / scale[:, None, None], start, piece.end - piece.start)
 
-        def at(asked: Array) -> Array:
-            states = motion(asked - piece.start) * scale
-            states[asked == piece.start] = x  # without the rounding of the way to the modes and back
+        def at(times: Array) -> Array:
+            states = motion(times - piece.start) * scale
+            states[times == piece.start] = x  # without the rounding of the way to the modes and back
             return states
 
         nodes = _nodes(problem, piece, fewest=0 if inputs is None else OWN_INTERVALS)  # a blow may lie between outputs
@@ -309,7 +309,7 @@ def _by_exponentials(
         step = (times[first + count] - times[first]) / count
         block = propagator.march(states[first], times[first] - piece.start, step, count)
         states[first + 1 : first + 1 + count] = block
-    return _ExactInterval(times, states[-1], lambda asked: propagator.between(times, states, asked))
+    return _ExactInterval(times, states[-1], partial(propagator.between, times, states))
 
 
 def _nodes(problem: Problem, piece: SmoothInterval, *, fewest: int = 0) -> Array:

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from shaftwork.core.errors import SimulationError
-from shaftwork.integrate.problem import Array, DaeProblem, Problem, Timed
+from shaftwork.integrate.problem import Array, DaeProblem, Problem, TimedProblem
 
 # A run has stalled when so many steps together advance by less than so many times this part of the whole time.
 STALL_STEPS, STALL_SPAN = 2000, 1e-10
@@ -87,7 +87,7 @@ class GuardedFunctions:
         return f"{reason.rstrip('.')}; the derivative of {name!r} was {derivative[bad[0]]} at t = {t:.9g} s"
 
 
-def pieces(problem: Timed) -> tuple[SmoothInterval, ...]:
+def pieces(problem: TimedProblem) -> tuple[SmoothInterval, ...]:
     """The pieces between the start, the breakpoints and the end of a problem, in order."""
     ends = (problem.t0, *problem.breakpoints, problem.t_end)
     sides = [problem.sides(end) for end in ends]
@@ -97,7 +97,7 @@ def pieces(problem: Timed) -> tuple[SmoothInterval, ...]:
     )
 
 
-def start_of_piece(problem: Timed, piece: SmoothInterval, x: Array) -> Array:
+def start_of_piece(problem: TimedProblem, piece: SmoothInterval, x: Array) -> Array:
     """State (n,) with which a piece starts, from the state at the end of the piece before (or the start state)."""
     if problem.jump is None or piece.start == problem.t0:
         return x
@@ -139,7 +139,7 @@ def _no_jacobian(t: float, x: Array) -> Any:
     raise NotImplementedError(f"a problem without Jacobian was asked for it at t = {t}, with {x.size} states")
 
 
-def both_sides(problem: Timed, times: Sequence[Array], states: Sequence[Array]) -> tuple[Array, Array]:
+def both_sides(problem: TimedProblem, times: Sequence[Array], states: Sequence[Array]) -> tuple[Array, Array]:
     """Join the step ends of all pieces: (k,) times and (k, n) states.
 
     Where the state is continuous a breakpoint is listed once, where it may jump twice: before and after.
@@ -156,7 +156,7 @@ def reached(times: Array, end: float) -> Array:
 
 
 def failure(
-    problem: Timed, engine: str, t: float, x: Array, reason: str, guard: GuardedFunctions | None = None
+    problem: TimedProblem, engine: str, t: float, x: Array, reason: str, guard: GuardedFunctions | None = None
 ) -> SimulationError:
     """The error of a failed run: when, in which state, why, and what to try; or the law that has no value there.
 
@@ -191,16 +191,16 @@ def failure(
     )
 
 
-def _without_value(problem: Timed, t: float, x: Array, guard: GuardedFunctions | None) -> SimulationError | None:
+def _without_value(problem: TimedProblem, t: float, x: Array, guard: GuardedFunctions | None) -> SimulationError | None:
     """The error of what has no value where a run has failed, or just after."""
-    found = _near(problem, problem.explain, t, x)
-    if problem.explain is None or found is not None or guard is None or guard.not_finite is None:
-        return found
+    error = _near(problem, problem.explain, t, x)
+    if problem.explain is None or error is not None or guard is None or guard.not_finite is None:
+        return error
     at, state, _ = guard.not_finite
     return problem.explain(np.array([at]), state[None, :]) if np.isfinite(at) and np.isfinite(state).all() else None
 
 
-def _near(problem: Timed, explain: Callable[[Array, Array], T] | None, t: float, x: Array) -> T | None:
+def _near(problem: TimedProblem, explain: Callable[[Array, Array], T] | None, t: float, x: Array) -> T | None:
     """What explains the failure of a run where it has come to, or just after."""
     if explain is None:
         return None
@@ -221,7 +221,7 @@ class Pace:
         problem: what is being solved.
     """
 
-    def __init__(self, problem: Timed) -> None:
+    def __init__(self, problem: TimedProblem) -> None:
         self._progress, self._duration = problem.progress, problem.t_end - problem.t0
         self._since, self._steps = {STALL_STEPS: problem.t0, LONG_STEPS: problem.t0}, 0
 
@@ -251,7 +251,7 @@ class Pace:
         )
 
 
-def check_finite(problem: Timed, engine: str, t: float, x: Array) -> None:
+def check_finite(problem: TimedProblem, engine: str, t: float, x: Array) -> None:
     """Raise `SimulationError` when a state (n,) at time t in s is not finite."""
     if not np.isfinite(x).all():
         raise failure(problem, engine, t, x, "the state is not finite")
