@@ -59,7 +59,7 @@ class Contact(Component):
         super().__post_init__()
         if self.c is None and self.d:
             raise ParameterError(f"{type(self).__name__} '{self.name}': a damping d needs a stiffness c beside it.")
-        if self.c is not None and getattr(self, "restitution", 0):
+        if self.c is not None and getattr(self, "restitution", False):
             raise ParameterError(
                 f"{type(self).__name__} '{self.name}': restitution is for rigid flanks. Leave out c, or take d instead."
             )

@@ -13,12 +13,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from types import SimpleNamespace
+from typing import TYPE_CHECKING
 
 from sympy import Add, Derivative, Eq, Expr, Float, Function, Integer, Symbol, sqrt
 from sympy.core.function import AppliedUndef
 
-from shaftwork.components.base import Derived, symbols_of
+from shaftwork.components.base import Derived
 from shaftwork.components.laws import t
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.domains import ROTATION
@@ -133,7 +134,7 @@ class Field:
     @cached_property
     def _derived(self) -> tuple[Derived, ...]:
         names = ("area_moment", "line_inertia", "line_stiffness")
-        symbols: Any = symbols_of({name: self.symbol(name) for name in (*self.part.component.declared, *names)})
+        symbols = SimpleNamespace(**{name: self.symbol(name) for name in (*self.part.component.declared, *names)})
         return tuple(made for made in self.part.component.derived(symbols) if made.name in names)
 
     def lines(self, *, values: bool = False) -> tuple[tuple[Line, ...], tuple[Line, ...], tuple[Line, ...]]:
