@@ -154,8 +154,8 @@ def start_of(options: Namespace, model: Model) -> dict[str, float] | None:
     """
     from shaftwork.pipeline.model import steady_start
 
-    given = point(options.initial, option="--initial")
-    return steady_start(model, given) if options.steady else given or None
+    values = point(options.initial, option="--initial")
+    return steady_start(model, values) if options.steady else values or None
 
 
 def point_of(options: Namespace, net: Network) -> dict[str, float] | None:

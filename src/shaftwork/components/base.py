@@ -7,7 +7,6 @@ import inspect
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from types import SimpleNamespace
 from typing import Any, ClassVar, Literal, Self, TypeVar, dataclass_transform, get_args
 
 from sympy import Expr
@@ -257,18 +256,18 @@ def component(cls: type[C]) -> type[C]:
             are not what they must be.
     """
     _refuse_wrong_class(cls)
-    made = dataclass(frozen=True)(cls)
-    fields = [field for field in dataclasses.fields(made) if field.name not in ("name", "symbol")]
+    kind = dataclass(frozen=True)(cls)
+    fields = [field for field in dataclasses.fields(kind) if field.name not in ("name", "symbol")]
     if bare := [field.name for field in fields if "declare" not in field.metadata]:
         raise ShaftworkError(
             f"{cls.__name__}: {bare[0]} is not declared. Write {bare[0]}: float = parameter('unit', 'meaning'), or "
             "make it a ClassVar if all parts share it."
         )
-    made.declared = {field.name: field.metadata["declare"](field.name) for field in fields}
-    _refuse_wrong_parameters(made)
-    _explain_wrong_arguments(made)
-    REGISTRY[made.__name__] = made
-    return made
+    kind.declared = {field.name: field.metadata["declare"](field.name) for field in fields}
+    _refuse_wrong_parameters(kind)
+    _explain_wrong_arguments(kind)
+    REGISTRY[kind.__name__] = kind
+    return kind
 
 
 def _refuse_wrong_class(cls: type[Component]) -> None:
@@ -285,20 +284,20 @@ def _refuse_wrong_class(cls: type[Component]) -> None:
         raise ShaftworkError(f"{name}: its ports are {names}. Give it one or more, each with a name of its own.")
 
 
-def _refuse_wrong_parameters(made: type[Component]) -> None:
-    for name, declared in made.declared.items():
+def _refuse_wrong_parameters(kind: type[Component]) -> None:
+    for name, declared in kind.declared.items():
         if name in dir(Component) or name in ("form", "mode") or name.startswith(("form_", "mode_")):
             raise ParameterError(
-                f"{made.__name__}: a parameter is named '{name}', which has a meaning here. Rename it."
+                f"{kind.__name__}: a parameter is named '{name}', which has a meaning here. Rename it."
             )
         _, objection = (None, None) if declared.required else declared.magnitude(declared.default)
         if objection is not None:
-            raise ParameterError(f"{made.__name__}: the default of {name} = {declared.default!r} {objection}.")
+            raise ParameterError(f"{kind.__name__}: the default of {name} = {declared.default!r} {objection}.")
 
 
-def _explain_wrong_arguments(made: type[Component]) -> None:
+def _explain_wrong_arguments(kind: type[Component]) -> None:
     """Let the constructor answer a wrong or missing argument with the list of parameters."""
-    plain: Callable[..., None] = made.__init__
+    plain: Callable[..., None] = kind.__init__
     signature = inspect.signature(plain)
 
     def __init__(self: Component, *args: Any, **kwargs: Any) -> None:  # noqa: N807
@@ -308,15 +307,15 @@ def _explain_wrong_arguments(made: type[Component]) -> None:
             name = args[0] if args else kwargs.get("name", "?")
             rows = [
                 f"{p.name} [{p.unit}] {p.meaning}{'' if p.required else f' (default {p.default})'}"
-                for p in made.declared.values()
+                for p in kind.declared.values()
             ]
             raise ParameterError(
-                f"{made.__name__} '{name}': {error}. It takes a name and: {'; '.join(rows) or 'no parameters'}."
+                f"{kind.__name__} '{name}': {error}. It takes a name and: {'; '.join(rows) or 'no parameters'}."
             ) from None
         plain(self, *args, **kwargs)
 
-    made.__init__ = __init__  # type: ignore[method-assign]
-    made.__signature__ = signature  # type: ignore[attr-defined]
+    kind.__init__ = __init__  # type: ignore[method-assign]
+    kind.__signature__ = signature  # type: ignore[attr-defined]
 
 
 def default_signals(part: Component) -> dict[str, Signal]:
@@ -362,6 +361,7 @@ def _two_port(part: Component) -> dict[str, Signal]:
     return signals
 
 
-def symbols_of(values: Mapping[str, Any]) -> SimpleNamespace:
-    """The namespace handed to `Component.branches`."""
-    return SimpleNamespace(**values)
+def number_of(part: Component, name: str) -> float | None:
+    """A parameter in SI, None where it is left out or is no admissible number, which the checks of a network report."""
+    value, objection = part.declared[name].magnitude(getattr(part, name))
+    return value if objection is None and isinstance(value, float) else None

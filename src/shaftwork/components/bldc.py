@@ -23,8 +23,9 @@ from shaftwork.components.branches import (
 )
 from shaftwork.components.clips import larger, no_less, smaller
 from shaftwork.components.laws import PWM, as_expression
+from shaftwork.components.machines import ROTOR
 from shaftwork.components.modes import ANEW, Leave, Mode, Modes
-from shaftwork.core.domains import ELECTRICAL, ROTATION
+from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter
 
@@ -124,13 +125,12 @@ class BLDCMotor(Component):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        controls = {"k_p": self.k_p, "f_c": self.f_c}
         if self.i_ref is None and self.t_i is not None:
             raise ParameterError(
                 f"BLDCMotor '{self.name}': t_i controls nothing without i_ref. Give both, or leave it out."
             )
-        for name, value in controls.items():
-            if (value is None) != (self.i_ref is None):
+        for name in ("k_p", "f_c"):
+            if (getattr(self, name) is None) != (self.i_ref is None):
                 says = "controls nothing without i_ref" if self.i_ref is None else "is missing beside i_ref"
                 raise ParameterError(
                     f"BLDCMotor '{self.name}': {name} {says}. Give i_ref, k_p and f_c, or none of them."
@@ -138,10 +138,7 @@ class BLDCMotor(Component):
 
     def signals(self) -> dict[str, Signal]:
         """Speed and torque of the rotor, currents into the phases and their voltages against the star point."""
-        signals = {
-            "omega": Signal("across", ("rotor", None), ROTATION),
-            "tau": Signal("through", ("rotor", None), ROTATION, -1),
-        }
+        signals = dict(ROTOR)
         for phase in PHASES:
             signals[f"i_{phase}"] = Signal("store", (f"winding_{phase}", "star"), ELECTRICAL, 1, f"i_{phase}")
             signals[f"u_{phase}"] = Signal("across", (f"leg_{phase}", "star"), ELECTRICAL)
@@ -237,8 +234,4 @@ class AveragedBLDC(Component):
 
     def signals(self) -> dict[str, Signal]:
         """Speed and torque of the rotor, and the current of the two phases that conduct."""
-        return {
-            "omega": Signal("across", ("rotor", None), ROTATION),
-            "tau": Signal("through", ("rotor", None), ROTATION, -1),
-            "i": Signal("store", ("winding", "commutation"), ELECTRICAL, 1, "i"),
-        }
+        return {**ROTOR, "i": Signal("store", ("winding", "commutation"), ELECTRICAL, 1, "i")}

@@ -76,12 +76,12 @@ class Buckets(int):
             ParameterError: it is no whole number from 3 to 100.
         """
         try:
-            made = cls(text)
+            count = cls(text)
         except (TypeError, ValueError, OverflowError):
-            made = cls(0)
-        if not 3 <= made <= 100 or (not isinstance(text, str) and made != text):
+            count = cls(0)
+        if not 3 <= count <= 100 or (not isinstance(text, str) and count != text):
             raise ParameterError(f"{reprlib.repr(text)} buckets: write a whole number from 3 to 100.")
-        return made
+        return count
 
 
 @component

@@ -16,37 +16,37 @@ from shaftwork.components.tables import Interpolation
 
 def larger(*args: Any) -> Expr:
     """The largest of numbers and expressions."""
-    return _made(Max, args)
+    return _limit(Max, args)
 
 
 def smaller(*args: Any) -> Expr:
     """The smallest of numbers and expressions."""
-    return _made(Min, args)
+    return _limit(Min, args)
 
 
-def replaced(expression: Basic, known: Mapping[Any, Any]) -> Any:
-    """The same as `expression.xreplace(known)`, at once where limits are in it."""
+def replaced(expression: Basic, replacements: Mapping[Any, Any]) -> Any:
+    """The same as `expression.xreplace(replacements)`, at once where limits are in it."""
     if not expression.has(Max, Min):
-        return expression.xreplace(known)
-    made: dict[Basic, Basic] = {}
+        return expression.xreplace(replacements)
+    results: dict[Basic, Basic] = {}
 
     def anew(node: Basic) -> Basic:
-        if node in known:
-            return known[node]
+        if node in replacements:
+            return replacements[node]
         if not node.args:
             return node
-        if node not in made:
+        if node not in results:
             args = [anew(one) for one in node.args]
             if all(new is old for new, old in zip(args, node.args, strict=True)):
-                made[node] = node
+                results[node] = node
             else:
-                made[node] = _made(node.func, args) if isinstance(node, Max | Min) else node.func(*args)
-        return made[node]
+                results[node] = _limit(node.func, args) if isinstance(node, Max | Min) else node.func(*args)
+        return results[node]
 
     return anew(expression)
 
 
-def _made(function: type[Basic], args: Any) -> Any:
+def _limit(function: type[Basic], args: Any) -> Any:
     """A limit of the arguments, which are compared where all of them are numbers."""
     compared = all(getattr(one, "is_number", True) for one in args)
     return function(*args) if compared else function(*args, evaluate=False)

@@ -35,7 +35,7 @@ def _rest(unit: str = "rad/s", latex: str = r"\omega_r") -> Any:
     return parameter(unit, meaning, at_least=0, default=0.0, latex=latex)
 
 
-class Contact(Component):
+class ContactPart(Component):
     """Base of parts that touch where the twist between their nodes is beyond a limit, and are apart elsewhere.
 
     In contact a flank of stiffness `c` springs back and never pulls. Without `c` flanks are rigid: they rebound, and
@@ -59,7 +59,7 @@ class Contact(Component):
         super().__post_init__()
         if self.c is None and self.d:
             raise ParameterError(f"{type(self).__name__} '{self.name}': a damping d needs a stiffness c beside it.")
-        if self.c is not None and bool(getattr(self, "restitution", False)):
+        if self.c is not None and getattr(self, "restitution", False):
             raise ParameterError(
                 f"{type(self).__name__} '{self.name}': restitution is for rigid flanks. Leave out c, or take d instead."
             )
@@ -107,7 +107,7 @@ def _stored(upper: Any, lower: Any, p: Any) -> Expr:
 
 
 @component
-class Backlash(Contact):
+class Backlash(ContactPart):
     """A gap between two nodes, with the stiffness and damping of the flanks that close it: teeth, claws, splines.
 
     Law: tau = max(0, c (phi - gap/2) + d omega) where phi > gap/2, min(0, c (phi + gap/2) + d omega) where
@@ -130,7 +130,7 @@ class Backlash(Contact):
 
 
 @component
-class TranslationalBacklash(Contact):
+class TranslationalBacklash(ContactPart):
     """A gap between two nodes that move along a line: couplings of wagons, claws and pins with play.
 
     Law: that of a `Backlash`, with the force f, the way s and the speed v of node a against node b in place of torque,
@@ -152,7 +152,7 @@ class TranslationalBacklash(Contact):
 
 
 @component
-class Rope(Contact):
+class Rope(ContactPart):
     """A massless rope, chain or belt between two nodes: it pulls, and hangs slack instead of pushing.
 
     Law: f = max(0, c s + d v) where s > 0, and 0 else, with s the way and v the speed of node a against node b: s is
@@ -172,7 +172,7 @@ class Rope(Contact):
 
 
 @component
-class HardStop(Contact):
+class HardStop(ContactPart):
     """A stop at a limit of the twist of node a against node b, or against the frame, counted from the start.
 
     Law: as of a `Backlash`, with limits of its own, of which one may be left out. Without c the stop is rigid, and the

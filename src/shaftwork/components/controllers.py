@@ -7,10 +7,10 @@ from typing import Any, ClassVar
 
 from sympy import Expr
 
-from shaftwork.components.base import Component, Port, Role, Signal, component
+from shaftwork.components.base import Component, Port, Role, Signal, component, number_of
 from shaftwork.components.branches import ACROSS, AcrossLaw, Branch, ThroughLaw, ThroughStore, across_of, through_of
 from shaftwork.components.clips import larger, smaller
-from shaftwork.components.timing import number_of, off_time, on_time, refuse_no_time_on, while_on
+from shaftwork.components.timing import off_time, on_time, refuse_no_time_on, while_on
 from shaftwork.core.domains import ROTATION
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter
@@ -67,21 +67,26 @@ class SpeedController(Component):
 
     def signals(self) -> dict[str, Signal]:
         """Speed, torque on the node, and the integral part of the torque."""
-        own = {"omega": Signal("across", ("a", None), ROTATION), "tau": Signal("through", ("a", None), ROTATION, -1)}
-        return own if self.t_i is None else {**own, "tau_i": Signal("store", ("i", None), ROTATION)}
+        signals = super().signals()
+        return signals if self.t_i is None else {**signals, "tau_i": Signal("store", ("i", None), ROTATION)}
 
     def branches(self, p: Any) -> Iterator[Branch]:
+        torque = -while_on(_limited(_wanted(p, ACROSS), p), p)
         if p.t_i is None:
-            yield ThroughLaw(-while_on(_limited(p.k_p * (p.omega_ref - ACROSS), p), p))
+            yield ThroughLaw(torque)
             return
-        wanted = p.k_p * (p.omega_ref - ACROSS) + through_of("tau_i")
-        yield ThroughLaw(-while_on(_limited(wanted, p), p), ("a", None), "tau_u")
-        lag = p.omega_ref - across_of("a")
-        wanted = p.k_p * lag + through_of("tau_i")
-        track = p.t_i if p.t_track is None else p.t_track
+        yield ThroughLaw(torque, ("a", None), "tau_u")
+        speed = across_of("a")
+        wanted, track = _wanted(p, speed), p.t_i if p.t_track is None else p.t_track
         wound = (_limited(wanted, p) - wanted) * p.t_i / (p.k_p * track)
-        yield AcrossLaw(-while_on(lag + wound, p), (None, "i"))
+        yield AcrossLaw(-while_on(p.omega_ref - speed + wound, p), (None, "i"))
         yield ThroughStore(p.k_p / p.t_i, ("i", None), "tau_i")
+
+
+def _wanted(p: Any, speed: Expr) -> Expr:
+    """The torque without limits."""
+    proportional = p.k_p * (p.omega_ref - speed)
+    return proportional if p.t_i is None else proportional + through_of("tau_i")
 
 
 def _limited(torque: Expr, p: Any) -> Expr:

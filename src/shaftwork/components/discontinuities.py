@@ -45,10 +45,10 @@ def breakpoints(expression: sympy.Basic, values: Mapping[sympy.Symbol, float] | 
     numbers = {symbol: sympy.Float(value) for symbol, value in (values or {}).items()}
     times: set[float] = set()
     for argument, levels in switches(expression):
-        found = line(argument.xreplace(numbers))
-        if found is None or found[0].is_zero or found[0].free_symbols | found[1].free_symbols:
+        straight = line(argument.xreplace(numbers))
+        if straight is None or straight[0].is_zero or straight[0].free_symbols | straight[1].free_symbols:
             continue
-        slope, offset = float(found[0]), float(found[1])
+        slope, offset = map(float, straight)
         times.update((level - offset) / slope + 0.0 for level in levels)
     return tuple(sorted(time for time in times if math.isfinite(time)))
 
@@ -196,13 +196,13 @@ class _Degrees:
     def __init__(self, expression: sympy.Expr) -> None:
         self._steps = any(isinstance(part, sympy.floor) for part in parts((expression,)))
         self._moving: dict[sympy.Basic, bool] = {t: True}
-        self._found: dict[sympy.Basic, float] = {}
+        self._results: dict[sympy.Basic, float] = {}
 
     def of(self, expression: sympy.Expr) -> float:
         """Degree of a part."""
-        if expression not in self._found:
-            self._found[expression] = self._degree(expression)
-        return self._found[expression]
+        if expression not in self._results:
+            self._results[expression] = self._degree(expression)
+        return self._results[expression]
 
     def _moves(self, expression: sympy.Basic) -> bool:
         if expression not in self._moving:
@@ -242,10 +242,10 @@ class _Degrees:
 def parts(expressions: Iterable[sympy.Basic]) -> Iterator[sympy.Basic]:
     """Every distinct part of expressions once, the expressions as well."""
     left = list(dict.fromkeys(expressions))
-    known = set(left)
+    seen = set(left)
     while left:
         node = left.pop()
         yield node
-        found = [part for part in dict.fromkeys(node.args) if part not in known]
-        known.update(found)
-        left += found
+        new = [part for part in dict.fromkeys(node.args) if part not in seen]
+        seen.update(new)
+        left += new

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any
 
 from sympy import Abs, Expr, Float, Integer, Max, Piecewise, pi
 
-from shaftwork.components.base import Derived, Note, component, symbols_of
+from shaftwork.components.base import Derived, Note, component, number_of
 from shaftwork.components.branches import ACROSS
 from shaftwork.components.laws import Ramp, as_expression, t
 from shaftwork.components.motors import CurveMotor, kloss
-from shaftwork.components.timing import number_of, off_time, on_time
+from shaftwork.components.timing import off_time, on_time
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter
 
@@ -73,7 +74,7 @@ class FrequencyDrive(CurveMotor):
 
         Of a motor with s_k of 1 or more nothing is said: it has less on the mains, too.
         """
-        p = symbols_of({name: number_of(self, name) for name in self.declared})
+        p = SimpleNamespace(**{name: number_of(self, name) for name in self.declared})
         f = p.f_0 if self.f is None else _value_at(self.declared["f"].magnitude(self.f)[0], p.t_on or 0.0)
         if f is None or p.s_k >= 1 or p.slip_exponent >= 1:
             return

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
-from sympy import And, Heaviside, Min, Not, false
+from sympy import And, Heaviside, Not
 
 from shaftwork.components.base import Component, Port, Role, component
 from shaftwork.components.branches import (
@@ -19,9 +19,8 @@ from shaftwork.components.branches import (
     rigid,
 )
 from shaftwork.components.friction import STUCK, conducting
-from shaftwork.components.laws import t
 from shaftwork.components.modes import ANEW, Leave, Mode, Modes
-from shaftwork.components.timing import refuse_no_time_on
+from shaftwork.components.timing import ends, is_past, onset, refuse_no_time_on
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.parameters import parameter
 
@@ -117,15 +116,13 @@ class Switch(Component):
     def modes(self, p: Any) -> Iterator[Modes]:
         timed = p.on is not None and not p.on.free_symbols & {ACROSS, INTEGRAL}
         law = 2 * Heaviside(p.on, 0) - 1 if timed else p.on  # of a law that is zero for a while too
-        begins = t - p.t_on if law is None else law if p.t_on == 0 else Min(t - p.t_on, law)
-        past = false if p.t_off is None else t >= p.t_off
+        begins, past = onset(p, law), is_past(p)
         on = And(begins >= 0 if p.on is None else begins > 0, Not(past))
-        over = () if p.t_off is None else (Leave(t - p.t_off, "over"),)
         opens = (Leave(-law, "open"),) if timed else ()
         yield Modes(
             (
                 Mode("open", (Leave(begins, ANEW),), starts=And(Not(on), Not(past))),
-                Mode("closed", (*over, *opens), 1.0, STUCK, starts=on),
+                Mode("closed", (*ends(p, "over"), *opens), 1.0, STUCK, starts=on),
                 Mode("over", starts=past, says="open"),
             )
         )

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, ClassVar
 
-from sympy import And, Expr, Min, Ne, Not, exp, false
+from sympy import And, Expr, Min, Ne, Not, exp
 
-from shaftwork.components.base import Component, Port, Role, component
+from shaftwork.components.base import Component, Port, Role, component, number_of
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, Branch, End, ThroughLaw, rigid
 from shaftwork.components.clips import no_less
 from shaftwork.components.laws import as_expression, t
 from shaftwork.components.modes import ANEW, Leave, Mode, Modes
-from shaftwork.components.timing import number_of, refuse_no_time_on
+from shaftwork.components.timing import ends, is_past, onset, refuse_no_time_on
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter
 
@@ -26,7 +26,7 @@ def rubbing(
     limit: Any,
     back: Any = None,
     *,
-    held: str = "stuck",
+    holds: str = "stuck",
     moves: str = "slipping",
     apart: tuple[Leave, ...] = (),
     at_rest: str | None = None,
@@ -36,7 +36,7 @@ def rubbing(
     Args:
         limit: the torque up to which it holds, N m.
         back: the same backward, where it is another.
-        held: what the mode of rest is called.
+        holds: what the mode of rest is called.
         moves: what the modes of motion are called, before "forward" and "backward".
         apart: what else ends each of these modes, where they lead to one that is called "apart".
         at_rest: the form in which it gives way while others hold it at rest, where its law is another one then.
@@ -49,22 +49,14 @@ def rubbing(
             Mode(
                 "backward", (Leave(ACROSS, "stuck"), *apart), -1.0, SLIPPING, ACROSS < 0, f"{moves} backward", at_rest
             ),
-            Mode("stuck", (*gives_way, *apart), 0.0, STUCK, says=held),
+            Mode("stuck", (*gives_way, *apart), 0.0, STUCK, says=holds),
         )
     )
 
 
-def rubs(size: Any, p: Any, second: End = "b") -> Iterator[Branch]:
-    """The branches of what has the modes of `rubbing`, with a torque of a given size against the motion."""
-    yield from slips(lambda way: way * size, p, second)
-
-
-def slips(torque: Callable[[Any], Expr], p: Any, second: End = "b") -> Iterator[Branch]:
-    """The same for any torque of the way: 1 forward, -1 backward."""
-    if p.form == STUCK:
-        yield rigid(("a", second))
-    else:
-        yield ThroughLaw(torque(p.mode))
+def rubs(torque: Any, p: Any, second: End = "b") -> Branch:
+    """The branch of what has the modes of `rubbing`: a torque while it slips, in which `p.mode` is the direction."""
+    return rigid(("a", second)) if p.form == STUCK else ThroughLaw(torque)
 
 
 @component
@@ -109,7 +101,7 @@ class DryFriction(Component):
     def branches(self, p: Any) -> Iterator[Branch]:
         falls = p.tau_s is not None and p.omega_s != 0
         slides = p.tau_c + ((p.tau_s - p.tau_c) * exp(-((ACROSS / p.omega_s) ** 2)) if falls else 0)
-        yield from rubs(p.tau_s if p.form == HELD else slides, p)
+        yield rubs(p.mode * (p.tau_s if p.form == HELD else slides), p)
         if p.form != STUCK:
             yield ThroughLaw(p.d * ACROSS)
 
@@ -155,12 +147,10 @@ class Brake(Component):
         return tau if p.t_lag == 0 else tau * (1 - exp(-(t - p.t_on) / p.t_lag))
 
     def modes(self, p: Any) -> Iterator[Modes]:
-        released, moves, held = self.words
-        begins = t - p.t_on if p.on is None else p.on if p.t_on == 0 else Min(t - p.t_on, p.on)
-        over = () if p.t_off is None else (Leave(t - p.t_off, "released"),)
-        past = false if p.t_off is None else t >= p.t_off
+        released, moves, holds = self.words
+        begins, past, over = onset(p, p.on), is_past(p), ends(p, "released")
         waits = And(begins < 0 if p.on is None else begins <= 0, Not(past))
-        rubs_so = rubbing(self._capacity(p), held=held, moves=moves, apart=over).options
+        rubs_so = rubbing(self._capacity(p), holds=holds, moves=moves, apart=over).options
         yield Modes(
             (
                 *(replace(mode, starts=And(mode.starts, Not(waits), Not(past))) for mode in rubs_so),
@@ -175,7 +165,7 @@ class Brake(Component):
         if p.form != STUCK and capacity.has(INTEGRAL):
             yield ThroughLaw(p.mode * capacity, label="phi")
             return
-        yield from rubs(capacity, p)
+        yield rubs(p.mode * capacity, p)
         if capacity.has(INTEGRAL) or as_expression(p.on or 0).has(INTEGRAL):
             yield ThroughLaw(p.mode * (1 - p.mode**2) * INTEGRAL, label="phi")  # no torque: it carries the angle
 

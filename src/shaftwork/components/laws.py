@@ -106,8 +106,8 @@ def PWM(duty: Any, frequency: Any) -> sympy.Expr:
         ParameterError: an argument is not finite, or the frequency is not positive.
     """
     free = isinstance(frequency, sympy.Expr) and frequency.free_symbols.isdisjoint(SYMBOLS)
-    given = frequency if free and frequency.free_symbols else in_si("PWM: frequency", frequency, "Hz", above=0)
-    rate = sympy.sympify(given, strict=True)
+    symbolic = free and frequency.free_symbols
+    rate = sympy.sympify(frequency if symbolic else in_si("PWM: frequency", frequency, "Hz", above=0), strict=True)
     (share,) = _finite("PWM", duty=duty)
     inside = larger(0, smaller(1, share))
     if inside.is_number and float(inside) in (0, 1):

@@ -11,7 +11,7 @@ from sympy import Abs, Expr, Float, Integer, Max, Symbol, cos, pi, sin, tanh
 
 from shaftwork.components.base import Component, Derived, Port, Role, component
 from shaftwork.components.branches import ACROSS, THROUGH, Branch, ThroughLaw
-from shaftwork.components.friction import rubbing, slips
+from shaftwork.components.friction import rubbing, rubs
 from shaftwork.components.laws import t
 from shaftwork.components.modes import Leave, Modes
 from shaftwork.components.noise import HeldNoise, SmoothNoise
@@ -64,7 +64,7 @@ class Resistance(Component):
         if self.against(p, 1) == 0:
             return
         if p.omega_s == 0:
-            yield from slips(lambda direction: self.against(p, direction), p, None)
+            yield rubs(self.against(p, p.mode), p, None)
         else:
             yield ThroughLaw(self.against(p, tanh(ACROSS / p.omega_s)))
 

@@ -23,6 +23,11 @@ from shaftwork.components.timing import on_time
 from shaftwork.core.domains import ELECTRICAL, ROTATION
 from shaftwork.core.parameters import parameter
 
+ROTOR = {
+    "omega": Signal("across", ("rotor", None), ROTATION),
+    "tau": Signal("through", ("rotor", None), ROTATION, -1),
+}
+"""Speed of the rotor, and the torque that the machine gives to it."""
 AXES = ("alpha", "beta")
 PHASES = Rational(3, 2)
 """How many phases an axis stands for."""
@@ -54,8 +59,7 @@ class DCMachine(Component):
         return {
             "u": Signal("across", ("p", "n"), ELECTRICAL),
             "i": Signal("through", ("p", None), ELECTRICAL),
-            "omega": Signal("across", ("rotor", None), ROTATION),
-            "tau": Signal("through", ("rotor", None), ROTATION, -1),
+            **ROTOR,
         }
 
 
@@ -114,8 +118,7 @@ class InductionMachine(Component):
         """Speed and torque of the rotor, the currents of the stator, and those that magnetise."""
         labels = [(f"{name}_{axis}", f"gap_{axis}") for name in ("i", "i_m") for axis in AXES]
         return {
-            "omega": Signal("across", ("rotor", None), ROTATION),
-            "tau": Signal("through", ("rotor", None), ROTATION, -1),
+            **ROTOR,
             **{label: Signal("store", (gap, None), ELECTRICAL, 1, label) for label, gap in labels},
         }
 

@@ -69,9 +69,9 @@ class Leave:
         """Whether twists and the time alone end the mode, whatever else changes at that instant."""
         return self.rebound is None and not self._reads(ACROSS) and not self._reads(THROUGH)
 
-    def _reads(self, own: Symbol) -> bool:
+    def _reads(self, variable: Symbol) -> bool:
         """Whether a variable of the element, ACROSS or THROUGH, or the same of another branch stands in the guard."""
-        return own in self.when.free_symbols or any(named_in(s)[0] == own.name for s in self.when.free_symbols)
+        return any(symbol == variable or named_in(symbol)[0] == variable.name for symbol in self.when.free_symbols)
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ from typing import Any, ClassVar
 
 from sympy import Expr, Piecewise, pi, sqrt
 
-from shaftwork.components.base import Component, Derived, Port, Role, component
+from shaftwork.components.base import Component, Derived, Port, Role, component, number_of
 from shaftwork.components.branches import ACROSS, Branch, ThroughLaw
 from shaftwork.components.clips import no_less
 from shaftwork.components.tables import Interpolation, Table
-from shaftwork.components.timing import number_of, off_time, on_time, refuse_no_time_on, while_on
+from shaftwork.components.timing import off_time, on_time, refuse_no_time_on, while_on
 from shaftwork.core.errors import NetworkWarning, ParameterError
 from shaftwork.core.notices import warn
 from shaftwork.core.parameters import parameter

@@ -57,10 +57,10 @@ def held(x: Any, seed: Any) -> Any:
     x, seed = np.broadcast_arrays(np.floor(x), np.asarray(seed, dtype=float))
     values = np.full(x.shape, math.nan)
     for one in np.unique(seed).tolist():
-        asked = (seed == one) & np.isfinite(x)
-        numbers, places = np.unique(x[asked], return_inverse=True)
-        found = np.array([normal(int(number), one) for number in numbers.tolist()])
-        values[asked] = found[places.reshape(-1)] if found.size else values[asked]
+        finite = (seed == one) & np.isfinite(x)
+        numbers, places = np.unique(x[finite], return_inverse=True)
+        normals = np.array([normal(int(number), one) for number in numbers.tolist()])
+        values[finite] = normals[places.reshape(-1)] if normals.size else values[finite]
     return values
 
 
@@ -103,10 +103,10 @@ def _piece(order: int) -> Callable[..., Any]:
     def value(along: Any, *around: Any) -> Any:
         total = squares(along, *around)
         root = math.sqrt(total) if isinstance(total, float) else np.sqrt(total)
-        found = numerator(along, *around) / root
+        quotient = numerator(along, *around) / root
         for _ in range(order):
-            found = found / total
-        return found
+            quotient = quotient / total
+        return quotient
 
     return value
 
@@ -177,8 +177,8 @@ class SmoothNoise(sympy.Function):  # type: ignore[misc]
         below = sympy.floor(x)
         values = {number: HeldNoise(below + k, seed) for k, number in enumerate(_AROUND, _FIRST)}
         squares = _nested(_SQUARES)
-        found = _nested(_numerator(order)) / sympy.sqrt(squares) / squares**order
-        return found.xreplace({_ALONG: x - below, **values})
+        piece = _nested(_numerator(order)) / sympy.sqrt(squares) / squares**order
+        return piece.xreplace({_ALONG: x - below, **values})
 
     def _eval_is_extended_real(self) -> bool:
         return True
@@ -205,5 +205,5 @@ NUMERICAL = {"HeldNoise": held, "SmoothNoise": smooth}
 def _latex(letter: str, node: sympy.Function, printer: Any, exponent: str | None) -> str:
     # the public doprint would open a new formula inside the formula
     x, seed = (printer._print(argument) for argument in node.args)  # noqa: SLF001
-    made = rf"{letter}_{{{seed}}}\left({x}\right)"
-    return made if exponent is None else rf"\left({made}\right)^{{{exponent}}}"
+    text = rf"{letter}_{{{seed}}}\left({x}\right)"
+    return text if exponent is None else rf"\left({text}\right)^{{{exponent}}}"

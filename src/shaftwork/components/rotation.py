@@ -180,13 +180,13 @@ def _back(p: Any) -> Any:
     return p.efficiency if p.efficiency_back is None else p.efficiency_back
 
 
-def _moving(way: int) -> Iterator[Mode]:
+def _moving(direction: int) -> Iterator[Mode]:
     """Turning one way: power goes from a to b while the torque in the mesh has the sign of the speed."""
-    torque, word = way * through_of(MESH), "forward" if way > 0 else "backward"
-    stops, turns = -way * ACROSS, way * ACROSS > 0
+    torque, word = direction * through_of(MESH), "forward" if direction > 0 else "backward"
+    stops, turns = -direction * ACROSS, direction * ACROSS > 0
     driving, driven = f"{DRIVING} {word}", f"{DRIVEN} {word}"
-    yield Mode(driving, (Leave(-torque, driven), Leave(stops, _flank(way))), way, DRIVING, turns)
-    yield Mode(driven, (Leave(torque, driving), Leave(stops, _flank(-way))), way, DRIVEN, turns)
+    yield Mode(driving, (Leave(-torque, driven), Leave(stops, _flank(direction))), direction, DRIVING, turns)
+    yield Mode(driven, (Leave(torque, driving), Leave(stops, _flank(-direction))), direction, DRIVEN, turns)
 
 
 def _flank(side: int) -> str:

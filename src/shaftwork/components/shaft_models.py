@@ -278,9 +278,9 @@ def _frequency_error(model: ShaftModel, half_waves: float) -> float:
             weights[k, j] += weight
     matrix = weights / np.sqrt(np.array(mesh.lengths))[:, None] / np.sqrt(np.array(mesh.inertias))[None, :]
     worst = 0.0
-    for first, kept in ((1.0, matrix), (0.5, matrix[:, 1:])):
+    for first, columns in ((1.0, matrix), (0.5, matrix[:, 1:])):
         exact = np.pi * np.arange(first, max(half_waves, 1.0) + 0.5)  # the first mode always counts
-        rates = np.sort(np.linalg.svd(kept, compute_uv=False))
+        rates = np.sort(np.linalg.svd(columns, compute_uv=False))
         rates = rates[rates > 1e-6]
         if len(rates) < len(exact):
             return np.inf

@@ -9,7 +9,7 @@ from typing import Any
 
 from sympy import Expr, Float, Rational, pi, sqrt
 
-from shaftwork.components.base import Component, Derived, Port, Profile, Signal, component
+from shaftwork.components.base import Component, Derived, Port, Profile, Signal, component, number_of
 from shaftwork.components.branches import (
     ACROSS,
     AcrossLaw,
@@ -70,8 +70,8 @@ class Shaft(Component):
 
     def _value(self, name: str) -> float:
         """A parameter in SI; for one that is not admissible, which the checks of the network report, some number."""
-        value, objection = self.declared[name].magnitude(getattr(self, name))
-        return float(value) if objection is None else float(name not in ("inner_diameter", "damping"))
+        value = number_of(self, name)
+        return float(name not in ("inner_diameter", "damping")) if value is None else value
 
     @property
     def resolved(self) -> ShaftModel:

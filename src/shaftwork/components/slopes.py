@@ -58,7 +58,6 @@ STEPS = (sign, Heaviside, Relational, InterpolationSlope, floor, ceiling)
 TURNING = (sin, cos, tan, cot, sec, csc)
 MOST_SYMBOLS, MOST_DEGREE = 4, 8
 """Of more symbols, or of a higher degree, a square is not looked for: it would take longer than the run."""
-KEPT = 4096
 
 
 def wraps(node: Basic) -> bool:
@@ -84,34 +83,39 @@ def slope(expression: Expr, symbol: Symbol) -> Expr:
         expression: a law.
         symbol: what to differentiate by.
     """
-    expression = unrooted(expression)
+    expression = _unrooted(expression)
     kinks = expression.atoms(sign, Heaviside, Abs, floor) | {
-        node for node in expression.atoms(asin, acos) if folded(node)
+        node for node in expression.atoms(asin, acos) if complement(node) is not None
     }
     # whether one is real sympy finds out by expanding an argument of which it does not know it: for ever, of a power
     doubtful = {node for node in expression.atoms(sinh, cosh, tanh) if not node.args[0].is_extended_real}
     if not kinks | doubtful:
         return expression.diff(symbol)
-    held = {node: Dummy(real=True) for node in kinks | doubtful}
-    smooth = replaced(expression, held)  # from the outside in: what is inside a kink is not seen
+    constants = {node: Dummy(real=True) for node in kinks | doubtful}
+    smooth = replaced(expression, constants)  # from the outside in: what is inside a kink is not seen
     total = smooth.diff(symbol)
-    for node in (one for one in held if isinstance(one, Abs | asin | acos)):
-        if (outer := smooth.diff(held[node])) != 0:
+    for node in (one for one in constants if isinstance(one, Abs | asin | acos)):
+        if (outer := smooth.diff(constants[node])) != 0:
             total += outer * _slope_of_kink(node, symbol)
     for node in doubtful:
-        if (inner := slope(node.args[0], symbol)) != 0 and (outer := smooth.diff(held[node])) != 0:
+        if (inner := slope(node.args[0], symbol)) != 0 and (outer := smooth.diff(constants[node])) != 0:
             total += outer * node.fdiff(1) * inner
-    made: Expr = replaced(total, {dummy: node for node, dummy in held.items()})
-    return made.replace(_is_at_rest, _together) if made.has(Abs) else made
+    derivative: Expr = replaced(total, {dummy: node for node, dummy in constants.items()})
+    return derivative.replace(_is_at_rest, _together) if derivative.has(Abs) else derivative
 
 
 def _slope_of_kink(node: Expr, symbol: Symbol) -> Expr:
-    inner = node.args[0]
+    """The derivative of |g|, asin(g) or acos(g), of the last two without a division.
+
+    Law: d asin(g) = sign(w) (w dg - g dw) = -d acos(g), that of the angle whose sine is g and whose cosine is w.
+    """
+    g = node.args[0]
     if isinstance(node, Abs):
-        return sign(inner) * slope(inner, symbol)
-    by = complement(node)
-    assert by is not None  # noqa: S101 (only such nodes are asked for)
-    return sign(by) * turning(node, by, slope(inner, symbol), slope(by, symbol))
+        return sign(g) * slope(g, symbol)
+    w = complement(node)
+    assert w is not None  # noqa: S101 (only such nodes are asked for)
+    turning = TR8((w * slope(g, symbol) - g * slope(w, symbol)).expand()).expand()
+    return sign(w) * (-turning if isinstance(node, acos) else turning)
 
 
 def _is_at_rest(node: Expr) -> bool:
@@ -124,18 +128,18 @@ def _together(product: Expr) -> Expr:
     factors = list(product.args)
     for turned in [factor for factor in factors if isinstance(factor, sign)]:
         inner = turned.args[0]
-        for factor, way in ((inner, 1), (-inner, -1)):
+        for factor, number in ((inner, 1), (-inner, -1)):
             if factor in factors and turned in factors:
                 factors.remove(factor)
                 factors.remove(turned)
-                factors += [way, Abs(inner)]
+                factors += [number, Abs(inner)]
     return Mul(*factors)
 
 
 def jumps(expression: Expr, *symbols: Symbol) -> bool:
     """Whether a law may jump in one of the symbols, so that it is not linear in it even where its slope is constant."""
-    found = (node for node in preorder_traversal(expression) if isinstance(node, STEPS) or wraps(node))
-    return any(not node.free_symbols.isdisjoint(symbols) for node in found)
+    steps = (node for node in preorder_traversal(expression) if isinstance(node, STEPS) or wraps(node))
+    return any(not node.free_symbols.isdisjoint(symbols) for node in steps)
 
 
 def is_root(node: Expr) -> bool:
@@ -143,12 +147,12 @@ def is_root(node: Expr) -> bool:
     return isinstance(node, Pow) and isinstance(node.exp, Rational) and node.exp.q == 2 and node.base.has(Add)
 
 
-def unrooted(expression: Expr) -> Expr:
+def _unrooted(expression: Expr) -> Expr:
     """The same where roots of perfect squares are sizes: sqrt(2 - 2 cos x) is 2 |sin(x/2)|, whose slope is known."""
     if not any(is_root(node) for node in expression.atoms(Pow)):
         return expression
-    made: Expr = expression.replace(is_root, lambda node: _size(node, square_root(node.base)))
-    return made
+    without: Expr = expression.replace(is_root, lambda node: _size(node, square_root(node.base)))
+    return without
 
 
 def complement(node: Expr) -> Expr | None:
@@ -165,28 +169,7 @@ def complement(node: Expr) -> Expr | None:
     return sin(inner.args[0]) if isinstance(inner, cos) else square_root(1 - inner**2)
 
 
-def turning(node: Expr, by: Expr, inner_slope: Expr, complement_slope: Expr) -> Expr:
-    """The derivative of asin(g) or acos(g) without a division: that of the angle whose sine is g and cosine w.
-
-    Law: d asin(g) = sign(w) (w dg - g dw) = -d acos(g) with w^2 + g^2 = 1; this gives what stands behind sign(w).
-
-    Args:
-        node: asin(g) or acos(g).
-        by: w.
-        inner_slope: dg.
-        complement_slope: dw.
-    """
-    inner = node.args[0]
-    plain = TR8((by * inner_slope - inner * complement_slope).expand()).expand()
-    return -plain if isinstance(node, acos) else plain
-
-
-def folded(node: Expr) -> bool:
-    """Whether a node is an inverse sine or cosine with corners where its argument touches 1 or -1."""
-    return isinstance(node, asin | acos) and complement(node) is not None
-
-
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=4096)
 def square_root(square: Expr) -> Expr | None:
     """An expression without roots whose square this is, or None.
 
@@ -208,8 +191,8 @@ def square_root(square: Expr) -> Expr | None:
     if root is None or not angles:
         return root
     back = {half: f(angle / 2) for angle, pair in halves.items() for half, f in zip(pair, (sin, cos), strict=True)}
-    made: Expr = TR8(root.xreplace(back).expand())
-    return made
+    in_angles: Expr = TR8(root.xreplace(back).expand())
+    return in_angles
 
 
 def _homogeneous(square: Expr, halves: dict[Expr, tuple[Dummy, Dummy]]) -> Expr:

@@ -1,13 +1,15 @@
-"""Torque that is switched on and off at given times, the same way for every motor."""
+"""Parts that are on from one time to another: motors, brakes and switches."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from sympy import Expr, Mul, Piecewise
+from sympy import Expr, Min, Mul, Piecewise, false
+from sympy.logic.boolalg import Boolean
 
-from shaftwork.components.base import Component
+from shaftwork.components.base import Component, number_of
 from shaftwork.components.laws import t
+from shaftwork.components.modes import Leave
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter
 
@@ -46,10 +48,21 @@ def _cases(law: Expr) -> tuple[tuple[Expr, Any], ...]:
     return tuple((others * value, condition) for value, condition in pieces[0].args)
 
 
-def number_of(part: Component, name: str) -> float | None:
-    """A parameter in SI, None where it is left out or is no admissible number, which the checks of a network report."""
-    value, objection = part.declared[name].magnitude(getattr(part, name))
-    return value if objection is None and isinstance(value, float) else None
+def onset(p: Any, on: Expr | None) -> Expr:
+    """Rises above zero when a part comes on: at `p.t_on`, or with a law when that is above zero after `p.t_on`."""
+    if on is None:
+        return t - p.t_on
+    return on if p.t_on == 0 else Min(t - p.t_on, on)
+
+
+def is_past(p: Any) -> Boolean:
+    """Whether a part is off for good, from `p.t_off` on."""
+    return false if p.t_off is None else t >= p.t_off
+
+
+def ends(p: Any, mode: str) -> tuple[Leave, ...]:
+    """What leads to the mode of a part that is off for good."""
+    return () if p.t_off is None else (Leave(t - p.t_off, mode),)
 
 
 def refuse_no_time_on(part: Component, does: str = "gives torque") -> None:

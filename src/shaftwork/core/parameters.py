@@ -88,11 +88,8 @@ class Parameter:
         readable = self.record is None or (
             isinstance(self.record, type) and callable(getattr(self.record, "read", None))
         )
-        limits, texts, flags = (
-            ("above", "at_least", "at_most"),
-            ("unit", "meaning", "latex"),
-            ("nonzero", "whole", "law"),
-        )
+        limits, texts = ("above", "at_least", "at_most"), ("unit", "meaning", "latex")
+        flags = ("nonzero", "whole", "law")
         refuse_fields(
             self,
             **{name: (is_bound(getattr(self, name)), "a number, or None") for name in limits},

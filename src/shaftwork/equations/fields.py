@@ -13,12 +13,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
 
 from sympy import Add, Derivative, Eq, Expr, Function, Integer, Symbol, sqrt
 from sympy.core.function import AppliedUndef
 
-from shaftwork.components.base import Derived, symbols_of
+from shaftwork.components.base import Derived
 from shaftwork.components.laws import t
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.domains import ROTATION
@@ -124,7 +125,7 @@ class Field:
     @cached_property
     def _derived(self) -> tuple[Derived, ...]:
         names = ("area_moment", "line_inertia", "line_stiffness")
-        symbols: Any = symbols_of({name: self.symbol(name) for name in (*self.part.component.declared, *names)})
+        symbols = SimpleNamespace(**{name: self.symbol(name) for name in (*self.part.component.declared, *names)})
         return tuple(derived for derived in self.part.component.derived(symbols) if derived.name in names)
 
     def lines(self, *, values: bool = False) -> tuple[tuple[Line, ...], tuple[Line, ...], tuple[Line, ...]]:

@@ -11,11 +11,12 @@ import reprlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from types import SimpleNamespace
 from typing import Any, TypeVar, get_args
 
 from sympy import Expr, Float, Integer, S, Symbol
 
-from shaftwork.components.base import Component, Derived, symbols_of
+from shaftwork.components.base import Component, Derived
 from shaftwork.components.branches import (
     ACROSS,
     HISTORY,
@@ -145,7 +146,7 @@ def make_template(part: Component, values: Mapping[str, Any], choices: tuple[Mod
         else:
             placed[name] = value.xreplace(translate) if isinstance(value, Expr) else value
     symbols = {Symbol(name, real=True): name for name, value in values.items() if isinstance(value, float) and value}
-    p = symbols_of(placed | {"form": None, "mode": mode_symbol("mode")})
+    p = SimpleNamespace(**placed, form=None, mode=mode_symbol("mode"))
     derived = tuple(_derived(part, p))
     modes = tuple(part.modes(p))
     symbols |= _choose(p, modes, choices)
