@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.core.errors import SimulationError
-from shaftwork.results.exact_lines import ExactLines
+from shaftwork.results.exact_lines import ExactSlopes
 from shaftwork.results.frequency import solved_densely
 from shaftwork.results.observer import Array, blocks
-from shaftwork.results.slopes import Complex, OpenSlopes
+from shaftwork.results.slopes import Complex
 
 ITERATIONS, CONVERGED, SETTLED = 30, 1e-15, 1e-9
 """Steps to a root; found where a step is below the first fraction of it, or below the second and shrinks no more."""
@@ -25,26 +25,23 @@ class ExactProblem:
     """M(s) u = 0 in variables of equal units, with rows such that M'(s) is of size one.
 
     Args:
-        slopes: the network without its shafts.
-        lines: the shafts.
-        weights: (n,) factors of x, V and W with which they have equal units.
-        acting: the states x that have modes; None for all.
+        slopes: the network with its shafts.
+        acting: the states of the network between them that have modes; None for all.
     """
 
-    def __init__(
-        self, slopes: OpenSlopes, lines: ExactLines, weights: Array, acting: NDArray[np.intp] | None = None
-    ) -> None:
-        states, inputs = slopes.A.shape[0], len(slopes.inputs)
+    def __init__(self, slopes: ExactSlopes, acting: NDArray[np.intp] | None = None) -> None:
+        network, lines, weights = slopes.open, slopes.lines, slopes.weights
+        states, inputs = len(network.states), len(network.inputs)
         x = np.arange(states) if acting is None else acting
         rows = np.repeat(np.sqrt(lines.impedance / lines.delay), 2)[:, None]
         w = weights[x][:, None]
         self._lines, self._scale = lines, 1 / weights[states:]
-        self._A = w * slopes.A[x][:, x].toarray() / w.T
-        self._C = rows * slopes.C[:, x].toarray() / w.T
-        self._arriving, self._through = w * slopes.B[x, inputs:], rows * slopes.D[:, inputs:]
+        self._A = w * network.A[x][:, x].toarray() / w.T
+        self._C = rows * network.C[:, x].toarray() / w.T
+        self._arriving, self._through = w * network.B[x, inputs:], rows * network.D[:, inputs:]
         self._rows = rows
-        self._level = np.vstack([w * slopes.B[x, :inputs], rows * slopes.D[:, :inputs]])
-        self._rate = np.vstack([w * slopes.B1[x, :inputs], np.zeros((len(rows), inputs))])
+        self._level = np.vstack([w * network.B[x, :inputs], rows * network.D[:, :inputs]])
+        self._rate = np.vstack([w * network.B1[x, :inputs], np.zeros((len(rows), inputs))])
         self._states, self.unknowns = len(x), len(x) + len(rows)
         self.size = float(max([*abs(self._A).sum(axis=0), *(1 / lines.delay)]))
 

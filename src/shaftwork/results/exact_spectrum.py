@@ -28,11 +28,9 @@ WIDER = 1.3
 BELOW = 0.5
 """Modes are sought up to this fraction of the rate at which, without number, they crowd."""
 TOGETHER = 1e-6
-"""Starts that differ by less than this fraction are refined together."""
+"""Starts that differ by less than this fraction are refined together; roots that differ by less than half are one."""
 ROOM = 1.001
 """A circle for a number of modes reaches so many times as far as the next one."""
-APART = 0.5
-"""Roots stay apart by at least this fraction of the distance of their starts."""
 FADED, SINGULAR = 40.0, 1e13
 """At the rate -FADED / T what fades grows to beyond rounding: the matrix then has this condition where none echoes."""
 AUDIBLE = 3.0
@@ -45,22 +43,7 @@ Starts = Callable[[float, int], Modes]
 def find_exact_modes(
     title: str, slopes: ExactSlopes, starts: Starts, count: int | None = None, f_max: float | None = None
 ) -> Modes:
-    """The modes of smallest |rate|.
-
-    Args:
-        title: of the network.
-        slopes: the network near the point.
-        starts: see `Starts`.
-        count: the modes wanted; by default 10, or all up to f_max.
-        f_max: the largest |rate| / 2 pi, Hz.
-
-    Raises:
-        ParameterError: count or f_max is out of its range, or modes without number crowd below it.
-        SimulationError: it cannot be settled that all modes were found.
-
-    Warns:
-        NetworkWarning: an end takes all that arrives, so that there are fewer modes.
-    """
+    """The modes of smallest |rate|; see `ExactModel.modes`."""
     wanted, limit = checked_count(count), min(BELOW * slopes.lines.crowding, _echo_limit(slopes))
     if f_max is not None:
         radius = largest_rate(f_max)
@@ -125,11 +108,8 @@ def _settled(title: str, slopes: ExactSlopes, starts: Starts, radius: float) -> 
         inside = np.flatnonzero(np.abs(mesh.rates) < outer)
         standing, starts_inside = inside[mesh.rates[inside] == 0], mesh.rates[inside][mesh.rates[inside] != 0]
         moving = problem.count(outer) - len(standing)
-        refined = _refined(problem, starts_inside)
-        if refined is None or _number(refined[0]) != moving:
-            refined = _reached(problem, starts_inside if moving else starts_inside[:0], outer)
-        rates, shapes = refined
-        if _number(rates) != moving:
+        rates, shapes = _refined(problem, starts_inside if moving else starts_inside[:0], outer)
+        if int(np.where(rates.imag > 0, 2, 1).sum()) != moving:  # with the conjugate ones
             continue
         vectors = np.zeros((len(weights), len(rates)), dtype=complex)
         vectors[np.concatenate([acting, np.arange(states, len(weights))])] = shapes
@@ -148,11 +128,6 @@ def _settled(title: str, slopes: ExactSlopes, starts: Starts, radius: float) -> 
     )
 
 
-def _number(rates: Complex) -> int:
-    """How many roots there are, with the conjugate ones."""
-    return int(np.where(rates.imag > 0, 2, 1).sum())
-
-
 def _gap(sizes: Array, radius: float) -> float:
     """The middle of the widest gap between the sizes from a radius to WIDER times it."""
     edges = np.sort(np.concatenate([[radius, WIDER * radius], sizes[(sizes > radius) & (sizes < WIDER * radius)]]))
@@ -163,11 +138,11 @@ def _gap(sizes: Array, radius: float) -> float:
 def _problem(slopes: ExactSlopes) -> tuple[ExactProblem, NDArray[np.intp], NDArray[np.intp]]:
     """The problem without angles that are only recorded; the states that it has, and those that follow."""
     acting, following = states_that_act(slopes.open.angles, slopes.open.A, slopes.open.C)
-    return ExactProblem(slopes.open, slopes.lines, slopes.weights, acting), acting, following
+    return ExactProblem(slopes, acting), acting, following
 
 
-def _reached(problem: ExactProblem, starts: Complex, radius: float) -> tuple[Complex, Complex]:
-    """The different roots within a radius that any starts lead to, and their vectors: the mesh may have more modes."""
+def _refined(problem: ExactProblem, starts: Complex, radius: float) -> tuple[Complex, Complex]:
+    """The different roots within a radius that starts lead to, and their vectors: the mesh may have more modes."""
     rates, vectors = np.zeros(0, dtype=complex), np.zeros((problem.unknowns, 0), dtype=complex)
     for group in _together(starts):
         try:
@@ -175,7 +150,7 @@ def _reached(problem: ExactProblem, starts: Complex, radius: float) -> tuple[Com
         except SimulationError:
             continue
         new = [k for k, root in enumerate(roots) if 0 < abs(root) < radius and root.imag >= 0]
-        new = [k for k in new if (np.abs(rates - roots[k]) > TOGETHER * abs(roots[k])).all()]
+        new = [k for k in new if (np.abs(rates - roots[k]) > TOGETHER / 2 * abs(roots[k])).all()]
         rates, vectors = np.append(rates, roots[new]), np.hstack([vectors, shapes[:, new]])
     return rates, vectors
 
@@ -187,24 +162,6 @@ def _together(starts: Complex) -> list[list[int]]:
         near = groups and abs(starts[groups[-1][0]] - starts[k]) <= TOGETHER * abs(starts[k])
         groups[-1].append(k) if near else groups.append([k])
     return groups
-
-
-def _refined(problem: ExactProblem, starts: Complex) -> tuple[Complex, Complex] | None:
-    """The roots next to the starts and their vectors; None where two starts led to one root, or one to none."""
-    groups = _together(starts)
-    order = np.array([k for group in groups for k in group], dtype=np.intp)
-    if not groups:
-        return starts, np.zeros((problem.unknowns, 0), dtype=complex)
-    try:
-        solved = [problem.roots(starts[group]) for group in groups]
-    except SimulationError:
-        return None
-    rates = np.concatenate([roots for roots, _ in solved])
-    label = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
-    before, after = (np.abs(each[:, None] - each[None, :]) for each in (starts[order], rates))
-    if ((after < APART * before) & (label[:, None] != label)).any():
-        return None
-    return rates, np.hstack([vectors for _, vectors in solved])
 
 
 def _standing(slopes: ExactSlopes, mesh: Modes, columns: NDArray[np.intp]) -> Complex:

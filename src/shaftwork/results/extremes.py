@@ -75,13 +75,13 @@ class Extremes(Mapping[str, tuple[Extreme, Extreme]]):
         return row.least, row.most
 
     def __iter__(self) -> Iterator[str]:
-        return iter(dict.fromkeys((*self._reader.observer.units, *self._reader.observer.profiles)))
+        return iter(self._reader.names)
 
     def __len__(self) -> int:
-        return sum(1 for _ in self)
+        return len(self._reader.names)
 
     def __contains__(self, name: object) -> bool:
-        return name in self._reader.observer.units or name in self._reader.observer.profiles
+        return name in self._reader.names
 
     def row(self, name: str) -> ExtremesRow:
         """Extremes, mean over time and value at the end; along a part those of the worst places.

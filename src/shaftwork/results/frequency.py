@@ -135,21 +135,10 @@ class DrivenSystem(Protocol):
 def frequency_response(
     title: str, slopes: Motions, system: DrivenSystem, names: tuple[str, str], f: Any
 ) -> FrequencyResponse:
-    """The response of one quantity to one input.
+    """The response of one quantity to one input, by their names; see `LinearModel.frequency_response`.
 
     Law: M(s) x = r(s) with s = 2 pi i f, and the output from x, v and s v, by which the derivatives that rigidly driven
     inertias ask for are exact.
-
-    Args:
-        title: of the network.
-        slopes: the network near the point.
-        system: its equations.
-        names: of the input, one of `slopes.inputs`, and of the output.
-        f: frequencies, Hz.
-
-    Raises:
-        ParameterError: f holds no positive, finite numbers.
-        SignalError: there is no such input or output.
     """
     source, output = names
     if source not in slopes.inputs:

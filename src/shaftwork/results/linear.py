@@ -199,8 +199,7 @@ class ExactModel:
             ParameterError: f holds no positive, finite numbers.
             SignalError: there is no such input or output.
         """
-        problem = ExactProblem(self.slopes.open, self.slopes.lines, self.slopes.weights)
-        return frequency_response(self.title, self.slopes, problem, (input, output), f)
+        return frequency_response(self.title, self.slopes, ExactProblem(self.slopes), (input, output), f)
 
 
 def linear_model(

@@ -130,20 +130,7 @@ class _Shapes(Mapping[str, Complex]):
 
 
 def find_modes(title: str, slopes: DeviationEquations, count: int | None = None, f_max: float | None = None) -> Modes:
-    """The modes of a network near a point.
-
-    Law: the eigenvalues and eigenvectors of A.
-
-    Args:
-        title: of the network.
-        slopes: the network near the point.
-        count: the modes wanted, those of smallest |rate|; by default all.
-        f_max: the largest |rate| / 2 pi, Hz; by default there is none.
-
-    Raises:
-        ParameterError: count or f_max is out of its range, or the network is too large for all modes.
-        SimulationError: the lowest modes of a large network were not found.
-    """
+    """The modes of a network near a point, the eigenvalues and eigenvectors of A; see `LinearModel.modes`."""
     count, top = checked_count(count), largest_rate(f_max)
     acting, following = states_that_act(slopes.angles, slopes.A)
     weights = slopes.weights[acting]

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+from scipy.optimize import brentq, linear_sum_assignment
 
 from shaftwork.results.modes import Modes, natural_frequencies
 from shaftwork.results.observer import Array
 from shaftwork.results.slopes import Complex
 
-REFINED, ITERATIONS = 1e-12, 60
-"""A speed that is sought is found when it changes by less than this fraction, and in so many steps at most."""
+REFINED = 1e-12
+"""To this fraction a speed is found that is sought."""
 MET = 1e-6
 """An order meets a frequency that is as near as this fraction; at a jump of the frequencies it passes between two."""
 HALVINGS, NARROW = 40, 1e-6
@@ -178,22 +178,16 @@ class OverSpeed:
         return meetings, stranger
 
     def _refined(self, left: Swinging, right: Swinging, order: float, rank: int) -> Swinging:
-        """Where the mode of a rank meets an order, by the Illinois algorithm; sooner where the modes are others.
+        """Where the mode of a rank meets an order, by Brent's method; sooner where the modes are others.
 
         By their rank all modes are continuous within a phase, also where two cross.
         """
-        first, low, high = left, left.above(order)[rank], right.above(order)[rank]
-        for _ in range(ITERATIONS):
-            step = high * (right.speed - left.speed) / (high - low)
-            before, at = right, self.at(float(right.speed - step))
-            if not _goes_on(first, at, rank) or abs(at.speed - before.speed) <= REFINED * at.speed:
-                break
-            gap = at.above(order)[rank]
-            if gap == 0:
-                break
-            left, low = (right, high) if gap * high < 0 else (left, low / 2)
-            right, high = at, gap
-        return at
+
+        def gap(speed: float) -> float:
+            at = self.at(speed)
+            return float(at.above(order)[rank]) if _goes_on(left, at, rank) else 0.0  # which ends the search
+
+        return self.at(brentq(gap, left.speed, right.speed, xtol=np.finfo(float).tiny, rtol=REFINED, disp=False))
 
 
 def _at(point: Swinging, orders: Iterable[float]) -> list[Meeting]:

@@ -44,6 +44,11 @@ class Reader:
         self.unbounded: dict[tuple[str, int | None], dict[float, float]] = {}
         """Values that are not finite, by the name of the quantity and its place, and by time in s."""
 
+    @property
+    def names(self) -> dict[str, None]:
+        """Every quantity that can be read, at a place or along a part, in order."""
+        return dict.fromkeys((*self.observer.units, *self.observer.profiles))
+
     def unit(self, name: str) -> str:
         """The unit of a quantity; empty for what is stored and has no other meaning.
 
@@ -63,7 +68,7 @@ class Reader:
             return units[name]
         if name in self.states:
             return ""
-        error = no_quantity(name, self.title, dict.fromkeys((*units, *profiles)))
+        error = no_quantity(name, self.title, self.names)
         owner, _, quantity = name.rpartition(".")
         if quantity.partition("_")[0] in ANGLES and any(other.rpartition(".")[0] == owner for other in units):
             raise SignalError(f"{error} An angle is recorded when asked for: net.compile(angles=['{owner}']).")

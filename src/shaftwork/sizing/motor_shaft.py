@@ -260,7 +260,10 @@ def zeros(value: Callable[..., Array], low: Array, high: Array, *args: Array) ->
         high: (k,) s.
         *args: (k,) arguments.
     """
-    return np.asarray(find_root(value, (low, high), args=args).x if len(low) else low)
+    if not len(low):
+        return low
+    root = find_root(value, (low, high), args=args)
+    return np.where(root.success, root.x, high)  # rounding may take the difference of the signs away
 
 
 def run_up(shaft: MotorShaft, share: float) -> float:
