@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import networkx as nx
 import numpy as np
-from sympy import lambdify
+from sympy import Expr, lambdify
 
 from shaftwork.components.base import Component
 from shaftwork.components.laws import NUMERICAL, as_expression, breakpoints
@@ -41,8 +41,8 @@ NONLINEAR, LOOSER = (8, 12, 16, 24, 32), 1e-8
 one, and of a shaft that is damped the high ones do not matter."""
 ALIKE = 1e-7
 """So much of the largest torque two models may differ that stand for the truth of a nonlinear network."""
-JUDGED = 4
-"""Elastic natural frequencies that the truth names."""
+MODES = 3
+"""Elastic natural frequencies that are compared. The truth names one more, to tell those beyond from them."""
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,7 @@ def _exact_frequencies(net: Network) -> Array:
         exact = frequencies(net.modes(exact=True))
     except ShaftworkError:
         return np.empty(0)
-    return exact[:JUDGED] if len(exact) >= JUDGED else np.empty(0)
+    return exact[: MODES + 1] if len(exact) > MODES else np.empty(0)
 
 
 def _read(net: Network, shaft: str, t_end: float, t: Array, rtol: float = TIGHT) -> dict[str, Array]:
@@ -211,7 +211,10 @@ def _torque(placed: Placed, order: list[str]) -> JunctionTorque:
     law = as_expression(placed.part.tau)  # type: ignore[attr-defined]
     if not law.free_symbols <= {TIME}:
         raise ParameterError("A torque depends on more than time.")
+    return JunctionTorque(order.index(placed.nodes[0]), function_of_time(law), breakpoints(law))
+
+
+def function_of_time(law: Expr) -> Callable[[Array], Array]:
+    """A law of time alone as a function of an array of times in s."""
     value = lambdify(TIME, law, modules=[NUMERICAL, "numpy"])
-    return JunctionTorque(
-        order.index(placed.nodes[0]), lambda t: np.broadcast_to(value(t), np.shape(t)), breakpoints(law)
-    )
+    return lambda t: np.broadcast_to(value(t), np.shape(t))
