@@ -94,6 +94,17 @@ class Ending(dict[str, float]):
             )
 
 
+def rewired(here: Mapping[str, str], there: Mapping[str, str]) -> list[str]:
+    """What is another part, elsewhere or of another law in a network there than it is here, each in a few words."""
+    names = dict.fromkeys((*here, *there))
+    absent = "not there"
+    return [
+        f"'{name}' is {there.get(name, absent)} instead of {here.get(name, absent)}"
+        for name in names
+        if here.get(name) != there.get(name)
+    ]
+
+
 def ending_of(motion: Solution, graph: CircuitGraph) -> Ending:
     """Where a motion ended: at its last output time.
 
@@ -104,14 +115,11 @@ def ending_of(motion: Solution, graph: CircuitGraph) -> Ending:
     Raises:
         ParameterError: it is a motion of another network; names what differs.
     """
-    here, there = graph.wiring, motion.observer.wiring
-    names = dict.fromkeys((*here, *there))
-    if other := [name for name in names if here.get(name) != there.get(name)]:
-        told = [f"'{n}' is {there.get(n, 'not there')} instead of {here.get(n, 'not there')}" for n in other[:NAMED]]
+    if other := rewired(graph.wiring, motion.observer.wiring):
         more = f" and {len(other) - NAMED} more" if len(other) > NAMED else ""
         raise ParameterError(
             f"initial is a motion of '{motion.name}', which is another network than '{graph.name}': "
-            f"{', '.join(told)}{more}. Give a motion of the same network; numbers of its parts may differ. "
+            f"{', '.join(other[:NAMED])}{more}. Give a motion of the same network; numbers of its parts may differ. "
             "Or begin with start values, initial={name: sol[name][-1] for name in sol.states} and t_start=sol.t[-1]."
         )
     t, x = float(motion.t[-1]), motion.x[-1]

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
+import networkx as nx
 import numpy as np
 
 from shaftwork.components.contacts import Backlash
@@ -250,16 +251,21 @@ def _not_a_row(stations: dict[str, Station], links: dict[tuple[str, str], list[P
 
 
 def _in_a_row(stations: dict[str, Station], links: dict[tuple[str, str], list[Placed]]) -> Chain:
-    ends = [node for node in stations if sum(node in pair for pair in links) < 2]
-    row, joints, left = [ends[0]], list[Link](), dict(links)
-    while left:
-        pair = next(pair for pair in left if row[-1] in pair)
-        items = left.pop(pair)
-        row.append(pair[1] if pair[0] == row[-1] else pair[0])
-        c, d, gap = (sum(float(getattr(item.part, name, 0.0)) for item in items) for name in ("c", "d", "gap"))
-        springs = tuple(item.part.name for item in items if not isinstance(item.part, Damper))
-        joints.append(Link(springs[0], c, d, gap, springs, tuple(items)))
-    return Chain(tuple(stations[node] for node in row), tuple(joints))
+    joints = nx.Graph()
+    joints.add_nodes_from(stations)
+    joints.add_edges_from(links)
+    ends = [node for node, degree in joints.degree if degree < 2]
+    row = nx.shortest_path(joints, ends[0], ends[-1])
+    return Chain(
+        tuple(stations[node] for node in row), tuple(_link(links[min(pair), max(pair)]) for pair in pairwise(row))
+    )
+
+
+def _link(items: Sequence[Placed]) -> Link:
+    """What lies side by side between two stations."""
+    c, d, gap = (sum(float(getattr(item.part, name, 0.0)) for item in items) for name in ("c", "d", "gap"))
+    springs = tuple(item.part.name for item in items if not isinstance(item.part, Damper))
+    return Link(springs[0], c, d, gap, springs, tuple(items))
 
 
 def _condensed(chain: Chain, keep: str, title: str) -> Chain:

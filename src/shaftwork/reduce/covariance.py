@@ -37,14 +37,14 @@ def does_the_same(part: Component, referred: Component, scale: Scale) -> bool:
         referred: as it is at the reference shaft.
         scale: of its speeds and powers to those of the reference shaft.
     """
-    old, new = _PartView.of(part), _PartView.of(referred)
+    old, new = _PartView.of(part, scale), _PartView.of(referred, Scale())
     if len(old.modes) != len(new.modes):
         return False
     forms = [dict.fromkeys(form for mode in element.options for form in mode.forms) for element in old.modes]
     try:
-        guards = all(_guards_agree(old, new, *pair, scale) for pair in zip(old.modes, new.modes, strict=True))
+        guards = all(_guards_agree(old, new, *pair) for pair in zip(old.modes, new.modes, strict=True))
         return guards and all(
-            _agree(old.chosen(tuple(map(ModeChoice, chosen))), new.chosen(tuple(map(ModeChoice, chosen))), scale)
+            _agree(old.chosen(tuple(map(ModeChoice, chosen))), new.chosen(tuple(map(ModeChoice, chosen))))
             for chosen in product(*forms)
         )
     except (TypeError, ValueError, ArithmeticError):
@@ -53,18 +53,19 @@ def does_the_same(part: Component, referred: Component, scale: Scale) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class _PartView:
-    """A part with the values of its parameters, and its branches in one combination of forms."""
+    """A part with the values of its parameters, its branches in one combination of forms, and its scale."""
 
     part: Component
+    scale: Scale
     template: Template
 
     @classmethod
-    def of(cls, part: Component, choices: tuple[ModeChoice, ...] = ()) -> _PartView:
+    def of(cls, part: Component, scale: Scale, choices: tuple[ModeChoice, ...] = ()) -> _PartView:
         nodes = tuple("ground" for _ in part.ports)
-        return cls(part, make_template(part, resolve(Placed(part, nodes))[0].values, choices))
+        return cls(part, scale, make_template(part, resolve(Placed(part, nodes))[0].values, choices))
 
     def chosen(self, choices: tuple[ModeChoice, ...]) -> _PartView:
-        return self.of(self.part, choices) if choices else self
+        return self.of(self.part, self.scale, choices) if choices else self
 
     @property
     def modes(self) -> tuple[Modes, ...]:
@@ -84,18 +85,15 @@ class _PartView:
         values = {**self.numbers, **{symbol: Float(value) for symbol, value in at.items()}}
         return float(law.xreplace(values).evalf())
 
-    def is_electrical(self, end: End) -> bool:
-        ports = (*self.part.ports, *self.part.inner_ports())
-        return any(port.name == end and port.domain is ELECTRICAL for port in ports)
-
-    def scale_at(self, end: End, scale: Scale) -> Scale:
+    def scale_at(self, end: End) -> Scale:
         """What a node of the part is scaled by: nothing in a circuit."""
-        return Scale() if self.is_electrical(end) else scale
+        ports = (*self.part.ports, *self.part.inner_ports())
+        electrical = any(port.name == end and port.domain is ELECTRICAL for port in ports)
+        return Scale() if electrical else self.scale
 
-    def scale_of(self, branch: BranchTemplate, scale: Scale) -> Scale:
+    def scale_of(self, branch: BranchTemplate) -> Scale:
         """What a branch is scaled by, by either of its ends."""
-        ends = [end for end in branch.ends if end is not None]
-        return self.scale_at(ends[0], scale) if ends else scale
+        return next((self.scale_at(end) for end in branch.ends if end is not None), self.scale)
 
     def ends_beside(self, other: _PartView, branch: BranchTemplate) -> tuple[End | None, ...]:
         """The ends of a branch; an optional port that the other part does not have is left at the frame."""
@@ -103,17 +101,25 @@ class _PartView:
         frame = [port.name for port in self.part.ports if port.optional and port.name not in ports]
         return tuple(None if end in frame else end for end in branch.ends)
 
-    def labelled(self, label: str, scale: Scale) -> Scale:
-        """What the branch of a label is scaled by."""
-        scales = (self.scale_of(branch, scale) for branch in self.template.branches if branch.label == label)
-        return next(scales, scale)
+    def behind(self, symbol: Symbol, at_branch: Scale) -> float:
+        """By what an argument of a law at the reference shaft is multiplied to be that of the part as it was.
 
-    def read(self, symbol: Symbol, scale: Scale) -> float:
-        """By what a reading of another port or branch of the part is multiplied to be that of the part as it was."""
-        kind, name = named_in(symbol)
+        Args:
+            symbol: the argument.
+            at_branch: what the branch of the law is scaled by.
+        """
+        if symbol in (ACROSS, INTEGRAL):
+            return at_branch.ratio
+        if symbol == THROUGH:
+            return 1 / at_branch.through
+        kind, name = named_in(symbol)  # of another port or branch of the part
         if kind == "across":
-            return self.scale_at(name, scale).ratio
-        return self.labelled(name, scale).ratio if kind == "integral" else 1 / self.labelled(name, scale).through
+            return self.scale_at(name).ratio
+        if kind:
+            scales = (self.scale_of(branch) for branch in self.template.branches if branch.label == name)
+            read = next(scales, self.scale)
+            return read.ratio if kind == "integral" else 1 / read.through
+        return -1.0 if symbol != t and at_branch.ratio < 0 else 1.0  # slipping forward is slipping backward
 
 
 def _samples(symbols: Sequence[Symbol], modes: Sequence[Modes]) -> Iterator[dict[Symbol, float]]:
@@ -127,37 +133,39 @@ def _samples(symbols: Sequence[Symbol], modes: Sequence[Modes]) -> Iterator[dict
             yield {symbol: abs(value) if symbol == t else value for symbol, value in chosen.items()}
 
 
-def _agree(old: _PartView, new: _PartView, scale: Scale) -> bool:
-    pairs = tuple(zip(old.template.branches, new.template.branches, strict=True))
+def _agree(old: _PartView, new: _PartView) -> bool:
     return all(
-        a.kind is b.kind and a.ends == new.ends_beside(old, b) and _same_branch(old, new, a, b, scale) for a, b in pairs
+        before.kind is after.kind
+        and before.ends == new.ends_beside(old, after)
+        and _same_branch(old, new, before, after)
+        for before, after in zip(old.template.branches, new.template.branches, strict=True)
     )
 
 
-def _same_branch(old: _PartView, new: _PartView, before: BranchTemplate, after: BranchTemplate, scale: Scale) -> bool:
+def _same_branch(old: _PartView, new: _PartView, before: BranchTemplate, after: BranchTemplate) -> bool:
     if before.terms:
-        return _proportional(old, new, before, after, scale)
-    at_branch = old.scale_of(before, scale)
-    square = at_branch.ratio * at_branch.through
+        return _proportional(old, new, before, after)
+    scale = old.scale_of(before)
+    square = scale.ratio * scale.through
     if before.line is not None and after.line is not None:
         pairs = zip(before.line, after.line, (square, 1.0), strict=True)
         return all(_close(new.value(b, {}), factor * old.value(a, {})) for a, b, factor in pairs)
-    factor = square if before.kind in LINEAR else at_branch.through
+    factor = square if before.kind in LINEAR else scale.through
     if before.kind is Kind.ACROSS_SOURCE:
-        factor = 1 / at_branch.ratio
-    laws = _evaluated(old, new, (before.law, after.law), (ACROSS, INTEGRAL, t), at_branch, scale)
+        factor = 1 / scale.ratio
+    laws = _evaluated(old, new, (before.law, after.law), (ACROSS, INTEGRAL, t), scale)
     return all(_close(now, factor * was) for was, now in laws)
 
 
 def _evaluated(
-    old: _PartView, new: _PartView, laws: tuple[Expr, Expr], symbols: tuple[Symbol, ...], at_branch: Scale, scale: Scale
+    old: _PartView, new: _PartView, laws: tuple[Expr, Expr], symbols: tuple[Symbol, ...], at_branch: Scale
 ) -> Iterator[tuple[float, float]]:
     """A law before and after, point by point: there as the part was, here with what its arguments are then."""
     before, after = laws
     arguments = tuple(dict.fromkeys((*symbols, *readings_in(after), *_modes_in(after))))
     for at in _samples(arguments, old.modes):
-        behind = {symbol: value * _turned(old, symbol, at_branch, scale) for symbol, value in at.items()}
-        yield old.value(before, behind), new.value(after, at)
+        there = {symbol: value * old.behind(symbol, at_branch) for symbol, value in at.items()}
+        yield old.value(before, there), new.value(after, at)
 
 
 def _modes_in(law: Expr) -> tuple[Symbol, ...]:
@@ -165,21 +173,10 @@ def _modes_in(law: Expr) -> tuple[Symbol, ...]:
     return tuple(sorted(symbols, key=lambda symbol: str(symbol.name)))
 
 
-def _turned(view: _PartView, symbol: Symbol, at_branch: Scale, scale: Scale) -> float:
-    """By what an argument of a law at the reference shaft is multiplied to be that of the part as it was."""
-    if symbol in (ACROSS, INTEGRAL):
-        return at_branch.ratio
-    if symbol == THROUGH:
-        return 1 / at_branch.through
-    if named_in(symbol)[0]:
-        return view.read(symbol, scale)
-    return -1.0 if symbol != t and at_branch.ratio < 0 else 1.0  # slipping forward is slipping backward
-
-
-def _proportional(old: _PartView, new: _PartView, before: BranchTemplate, after: BranchTemplate, scale: Scale) -> bool:
+def _proportional(old: _PartView, new: _PartView, before: BranchTemplate, after: BranchTemplate) -> bool:
     """Whether a coupling asks for the same speeds, and shares the same torques."""
     ends = [(plus if plus is not None else minus) for _, plus, minus in before.terms]
-    scales = [old.scale_at(end, scale) for end in ends]
+    scales = [old.scale_at(end) for end in ends]
     for laws, others, factors in (
         (before.terms, after.terms, [end_scale.ratio for end_scale in scales]),
         (before.balances, after.balances, [end_scale.through for end_scale in scales]),
@@ -195,17 +192,17 @@ def _close(one: float, other: float) -> bool:
     return math.isclose(one, other, rel_tol=CLOSE)
 
 
-def _guards_agree(old: _PartView, new: _PartView, before: Modes, after: Modes, scale: Scale) -> bool:
+def _guards_agree(old: _PartView, new: _PartView, before: Modes, after: Modes) -> bool:
     """Whether each mode ends where the same one ended; forward and backward are exchanged where the part turns."""
     end = before.ends[0] if before.ends else old.part.ports[0].name
-    at_ends = old.scale_at(end, scale)
-    backwards = scale.ratio < 0 and at_ends.ratio < 0
+    at_ends = old.scale_at(end)
+    backwards = at_ends.ratio < 0
     twins = {mode.name: after[_turned_mode(mode, after).name if backwards else mode.name] for mode in before.options}
 
     def agree(leave: Leave, other: Leave) -> bool:
         laws, symbols = (leave.when, other.when), (ACROSS, THROUGH, INTEGRAL, t)
         to = twins[leave.to].name if leave.to in twins else leave.to
-        return other.to == to and _same_sign(_evaluated(old, new, laws, symbols, at_ends, scale))
+        return other.to == to and _same_sign(_evaluated(old, new, laws, symbols, at_ends))
 
     for mode in before.options:
         left = list(twins[mode.name].leaves)

@@ -14,14 +14,14 @@ from shaftwork.components.rotation import Inertia, PlanetaryGear, Spring
 from shaftwork.network.netlist import REFERENCE
 from shaftwork.pipeline.network import Network
 from shaftwork.reduce.chain import Chain, Link, add_circuits, add_link, add_riders, series
-from shaftwork.reduce.tridiagonal_modes import Array, TridiagonalChain, carried, singular_values
+from shaftwork.reduce.tridiagonal_modes import Array, TridiagonalChain, constraint_mode, singular_values
 
 NOTHING = 1e-12
 """A share of a speed or of an inertia that is only rounding."""
 
 
 @dataclass(frozen=True, eq=False)
-class Carried:
+class BoundaryInertia:
     """An inertia that the boundaries carry, each by its share.
 
     Args:
@@ -36,7 +36,7 @@ class Carried:
 
 
 @dataclass(frozen=True, eq=False)
-class FixedBoundaryMode(Carried):
+class FixedBoundaryMode(BoundaryInertia):
     """How a piece of a chain swings while its boundaries are held: an inertia on a spring that they carry.
 
     Args:
@@ -56,21 +56,22 @@ class Substructure:
     """The stations between boundaries, or beyond the outer ones.
 
     Args:
-        still: (n, b) speed of each station by those of the boundaries while nothing swings; zero in other pieces.
+        constraint_modes: (n, b) speed of each station by those of the boundaries while nothing swings; zero in other
+            pieces.
         joint: stiffness, N m/rad, and damping, N m s/rad, of the spring that it is between two boundaries then.
         support: (b, 2) the same of the springs that it is from the boundaries to the frame.
         between: places of the boundaries beside it, one or two.
         modes: all of its modes.
     """
 
-    still: Array
+    constraint_modes: Array
     joint: tuple[float, float]
     support: Array
     between: tuple[int, ...]
     modes: tuple[FixedBoundaryMode, ...]
 
 
-def piece_of(chain: Chain, count: int, number: int, inner: range) -> Substructure:
+def substructure(chain: Chain, count: int, number: int, inner: range) -> Substructure:
     """The stations before the boundary of this number, of so many, and behind the one before it.
 
     Law: C is the deflection of the stations under the boundaries while nothing swings; the force that it takes to hold
@@ -78,24 +79,24 @@ def piece_of(chain: Chain, count: int, number: int, inner: range) -> Substructur
     into the supports, sum c_s C.
     """
     between = tuple(k for k in (number - 1, number) if 0 <= k < count)
-    still = np.zeros((len(chain.stations), count))
+    constraints = np.zeros((len(chain.stations), count))
     if not inner:
-        return Substructure(still, (0.0, 0.0), np.zeros((count, 2)), between, ())
+        return Substructure(constraints, (0.0, 0.0), np.zeros((count, 2)), between, ())
     fixed = _FixedBoundaries.of(chain, inner)
     motion = np.zeros((len(inner) + 2, count))
     for k, place, follow in zip((number - 1, number), (0, -1), (fixed.from_first, fixed.from_last), strict=True):
         if k in between:
             motion[place, k] = 1.0
             motion[1:-1, k] = follow()
-    still[inner] = motion[1:-1]
-    stiffness = fixed.c[-1] * float(still[inner[-1], number - 1]) if len(between) > 1 else 0.0
-    lost = fixed.lost(motion)
-    damping = max(-float(lost[between]), 0.0) if len(between) > 1 else 0.0
-    support = np.stack([fixed.supports @ still[inner], np.maximum(lost.diagonal() - damping, 0.0)], axis=1)
+    constraints[inner] = motion[1:-1]
+    stiffness = fixed.c[-1] * float(constraints[inner[-1], number - 1]) if len(between) > 1 else 0.0
+    losses = fixed.damping(motion)
+    damping = max(-float(losses[between]), 0.0) if len(between) > 1 else 0.0
+    support = np.stack([fixed.supports @ constraints[inner], np.maximum(losses.diagonal() - damping, 0.0)], axis=1)
     beside = [chain.stations[k].inertia for k in (inner.start - 1, inner.stop) if 0 <= k < len(chain.stations)]
-    faint = math.sqrt(NOTHING * min(size for size in (*beside, *fixed.inertias.tolist()) if size))
-    modes = tuple(_modes(fixed, still, between, np.array(inner), number, faint))
-    return Substructure(still, (stiffness, damping), support, between, modes)
+    least = math.sqrt(NOTHING * min(size for size in (*beside, *fixed.inertias.tolist()) if size))
+    modes = tuple(_modes(fixed, constraints, between, np.array(inner), number, least))
+    return Substructure(constraints, (stiffness, damping), support, between, modes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,13 +133,13 @@ class _FixedBoundaries:
 
     def from_first(self) -> Array:
         """(m,) how they follow the boundary before them."""
-        return carried(self.c[0], self.c[1:-1], _last(self.supports, self.c[-1]))
+        return constraint_mode(self.c[0], self.c[1:-1], _last(self.supports, self.c[-1]))
 
     def from_last(self) -> Array:
         """(m,) how they follow the boundary behind them."""
-        return carried(self.c[-1], self.c[-2:0:-1], _first(self.supports, self.c[0])[::-1])[::-1]
+        return constraint_mode(self.c[-1], self.c[-2:0:-1], _first(self.supports, self.c[0])[::-1])[::-1]
 
-    def lost(self, speeds: Array) -> Array:
+    def damping(self, speeds: Array) -> Array:
         """(k, k) damping of motions in which they and the places beside them have (m + 2, k) speeds."""
         twists, inner = np.diff(speeds, axis=0), speeds[1:-1]
         return np.asarray(twists.T @ (self.d[:, None] * twists) + inner.T @ (self.bearings[:, None] * inner))
@@ -153,25 +154,25 @@ def _last(values: Array, more: float) -> Array:
 
 
 def _modes(
-    fixed: _FixedBoundaries, still: Array, between: tuple[int, ...], inner: Array, number: int, faint: float
+    fixed: _FixedBoundaries, constraints: Array, between: tuple[int, ...], inner: Array, number: int, least: float
 ) -> Iterator[FixedBoundaryMode]:
     """The modes of stations while the boundaries beside them rest.
 
-    Law: L = Phi^T J C, which is the force on each boundary, c Phi of the station beside it, over omega^2. Below a faint
-    one the inertia is not made smaller, but the share by which it is carried.
+    Law: L = Phi^T J C, which is the force on each boundary, c Phi of the station beside it, over omega^2. The
+    inertia is not made smaller than `least` squared, but the share by which it is carried.
     """
-    row, count = fixed.row, still.shape[1]
+    row, count = fixed.row, constraints.shape[1]
     for rate in row.rates().tolist():
         shape, _ = row.swing(rate)
         forces = dict(zip((number - 1, number), (fixed.c[0] * shape[0], fixed.c[-1] * shape[-1]), strict=True))
         participation = np.array([forces[k] if k in between else 0.0 for k in range(count)]) / rate**2
         size, base = _scaled(participation)
-        if abs(size) < faint:
-            size, base = faint, participation / faint
-        shares = np.zeros(len(still))
+        if abs(size) < least:
+            size, base = least, participation / least
+        shares = np.zeros(len(constraints))
         shares[inner] = size * shape
-        lost = float(fixed.lost(np.pad(shape, 1)[:, None])[0, 0])
-        yield FixedBoundaryMode(size**2, base, between, size**2 * rate**2, size**2 * lost, shares)
+        damping = float(fixed.damping(np.pad(shape, 1)[:, None])[0, 0])
+        yield FixedBoundaryMode(size**2, base, between, size**2 * rate**2, size**2 * damping, shares)
 
 
 def _scaled(participation: Array) -> tuple[float, Array]:
@@ -181,7 +182,7 @@ def _scaled(participation: Array) -> tuple[float, Array]:
     return size, participation / size if size else participation
 
 
-def common(inertias: Array, between: tuple[int, ...]) -> Carried | None:
+def coupling_inertia(inertias: Array, between: tuple[int, ...]) -> BoundaryInertia | None:
     """What couples two boundaries, as an inertia that both carry and that leaves neither with less than nothing."""
     first, second = (max(float(inertias[k, k]), 0.0) for k in between)
     shared, largest = float(inertias[between]), math.sqrt(first * second)
@@ -190,7 +191,7 @@ def common(inertias: Array, between: tuple[int, ...]) -> Carried | None:
     parts = np.zeros(len(inertias))
     parts[list(between)] = math.sqrt(first), math.copysign(math.sqrt(second), shared)
     size, base = _scaled(math.sqrt(min(abs(shared) / largest, 1.0)) * parts)
-    return Carried(size**2, base, between)
+    return BoundaryInertia(size**2, base, between)
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,7 +206,7 @@ class ModalChain:
         support: (b, 2) stiffness and damping of what else holds each of them, for the supports of other stations.
         carried: what two of them carry together.
         modes: lowest first.
-        still: (n, b) speed of each station by those of the boundaries while nothing swings.
+        constraint_modes: (n, b) speed of each station by those of the boundaries while nothing swings.
     """
 
     chain: Chain
@@ -213,16 +214,16 @@ class ModalChain:
     ends: Array
     joints: tuple[Link, ...]
     support: Array
-    carried: tuple[Carried, ...]
+    carried: tuple[BoundaryInertia, ...]
     modes: tuple[FixedBoundaryMode, ...]
-    still: Array
+    constraint_modes: Array
 
     def speeds(self) -> Array:
         """(n, b + m) speed of each station by those of the b boundaries and of the m inertias of modes."""
         if not self.modes:
-            return self.still
+            return self.constraint_modes
         swings = np.array([mode.shares for mode in self.modes]).T
-        return np.hstack([self.still - swings @ np.array([mode.base for mode in self.modes]), swings])
+        return np.hstack([self.constraint_modes - swings @ np.array([mode.base for mode in self.modes]), swings])
 
     def frequencies(self) -> Array:
         """(f,) natural frequencies in Hz, ascending, 0 for the turning of the whole: as many as speeds are free."""
@@ -296,23 +297,25 @@ def truncated(chain: Chain, unknowns: int, link: int) -> ModalChain:
     inertias = np.array([station.inertia for station in chain.stations])
     boundaries = tuple(k for k, prescribed in enumerate(chain.prescribed) if prescribed or k in (link, link + 1))
     bounds = list(pairwise((-1, *boundaries, len(inertias))))
-    pieces = [piece_of(chain, len(boundaries), number, range(a + 1, b)) for number, (a, b) in enumerate(bounds)]
+    pieces = [substructure(chain, len(boundaries), number, range(a + 1, b)) for number, (a, b) in enumerate(bounds)]
     swinging = (mode for piece in pieces for mode in piece.modes)
     modes = sorted(swinging, key=lambda mode: mode.c / mode.inertia)[: unknowns - len(boundaries)]
-    still, ends, shared = np.zeros((len(inertias), len(boundaries))), inertias[list(boundaries)], list[Carried]()
-    still[list(boundaries)] = np.eye(len(boundaries))
+    constraints, ends = np.zeros((len(inertias), len(boundaries))), inertias[list(boundaries)]
+    shared: list[BoundaryInertia] = []
+    constraints[list(boundaries)] = np.eye(len(boundaries))
     for piece in pieces:
-        still += piece.still
+        constraints += piece.constraint_modes
         left_out = (mode for mode in piece.modes if mode not in modes)
-        rest = sum((mode.inertia * np.outer(mode.base, mode.base) for mode in left_out), np.zeros(2 * still.shape[1:]))
-        coupling = common(rest, piece.between) if len(piece.between) > 1 else None
+        products = (mode.inertia * np.outer(mode.base, mode.base) for mode in left_out)
+        rest = sum(products, np.zeros(2 * constraints.shape[1:]))
+        coupling = coupling_inertia(rest, piece.between) if len(piece.between) > 1 else None
         if coupling:
             shared.append(coupling)
             rest -= coupling.inertia * np.outer(coupling.base, coupling.base)
         ends = ends + np.maximum(rest.diagonal(), 0.0)
     joints = tuple(_joint(chain.links[a:b], piece) for (a, b), piece in zip(bounds[1:-1], pieces[1:-1], strict=True))
     support = np.sum([piece.support for piece in pieces], axis=0)
-    return ModalChain(chain, boundaries, ends, joints, support, tuple(shared), tuple(modes), still)
+    return ModalChain(chain, boundaries, ends, joints, support, tuple(shared), tuple(modes), constraints)
 
 
 def _joint(links: Sequence[Link], piece: Substructure) -> Link:

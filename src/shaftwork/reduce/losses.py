@@ -13,6 +13,7 @@ import numpy as np
 from shaftwork.core.errors import ParameterError
 from shaftwork.equations.nomenclature import table as longtable
 from shaftwork.equations.printing import printed_number
+from shaftwork.pipeline.ending import rewired
 from shaftwork.pipeline.network import Network
 from shaftwork.reduce.tridiagonal_modes import Array
 from shaftwork.results.solution import Solution
@@ -201,11 +202,7 @@ def check_motion(before: Any, train: Network, start: float, end: float) -> None:
     here, there = graph.parameters, before.parameters
     pairs = {name: (there.get(name, 0.0), here.get(name, 0.0)) for name in (*here, *there)}
     differing = [f"{name} = {was:g} instead of {now:g}" for name, (was, now) in pairs.items() if was != now]
-    if not differing:  # in a number, but in a law or a node
-        wires, others = graph.wiring, before.observer.wiring
-        names = dict.fromkeys(name for name in (*wires, *others) if wires.get(name) != others.get(name))
-        differing = [f"'{n}' is {others.get(n, 'not there')} instead of {wires.get(n, 'not there')}" for n in names]
-    if differing:
+    if differing := differing or rewired(graph.wiring, before.observer.wiring):
         shown = ", ".join([*differing[:SHOWN], *(["..."] if len(differing) > SHOWN else [])])
         raise ParameterError(
             f"compare: the motion `before` is not that of '{train.name}': {shown}. Simulate the train as it is, or "

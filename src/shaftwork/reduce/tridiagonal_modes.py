@@ -41,7 +41,7 @@ class TridiagonalChain:
         size, supported = len(self.inertias), self.supports.any()
         if not size:
             return np.empty(0)
-        pivots = felt(self.stiffnesses, self.supports) + np.append(self.stiffnesses, 0.0)
+        pivots = driving_point_stiffness(self.stiffnesses, self.supports) + np.append(self.stiffnesses, 0.0)
         beside = np.empty(2 * size - 1)
         beside[::2] = np.sqrt(pivots / self.inertias)
         beside[1::2] = self.stiffnesses / np.sqrt(pivots[:-1] * self.inertias[1:])
@@ -70,37 +70,39 @@ class TridiagonalChain:
         factorization, Linear Algebra and its Applications 267, 1997.
         """
         stiffness, last = self.supports - rate**2 * self.inertias, len(self.inertias) - 1
-        left, right = felt(self.stiffnesses, stiffness), felt(self.stiffnesses[::-1], stiffness[::-1])[::-1]
+        left = driving_point_stiffness(self.stiffnesses, stiffness)
+        right = driving_point_stiffness(self.stiffnesses[::-1], stiffness[::-1])[::-1]
         meet = int(np.argmin(np.abs(left + right - stiffness) / self.inertias))
         shape, torques = np.ones(last + 1), np.empty(last)
         for k in range(meet - 1, -1, -1):
-            shape[k] = shape[k + 1] * followed(self.stiffnesses[k], left[k])
+            shape[k] = shape[k + 1] * transmissibility(self.stiffnesses[k], left[k])
             torques[k] = -left[k] * shape[k]
         for k in range(meet, last):
-            shape[k + 1] = shape[k] * followed(self.stiffnesses[k], right[k + 1])
+            shape[k + 1] = shape[k] * transmissibility(self.stiffnesses[k], right[k + 1])
             torques[k] = right[k + 1] * shape[k + 1]
         size = float(np.sqrt(np.sum(self.inertias * shape**2)))
         return shape / size, torques / size
 
 
-def felt(stiffnesses: Array, supports: Array) -> Array:
+def driving_point_stiffness(stiffnesses: Array, supports: Array) -> Array:
     """(n,) stiffness against the frame at each place, of itself and of all before it through the springs between."""
     stiffness = np.array(supports)
     for k, c in enumerate(stiffnesses):
-        stiffness[k + 1] += stiffness[k] * followed(c, stiffness[k])
+        stiffness[k + 1] += stiffness[k] * transmissibility(c, stiffness[k])
     return stiffness
 
 
-def followed(c: float, stiffness: float) -> float:
+def transmissibility(c: float, stiffness: float) -> float:
     """The share of a motion that arrives behind a spring, where it meets a stiffness."""
     return c / ((c + stiffness) or ROUNDING * c) if c else 0.0
 
 
-def carried(first: float, stiffnesses: Array, supports: Array) -> Array:
+def constraint_mode(first: float, stiffnesses: Array, supports: Array) -> Array:
     """(n,) how places in a row follow a motion before the first of them, through a spring, while nothing swings."""
-    behind = felt(stiffnesses[::-1], supports[::-1])[::-1]
+    behind = driving_point_stiffness(stiffnesses[::-1], supports[::-1])[::-1]
     springs = (first, *stiffnesses)
-    return np.asarray(np.cumprod([followed(c, each) for c, each in zip(springs, behind, strict=True)]), dtype=float)
+    shares = [transmissibility(c, each) for c, each in zip(springs, behind, strict=True)]
+    return np.asarray(np.cumprod(shares), dtype=float)
 
 
 def singular_values(matrix: Array) -> Array:

@@ -268,7 +268,6 @@ COLOURS = {
     "unknown": "#b59ad6",
     "wrong": "#d62728",
 }
-ABSENT = "#ffffff"
 LEAST = 1e-16
 """Errors below are drawn as this one."""
 COLUMN, LETTER = 0.24, 0.075
@@ -304,7 +303,7 @@ def _figure(study: Stability) -> Figure:
             exponent = int(np.ceil(np.log10(max(cell.error, LEAST))))
             colour = "white" if cell.verdict in ("right", "wrong") else "black"
             axes.text(column, row, str(exponent), ha="center", va="center", fontsize=6, color=colour)
-    axes.imshow(numbers, cmap=ListedColormap([ABSENT, *COLOURS.values()]), vmin=0, vmax=len(names), aspect="auto")
+    axes.imshow(numbers, cmap=ListedColormap(["#ffffff", *COLOURS.values()]), vmin=0, vmax=len(names), aspect="auto")
     axes.set_yticks(range(len(cases)), cases, fontsize=7)
     axes.set_xticks(range(numbers.shape[1]), engines * len(kinds), fontsize=6, rotation=90)
     middles = np.arange(len(kinds)) * len(engines) + (len(engines) - 1) / 2

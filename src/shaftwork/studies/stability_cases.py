@@ -110,17 +110,22 @@ class Case:
         span = 2 * self.section.delay if self.periods else self.t_end
         return self.t_end - span * (np.arange(POINTS, 0, -1) - 0.5) / POINTS
 
-    def network(self, model: ShaftModel) -> Network:
-        """The drive with a model of its shaft."""
-        section, rise = self.section, self.rise * self.section.delay
-        law = {
+    @property
+    def torque(self) -> sympy.Expr:
+        """Of the motor, as a law of time in N m."""
+        rise = self.rise * self.section.delay
+        return {
             "step": sympy.Float(TORQUE),
             "pulse": Step(TORQUE) - Step(TORQUE, start=rise),
             "ramp": Ramp(TORQUE, rise),
             "sine": TORQUE * (1 - sympy.cos(2 * np.pi / rise * TIME)),
         }[self.form]
+
+    def network(self, model: ShaftModel) -> Network:
+        """The drive with a model of its shaft."""
+        section = self.section
         net = Network(self.name)
-        net.add(TorqueSource("motor", tau=law), "a")
+        net.add(TorqueSource("motor", tau=self.torque), "a")
         if self.drive:
             net.add(Inertia("drive", J=self.drive * self.inertia), "a")
         shaft = Shaft(

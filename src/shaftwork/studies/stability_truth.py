@@ -11,12 +11,14 @@ from itertools import pairwise
 import numpy as np
 from scipy.linalg import expm
 
+from shaftwork.components.laws import breakpoints
 from shaftwork.components.shaft_models import OneSpring, Rigid, ShaftModel, Wave
 from shaftwork.results.observer import Array
 from shaftwork.shafts.exact_motion import JunctionTorque, motion
 from shaftwork.shafts.exact_response import Complex, laplace_response
 from shaftwork.shafts.line import Section, SectionLine
 from shaftwork.studies.stability_cases import TORQUE, Case
+from shaftwork.studies.truth import function_of_time
 
 QUANTITIES = ("tau_a", "tau_b", "omega_a", "omega_b")
 MOST_PREDICTED = 200
@@ -57,8 +59,8 @@ def exact(case: Case) -> EndMotion:
     line = _line(case)
     late = case.t_end - 6 * case.section.delay if case.periods else 0.0
     t = case.times - late
-    kinks = (case.rise * case.section.delay,) if case.form in ("pulse", "ramp") else ()
-    junctions = motion(line, [JunctionTorque(0, lambda t: _torque(case, t), kinks)], case.t_end - late)
+    motor = JunctionTorque(0, function_of_time(case.torque), breakpoints(case.torque))
+    junctions = motion(line, [motor], case.t_end - late)
     values = {
         "tau_a": junctions.torque_in(0, t, "left"),
         "tau_b": junctions.torque_in(0, t, "right"),
@@ -91,20 +93,6 @@ def _by_transform(case: Case) -> EndMotion:
     sizes = np.repeat([np.abs(values[:, :2]).max(), np.abs(values[:, 2:]).max()], 2)
     error = float((np.abs(values - coarser).max(axis=0) / sizes).max())
     return EndMotion(dict(zip(QUANTITIES, values.T, strict=True)), error, "exact two-port")
-
-
-def _torque(case: Case, t: Array) -> Array:
-    """Of the motor, N m."""
-    rise = case.rise * case.section.delay
-    match case.form:
-        case "step":
-            return np.full_like(t, TORQUE)
-        case "pulse":
-            return np.asarray(TORQUE * (t < rise))
-        case "ramp":
-            return np.asarray(TORQUE * np.minimum(t / rise, 1.0))
-        case "sine":
-            return np.asarray(TORQUE * (1 - np.cos(2 * np.pi / rise * t)))
 
 
 def _transform(case: Case, s: Complex) -> Complex:
@@ -175,7 +163,7 @@ def predicted(case: Case, model: ShaftModel) -> EndMotion | None:
 
 def _without_states(case: Case, model: ShaftModel) -> tuple[Array, ...] | None:
     """The quantities where the torque of the motor goes through to a wall, or to a brake that alone takes it."""
-    torque = _torque(case, case.times)
+    torque = function_of_time(case.torque)(case.times)
     if isinstance(model, Rigid) and case.clamped:
         return torque, torque, np.zeros_like(torque), np.zeros_like(torque)
     if isinstance(model, OneSpring) and case.drive == case.load == 0 < case.damper and case.form in ("step", "pulse"):

@@ -165,7 +165,6 @@ class Sweep:
 
 MOST_LINES = 2000
 """More lines would hide each other."""
-TICKS = 5
 
 
 def _parallel_coordinates(sweep: Sweep, names: tuple[str, ...]) -> Figure:
@@ -195,7 +194,7 @@ def _parallel_coordinates(sweep: Sweep, names: tuple[str, ...]) -> Figure:
             )
     for k, name in enumerate(shown):
         axes.axvline(k, color="0.3", linewidth=0.8, zorder=3)
-        for share in np.linspace(0.0, 1.0, TICKS) if name in low else ():
+        for share in np.linspace(0.0, 1.0, 5) if name in low else ():
             text = f"{low[name] + share * size[name]:.4g}"
             axes.annotate(text, (k, share), (3, 0), textcoords="offset points", fontsize=7, va="center", zorder=4)
         for limit in sweep.require.get(name, ()) if name in low else ():

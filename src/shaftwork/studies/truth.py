@@ -6,9 +6,11 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import pairwise
 
+import networkx as nx
 import numpy as np
-from sympy import lambdify
+from sympy import Expr, lambdify
 
 from shaftwork.components.base import Component
 from shaftwork.components.discontinuities import breakpoints
@@ -40,8 +42,8 @@ NONLINEAR, LOOSER = (8, 12, 16, 24, 32), 1e-8
 one, and of a shaft that is damped the high ones do not matter."""
 ALIKE = 1e-7
 """So much of the largest torque two models may differ that stand for the truth of a nonlinear network."""
-JUDGED = 4
-"""Elastic natural frequencies that the truth names."""
+MODES = 3
+"""Elastic natural frequencies that are compared. The truth names one more, to tell those beyond from them."""
 
 
 @dataclass(frozen=True)
@@ -148,7 +150,7 @@ def _exact_frequencies(net: Network) -> Array:
         exact = frequencies(net.modes(exact=True))
     except ShaftworkError:
         return np.empty(0)
-    return exact[:JUDGED] if len(exact) >= JUDGED else np.empty(0)
+    return exact[: MODES + 1] if len(exact) > MODES else np.empty(0)
 
 
 def _read(net: Network, shaft: str, t_end: float, t: Array, rtol: float = TIGHT) -> dict[str, Array]:
@@ -166,18 +168,12 @@ def _by_characteristics(netlist: Netlist, shaft: str, t_end: float, t: Array) ->
     sources = [placed for placed in netlist.placed if isinstance(placed.part, TorqueSource)]
     junctions = motion(line, [_torque(placed, order) for placed in sources], t_end)
     number = next(k for k, placed in enumerate(shafts) if placed.part.name == shaft)
-    left, right = number, number + 1
     middle = line.junctions[number] + line.sections[number].length / 2
-    torques = [junctions.torque_in(number, t, "left"), junctions.torque_in(number, t, "right")]
-    speeds = [junctions.junction_speed(left, t), junctions.junction_speed(right, t)]
-    sign = 1.0
-    if shafts[number].nodes[0] != order[number]:  # wired from right to left
-        sign, torques, speeds = -1.0, torques[::-1], speeds[::-1]
-    values = dict(
-        zip(("tau_a", "tau_b", "omega_a", "omega_b"), (*(sign * tau for tau in torques), *speeds), strict=True)
-    )
-    values["tau_mid"] = sign * junctions.torque(middle, t)
-    return values, junctions.error
+    step = 1 if shafts[number].nodes[0] == order[number] else -1  # wired from left to right, or from right to left
+    tau_a, tau_b = [step * junctions.torque_in(number, t, side) for side in ("left", "right")][::step]
+    omega_a, omega_b = [junctions.junction_speed(k, t) for k in (number, number + 1)][::step]
+    tau_mid = step * junctions.torque(middle, t)
+    return dict(zip(QUANTITIES, (tau_a, tau_b, tau_mid, omega_a, omega_b), strict=True)), junctions.error
 
 
 def _train(netlist: Netlist) -> tuple[list[str], list[Placed]]:
@@ -186,21 +182,17 @@ def _train(netlist: Netlist) -> tuple[list[str], list[Placed]]:
     kinds = (Inertia, Damper, TorqueSource, Shaft)
     if not shafts or not all(isinstance(placed.part, kinds) for placed in netlist.placed):
         raise ParameterError("The network is no train of inertias, shafts, bearings and torques.")
-    at: dict[str, list[Placed]] = {}
+    joints = nx.MultiGraph()
     for placed in shafts:
-        for node in placed.nodes:
-            at.setdefault(node, []).append(placed)
-    ends = [node for node, members in at.items() if len(members) == 1]
-    one_ended = (placed.nodes for placed in netlist.placed if not isinstance(placed.part, Shaft))
-    attached = all(len(nodes) == 1 and nodes[0] in at for nodes in one_ended)
-    if len(ends) != 2 or max(map(len, at.values())) > 2 or REFERENCE in at or not attached:
+        joints.add_edge(*placed.nodes, placed=placed)
+    others = (placed.nodes for placed in netlist.placed if not isinstance(placed.part, Shaft))
+    attached = all(len(nodes) == 1 and nodes[0] in joints for nodes in others)
+    degrees = dict(joints.degree)
+    if not nx.is_tree(joints) or max(degrees.values()) > 2 or REFERENCE in joints or not attached:
         raise ParameterError("The shafts are not in one row.")
-    order = [ends[0]]
-    row: list[Placed] = []
-    while len(row) < len(shafts):
-        row.append(next(placed for placed in at[order[-1]] if placed not in row))
-        order.append(next(node for node in row[-1].nodes if node != order[-1]))
-    return order, row
+    first, last = (node for node, degree in degrees.items() if degree == 1)
+    order = nx.shortest_path(joints, first, last)
+    return order, [joints.edges[a, b, 0]["placed"] for a, b in pairwise(order)]
 
 
 def _section(part: Component) -> Section:
@@ -220,7 +212,10 @@ def _torque(placed: Placed, order: list[str]) -> JunctionTorque:
     law = as_expression(placed.part.tau)  # type: ignore[attr-defined]
     if not law.free_symbols <= {TIME}:
         raise ParameterError("A torque depends on more than time.")
+    return JunctionTorque(order.index(placed.nodes[0]), function_of_time(law), breakpoints(law))
+
+
+def function_of_time(law: Expr) -> Callable[[Array], Array]:
+    """A law of time alone as a function of an array of times in s."""
     value = lambdify(TIME, law, modules=[NUMERICAL, "numpy"])
-    return JunctionTorque(
-        order.index(placed.nodes[0]), lambda t: np.broadcast_to(value(t), np.shape(t)), breakpoints(law)
-    )
+    return lambda t: np.broadcast_to(value(t), np.shape(t))

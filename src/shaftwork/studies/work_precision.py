@@ -21,7 +21,7 @@ from shaftwork.pipeline.network import Network
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
 from shaftwork.studies.study_arguments import LADDER, engine_names, several, shaft_models, text_of
-from shaftwork.studies.truth import QUANTITIES, Truth, frequencies, quantities, truth, with_model
+from shaftwork.studies.truth import MODES, QUANTITIES, Truth, frequencies, quantities, truth, with_model
 from shaftwork.studies.work_precision_result import RTOL, Trial, WorkPrecision
 
 POINTS, CALLS = 401, 5
@@ -34,8 +34,6 @@ BUDGET = 45.0
 """CPU time in s for all trials, from when the truth is known."""
 LOWEST = 20
 """Modes of a model that are computed, those of smallest rate; as many as the exact ones up to f_5 and their doubles."""
-MODES = 3
-"""Elastic natural frequencies that are compared."""
 
 
 def work_precision(
