@@ -27,9 +27,8 @@ from shaftwork.pipeline.ensemble.programs import EXTREMES, EnsembleCode
 from shaftwork.pipeline.ensemble.rises import first_rises
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.assemblies import ModeEquations
-from shaftwork.pipeline.phases.mode_machines import ModeNames
+from shaftwork.pipeline.phases.mode_machines import ModeNames, with_modes
 from shaftwork.pipeline.phases.model import PhasedModel
-from shaftwork.pipeline.phases.regimes import with_modes
 from shaftwork.pipeline.phases.starts import conditional
 from shaftwork.results.measures import Measure
 
