@@ -59,7 +59,10 @@ KINDS = st.lists(st.sampled_from(["friction", "load", "brake", "clutch"]), min_s
 def by_combinations(model: Any, t_end: float) -> sw.Solution:
     """The motion in equations of its own for each combination."""
     run = HybridRun(
-        model.phases, {}, Demand((0.0, t_end), 1e-10, None, np.linspace(0.0, t_end, 11), "auto", 10**6, None), own=True
+        model.phases,
+        {},
+        Demand((0.0, t_end), 1e-10, None, np.linspace(0.0, t_end, 11), "auto", 10**6, None),
+        by_combination=True,
     )
     run.march(None)
     return solution(run, "own")

@@ -301,9 +301,7 @@ def test_the_rates_of_many_instants_are_those_of_each() -> None:
     regime = settling.regime(("forward", "forward", "released"))
     x = np.random.default_rng(0).normal(size=(5, len(regime.assembly.model.states)))
     moment = HybridState(regime, x[0], [0.0] * len(regime.sides))
-    problem = regime.assembly.problem(
-        moment, (0.0, 10.0), regime.assembly.model.switching.timeline(regime.p, 0.0, 10.0)
-    )
+    problem = moment.problem((0.0, 10.0), regime.assembly.model.switching.timeline(regime.p, 0.0, 10.0))
     times = np.linspace(0.1, 0.9, 5)
     assert problem.rates is not None
     each = [problem.rhs(t, state) for t, state in zip(times.tolist(), x, strict=True)]

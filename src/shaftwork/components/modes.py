@@ -18,7 +18,8 @@ from math import isfinite
 from sympy import Expr, Symbol, false, true
 from sympy.logic.boolalg import Boolean
 
-from shaftwork.components.branches import ACROSS, THROUGH, End, is_pair, named_in
+from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, End, is_pair, named_in
+from shaftwork.components.laws import t as TIME
 from shaftwork.core.parameters import is_label, refuse_fields
 
 ANEW = ""
@@ -68,6 +69,11 @@ class Leave:
     def by_twist(self) -> bool:
         """Whether twists and the time alone end the mode, whatever else changes at that instant."""
         return self.rebound is None and not self._reads(ACROSS) and not self._reads(THROUGH)
+
+    @cached_property
+    def by_time(self) -> bool:
+        """Whether the time alone ends the mode."""
+        return self.by_twist and not self.when.has(INTEGRAL) and self.when.has(TIME)
 
     def _reads(self, variable: Symbol) -> bool:
         """Whether a variable of the element, ACROSS or THROUGH, or the same of another branch stands in the guard."""

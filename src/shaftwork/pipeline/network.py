@@ -24,8 +24,7 @@ from shaftwork.pipeline.angles import with_angles
 from shaftwork.pipeline.arguments import as_names
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.model import PhasedModel
-from shaftwork.pipeline.phases.names import in_phase, meant, whole_name, words_of
-from shaftwork.pipeline.phases.spans import during, span_of
+from shaftwork.pipeline.phases.named_phases import during, in_phase, span_of, whole_name, words_of
 from shaftwork.reduction.diagnosis import diagnose
 from shaftwork.reduction.form import StateForm, state_form
 from shaftwork.results.solution import Solution
@@ -326,7 +325,7 @@ def _equations_in(netlist: Netlist, form: StateForm, phase: str | NamedPhase) ->
 def _in_phase(netlist: Netlist, graph: CircuitGraph, phase: str) -> StateForm:
     """The state form in a phase, with the laws that hold at its times."""
     form = _sound(in_phase(netlist, graph, phase))
-    then = during(form.graph, span_of(graph, meant(graph, phase)))
+    then = during(form.graph, span_of(graph, phase))
     return form if then is form.graph else state_form(then)
 
 

@@ -16,7 +16,7 @@ from shaftwork.core.screen import counted
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.network import Network
 from shaftwork.pipeline.phases.model import PhasedModel
-from shaftwork.pipeline.phases.names import whole_name
+from shaftwork.pipeline.phases.named_phases import whole_name
 from shaftwork.results.modes import natural_frequencies
 
 LARGEST_DENSE = 1500

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from operator import itemgetter
 from typing import TYPE_CHECKING
@@ -13,27 +13,21 @@ from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.operating import energy_weights, lasting
 from shaftwork.codegen.time_switches import Switching
+from shaftwork.codegen.switching import Switching
 from shaftwork.codegen.valueless import in_words
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.errors import NetworkWarning, SimulationError
 from shaftwork.core.notices import hint, warn
 from shaftwork.network.kinds import Kind
-from shaftwork.network.wording import listed
 
 if TYPE_CHECKING:
     from shaftwork.network.graph import CircuitGraph, GraphBranch
-    from shaftwork.pipeline.phases.hybrid_state import Regime
-    from shaftwork.pipeline.phases.mode_machines import ModeMachine
 
 SAME = 1e-6
 """Levels of a law that differ by less than this fraction are one."""
 NAMED = 3
 """Laws that a message shows."""
-BOTH = 2
-"""Sides on which friction gives way."""
-LEFT = 1e-3
-"""What is left of a disturbance in a torque is more than this fraction where it stays: rounding leaves some 1e-4."""
 MIDDLE = (1.0, 1.0 + SAME, 1.0)
 """Of a level that lasts its middle is named."""
 
@@ -112,40 +106,6 @@ def warn_of_earlier_levels(bound: BoundArrays, x: Array, when: float, switching:
             + hint(
                 f"steady_state(t={when:.6g}) or steady_state(t={other:.6g}).", f"--t {when:.6g} or --t {other:.6g}."
             ),
-            NetworkWarning,
-        )
-
-
-def warn_of_held_torques(regime: Regime, elements: Sequence[ModeMachine], x: Array, when: float) -> None:
-    """Warn where what sticks can hold other torques as well: a spring between two of them, or from one to the frame.
-
-    The states are disturbed, and of that is read what is left for ever: it tells equilibria side by side.
-
-    Args:
-        regime: the modes of the steady state.
-        elements: of the network.
-        x: (n,) the steady state.
-        when: time at which laws are read, s.
-    """
-    holding = [
-        (elements[k].name, watched.guard)
-        for k, watched in regime.watched
-        if watched.leave.by_torque and len(elements[k].modes[regime.modes[k]].gives_way) == BOTH
-    ]
-    if not (holding and x.size):
-        return
-    bound = regime.assembly.bound(regime.p)
-    shares = np.random.default_rng(0).uniform(1.0, 2.0, x.size)  # no state makes up for another
-    disturbed = shares / energy_weights(bound)
-    left = lasting(bound, x, disturbed, when)
-    now, soon, late = (np.array(regime.limits(when, (x + change).tolist())) for change in (0 * x, disturbed, left))
-    moves = np.abs(late - now) > LEFT * np.abs(soon - now).max()
-    if names := tuple(dict.fromkeys(name for name, guard in holding if moves[guard])):
-        network = bound.program.form.graph.name
-        warn(
-            f"steady_state() of '{network}': {listed(names)} can hold within a range, so the torques given are one of "
-            "many that last; which of them stays depends on how the drive came to rest, and simulate(...) gives that "
-            "of its own motion.",
             NetworkWarning,
         )
 

@@ -31,9 +31,8 @@ from shaftwork.pipeline.ensemble.ensemble_equations import (
 from shaftwork.pipeline.ensemble.extremes import Index, Mask, first_rises, largest
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.assemblies import ModeEquations
-from shaftwork.pipeline.phases.mode_machines import ModeNames
+from shaftwork.pipeline.phases.mode_machines import ModeNames, with_modes
 from shaftwork.pipeline.phases.model import PhasedModel
-from shaftwork.pipeline.phases.regimes import with_modes
 from shaftwork.pipeline.phases.starts import conditional
 from shaftwork.results.measures import Measure
 

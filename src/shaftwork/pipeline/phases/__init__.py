@@ -1,1 +1,22 @@
-"""Motions through the phases of a network whose parts change their mode."""
+"""Hybrid motions: smooth phases, in each of which every part keeps its mode, and the events between them.
+
+An engine integrates the equations of one combination of modes until a guard rises through zero: the event. Then the
+mode whose guard is exceeded most changes, with an impact where something closes, and all that is stored goes over to
+the equations of the new modes, until no guard is exceeded any more; an event after which the same equations go on with
+other numbers is answered while the engine runs.
+
+    mode_machines, mode_guards   what changes its mode, and the guards that end its modes
+    assemblies, phases           the equations of a combination of modes; all of them, and their engines
+    hybrid_state, regimes        modes and states at an instant, and how they go over to other modes
+    exceeded_guards              which guards end modes at an instant
+    event_iteration              modes change one after another until they are consistent
+    in_place_events              the short way where only numbers change
+    impacts                      speeds that jump: `impact_contacts` take part, `collisions` solves the complementarity
+                                 problem of their impulses, `impulses` follows these through gears that rub
+    commutation                  diodes that take over what a switch would cut off
+    starts, run, solution        how a motion begins, goes on, and is read
+    model                        what a user calls
+
+Beside these, `reactions` holds many frictions in one set of equations, `resting` has the laws of what cannot move,
+`hybrid_waves` joins travelling waves to a motion, and `named_phases` finds a phase by its name.
+"""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache, cached_property, partial
+from itertools import count
 from operator import methodcaller
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -20,7 +21,6 @@ from shaftwork.codegen.model import ScalarProgram
 from shaftwork.codegen.products import ManyExpressions
 from shaftwork.codegen.recovery import BranchHistory
 from shaftwork.codegen.state_transfer import StateTransfer
-from shaftwork.codegen.timeline import Timeline
 from shaftwork.codegen.valueless import first_missing, in_words, rough, without_value
 from shaftwork.components.discontinuities import pieces_degree
 from shaftwork.components.laws import as_expression
@@ -28,19 +28,15 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError, SimulationError, no_value
 from shaftwork.core.kept import Kept
 from shaftwork.integrate.engines import available
-from shaftwork.integrate.problem import Guards, Problem, changed
+from shaftwork.integrate.problem import Guards, Problem
+from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.mode_guards import ModeGuards
 from shaftwork.pipeline.phases.mode_machines import ModeMachine, ModeNames
-from shaftwork.pipeline.phases.rates import rates_of
-from shaftwork.pipeline.phases.shown import GuardReadings
+from shaftwork.pipeline.phases.starts import ElementReadings
 from shaftwork.pipeline.prepared import Prepared
 from shaftwork.reduction.explicit_rows import Rows
 from shaftwork.reduction.form import Names
 from shaftwork.reduction.observables import NamedReadings, Observables
-
-if TYPE_CHECKING:
-    from shaftwork.pipeline.model import Model
-    from shaftwork.pipeline.phases.hybrid_state import HybridState
 
 KEPT = 64
 """Parameter vectors whose matrices are kept."""
@@ -51,6 +47,11 @@ SOON, MORE = 1e-9, 1e3
 CLOCK = 1e-20
 """What a clock counts: heyoka's tolerance is relative to the largest state, which this must never be."""
 
+FEW_CALLS = 50
+"""Calls of a right-hand side that are not worth code of its own."""
+
+RightSide = Callable[[float, Array], Array]
+GuardValues = Callable[[Array, Array], Array]
 Motion = Callable[[float, list[float]], tuple[list[float], list[float]]]
 Limits = Callable[[float, list[float]], list[float]]
 Near = Callable[[float, list[float], float, Moves, float], tuple[list[float], list[float], list[float]]]
@@ -69,7 +70,7 @@ class ModeEquations:
     def __init__(
         self,
         model: Model,
-        elements: Sequence[ModeMachine],
+        elements: tuple[ModeMachine, ...],
         forms: Sequence[str | None],
         rows: Rows | None = None,
     ) -> None:
@@ -83,16 +84,16 @@ class ModeEquations:
         names = tuple(Symbol(name, real=True) for name in model.parameters)
         self._parameters = names if rows is None else rows.parameters
         self.parts = {part.name: part for part in model.form.graph.parts}
-        found = ModeGuards(model.form, elements, forms, readings)
-        self.resting, self.watched, self.sides = found.resting, found.watched, found.sides
-        self._expressions, self._owners = found.expressions, found.owners
-        self._shown = GuardReadings(elements, self.parts, readings, self._parameters)
+        mode_guards = ModeGuards(model.form, elements, forms, readings)
+        self.resting, self.watched, self.sides = mode_guards.resting, mode_guards.watched, mode_guards.sides
+        self._expressions, self._owners = mode_guards.expressions, mode_guards.owners
+        self._shown = ElementReadings(elements, self.parts, readings, self._parameters)
         if rows is None:
             _ = self._shown.function  # so that all quantities are known before any function of them is made
         self._prepared = Kept[bytes, Prepared](KEPT)
         self._matrices = Kept[LinearPart, ReadingMatrices](KEPT)
-        self._rates_made = Kept[bytes, tuple[Callable[[float, Array], Array], dict[str, Any]]](KEPT)
-        self._guards_made = Kept[bytes, Callable[[Array, Array], Array]](KEPT)
+        self._rates_by_p = Kept[bytes, tuple[RightSide, dict[str, Any]]](KEPT)
+        self._guards_by_p = Kept[bytes, GuardValues](KEPT)
         self._problems = Kept[tuple[ModeNames, bytes], Problem](KEPT)
         self._translated = Kept[tuple[int, Expr], Expr](KEPT)
         self._numbers = [self._places[element.number] for element in elements if element.number in self._places]
@@ -101,9 +102,13 @@ class ModeEquations:
         """What arrives by waves, behind the states of a moment, by name; nothing where there are no waves."""
         return {}
 
-    def taking(self, t: float, held: Mapping[str, float], p: Array) -> Array:
+    def arriving_rates(self, x: list[float]) -> list[float]:  # noqa: ARG002
+        """The rates of what arrives by waves and of its rates."""
+        return []
+
+    def taking(self, t: float, stored: Mapping[str, float], p: Array) -> Array:
         """The states with which the equations take up what was stored, with the inputs of a time in s."""
-        return self.stores.states(self.bound(p), t, held)
+        return self.stores.states(self.bound(p), t, stored)
 
     def holds_by_numbers(self, number: int) -> bool:  # noqa: ARG002
         """Whether an element holds and gives way in these equations, by other numbers in explicit rows."""
@@ -127,7 +132,7 @@ class ModeEquations:
     def timed(self) -> tuple[int, ...]:
         """Guards that change with time by themselves, and not along straight pieces alone, or where no state moves."""
         every = not self.model.states
-        return tuple(k for k, made in enumerate(self._expressions) if every or pieces_degree(made) is None)
+        return tuple(k for k, guard in enumerate(self._expressions) if every or pieces_degree(guard) is None)
 
     def vector(self, base: Mapping[str, float], numbers: Mapping[str, float]) -> Array:
         """The parameter vector with the given values and numbers of modes."""
@@ -151,11 +156,11 @@ class ModeEquations:
         """The equations with their parameters; matrices hold no number of a mode."""
         return self.prepared(p).bound.with_laws(p)
 
-    def guards(self, p: Array) -> Callable[[Array, Array], Array]:
+    def guards(self, p: Array) -> GuardValues:
         """All guards as a function of times (k,) and states (k, n) to (k, guards)."""
-        return self._guards_made(p.tobytes(), lambda: self._guards(p))
+        return self._guards_by_p(p.tobytes(), lambda: self._guards(p))
 
-    def _guards(self, p: Array) -> Callable[[Array, Array], Array]:
+    def _guards(self, p: Array) -> GuardValues:
         expressions, read = self._many.bind(self.values(p)), self._read(p)
         return lambda times, states: expressions(times, read(times, states))
 
@@ -168,7 +173,7 @@ class ModeEquations:
         readings = self._readings
         if not isinstance(readings, NamedReadings):
             return lambda _, states: states.T
-        bound, reads = self.bound(p), [methodcaller("quantity", wanted) for wanted in readings.quantities]
+        bound, reads = self.bound(p), [methodcaller("quantity", quantity) for quantity in readings.quantities]
         return self._reading(bound, self._matrices(bound.part, lambda: ReadingMatrices(bound, reads)))
 
     def _reading(self, bound: Any, matrices: ReadingMatrices) -> Callable[[Array, Array], Array]:
@@ -197,38 +202,21 @@ class ModeEquations:
 
     def constant(self, number: int, expression: Expr | None, p: Array) -> float:
         """A number that is made of an element's parameters."""
-        made = self.of_element(number, expression)
-        return float(made.xreplace({s: p[self._places[s.name]] for s in made.free_symbols}))
+        value = self.of_element(number, expression)
+        return float(value.xreplace({s: p[self._places[s.name]] for s in value.free_symbols}))
 
     def of_element(self, number: int, expression: Expr | None) -> Expr:
         """What is made of an element's parameters, in those of the network; zero where there is nothing."""
-        element, wanted = self.elements[number], as_expression(expression or 0)
+        element, of_part = self.elements[number], as_expression(expression or 0)
         part = self.parts[element.part.name]
-        return self._translated((number, wanted), lambda: self._readings.guard(part, element.modes, wanted))
+        return self._translated((number, of_part), lambda: self._readings.guard(part, element.modes, of_part))
 
-    def problem(self, moment: HybridState, span: tuple[float, float], times: Timeline) -> Problem:
-        """The motion of a phase, before it is known where it ends; tolerances are for rtol = 1.
-
-        Its states are those of the model and, behind them, the integrals of the guards in `clocks`.
-        """
-        p, modes, x = moment.regime.p, moment.regime.modes, moment.x
-        same = self._problems((modes, p.tobytes()), lambda: self._problem(p, modes))
-        guards, sizes = same.guards, self._sizes(moment, span) if self.clocks else np.empty(0)
-        assert guards is not None  # noqa: S101 (which `_problem` gives)
-        now = np.abs(moment.regime.limits(span[0], x.tolist()))
-        return changed(
-            same,
-            x0=np.concatenate([x, np.zeros(sizes.size)]),
-            t0=span[0],
-            t_end=span[1],
-            atol=np.concatenate([same.atol, sizes]),
-            sides=times.sides,
-            guards=Guards(guards.values, guards.sides, np.array(moment.bands), now),
-        )
-
-    def _problem(self, p: Array, modes: ModeNames) -> Problem:
+    def problem(self, modes: ModeNames, p: Array) -> Problem:
         """What is the same in all phases of these modes; the rest is empty."""
-        bound, (_, known), clocks, size = partial(self.bound, p), self._rates(p), self.clocks, len(self.model.states)
+        return self._problems((modes, p.tobytes()), lambda: self._problem(modes, p))
+
+    def _problem(self, modes: ModeNames, p: Array) -> Problem:
+        bound, (_, notes), clocks, size = partial(self.bound, p), self._rates(p), self.clocks, len(self.model.states)
         guards, none = self.guards(p), np.empty(0)
         values = guards if not clocks else lambda t, y: guards(t, y[:, :size])
         return Problem(
@@ -244,7 +232,7 @@ class ModeEquations:
             symbolic=cache(lambda: None if self.program is None else self.program.bind(self.values(p))),
             explain=lambda t, y: self.without_value(p, modes, t, y[:, :size]),
             rough=lambda t, y: self._rough(p, modes, t, y[:, :size]),
-            estimates=known,
+            estimates=notes,
             rates=None if self.model.form.loop_laws else partial(self._many_rates, p),
         )
 
@@ -263,13 +251,13 @@ class ModeEquations:
 
     def alike(self, modes: ModeNames) -> tuple[ModeEquations, ModeNames]:
         """Equations and modes that are the same for the choice of an engine: a law knows a mode by its number alone."""
-        return self, tuple(element.alike[name] for element, name in zip(self.elements, modes, strict=True))
+        return self, tuple(element.equivalent[name] for element, name in zip(self.elements, modes, strict=True))
 
-    def judged(self, moment: HybridState, problem: Problem) -> Problem:  # noqa: ARG002
+    def judged(self, p: Array, problem: Problem) -> Problem:  # noqa: ARG002
         """The motion by which an engine is chosen."""
         return problem
 
-    def right_side(self, p: Array) -> Callable[[float, Array], Array]:
+    def right_side(self, p: Array) -> RightSide:
         """The rates of the states and, behind them, of the clocks."""
         (rates, _), guards, clocks, size = self._rates(p), self.guards(p), list(self.clocks), len(self.model.states)
         if not clocks:
@@ -293,33 +281,46 @@ class ModeEquations:
     def _rough(self, p: Array, modes: ModeNames, times: Array, states: Array) -> tuple[float, str] | None:
         """The first time at which a law or a guard has no value in some branch, and which one."""
         law, symbols = rough(self.bound(p), times, states), (TIME, *self._readings.symbols, *self._parameters)
-        for number, made in () if law is not None else self.watched(modes):
-            function = vectorised(symbols, self._expressions[made.guard])
-            known = np.array([*self._read(p)(times, states)]).reshape(-1, times.size)
-            for time, values in zip(times, known.T, strict=True):
+        for number, active in () if law is not None else self.watched(modes):
+            function = vectorised(symbols, self._expressions[active.guard])
+            quantities = np.array([*self._read(p)(times, states)]).reshape(-1, times.size)
+            for time, values in zip(times, quantities.T, strict=True):
                 if is_rough(function, (time, *values, *self.values(p))):
-                    return float(time), in_words(self.elements[number].part, made.leave.when)
+                    return float(time), in_words(self.elements[number].part, active.leave.when)
         return law
 
-    def _rates(self, p: Array) -> tuple[Callable[[float, Array], Array], dict[str, Any]]:
+    def _rates(self, p: Array) -> tuple[RightSide, dict[str, Any]]:
         """The right-hand side and what engines find out about it, for all phases with these parameters."""
-        return self._rates_made(p.tobytes(), lambda: (self._right_side(p), {}))
+        return self._rates_by_p(p.tobytes(), lambda: (self._right_side(p), {}))
 
-    def _right_side(self, p: Array) -> Callable[[float, Array], Array]:
+    def _right_side(self, p: Array) -> RightSide:
+        """In scalar code where there is some: that of `motion`, until it is asked for often enough to have its own."""
         scalar = self.whole.scalar
-        return self.bound(p).rhs if scalar is None else rates_of(scalar, self.motion(p)[0], self.values(p))
+        if scalar is None:
+            return self.bound(p).rhs
+        motion, calls, values = self.motion(p)[0], count(), self.values(p)
+        scalar_rates = cache(lambda: scalar.bind(values))
+
+        def rates(t: float, x: Array) -> Array:
+            if next(calls) < FEW_CALLS:
+                return np.array(motion(t, x.tolist())[0])
+            return scalar_rates()(t, x)
+
+        return rates
 
     @cached_property
     def scalar(self) -> ScalarProgram | None:
         """The right-hand side in scalar code, where there are rows."""
         return self.model.scalar
 
-    def _sizes(self, moment: HybridState, span: tuple[float, float]) -> Array:
-        """The size of each clock over a phase, as far as the time alone tells."""
+    def clock_sizes(self, span: tuple[float, float], x: Array, p: Array) -> Array:
+        """(clocks,) the size of each clock over a phase, as far as the time alone tells."""
+        if not self.clocks:
+            return np.empty(0)
         length = span[1] - span[0]
         times = np.linspace(span[0], span[1] - SOON * length, SAMPLES)
         pairs = np.concatenate([times, times + SOON * length])
-        values = self.guards(moment.regime.p)(pairs, np.tile(moment.x, (pairs.size, 1)))[:, list(self.clocks)]
+        values = self.guards(p)(pairs, np.tile(x, (pairs.size, 1)))[:, list(self.clocks)]
         largest, changes = np.abs(values).max(axis=0), np.abs(values[:SAMPLES] - values[SAMPLES:]).max(axis=0)
         # what is another number at once is rounding, and an engine that followed it would not get on
         return CLOCK * np.where(largest > MORE * changes, largest, 1.0) * length
@@ -334,7 +335,7 @@ class ModeEquations:
             return guards(np.array([t]), np.array([x]))[0].tolist()  # type: ignore[no-any-return]
 
         def motion(t: float, x: list[float]) -> tuple[list[float], list[float]]:
-            return bound.rhs(t, np.array(x)).tolist(), limits(t, x)
+            return [*bound.rhs(t, np.array(x)).tolist(), *self.arriving_rates(x)], limits(t, x)
 
         return motion, limits, partial(around, motion, limits)
 

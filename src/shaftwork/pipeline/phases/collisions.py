@@ -19,31 +19,27 @@ Source: Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts, 1996,
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
-from sympy import Integer
 
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.mobility import Mobility, complementary
-from shaftwork.components.branches import INTEGRAL
 from shaftwork.components.modes import Leave
 from shaftwork.core.errors import SimulationError
 from shaftwork.core.kept import Kept
-from shaftwork.pipeline.phases.contacts import Contact, lasting, limited, one_side, opens_at
-from shaftwork.pipeline.phases.hybrid_state import CLEAR, NOTHING, HybridState, Regime
-from shaftwork.pipeline.phases.impulses import Blow, ImpactStage, ImpactStart, Impulses
-from shaftwork.pipeline.phases.mode_machines import NO_IMPACT, ModeMachine, ModeNames
-from shaftwork.pipeline.phases.regimes import Regimes, with_modes
+from shaftwork.pipeline.phases.hybrid_state import HybridState, Regime
+from shaftwork.pipeline.phases.impact_contacts import Contact, in_turn, lasting, nodes, opens_at, touching
+from shaftwork.pipeline.phases.impulses import Blow, ImpactStage, ImpactStart, Impulses, summed
+from shaftwork.pipeline.phases.mode_machines import NO_IMPACT, GivesWay, ModeNames, limited, with_modes
+from shaftwork.pipeline.phases.regimes import Regimes
 
-KEPT = 64
+MOBILITIES = 64
 """Sets of contacts of which what impulses do is kept."""
 ROUNDED = 64 * float(np.finfo(float).eps)
 """Speeds at which contacts close that are less than this part of the largest speed are what rounding leaves."""
-SAME = 1e-9
-"""Speeds at which contacts close that differ by less than this fraction are the same."""
 
 
 class Collision(NamedTuple):
@@ -69,16 +65,14 @@ class Collisions:
 
     Args:
         regimes: combinations of modes.
-        elements: of the network.
         impulses: follows what passes through gears that rub.
         together: whether what touches is thrown back in the same instant as what is hit, and not after it.
     """
 
-    def __init__(
-        self, regimes: Regimes, elements: Sequence[ModeMachine], impulses: Impulses, *, together: bool
-    ) -> None:
-        self._regimes, self._elements, self._impulses, self._together = regimes, elements, impulses, together
-        self._mobilities = Kept[tuple[Regime, tuple[tuple[int, int], ...]], Mobility](KEPT)
+    def __init__(self, regimes: Regimes, impulses: Impulses, *, together: bool) -> None:
+        self._regimes, self._elements = regimes, regimes.elements
+        self._impulses, self._together = impulses, together
+        self._mobilities = Kept[tuple[Regime, tuple[tuple[int, int], ...]], Mobility](MOBILITIES)
 
     def impact(self, t: float, moment: HybridState, number: int, leave: Leave) -> Collision:
         """The impact of an element that closes.
@@ -93,24 +87,21 @@ class Collisions:
             NetworkError: nothing stops what is prescribed; says what contradicts what.
             SimulationError: flanks without a gap between them lose nothing.
         """
-        # without a gap the other flank of the element touches too; of two that are closed the last one tells the mode
-        touching = sorted(
-            self._contacts(t, moment, number, leave), key=lambda c: (c.number, c.joined) == (number, leave.to)
-        )
-        speeds = np.abs(moment.x[: len(moment.regime.assembly.model.form.across_states)])
-        meets = -min(opens_at(t, moment, touching), default=0.0) > ROUNDED * speeds.max(initial=0.0)
-        contacts = self._in_turn(t, moment, touching) if meets else touching
-        before = np.array(opens_at(t, moment, contacts))
-        back = np.array([meets * self._restitution(c, u) for c, u in zip(contacts, before.tolist(), strict=True)])
-        self._refuse_no_gap(
-            t, {c.number for c, share in zip(contacts, back.tolist(), strict=True) if share >= 1}, touching
-        )
         modes = moment.regime.modes
-        begins, stages, both_ways = (
-            self._apart(t, moment, modes, contacts),
-            tuple[ImpactStage, ...](),
-            tuple[Contact, ...](),
-        )
+
+        def is_wanted(contact: Contact) -> bool:
+            return (contact.number, contact.joined) == (number, leave.to)
+
+        # without a gap the other flank of the element touches too; of two that are closed the last one tells the mode
+        candidates = sorted(touching(t, moment, number, leave), key=is_wanted)
+        meets = -min(opens_at(t, moment, candidates), default=0.0) > ROUNDED * moment.top_speed
+        contacts = self._in_turn(t, moment, candidates) if meets else candidates
+        before = np.array(opens_at(t, moment, contacts))
+        back = np.array([meets * c.share_back(u) for c, u in zip(contacts, before.tolist(), strict=True)])
+        elastic = {c.number for c, share in zip(contacts, back.tolist(), strict=True) if share >= 1}
+        self._refuse_no_gap(t, elastic, candidates)
+        begins, stages = self._apart(t, moment, modes, contacts), tuple[ImpactStage, ...]()
+        both_ways = tuple[Contact, ...]()
         if all(contact.number != number for contact in contacts):  # it carries both ways, as a switch that closes
             both_ways = (Contact(number, 0.0, modes[number], leave.to),)
             stages = self._joined(t, begins, {number: leave.to}, contacts)
@@ -119,22 +110,23 @@ class Collisions:
         if back.any():
             stages += self._thrown_back(t, contacts, stages, back)
         least = NO_IMPACT * max(1.0, np.abs(before).max(initial=0.0))
-        wanted = {c for c in contacts if (c.number, c.joined) == (number, leave.to)}
         pressed = zip(contacts, _pressed(stages), strict=True)
-        hit = [c for c, impulse in pressed if c.leave and ((meets and impulse > 0) or c in wanted)]
+        hit = [c for c, impulse in pressed if c.leave and ((meets and impulse > 0) or is_wanted(c))]
         after, closed, further = self._ended(t, modes, contacts, stages, least, hit)
         owners = (self._elements[contact.number].part.name for contact in contacts)
-        lost = zip(owners, self._taken(t, contacts, stages).tolist(), strict=True)
+        taken = [{part: lost} for part, lost in zip(owners, self._taken(t, contacts, stages).tolist(), strict=True)]
+        stages += further
+        lost = summed([*taken, self._impulses.lost(t, stages)])
         return Collision(
             after,
             (*both_ways, *(c for c in hit if c in closed)),
             tuple(c for c in hit if c not in closed),
-            _sums([*lost, *self._impulses.lost(t, (*stages, *further)).items()]),
-            self._impulses.given(t, (*stages, *further)),
+            {part: energy for part, energy in lost.items() if energy},
+            self._impulses.given(t, stages),
         )
 
-    def _refuse_no_gap(self, t: float, elastic: Collection[int], touching: Sequence[Contact]) -> None:
-        numbers = [contact.number for contact in touching]
+    def _refuse_no_gap(self, t: float, elastic: Collection[int], candidates: Sequence[Contact]) -> None:
+        numbers = [contact.number for contact in candidates]
         for number in elastic:
             if numbers.count(number) > 1:
                 raise SimulationError(
@@ -181,12 +173,12 @@ class Collisions:
         modes = with_modes(after.regime.modes, self._slipping(t, before, after, least))
         massless = {c.number for c, tells in zip(contacts, mobility.has_inertia, strict=True) if not tells}
         open_yet = [c for c in closed if c.number in massless and c.leave is None]
-        kept = [c for c in closed if c not in open_yet]
+        pressed = [c for c in closed if c not in open_yet]
         new, apart = (
             self._regimes.changed(after, t, with_modes(modes, {c.number: c.joined for c in some}))
-            for some in (closed, kept)
+            for some in (closed, pressed)
         )
-        if not open_yet or not self._differs(t, new, apart, least):
+        if not open_yet or not self._regimes.differ(t, new, apart, least):
             return new, closed, ()
         further = tuple[ImpactStage, ...]()
         while open_yet:
@@ -194,23 +186,18 @@ class Collisions:
             if speed >= -least:
                 break
             joined = self._joined(t, self._impulses.begins(apart, t), {contact.number: contact.joined}, contacts)
-            if self._differs(t, apart, joined[-1].blow.after, least):
+            if self._regimes.differ(t, apart, joined[-1].blow.after, least):
                 further += joined
             apart = joined[-1].blow.after
             open_yet.remove(contact)
         return apart, [c for c in closed if c not in open_yet], further
-
-    def _differs(self, t: float, one: HybridState, other: HybridState, least: float) -> bool:
-        """Whether speeds at two moments of the same time are not the same."""
-        held, others = self._regimes.held(one, t), self._regimes.held(other, t)
-        return any(abs(value - others[name]) > least for name, value in held.items())
 
     def _compressed(self, t: float, begins: ImpactStart, contacts: Sequence[Contact]) -> tuple[ImpactStage, ...]:
         """Until nothing closes any more, with all contacts open; where nothing stops them, what closes is joined."""
 
         def compressed(start: ImpactStart, _: Sequence[ImpactStage]) -> Blow:
             modes = start.moment.regime.modes
-            moment = start.moment if start.t == t else self._regimes.taking(modes, t, start.held)
+            moment = start.moment if start.t == t else self._regimes.taking(modes, t, start.stored)
             mobility, opens = self._mobility(t, moment, contacts)
             impulses = complementary(mobility.W, opens)
             if impulses is not None:
@@ -229,8 +216,8 @@ class Collisions:
         self, t: float, begins: ImpactStart, joins: Mapping[int, str], contacts: Sequence[Contact]
     ) -> tuple[ImpactStage, ...]:
         def joined(start: ImpactStart, _: Sequence[ImpactStage]) -> Blow:
-            made = self._regimes.changed(start.moment, t, with_modes(start.moment.regime.modes, joins))
-            return Blow(made, made.regime, np.zeros(len(contacts)))
+            after = self._regimes.changed(start.moment, t, with_modes(start.moment.regime.modes, joins))
+            return Blow(after, after.regime, np.zeros(len(contacts)))
 
         return self._impulses.stages(t, begins, joined)
 
@@ -244,9 +231,9 @@ class Collisions:
         """
         shares, energy = back * _pressed(compression), self._returned(t, contacts, compression, back)
 
-        def thrown(start: ImpactStart, made: Sequence[ImpactStage]) -> Blow:
+        def thrown(start: ImpactStart, stages: Sequence[ImpactStage]) -> Blow:
             left = energy
-            for begun, share in (*((stage.start, stage.share) for stage in made), (start, 0.0)):
+            for begun, share in (*((stage.start, stage.share) for stage in stages), (start, 0.0)):
                 mobility, opens = self._mobility(t, begun.moment, contacts)
                 impulses = _of_energy(left, shares, opens, mobility.W)
                 gives = share * impulses
@@ -278,37 +265,31 @@ class Collisions:
 
     def _apart(self, t: float, moment: HybridState, modes: ModeNames, contacts: Sequence[Contact]) -> ImpactStart:
         """The moment in some modes, but with all contacts open, and what rubs slipping."""
-        apart = {k: ways[0][1] for k, ways in self._rubbing(modes).items()} | {c.number: c.apart for c in contacts}
+        apart = {k: sides[0][1] for k, sides in self._rubbing(modes).items()} | {c.number: c.apart for c in contacts}
         loose = with_modes(modes, apart)
-        return self._impulses.begins(self._regimes.taking(loose, t, self._regimes.held(moment, t)), t)
+        return self._impulses.begins(self._regimes.taking(loose, t, self._regimes.stored(moment, t)), t)
 
-    def _rubbing(self, modes: ModeNames) -> dict[int, tuple[tuple[float, str], ...]]:
+    def _rubbing(self, modes: ModeNames) -> dict[int, GivesWay]:
         """Elements that hold by torques limited on both sides, with the modes to which these lead."""
-        return {k: ways for k, ways in limited(self._elements, modes).items() if len(ways) > 1}
+        return {k: sides for k, sides in limited(self._elements, modes).items() if len(sides) > 1}
 
     def _slipping(self, t: float, before: ModeNames, after: HybridState, least: float) -> dict[int, str]:
         """The modes of what rubs after an impact: it slips where the speed across it is more than the least."""
         rubbing = self._rubbing(before)
         speeds = dict(zip(rubbing, after.speeds([*rubbing], t), strict=True))
         return {
-            k: next((to for side, to in ways if side * speeds[k] > least), before[k]) for k, ways in rubbing.items()
+            k: next((to for side, to in sides if side * speeds[k] > least), before[k]) for k, sides in rubbing.items()
         }
 
     def _mobility(self, t: float, moment: HybridState, contacts: Sequence[Contact]) -> tuple[Mobility, Array]:
         """The answer to impulses of contacts, and the speeds at which they open; zero where no impulse passes."""
-        regime, pairs = moment.regime, tuple(self._nodes(moment, contact) for contact in contacts)
+        regime, pairs = moment.regime, tuple(nodes(moment, contact) for contact in contacts)
         stores, p = regime.assembly.stores, regime.p
         mobility = self._mobilities((regime, pairs), lambda: stores.mobility(regime.assembly.bound(p), pairs))
         return mobility, np.where(mobility.has_inertia, opens_at(t, moment, contacts), 0.0)
 
     def _in_turn(self, t: float, moment: HybridState, contacts: list[Contact]) -> list[Contact]:
-        """The contacts that take part: of those that throw back only the fastest, but if all do so together."""
-        speeds = {c: -opens for c, opens in zip(contacts, opens_at(t, moment, contacts), strict=True)}
-        thrown = [speed for c, speed in speeds.items() if self._restitution(c, -speed)]
-        if self._together or not thrown:
-            return contacts
-        fastest = (1 - SAME) * max(thrown)
-        return [c for c, speed in speeds.items() if not c.restitution or speed >= fastest]
+        return contacts if self._together else in_turn(t, moment, contacts)
 
     def fastest(self, t: float, moment: HybridState, number: int, leave: Leave) -> Contact | None:
         """Of what closes and is thrown back what closes fastest, first the element that is given; None where none is.
@@ -316,53 +297,10 @@ class Collisions:
         Args:
             t, moment, number, leave: as in `impact`.
         """
-        contacts = self._in_turn(t, moment, [*self._contacts(t, moment, number, leave)])
+        contacts = self._in_turn(t, moment, [*touching(t, moment, number, leave)])
         opens = opens_at(t, moment, contacts)
-        thrown = (c for c, speed in zip(contacts, opens, strict=True) if self._restitution(c, speed))
+        thrown = (c for c, speed in zip(contacts, opens, strict=True) if c.share_back(speed))
         return min(thrown, key=lambda contact: contact.number != number, default=None)
-
-    def _nodes(self, moment: HybridState, contact: Contact) -> tuple[int, int]:
-        """The nodes of a contact, that first whose speed opens it."""
-        element = self._elements[contact.number]
-        part = moment.regime.assembly.parts[element.part.name]
-        ends = part.ends_of(element.modes)[:: int(contact.side)]
-        first, second = map(part.node_at, ends)
-        return first, second
-
-    def _restitution(self, contact: Contact, opens: float) -> float:
-        """The share of the speed at which a contact closes that comes back."""
-        return contact.restitution if -opens * contact.restitution > contact.rest else 0.0
-
-    def _contacts(self, t: float, moment: HybridState, number: int, leave: Leave) -> Iterator[Contact]:
-        """Contacts that are closed or touch, freewheels, and the element that wants to close."""
-        regime, here = moment.regime, moment.course(t)
-        now, bands = here[3], regime.bands(here)
-        closed = [*lasting(self._elements, regime.modes)]
-        yield from closed
-        yield from self._other_flanks(moment, closed)
-        for k, watched in regime.watched:
-            closes, guard = watched.leave, watched.guard
-            wanted = k == number and closes.to == leave.to
-            touches = closes.rebound is not None and watched.side * now[guard] > -CLEAR * bands[guard]
-            side = one_side(self._elements[k].modes, closes.to) if (wanted or touches) and closes.to else None
-            if side is not None and not any(c.number == k and c.joined == closes.to for c in closed):
-                closes = leave if wanted else closes
-                constants = (regime.constant(k, given) for given in (closes.rebound, closes.rest))
-                yield Contact(k, side, regime.modes[k], closes.to, closes, *constants)
-
-    def _other_flanks(self, moment: HybridState, closed: Sequence[Contact]) -> Iterator[Contact]:
-        """Flanks that touch while the other one of their element is closed, as there is no gap between them."""
-        for contact in closed:
-            number, modes = contact.number, self._elements[contact.number].modes
-            place = moment.regime.assembly.twist(number)
-            for leave in modes[contact.apart].leaves if place is not None else ():
-                side = one_side(modes, leave.to) if leave.rebound is not None and leave.to != contact.joined else None
-                if side is None:
-                    continue
-                limit = moment.regime.constant(number, leave.when.xreplace({INTEGRAL: Integer(0)}))
-                if limit + float(leave.when.diff(INTEGRAL)) * moment.x[place] > -NOTHING:
-                    constants = (moment.regime.constant(number, given) for given in (leave.rebound, leave.rest))
-                    yield Contact(number, side, contact.apart, leave.to, leave, *constants)
 
 
 def _blow(moment: HybridState, mobility: Mobility, impulses: Array) -> Blow:
@@ -385,11 +323,3 @@ def _of_energy(energy: float, shares: Array, opens: Array, W: Array) -> Array:
         return 0 * shares
     root = math.sqrt(linear**2 + 2 * square * energy)
     return shares * (2 * energy / (linear + root) if linear > 0 else (root - linear) / square)  # no terms cancel
-
-
-def _sums(pairs: Iterable[tuple[str, float]]) -> dict[str, float]:
-    """The sums of values by name, without zeros."""
-    sums: dict[str, float] = {}
-    for name, value in pairs:
-        sums[name] = sums.get(name, 0.0) + value
-    return {name: value for name, value in sums.items() if value}

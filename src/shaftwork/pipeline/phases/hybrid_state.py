@@ -14,21 +14,23 @@ from sympy import Expr
 
 from shaftwork.codegen.code import Moves
 from shaftwork.codegen.elements import Array
+from shaftwork.codegen.timeline import Timeline
 from shaftwork.components.laws import t as TIME
 from shaftwork.pipeline.arguments import NOMINAL
+from shaftwork.integrate.problem import Guards, Problem, changed
 from shaftwork.pipeline.phases.assemblies import Limits, ModeEquations, Motion, Near
 from shaftwork.pipeline.phases.mode_machines import ActiveGuard, ModeMachine, ModeNames
 
-# A guard within so many rounding units of zero is on its limit, and only its further course tells its side.
 ROUNDINGS = 64.0
-# A phase that starts at a limit or beyond meets it again where it is farther beyond by so many bands.
+"""A guard within so many rounding units of zero is on its limit, and only its further course tells its side."""
 CLEAR = 8
-# What is as good as zero, and is not.
+"""A phase that starts at a limit or beyond meets it again where it is farther beyond by so many bands."""
 NOTHING = 1e-200
+"""What is as good as zero, and is not."""
 EPS = float(np.finfo(float).eps)
-# How far ahead the further course is looked at: parts of the time in which a state moves by its nominal size, and of
-# the run.
 AHEAD, AHEAD_OF_RUN = 1e-3, 1e-7
+"""How far ahead the further course is looked at: parts of the time in which a state moves by its nominal size, and of
+the run."""
 GOLDEN = (5**0.5 - 1) / 2
 
 Course = tuple[float, list[float], list[float], list[float]]
@@ -53,28 +55,28 @@ class Change(NamedTuple):
 
 def together(changes: list[Change]) -> list[Change]:
     """Changes of one instant, with those of each element in one; but an impact stays apart."""
-    made: dict[int, Change] = {}
     if any(change.impact for change in changes):
         return changes
+    by_element: dict[int, Change] = {}
     for change in changes:
-        key = id(change.element)
-        made[key] = change._replace(before=made[key].before) if key in made else change
-    return [change for change in made.values() if change.before != change.after]
+        earlier = by_element.get(id(change.element), change)
+        by_element[id(change.element)] = change._replace(before=earlier.before)
+    return [change for change in by_element.values() if change.before != change.after]
 
 
 def without_detours(changes: list[Change]) -> list[Change]:
     """Changes of one instant without those by which an element came back to a mode; but an impact stays."""
     if len(changes) == 1 or any(change.impact for change in changes):
         return changes
-    kept: list[Change] = []
+    direct: list[Change] = []
     for change in changes:
-        own = [earlier for earlier in kept if earlier.element is change.element]
-        back = next((k for k, earlier in enumerate(own) if earlier.before == change.after), None)
-        dropped = [] if back is None else own[back:]
-        kept = [earlier for earlier in kept if earlier not in dropped]
+        of_element = [earlier for earlier in direct if earlier.element is change.element]
+        back = next((k for k, earlier in enumerate(of_element) if earlier.before == change.after), None)
         if back is None:
-            kept.append(change)
-    return kept
+            direct.append(change)
+        else:
+            direct = [earlier for earlier in direct if earlier not in of_element[back:]]
+    return direct
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +95,7 @@ class Regime:
         watched: element and guard of everything that may end one of the modes.
         tick: how far in s rounding moves the time.
         longest: how far in s the further course is looked at, at most.
-        ways: by guard, where it leads; found when it is first met.
+        successors: by guard, where it leads in place; told when it is first met.
     """
 
     modes: ModeNames
@@ -107,7 +109,12 @@ class Regime:
     watched: tuple[tuple[int, ActiveGuard], ...]
     tick: float
     longest: float
-    ways: dict[int, Any] = field(default_factory=dict)
+    successors: dict[int, Any] = field(default_factory=dict)
+
+    @property
+    def elements(self) -> tuple[ModeMachine, ...]:
+        """Of the network."""
+        return self.assembly.elements
 
     @cached_property
     def bends(self) -> bool:
@@ -118,7 +125,7 @@ class Regime:
     @cached_property
     def ends(self) -> tuple[tuple[int, float], ...]:
         """Number and side of each guard that ends one of the modes."""
-        return tuple((watched.guard, watched.side) for _, watched in self.watched)
+        return tuple((active.guard, active.side) for _, active in self.watched)
 
     @cached_property
     def equations(self) -> Callable[[], Callable[[float, Array], Array]]:
@@ -153,7 +160,7 @@ class Regime:
         each, tick = zip(x, rates, self.moves, strict=True), self.tick
         # all of it to the same side: what a tick moves must not make up for the rest
         return t + side * tick, [
-            v + side * (part * abs(v) + least + way * tick * abs(rate)) for v, rate, (part, least, way, _) in each
+            v + side * (part * abs(v) + least + sign * tick * abs(rate)) for v, rate, (part, least, sign, _) in each
         ]
 
     def bands(self, here: Course, beside: Sequence[float] | None = None) -> list[float]:
@@ -203,6 +210,31 @@ class HybridState(NamedTuple):
         """The speeds across elements at a time in s."""
         return self.regime.assembly.across(numbers, t, self.x, self.regime.p)
 
+    @property
+    def top_speed(self) -> float:
+        """The largest of the speeds that are states."""
+        return float(np.abs(self.x[: len(self.regime.assembly.model.form.across_states)]).max(initial=0.0))
+
+    def problem(self, span: tuple[float, float], times: Timeline) -> Problem:
+        """The motion of the phase, before it is told where it ends; tolerances are for rtol = 1.
+
+        Its states are those of the equations and, behind them, the integrals of the guards in their `clocks`.
+        """
+        regime, assembly = self.regime, self.regime.assembly
+        whole = assembly.problem(regime.modes, regime.p)
+        sizes, guards = assembly.clock_sizes(span, self.x, regime.p), whole.guards
+        assert guards is not None  # noqa: S101 (which the equations give)
+        now = np.abs(regime.limits(span[0], self.x.tolist()))
+        return changed(
+            whole,
+            x0=np.concatenate([self.x, np.zeros(sizes.size)]),
+            t0=span[0],
+            t_end=span[1],
+            atol=np.concatenate([whole.atol, sizes]),
+            sides=times.sides,
+            guards=Guards(guards.values, guards.sides, np.array(self.bands), now),
+        )
+
     def moved(self, t: float, step: float) -> HybridState:
         """The same modes a step in s later or earlier, along a straight line."""
         return self._replace(x=self.x + step * np.array(self.course(t)[2])) if step else self
@@ -229,8 +261,7 @@ def clear_of_limit(beyond: float, band: float) -> float:
 
 def clear_of_limits(regime: Regime, now: Sequence[float], bands: Sequence[float]) -> list[float]:
     """How far beyond zero each of the guards of a combination of modes is met."""
-    made = [0.0] * len(now)
-    for _, watched in regime.watched:
-        k = watched.guard
-        made[k] = clear_of_limit(watched.side * now[k], bands[k])
-    return made
+    clear = [0.0] * len(now)
+    for _, active in regime.watched:
+        clear[active.guard] = clear_of_limit(active.side * now[active.guard], bands[active.guard])
+    return clear

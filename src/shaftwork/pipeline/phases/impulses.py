@@ -8,7 +8,8 @@ article 198); it is what a contact does that is stiff enough.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -20,17 +21,13 @@ from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.hybrid_state import EPS, ROUNDINGS, HybridState, Regime
-from shaftwork.pipeline.phases.mode_machines import ModeMachine, ModeNames
-from shaftwork.pipeline.phases.regimes import Regimes, with_modes
+from shaftwork.pipeline.phases.mode_machines import ModeNames, with_modes
+from shaftwork.pipeline.phases.regimes import Regimes
 
-# So many times gears may come to rest in one impact.
 MOST_STAGES = 100
-# What rounding leaves of speeds and impulses, as part of the largest.
+"""So many times gears may come to rest in one impact."""
 NOTHING_OF = ROUNDINGS * EPS
-
-
-Held = Mapping[str, float]
-"""All that is stored, by name."""
+"""What rounding leaves of speeds and impulses, as part of the largest."""
 
 
 class Blow(NamedTuple):
@@ -54,7 +51,7 @@ class ImpactStart(NamedTuple):
 
     moment: HybridState
     t: float
-    held: Held
+    stored: Mapping[str, float]
     speeds: Mapping[int, float]
 
 
@@ -71,18 +68,17 @@ class Impulses:
 
     Args:
         regimes: combinations of modes.
-        elements: of the network.
     """
 
-    def __init__(self, regimes: Regimes, elements: Sequence[ModeMachine]) -> None:
-        self._regimes, self._elements = regimes, elements
-        self.gears = tuple(k for k, element in enumerate(elements) if element.modes.passes_on)
+    def __init__(self, regimes: Regimes) -> None:
+        self._regimes, self._elements = regimes, regimes.elements
+        self.gears = tuple(k for k, element in enumerate(self._elements) if element.modes.passes_on)
         """Elements that pass torques on by their direction."""
 
     def begins(self, moment: HybridState, t: float) -> ImpactStart:
         """Where an impact begins, with the inputs of a time in s."""
         speeds = dict(zip(self.gears, moment.speeds(self.gears, t), strict=True))
-        return ImpactStart(moment, t, self._regimes.held(moment, t), speeds)
+        return ImpactStart(moment, t, self._regimes.stored(moment, t), speeds)
 
     def stages(
         self, t: float, start: ImpactStart, blow: Callable[[ImpactStart, Sequence[ImpactStage]], Blow]
@@ -97,15 +93,15 @@ class Impulses:
         Raises:
             SimulationError: gears come to rest again and again.
         """
-        made: list[ImpactStage] = []
-        while len(made) < MOST_STAGES:
-            start, found = self._consistent(t, start, lambda begun: blow(begun, made))
-            share, number = min(self._coming_to_rest(t, start, found.after), default=(1.0, -1))
-            made.append(ImpactStage(start, found, share))
+        stages: list[ImpactStage] = []
+        while len(stages) < MOST_STAGES:
+            start, rest = self._consistent(t, start, lambda begun: blow(begun, stages))
+            share, number = min(self._coming_to_rest(t, start, rest.after), default=(1.0, -1))
+            stages.append(ImpactStage(start, rest, share))
             if number < 0:
-                return tuple(made)
-            modes = self._at_rest(found.after.regime.modes, number)
-            start = self._reached(t, made[-1], modes, number)
+                return tuple(stages)
+            modes = self._at_rest(rest.after.regime.modes, number)
+            start = self._reached(t, stages[-1], modes, number)
         raise SimulationError(
             f"'{self._elements[number].name}' comes to rest again and again in one impact at t = {t:.9g} s. Give the "
             "contact that is hit a stiffness c and a damping d."
@@ -114,40 +110,40 @@ class Impulses:
     def _reached(self, t: float, stage: ImpactStage, modes: ModeNames, number: int) -> ImpactStart:
         """The end of a stage, at which a gear is at rest, in the modes that go on."""
         start, blow, share = stage
-        held = {
+        stored = {
             name: value + share * gain
-            for (name, value), gain in zip(start.held.items(), self._gained(t, start, blow).values(), strict=True)
+            for (name, value), gain in zip(start.stored.items(), self._gained(t, start, blow).values(), strict=True)
         }
         speeds = {k: v + share * (blow.after.across(k, t) - v) for k, v in start.speeds.items()}
-        return ImpactStart(self._regimes.taking(modes, t, held), t, held, {**speeds, number: 0.0})
+        return ImpactStart(self._regimes.taking(modes, t, stored), t, stored, {**speeds, number: 0.0})
 
     def _in_modes(self, t: float, start: ImpactStart, modes: ModeNames) -> ImpactStart:
         """The same start in other modes of gears; one that jams has stopped in it."""
-        made = ImpactStart(self._regimes.taking(modes, t, start.held), t, start.held, start.speeds)
-        halted = {*self._stopped(made.moment)} - {*self._stopped(start.moment)}
-        return self.begins(made.moment, t) if any(start.speeds[k] for k in halted) else made
+        new = ImpactStart(self._regimes.taking(modes, t, start.stored), t, start.stored, start.speeds)
+        halted = {*self._stopped(new.moment)} - {*self._stopped(start.moment)}
+        return self.begins(new.moment, t) if any(start.speeds[k] for k in halted) else new
 
     def _consistent(
         self, t: float, start: ImpactStart, blow: Callable[[ImpactStart], Blow]
     ) -> tuple[ImpactStart, Blow]:
         """The modes of gears in which an impulse passes as they say; a gear that turns, and has none, jams at once."""
-        found, jammed, seen = self._passed(start, blow), set[int](), {start.moment.regime.modes}
+        rest, jammed, seen = self._passed(start, blow), set[int](), {start.moment.regime.modes}
         while True:
-            if found is None or found.after is start.moment:
-                start, found = self._released(t, start, blow) or (start, found or blow(start))
-            turn = self._turned(t, start, found)
+            if rest is None or rest.after is start.moment:
+                start, rest = self._released(t, start, blow) or (start, rest or blow(start))
+            turn = self._turned(t, start, rest)
             if turn is None:
-                return start, found
+                return start, rest
             number, to = turn
             modes = self._led(start.moment.regime.modes, number, to)
             if modes in seen:
                 if number in jammed:
-                    return start, found
+                    return start, rest
                 jammed.add(number)
                 seen.clear()
                 modes = self._at_rest(modes, number)
             start = self._in_modes(t, start, modes)
-            found = self._passed(start, blow)
+            rest = self._passed(start, blow)
             seen.add(modes)
 
     def _passed(self, start: ImpactStart, blow: Callable[[ImpactStart], Blow]) -> Blow | None:
@@ -168,39 +164,40 @@ class Impulses:
         """
         for k in self._stopped(start.moment):
             turning = (mode.name for mode in self._elements[k].modes.options if _turns(mode))
-            ways = (with_modes(start.moment.regime.modes, {k: name}) for name in turning)
-            for modes in filter(self._regimes.possible, ways):
+            options = (with_modes(start.moment.regime.modes, {k: name}) for name in turning)
+            for modes in filter(self._regimes.possible, options):
                 here = self._in_modes(t, start, modes)
-                found = self._passed(here, blow)
-                if found is None or found.after is here.moment:
+                rest = self._passed(here, blow)
+                if rest is None or rest.after is here.moment:
                     continue
-                turned = self._turned(t, here, found)
+                turned = self._turned(t, here, rest)
                 if turned is None or turned[0] != k:
-                    return here, found
+                    return here, rest
         return None
 
     def _stopped(self, moment: HybridState) -> list[int]:
         """Gears in a mode of rest."""
         return [k for k in self.gears if not _turns(self._elements[k].modes[moment.regime.modes[k]])]
 
-    def _turned(self, t: float, start: ImpactStart, found: Blow) -> tuple[int, str] | None:
+    def _turned(self, t: float, start: ImpactStart, rest: Blow) -> tuple[int, str] | None:
         """The gear that an impulse brings out of its mode at once, and the mode that follows."""
         if not self.gears:
             return None
-        assembly, p = found.passing.assembly, found.passing.p
-        impulses = self._impulses(t, start, found)
+        assembly, p = rest.passing.assembly, rest.passing.p
+        impulses = self._impulses(t, start, rest)
         # a gear elsewhere has the rounding of what moves there, however small the impact is
-        momentum = assembly.stores.momentum(assembly.bound(p), start.held)
+        momentum = assembly.stores.momentum(assembly.bound(p), start.stored)
         least = NOTHING_OF * max(np.abs(impulses).max(initial=0.0), momentum)
-        ways = [
+        exceeded = [
             (_guard(assembly, k, leave, impulses, p), k, leave.to)
             for k in self.gears
             for leave in self._elements[k].modes[start.moment.regime.modes[k]].leaves
             if leave.by_torque
         ]
-        ways = [way for way in ways if way[0] > least]
-        ways = ways or [(ends, k, to) for began, ends, k, to in self._stopping(t, start, found.after) if began >= 0]
-        return max(ways)[1:] if ways else None
+        exceeded = [turn for turn in exceeded if turn[0] > least]
+        turning = (turn for turn in self._stopping(t, start, rest.after) if turn[0] >= 0)
+        exceeded = exceeded or [(ends, k, to) for _, ends, k, to in turning]
+        return max(exceeded)[1:] if exceeded else None
 
     def _coming_to_rest(self, t: float, start: ImpactStart, after: HybridState) -> Iterator[tuple[float, int]]:
         """The share of an impulse after which a gear is at rest, and which one."""
@@ -208,14 +205,14 @@ class Impulses:
 
     def _stopping(self, t: float, start: ImpactStart, after: HybridState) -> Iterator[tuple[float, float, int, str]]:
         """Gears that would turn round: their speeds before and after, negative the way they turn, and what follows."""
-        states = (made.x[: len(made.regime.assembly.model.states)] for made in (start.moment, after))
+        states = (one.x[: len(one.regime.assembly.model.states)] for one in (start.moment, after))
         least = NOTHING_OF * max(np.abs(x).max(initial=0.0) for x in states)
         for k, speed in start.speeds.items():
             speeds = speed, after.across(k, t)
             for leave in self._elements[k].modes[start.moment.regime.modes[k]].leaves:
-                way = float(leave.when.diff(ACROSS))
-                began, ends = (0.0 if abs(speed) <= least else way * speed for speed in speeds)
-                if way and ends > 0:
+                slope = float(leave.when.diff(ACROSS))
+                began, ends = (0.0 if abs(speed) <= least else slope * speed for speed in speeds)
+                if slope and ends > 0:
                     yield began, ends, k, leave.to
 
     def _at_rest(self, modes: ModeNames, number: int) -> ModeNames:
@@ -225,13 +222,13 @@ class Impulses:
 
     def _led(self, modes: ModeNames, number: int, to: str) -> ModeNames:
         """Modes with another one of a gear; where its equations contradict others, one to which it leads."""
-        ways = (to, *(leave.to for leave in self._elements[number].modes[to].leaves if leave.to != modes[number]))
-        return next(filter(self._regimes.possible, (with_modes(modes, {number: name}) for name in ways)), modes)
+        names = (to, *(leave.to for leave in self._elements[number].modes[to].leaves if leave.to != modes[number]))
+        return next(filter(self._regimes.possible, (with_modes(modes, {number: name}) for name in names)), modes)
 
     def _gained(self, t: float, start: ImpactStart, blow: Blow) -> dict[str, float]:
         """What all that is stored gains by the whole of an impulse."""
-        then = self._regimes.held(blow.after, t)
-        return {name: then[name] - value for name, value in start.held.items()}
+        then = self._regimes.stored(blow.after, t)
+        return {name: then[name] - value for name, value in start.stored.items()}
 
     def given(self, t: float, stages: Sequence[ImpactStage], before: float | None = None) -> dict[str, float]:
         """What ideal sources give in an impulse, in J by part, their impulse times the mean of their speeds.
@@ -241,8 +238,7 @@ class Impulses:
             stages: of the impulse.
             before: time before it, where it is they that jump; they do so in proportion to the impulse.
         """
-        found: dict[str, float] = {}
-        jumped = 0.0
+        energies, jumped = list[Mapping[str, float]](), 0.0
         for stage in stages:
             assembly, p = stage.blow.passing.assembly, stage.blow.passing.p
             bound, stores, gained = assembly.bound(p), assembly.stores, self._gained(t, stage.start, stage.blow)
@@ -251,14 +247,14 @@ class Impulses:
             for time, weight in ((t, late), (before, 1.0 - late)):
                 if time is None:
                     continue
-                for part, energy in stores.given(bound, bound.sources(time), gained, stage.blow.through).items():
-                    found[part] = found.get(part, 0.0) + stage.share * weight * energy
+                whole = stores.given(bound, bound.sources(time), gained, stage.blow.through)
+                energies.append({part: stage.share * weight * energy for part, energy in whole.items()})
             jumped = then
-        return found
+        return summed(energies)
 
     def lost(self, t: float, stages: Sequence[ImpactStage]) -> dict[str, float]:
         """What gears lose in an impulse, in J by part: what passes through the mesh at the mean of the speeds there."""
-        found: dict[str, float] = {}
+        energies: list[Mapping[str, float]] = []
         for stage in stages if self.gears else ():
             impulses = self._impulses(t, stage.start, stage.blow)
             for k, began in stage.start.speeds.items():
@@ -268,14 +264,21 @@ class Impulses:
                 # the speeds of a mesh are in proportion to that of its gear
                 mean = (began + stage.share / 2 * (ends - began)) / speed if speed else 0.0
                 pairs = zip(_meshes(passing, name), _across_meshes(moment, time, name), strict=True)
-                lost = sum(stage.share * impulses[branch] * mean * across for branch, across in pairs)
-                found[name] = found.get(name, 0.0) + float(lost)
-        return found
+                energies += [{name: float(sum(stage.share * impulses[mesh] * mean * across for mesh, across in pairs))}]
+        return summed(energies)
 
-    def _impulses(self, t: float, start: ImpactStart, found: Blow) -> Array:
+    def _impulses(self, t: float, start: ImpactStart, blow: Blow) -> Array:
         """(branches,) what passes through every branch at once."""
-        assembly, p = found.passing.assembly, found.passing.p
-        return assembly.stores.impulses(assembly.bound(p), self._gained(t, start, found)) + found.through
+        assembly, p = blow.passing.assembly, blow.passing.p
+        return assembly.stores.impulses(assembly.bound(p), self._gained(t, start, blow)) + blow.through
+
+
+def summed(energies: Iterable[Mapping[str, float]]) -> dict[str, float]:
+    """Energies by part of several together."""
+    total: dict[str, float] = {}
+    for part, energy in chain.from_iterable(each.items() for each in energies):
+        total[part] = total.get(part, 0.0) + energy
+    return total
 
 
 def _turns(mode: Mode) -> bool:

@@ -14,10 +14,10 @@ from shaftwork.integrate.problem import Reaction, SeriesError
 from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.event_iteration import EventIteration
 from shaftwork.pipeline.phases.hybrid_state import CLEAR, Change, HybridState, Regime, Transition, clear_of_limit
-from shaftwork.pipeline.phases.mode_machines import ActiveGuard, ModeMachine, ModeNames, is_same
+from shaftwork.pipeline.phases.mode_machines import ActiveGuard, ModeMachine, ModeNames, is_same, with_modes
 
-# Of so many roundings of the time a guard may be late that is met together with another one.
 LATE = 1e4
+"""Of so many roundings of the time a guard may be late that is met together with another one."""
 
 
 class Phase(NamedTuple):
@@ -36,10 +36,10 @@ class Phase(NamedTuple):
     p: Array
 
 
-_Following = tuple[Regime, Sequence[float], list[Change], Array | None]
+Successor = tuple[Regime, Sequence[float], list[Change], Array | None]
 """The modes that follow, how far rounding moves their guards, the changes that lead there, and the states if other."""
 
-_Entered = tuple[Sequence[float], Sequence[float], list[float], Array | None]
+Entry = tuple[Sequence[float], Sequence[float], list[float], Array | None]
 """Guards at an instant and later, how far beyond zero each is met, and the states if they are other ones."""
 
 
@@ -48,7 +48,7 @@ def _always(_t: float, _moment: HybridState) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class _Transition:
+class ModeChange:
     """From one combination of modes to another in the same equations, by one guard.
 
     Args:
@@ -104,10 +104,10 @@ class InPlaceEvents:
             return self._reactions[number]
         if self.beyond is not None or self._note is None:
             return None
-        found = self._direct(met, t, x) or self._settled(met, t, x)
-        if found is None:
+        successor = self._direct(met, t, x) or self._settled(met, t, x)
+        if successor is None:
             return None
-        regime, bands, changes, y = found
+        regime, bands, changes, y = successor
         if regime not in self._suited:
             moment = HybridState(regime, x[: self._size].copy() if y is None else y, bands)
             if not self._suits(t, moment):
@@ -128,7 +128,7 @@ class InPlaceEvents:
         """
         self._note, self._suits = None, _always
 
-    def _settled(self, met: int, t: float, x: Array) -> _Following | None:
+    def _settled(self, met: int, t: float, x: Array) -> Successor | None:
         before = HybridState(self.regime, x[: self._size].copy(), self.bands)
         self.refuse_missed(met, t, x)
         moment, changes = self._settling.settle(t, t, before, met)
@@ -153,85 +153,85 @@ class InPlaceEvents:
             error = regime.assembly.without_value(regime.p, regime.modes, np.array([t]), np.array([here[1]]))
             if error is not None:
                 raise error
-        for number, made in regime.watched:
-            k = made.guard
-            if k != met and min(made.side * now[k], made.side * before[k]) > CLEAR * bands[k]:
-                element = self._settling.elements[number]
+        for number, active in regime.watched:
+            k, side = active.guard, active.side
+            if k != met and min(side * now[k], side * before[k]) > CLEAR * bands[k]:
+                element = regime.elements[number]
                 words = (
                     f"'{element.name}' ceased to be {element.modes[regime.modes[number]].words} before t = {t:.9g} s"
                 )
-                found = f"{words}, and the series of heyoka have not shown it"
-                raise SeriesError(f"The heyoka engine has not seen that {words}. Take engine='scipy'.", found)
+                cause = f"{words}, and the series of heyoka have not shown it"
+                raise SeriesError(f"The heyoka engine has not seen that {words}. Take engine='scipy'.", cause)
 
-    def _direct(self, met: int, t: float, x: Array) -> _Following | None:
+    def _direct(self, met: int, t: float, x: Array) -> Successor | None:
         """The modes that follow by this guard alone, or None where it takes more to tell.
 
         The same as in `EventIteration`, for the guards of one combination of modes only: it is asked at every change.
         What comes to hold by more than it can gives way at once.
         """
-        way = self._way(self.regime, met)
-        if way is None:
+        step = self._successor(self.regime, met)
+        if step is None:
             return None
-        made, changes = self._entered(way, t, x), [Change(t, *way.change)]
-        if isinstance(made, int):
-            element, before, _ = way.change
-            way = self._way(way.to, made) if way.holds else None
-            if way is None or way.change[0] is not element or not way.holds or way.change[2] == before:
+        entry, changes = self._entered(step, t, x), [Change(t, *step.change)]
+        if isinstance(entry, int):
+            element, before, _ = step.change
+            step = self._successor(step.to, entry) if step.holds else None
+            if step is None or step.change[0] is not element or not step.holds or step.change[2] == before:
                 return None
-            made, changes = self._entered(way, t, x), [*changes, Change(t, *way.change)]
-        if made is None or isinstance(made, int):
+            entry, changes = self._entered(step, t, x), [*changes, Change(t, *step.change)]
+        if entry is None or isinstance(entry, int):
             return None
-        now, later, bands, y = made
+        now, later, bands, y = entry
         # it is left behind for good
-        if not way.holds and (way.side * now[met] < 0 or not way.side * (later[met] - now[met]) > 0):
+        if not step.holds and (step.side * now[met] < 0 or not step.side * (later[met] - now[met]) > 0):
             return None
-        return way.to, bands, changes, y
+        return step.to, bands, changes, y
 
-    def _entered(self, way: _Transition, t: float, x: Array) -> _Entered | int | None:
-        """Guards now and later and their bands in the modes of a way, with the states where they are others; or the
+    def _entered(self, step: ModeChange, t: float, x: Array) -> Entry | int | None:
+        """Guards now and later and their bands in the modes of a step, with the states where they are others; or the
         number of one that is beyond its limit; None where it takes more to tell.
         """
-        to, before, y = way.to, self.bands, None
-        if way.holds:
+        to, before, y = step.to, self.bands, None
+        if step.holds:
             y = to.assembly.taking_over(x[: self._size], to.p)
             if y is None:  # what comes to hold stops something
                 return None
         states = (x if y is None else y).tolist()[: self._size]
         now, near, later = to.near(t, states, to.tick, to.moves, to.longest)
         bands = [0.0] * len(now)
-        for guard, side, other in way.watched:
+        for guard, side, other in step.watched:
             beyond, band = side * now[guard], abs(near[guard] - now[guard])
             if other and (beyond >= -band or beyond >= -before[guard]):
                 return guard if beyond > max(band, before[guard]) else None
             bands[guard] = clear_of_limit(beyond, band)
         return now, later, bands, y
 
-    def _way(self, regime: Regime, met: int) -> _Transition | None:
+    def _successor(self, regime: Regime, met: int) -> ModeChange | None:
         """Where a guard leads in the same equations."""
-        ways = regime.ways
-        found: _Transition | None = ways[met] if met in ways else ways.setdefault(met, self._find(regime, met))
-        return found
+        if met not in regime.successors:
+            regime.successors.setdefault(met, self._change_by(regime, met))
+        change: ModeChange | None = regime.successors[met]
+        return change
 
-    def _find(self, regime: Regime, met: int) -> _Transition | None:
+    def _change_by(self, regime: Regime, met: int) -> ModeChange | None:
         pairs = [pair for pair in regime.watched if pair[1].guard == met]
-        (number, ended), elements = pairs[0], self._settling.elements
-        element, leave = elements[number], ended.leave
-        before = regime.modes[number]
+        number, ended = pairs[0]
+        element, leave, before = regime.elements[number], ended.leave, regime.modes[number]
         if len(pairs) > 1 or not leave.to or leave.rebound is not None:
             return None
         holds = element.modes[leave.to].form != element.modes[before].form
         if holds and not regime.assembly.holds_by_numbers(number):
             return None
-        to = self._settling.regime((*regime.modes[:number], leave.to, *regime.modes[number + 1 :]))
-        watched = tuple((made.guard, made.side, _tells(number, ended, k, made, holds=holds)) for k, made in to.watched)
-        return _Transition(to, ended.side, watched, (element, before, leave.to), holds)
+        to = self._settling.regime(with_modes(regime.modes, {number: leave.to}))
+        watched = tuple((one.guard, one.side, _tells(number, ended, k, one, holds=holds)) for k, one in to.watched)
+        return ModeChange(to, ended.side, watched, (element, before, leave.to), holds)
 
 
-def _tells(number: int, ended: ActiveGuard, other: int, made: ActiveGuard, *, holds: bool) -> bool:
+def _tells(number: int, ended: ActiveGuard, other: int, active: ActiveGuard, *, holds: bool) -> bool:
     """Whether a guard must be within its limit where another one has led to its mode: it is not the same one.
 
     What gives way is at rest, and about to move as the torque that it has met grows.
     """
     if holds:
-        return other != number or not made.leave.by_speed
-    return made.guard != ended.guard or made.side == ended.side
+        return other != number or not active.leave.by_speed
+    return active.guard != ended.guard or active.side == ended.side

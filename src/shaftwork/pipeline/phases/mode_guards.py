@@ -37,16 +37,16 @@ class ModeGuards:
         """Each guard once."""
         self.resting = {k for k, e in enumerate(elements) if rests(form, self._parts[e.part.name], e.modes)}
         """Elements of which others hold both ends."""
-        self._known: dict[tuple[int, Expr], int] = {}
+        self._places: dict[tuple[int, Expr], int] = {}
         self._leaves: dict[tuple[int, str], tuple[ActiveGuard, ...]] = {}
         for number, element in enumerate(elements):
             part = self._parts[element.part.name]
             for mode in element.modes.options:
                 if forms[number] in (None, mode.form):
-                    holds = forms[number] is None and mode.form != element.modes.options[0].form
+                    holds = forms[number] is None and element.joins(mode.name)
                     still = {ACROSS: Integer(0)} if holds or number in self.resting else {}
                     self._leaves[number, mode.name] = tuple(self._leaving(number, part, mode, still))
-        self.owners = {made.guard: k for (k, _), found in self._leaves.items() for made in found}
+        self.owners = {active.guard: k for (k, _), guards in self._leaves.items() for active in guards}
         """The element of each guard."""
         self._sides: dict[ModeNames, Array] = {}
         self._ends: dict[ModeNames, tuple[tuple[int, ActiveGuard], ...]] = {}
@@ -75,16 +75,16 @@ class ModeGuards:
                     f"{mode.words}. Take one that has, as 1 / (0.1 + omega**2) has for 1 / omega**2."
                 ) from error
             for side, expression in ((1.0, when), (-1.0, -when)):
-                known = self._known.get((number, expression))
-                if known is not None and known not in taken:
-                    watched = ActiveGuard(known, side, leave)
+                place = self._places.get((number, expression))
+                if place is not None and place not in taken:
+                    active = ActiveGuard(place, side, leave)
                     break
             else:
                 self.expressions.append(when)
-                watched = ActiveGuard(len(self.expressions) - 1, 1.0, leave)
-                self._known.setdefault((number, when), watched.guard)
-            taken.append(watched.guard)
-            yield watched
+                active = ActiveGuard(len(self.expressions) - 1, 1.0, leave)
+                self._places.setdefault((number, when), active.guard)
+            taken.append(active.guard)
+            yield active
 
     def _holding(self, part: GraphPart, element: Modes) -> Expr:
         """The torque of the one friction that holds an element at rest, with the sign that its own would have."""
@@ -97,14 +97,14 @@ class ModeGuards:
     def watched(self, modes: ModeNames) -> tuple[tuple[int, ActiveGuard], ...]:
         """Element and guard of everything that may end one of the modes."""
         if modes not in self._ends:
-            self._ends[modes] = tuple((k, made) for k, name in enumerate(modes) for made in self._leaves[k, name])
+            self._ends[modes] = tuple((k, active) for k, name in enumerate(modes) for active in self._leaves[k, name])
         return self._ends[modes]
 
     def sides(self, modes: ModeNames) -> Array:
         """(guards,) the side of each guard that ends one of the modes."""
         if modes not in self._sides:
             sides = np.zeros(len(self.expressions))
-            for _, made in self.watched(modes):
-                sides[made.guard] = made.side
+            for _, active in self.watched(modes):
+                sides[active.guard] = active.side
             self._sides[modes] = sides
         return self._sides[modes]

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from functools import cached_property, partial
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -15,10 +15,15 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.linearization import Linearization, refuse_waves
 from shaftwork.codegen.model import CompiledModel, Cost
 from shaftwork.codegen.operating import another_start, steady_state
+from shaftwork.codegen.linear import Linearization, refuse_waves
+from shaftwork.codegen.model import CompiledModel
+from shaftwork.codegen.operating import another_start, energy_weights, lasting, steady_state
 from shaftwork.codegen.start_values import initial_state
-from shaftwork.core.errors import CompileError, SimulationError
+from shaftwork.core.errors import CompileError, NetworkWarning, SimulationError
+from shaftwork.core.notices import warn
 from shaftwork.core.parameters import in_si
 from shaftwork.equations.records import NamedPhase
+from shaftwork.network.wording import listed
 from shaftwork.pipeline.analysis import (
     Given,
     Names,
@@ -33,12 +38,13 @@ from shaftwork.pipeline.analysis import (
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.event_iteration import EventIteration
+from shaftwork.pipeline.phases.exceeded_guards import passes_limit
 from shaftwork.pipeline.phases.hybrid_state import HybridState
-from shaftwork.pipeline.phases.names import known_modes, modes_in, whole_name, words_of
+from shaftwork.pipeline.phases.named_phases import known_modes, modes_in, whole_name, words_of
 from shaftwork.pipeline.phases.phases import Phases
 from shaftwork.pipeline.phases.run import HybridRun
 from shaftwork.pipeline.phases.solution import solution
-from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels, warn_of_held_torques
+from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels
 from shaftwork.pipeline.sizes import in_its_size
 from shaftwork.reduction.form import StateForm
 from shaftwork.results.linear import LinearModel, linear_model
@@ -46,6 +52,8 @@ from shaftwork.results.solution import Solution
 
 MOST_CHANGES = 100
 """Changes of mode on the way to a steady operation."""
+LEFT = 1e-3
+"""What is left of a disturbance in a torque is more than this fraction where it stays: rounding leaves some 1e-4."""
 
 
 class PhaseModel(CompiledModel):
@@ -62,12 +70,30 @@ class PhaseModel(CompiledModel):
     def __init__(self, form: StateForm, name: str, numbers: Mapping[str, float]) -> None:
         super().__init__(form)
         self.name = name
-        known = {key: value for key, value in numbers.items() if key in self.parameters}
-        self.parameters = MappingProxyType({**self.parameters, **known})
+        of_laws = {key: value for key, value in numbers.items() if key in self.parameters}
+        self.parameters = MappingProxyType({**self.parameters, **of_laws})
         self.defaults = np.array(list(self.parameters.values()), dtype=float)
 
     def __repr__(self) -> str:
         return f"<PhaseModel of '{self.form.graph.name}', {self.name}: {', '.join(self.states) or 'no states'}>"
+
+
+def _of_a_phase(what: str) -> Any:
+    """What one phase has and a whole network has not."""
+
+    def refuse(self: PhasedModel, *_args: Any, **_options: Any) -> NoReturn:
+        """There is one for each phase.
+
+        Raises:
+            CompileError: always; says how to choose the phase.
+        """
+        graph = self.form.graph
+        raise CompileError(
+            f"model.{what} of '{self.name}': parts change their mode, and each phase has equations of its own. Name "
+            f"one, model.phase('{whole_name(graph)}').{what}, or a row of sol.phases. {known_modes(graph)}"
+        )
+
+    return refuse
 
 
 class PhasedModel(Model):
@@ -94,61 +120,8 @@ class PhasedModel(Model):
             self._phase_models[whole] = PhaseModel(form, whole, numbers)
         return self._phase_models[whole]
 
-    def rhs(self, t: float, x: Array, p: Array | None = None) -> Array:  # noqa: ARG002
-        """There is one for each phase.
-
-        Raises:
-            CompileError: always; says how to choose the phase.
-        """
-        raise self._of_a_phase("rhs")
-
-    def jacobian(self, t: float, x: Array, p: Array | None = None) -> Any:  # noqa: ARG002
-        """There is one for each phase.
-
-        Raises:
-            CompileError: always; says how to choose the phase.
-        """
-        raise self._of_a_phase("jacobian")
-
-    def cost(self) -> Cost:
-        """There is one for each phase.
-
-        Raises:
-            CompileError: always; says how to choose the phase.
-        """
-        raise self._of_a_phase("cost()")
-
-    @property
-    def code(self) -> str:
-        """There is one for each phase.
-
-        Raises:
-            CompileError: always; says how to choose the phase.
-        """
-        raise self._of_a_phase("code")
-
-    def source(self, language: str = "numpy") -> str:  # noqa: ARG002
-        """There is one for each phase.
-
-        Raises:
-            CompileError: always; says how to choose the phase.
-        """
-        raise self._of_a_phase("source()")
-
-    def compiled(self) -> Any:
-        """There is one for each phase.
-
-        Raises:
-            CompileError: always; says how to choose the phase.
-        """
-        raise self._of_a_phase("compiled()")
-
-    def _of_a_phase(self, what: str) -> CompileError:
-        graph = self.form.graph
-        return CompileError(
-            f"model.{what} of '{self.name}': parts change their mode, and each phase has equations of its own. Name "
-            f"one, model.phase('{whole_name(graph)}').{what}, or a row of sol.phases. {known_modes(graph)}"
-        )
+    rhs, jacobian, cost, source, compiled = map(_of_a_phase, ("rhs", "jacobian", "cost()", "source()", "compiled()"))
+    code = property(_of_a_phase("code"))
 
     @cached_property
     def phases(self) -> Phases:
@@ -158,7 +131,7 @@ class PhasedModel(Model):
     def _motion(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
         first = self.phases.assembly(self.phases.first)
         prepared = first.prepared(first.vector(values, {}))
-        return in_its_size(first.model.form, prepared, demand, lambda made: self._run_through(values, initial, made))
+        return in_its_size(first.model.form, prepared, demand, lambda sized: self._run_through(values, initial, sized))
 
     def _run_through(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
         run = HybridRun(self.phases, values, demand)
@@ -184,22 +157,23 @@ class PhasedModel(Model):
         first = self.phases.assembly(self.phases.first)
         when = t if math.isfinite(t) else first.model.settled(first.vector(values, {}))
         settling = EventIteration(self.phases, values, (0.0, 1.0))
-        moment = self._moment(settling, when, initial)
+        p = settling.regime(self.phases.first).p
+        moment = settling.started(when, initial_state(first.bound(p), initial or {}, when))
+        moment, _ = settling.settle(when, when, moment, None)
         for _ in range(MOST_CHANGES):
             bound = moment.regime.assembly.bound(moment.regime.p)
             if not math.isfinite(t):
                 refuse_moving(bound, when, moment.regime.assembly.model.switching)
-            x = moment.x
-            if x.size:
-                x = steady_state(bound, x, when, ends=partial(settling.ends, moment, when))
-            beyond = settling.ends(moment, when, x)
+            ends = partial(_ends, moment, when)
+            x = steady_state(bound, moment.x, when, ends=ends) if moment.x.size else moment.x
+            beyond = ends(x)
             moment, changes = settling.settle(when, when, moment._replace(x=x), None)
             if not (changes or beyond):
                 if not math.isfinite(t):
                     assembly = moment.regime.assembly
                     warn_of_earlier_levels(assembly.bound(moment.regime.p), moment.x, when, assembly.model.switching)
-                warn_of_held_torques(moment.regime, self.phases.elements, moment.x, when)
-                return SteadyState(settling.held(moment, when), when)
+                warn_of_held_torques(moment, when)
+                return SteadyState(settling.stored(moment, when), when)
         raise SimulationError(
             f"No steady operation was found: after {MOST_CHANGES} changes of its modes '{self.name}' still goes on, "
             f"with {self.words(moment)}. {another_start(self.form)}"
@@ -225,8 +199,7 @@ class PhasedModel(Model):
         if isinstance(at, Solution):
             time, stored = moment_of(at, self.states)
             time = time if t is None else in_si("t", t, "s")
-            held = dict(zip(self.states, stored.tolist(), strict=True))
-            x = first.stores.states(first.bound(p), time, held)
+            x = first.stores.states(first.bound(p), time, dict(zip(self.states, stored.tolist(), strict=True)))
         else:
             usual = 0.0 if at is None else first.model.settled(p)  # what rests has not begun to move
             time, x = operating_point(first.model, p, at, t, usual)
@@ -254,8 +227,39 @@ class PhasedModel(Model):
         first = self.phases.assembly(self.phases.first)
         return first.bound(first.vector(values, {}))
 
-    def _moment(self, settling: EventIteration, t: float, initial: Given) -> HybridState:
-        first = self.phases.assembly(self.phases.first)
-        p = settling.regime(self.phases.first).p
-        moment = settling.started(t, initial_state(first.bound(p), initial or {}, t))
-        return settling.settle(t, t, moment, None)[0]
+
+def _ends(moment: HybridState, t: float, x: Array) -> bool:
+    return passes_limit(moment._replace(x=x), t)
+
+
+def warn_of_held_torques(moment: HybridState, when: float) -> None:
+    """Warn where what sticks can hold other torques as well: a spring between two of them, or from one to the frame.
+
+    The states are disturbed, and of that is read what is left for ever: it tells equilibria side by side.
+
+    Args:
+        moment: the steady state.
+        when: time at which laws are read, s.
+    """
+    regime, x = moment.regime, moment.x
+    holding = [
+        (regime.elements[k].name, active.guard)
+        for k, active in regime.watched
+        if active.leave.by_torque and len(regime.elements[k].modes[regime.modes[k]].gives_way) > 1
+    ]
+    if not (holding and x.size):
+        return
+    bound = regime.assembly.bound(regime.p)
+    shares = np.random.default_rng(0).uniform(1.0, 2.0, x.size)  # no state makes up for another
+    disturbed = shares / energy_weights(bound)
+    left = lasting(bound, x, disturbed, when)
+    now, soon, late = (np.array(regime.limits(when, (x + change).tolist())) for change in (0 * x, disturbed, left))
+    moves = np.abs(late - now) > LEFT * np.abs(soon - now).max()
+    if names := tuple(dict.fromkeys(name for name, guard in holding if moves[guard])):
+        network = bound.program.form.graph.name
+        warn(
+            f"steady_state() of '{network}': {listed(names)} can hold within a range, so the torques given are one of "
+            "many that last; which of them stays depends on how the drive came to rest, and simulate(...) gives that "
+            "of its own motion.",
+            NetworkWarning,
+        )

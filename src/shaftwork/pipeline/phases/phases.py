@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,22 +16,17 @@ from shaftwork.integrate import choice
 from shaftwork.integrate.engines import ADAMS, available
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.netlist import Netlist
+from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.assemblies import ModeEquations
-from shaftwork.pipeline.phases.held import MANY, HeldAssembly, holds, laws_that_hold
-from shaftwork.pipeline.phases.mode_machines import ModeNames, elements_of
-from shaftwork.pipeline.phases.regimes import with_modes
+from shaftwork.pipeline.phases.hybrid_waves import WaveAssembly
+from shaftwork.pipeline.phases.mode_machines import ModeNames, elements_of, with_modes
+from shaftwork.pipeline.phases.reactions import MANY, HeldAssembly, laws_that_hold
 from shaftwork.pipeline.phases.resting import at_rest
-from shaftwork.pipeline.phases.wave_assembly import WaveAssembly
 from shaftwork.pipeline.waves import engine_of_waves
 from shaftwork.reduction.value_diagnosis import self_locks
 from shaftwork.pipeline.wave_motion import engine_of_waves
 from shaftwork.reduction.cancelling import self_locks
 
-if TYPE_CHECKING:
-    from shaftwork.pipeline.model import Model
-
-# Engines that follow guards. An error grows with every change of mode, by some hundreds through sixty contacts, so
-# they run with this part of the tolerance that is asked for, and with no looser one than the second number.
 FOLLOWING = {
     "heyoka": (1.0, 1e-12),  # the cost grows only with the logarithm
     "scipy": (1 / 30, 1e-7),
@@ -41,8 +35,10 @@ FOLLOWING = {
     ADAMS: (1 / 100, 1e-8),
     "wave": (1.0, 1e-6),  # its panels leave out a tenth of the tolerance
 }
-# A speed that is no more than this, where all speeds are about 1, is none.
+"""Engines that follow guards. An error grows with every change of mode, by some hundreds through sixty contacts, so
+they run with this part of the tolerance that is asked for, and with no looser one than the second number."""
 STILL = 1e-9
+"""A speed that is no more than this, where all speeds are about 1, is none."""
 _ENGINES = ", ".join(name for name in FOLLOWING if name not in (ADAMS, "wave"))
 
 
@@ -56,15 +52,15 @@ class Phases:
 
     def __init__(self, base: Model, rebuild: Callable[[Netlist], Model]) -> None:
         self.netlist, self._rebuild = base.netlist, rebuild
-        self.elements = elements_of(base)
-        self.first: ModeNames = tuple(element.modes.options[0].name for element in self.elements)
+        self.elements = elements_of(base.form.graph)
+        self.first: ModeNames = tuple(element.first for element in self.elements)
         self._assemblies: dict[tuple[str, ...], ModeEquations | NetworkError] = {}
-        self._wholes: dict[tuple[str, ...], HeldAssembly | None] = {}
-        self._held: dict[tuple[tuple[str, ...], tuple[int, ...]], HeldAssembly] = {}
+        self._slipping: dict[tuple[str, ...], HeldAssembly | None] = {}
+        self._holding: dict[tuple[tuple[str, ...], tuple[int, ...]], HeldAssembly] = {}
         self._engines: dict[tuple[ModeEquations, ModeNames, str], tuple[str, str]] = {}
         self._easy: dict[ModeEquations, dict[tuple[int, str], tuple[str, str]]] = {}
-        self.found = Kept[Any, Any](1)
-        """What the last run has found out, by its values and times: the next like it goes on with that."""
+        self.last_run = Kept[Any, Any](1)
+        """What the last run has learned, by its values and times: the next like it goes on with that."""
 
     def assembly(self, modes: ModeNames) -> ModeEquations:
         """The equations for a combination of modes.
@@ -81,14 +77,14 @@ class Phases:
                     if (resting := at_rest(netlist, model.form)) is not netlist:
                         model = self._rebuild(resting)
                 kind = WaveAssembly if model.form.waves else ModeEquations
-                made: ModeEquations | NetworkError = kind(model, self.elements, forms)
+                assembly: ModeEquations | NetworkError = kind(model, self.elements, forms)
             except NetworkError as error:
-                made = error
-            self._assemblies.setdefault(forms, made)  # another thread may have been first
-        made = self._assemblies[forms]
-        if isinstance(made, NetworkError):
-            raise made.with_traceback(None)  # else it would keep the frames of every time that it was raised
-        return made
+                assembly = error
+            self._assemblies.setdefault(forms, assembly)  # another thread may have been first
+        assembly = self._assemblies[forms]
+        if isinstance(assembly, NetworkError):
+            raise assembly.with_traceback(None)  # else it would keep the frames of every time that it was raised
+        return assembly
 
     def running(self, modes: ModeNames, values: Mapping[str, float], engine: str) -> ModeEquations:
         """The equations in which a motion goes on: those of `assembly`, or one set for all that hold.
@@ -101,35 +97,38 @@ class Phases:
         Raises:
             NetworkError: as there.
         """
-        if not self._holding:
+        able = [k for k, element in enumerate(self.elements) if element.holds]
+        if not able:
             return self.assembly(modes)
-        held = tuple(k for k in self._holding if self._form(k, modes) != self._form(k, self.first))
-        forms = tuple(self._form(k, modes) for k in self._lasting)
-        if forms not in self._wholes:
-            self._wholes[forms] = self._whole(with_modes(modes, {k: self.first[k] for k in held}))
-        whole = self._wholes[forms]
-        if whole is None or not (whole.suits(engine) or (len(self._holding) >= MANY and engine != "heyoka")):
+        holding = tuple(k for k in able if self.elements[k].joins(modes[k]))
+        free = with_modes(modes, {k: self.first[k] for k in holding})
+        forms = tuple(element.modes[name].form for element, name in zip(self.elements, free, strict=True))
+        if forms not in self._slipping:
+            self._slipping[forms] = self._all_slipping(free)
+        slipping = self._slipping[forms]
+        if slipping is None or not (slipping.suits(engine) or (len(able) >= MANY and engine != "heyoka")):
             return self.assembly(modes)
-        if self_locks(whole.model.form, {**whole.model.parameters, **values}):
+        if self_locks(slipping.model.form, {**slipping.model.parameters, **values}):
             return self.assembly(modes)  # whether it jams depends on what is held
-        if (forms, held) not in self._held:
-            self._held[forms, held] = whole.holding(held)
-        made = self._held[forms, held]
-        p = made.vector(values, self.numbers(modes))
+        if (forms, holding) not in self._holding:
+            self._holding[forms, holding] = slipping.holding(holding)
+        assembly = self._holding[forms, holding]
+        p = assembly.vector(values, self.numbers(modes))
         # where parts share what they hold, the first carries as much as it can
-        return made if made.joints(p).independent and not self._rests(made, modes, p) else self.assembly(modes)
+        independent = assembly.joints(p).independent and not self._rests(assembly, modes, p)
+        return assembly if independent else self.assembly(modes)
 
-    def _rests(self, made: HeldAssembly, modes: ModeNames, p: Array) -> bool:
+    def _rests(self, assembly: HeldAssembly, modes: ModeNames, p: Array) -> bool:
         """Whether what has another law at rest slips by its mode, and yet cannot turn as others hold its ends."""
         pairs = enumerate(zip(self.elements, modes, strict=True))
         slipping = [k for k, (element, name) in pairs if element.modes[name].at_rest is not None]
         if not slipping:
             return False
-        x = np.random.default_rng(0).uniform(1.0, 2.0, len(made.model.states))  # no two alike by chance
-        speeds = made.across(slipping, 0.0, made.joints(p).alike(x), p)
+        x = np.random.default_rng(0).uniform(1.0, 2.0, len(assembly.model.states))  # no two alike by chance
+        speeds = assembly.across(slipping, 0.0, assembly.joints(p).alike(x), p)
         return any(abs(speed) < STILL for speed in speeds)
 
-    def _whole(self, free: ModeNames) -> HeldAssembly | None:
+    def _all_slipping(self, free: ModeNames) -> HeldAssembly | None:
         """One set of equations for all that hold, from the modes in which none does; None where there is none."""
         try:
             model = self.assembly(free).model
@@ -137,19 +136,6 @@ class Phases:
             return None
         laws = laws_that_hold(model, self.elements)
         return None if laws is None else HeldAssembly(model, self.elements, laws)
-
-    @cached_property
-    def _holding(self) -> tuple[int, ...]:
-        """Elements for which a reaction may stand."""
-        return tuple(k for k, element in enumerate(self.elements) if holds(element))
-
-    @cached_property
-    def _lasting(self) -> tuple[int, ...]:
-        """All other elements."""
-        return tuple(k for k in range(len(self.elements)) if k not in self._holding)
-
-    def _form(self, number: int, modes: ModeNames) -> str:
-        return self.elements[number].modes[modes[number]].form
 
     def _netlist(self, forms: tuple[str, ...]) -> Netlist:
         chosen: dict[str, tuple[ModeChoice, ...]] = {}
@@ -163,7 +149,7 @@ class Phases:
         return {element.number: element.modes[name].value for element, name in pairs}
 
     def engine(
-        self, assembly: ModeEquations, modes: ModeNames, problem: Callable[[], Problem], asked: str
+        self, assembly: ModeEquations, modes: ModeNames, problem: Callable[[], Problem], engine: str
     ) -> tuple[str, str]:
         """The engine for a phase, and why: a light wheel that runs free is no trouble, and stiff in contact.
 
@@ -171,27 +157,27 @@ class Phases:
             assembly: the equations.
             modes: in which they are solved.
             problem: makes the motion from there on, which is looked at once for these modes.
-            asked: name of an engine, or "auto".
+            engine: its name, or "auto".
 
         Raises:
             ParameterError: the one that is asked for follows no modes.
         """
         if assembly.model.form.waves:
-            return engine_of_waves(asked)
+            return engine_of_waves(engine)
         assembly, modes = assembly.alike(modes)
-        key = assembly, modes, asked
-        if asked != "auto":
-            choice.check(asked)
-            if asked not in FOLLOWING or asked == "wave":
+        key = assembly, modes, engine
+        if engine != "auto":
+            choice.check(engine)
+            if engine not in FOLLOWING or engine == "wave":
                 raise ParameterError(
-                    f"The engine '{asked}' follows no parts that change their mode "
+                    f"The engine '{engine}' follows no parts that change their mode "
                     f"({', '.join(element.name for element in self.elements)}). Take one of: {_ENGINES}."
                 )
-            if asked != "sundials":
-                return asked, "asked for"
+            if engine != "sundials":
+                return engine, "asked for"
             if key not in self._engines:
                 adams = ADAMS, "asked for; the motion is not stiff, so Adams' formulas are taken."
-                self._engines[key] = (asked, "asked for") if choice.is_stiff(problem()) else adams
+                self._engines[key] = (engine, "asked for") if choice.is_stiff(problem()) else adams
             return self._engines[key]
         if key not in self._engines:
             easy = self._easy.setdefault(assembly, {})

@@ -3,29 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from sympy import Integer
 
-from shaftwork.codegen.elements import Array
 from shaftwork.components.branches import INTEGRAL
 from shaftwork.core.errors import NetworkError, ParameterError, SimulationError
 from shaftwork.pipeline.motion_start import Ending
+from shaftwork.pipeline.ending import Ending
+from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.hybrid_state import AHEAD_OF_RUN, ROUNDINGS, HybridState, Regime
-from shaftwork.pipeline.phases.mode_machines import ModeMachine, ModeNames
+from shaftwork.pipeline.phases.mode_machines import ModeNames, with_modes
+from shaftwork.pipeline.phases.phases import Phases
 from shaftwork.pipeline.phases.starts import begins_anew
 from shaftwork.pipeline.start import Ending
 from shaftwork.reduction.value_diagnosis import jamming
 from shaftwork.reduction.cancelling import jamming
 
-if TYPE_CHECKING:
-    from shaftwork.pipeline.phases.assemblies import ModeEquations
-    from shaftwork.pipeline.phases.phases import Phases
-
-# How far in rad a motion may start beyond a rigid limit: what errors and printed digits of another run leave there.
 BEYOND = 1e-6
+"""How far in rad a motion may start beyond a rigid limit: errors and printed digits of another run leave so much."""
 
 
 class Regimes:
@@ -46,8 +43,9 @@ class Regimes:
         equations: Callable[[ModeNames], ModeEquations],
     ) -> None:
         self._phases, self._values, self._equations = phases, dict(values), equations
+        self.first, self.elements = phases.first, phases.elements
         self._times = ROUNDINGS * math.ulp(max(map(abs, span))), AHEAD_OF_RUN * (span[1] - span[0])
-        self._made: dict[ModeNames, Regime] = {}
+        self._regimes: dict[ModeNames, Regime] = {}
 
     def regime(self, modes: ModeNames) -> Regime:
         """A combination of modes.
@@ -55,23 +53,15 @@ class Regimes:
         Raises:
             NetworkError: the equations of these modes contradict each other, or a gear jams in them.
         """
-        if modes not in self._made:
+        if modes not in self._regimes:
             assembly = self._equations(modes)
             form, p = assembly.model.form, assembly.vector(self._values, self._phases.numbers(modes))
             if self._values and (jammed := tuple(jamming(form, {**assembly.model.parameters, **self._values}))):
                 raise NetworkError(f"'{form.graph.name}' cannot be assembled", jammed)
-            made = Regime(
-                modes,
-                assembly,
-                p,
-                *assembly.motion(p),
-                assembly.sides(modes),
-                assembly.sizes(p),
-                assembly.watched(modes),
-                *self._times,
-            )
-            self._made.setdefault(modes, made)  # another thread may have been first
-        return self._made[modes]
+            sides, sizes, watched = assembly.sides(modes), assembly.sizes(p), assembly.watched(modes)
+            regime = Regime(modes, assembly, p, *assembly.motion(p), sides, sizes, watched, *self._times)
+            self._regimes.setdefault(modes, regime)  # another thread may have been first
+        return self._regimes[modes]
 
     def possible(self, modes: ModeNames) -> bool:
         """Whether the equations of these modes agree with each other."""
@@ -88,51 +78,31 @@ class Regimes:
         """
         if self.possible(with_modes(modes, joins)):
             return joins
-        held: dict[int, str] = {}
+        joined: dict[int, str] = {}
         for k, name in joins.items():
-            if self.possible(with_modes(modes, {**held, k: name})):
-                held[k] = name
-        return held
+            if self.possible(with_modes(modes, {**joined, k: name})):
+                joined[k] = name
+        return joined
 
-    def held(self, moment: HybridState, t: float) -> dict[str, float]:
+    def stored(self, moment: HybridState, t: float) -> dict[str, float]:
         """All that is stored, and what arrives by waves, by name."""
         assembly, p = moment.regime.assembly, moment.regime.p
         values = assembly.stores.of(lambda: assembly.bound(p), np.array([t]), moment.x[None, :])[0]
         return dict(zip(assembly.stores.names, values.tolist(), strict=True)) | assembly.arriving(moment.x)
 
-    def taking(self, modes: ModeNames, t: float, held: Mapping[str, float]) -> HybridState:
+    def differ(self, t: float, one: HybridState, other: HybridState, least: float) -> bool:
+        """Whether what is stored at two moments of one time differs by more than so much."""
+        stored, others = self.stored(one, t), self.stored(other, t)
+        return any(abs(others[name] - value) > least for name, value in stored.items())
+
+    def taking(self, modes: ModeNames, t: float, stored: Mapping[str, float]) -> HybridState:
         """A moment in the given modes that takes up what was stored, with the inputs of a time in s.
 
         Raises:
             NetworkError: the equations of these modes contradict each other.
         """
         new = self.regime(modes)
-        return HybridState(new, new.assembly.taking(t, held, new.p))
-
-    def resumed(self, ending: Ending) -> HybridState:
-        """The moment at which another motion ended, in its modes.
-
-        An element begins anew, as at a start, where a parameter has changed that says in which mode it starts.
-
-        Raises:
-            ParameterError: something is stored that it did not store, or a twist lies beyond a rigid limit.
-        """
-        first, elements, t = self._phases.first, self._phases.elements, ending.read
-        loose = self.regime(first)
-        ending.refuse_lacking(loose.assembly.stores.names)
-        parameters = dict(zip(loose.assembly.model.parameters, loose.p.tolist(), strict=True))
-        changed = ending.changed(parameters) - {element.number for element in elements}
-        apart = self.taking(first, t, ending)
-        if changed:
-            refuse_beyond(loose, elements, t, apart.x)
-        anew = [
-            begins_anew(e.part.name, e.modes, ending.modes.get(e.name), t, ending.parameters, parameters)
-            for e in elements
-        ]
-        fresh = loose.assembly.first_modes(t, apart.x, loose.p) if any(anew) else first
-        triples = zip(anew, fresh, elements, strict=True)
-        modes = tuple(name if begins else ending.modes[e.name] for begins, name, e in triples)
-        return self.taking(modes if self.possible(modes) else first, t, ending)
+        return HybridState(new, new.assembly.taking(t, stored, new.p))
 
     def changed(self, moment: HybridState, t: float, modes: ModeNames) -> HybridState:
         """The same instant in other modes: all that is stored goes over.
@@ -143,44 +113,61 @@ class Regimes:
         new = self.regime(modes)
         if new.assembly is moment.regime.assembly:
             return HybridState(new, moment.x)
-        return self.taking(modes, t, self.held(moment, t))
+        return self.taking(modes, t, self.stored(moment, t))
+
+    def resumed(self, ending: Ending) -> HybridState:
+        """The moment at which another motion ended, in its modes.
+
+        An element begins anew, as at a start, where a parameter has changed that says in which mode it starts.
+
+        Raises:
+            ParameterError: something is stored that it did not store, or a twist lies beyond a rigid limit.
+        """
+        first, t, loose = self.first, ending.read, self.regime(self.first)
+        ending.refuse_lacking(loose.assembly.stores.names)
+        parameters = dict(zip(loose.assembly.model.parameters, loose.p.tolist(), strict=True))
+        apart = self.taking(first, t, ending)
+        if ending.changed(parameters) - {element.number for element in self.elements}:
+            refuse_beyond(apart, t)
+        anew = [
+            begins_anew(e.part.name, e.modes, ending.modes.get(e.name), t, ending.parameters, parameters)
+            for e in self.elements
+        ]
+        fresh = loose.assembly.first_modes(t, apart.x, loose.p) if any(anew) else first
+        triples = zip(anew, fresh, self.elements, strict=True)
+        modes = tuple(name if begins else ending.modes[e.name] for begins, name, e in triples)
+        return self.taking(modes if self.possible(modes) else first, t, ending)
 
 
-def anew(elements: Sequence[ModeMachine], moment: HybridState, t: float, number: int) -> str:
+def anew(moment: HybridState, t: float, number: int) -> str:
     """The mode of an element in which a motion would start, other than the one that ends."""
     regime, before = moment.regime, moment.regime.modes[number]
     for late in (0.0, regime.ahead(moment.course(t)[2])):  # by rounding, what ends the mode may not be true yet
         to = regime.assembly.start_of(number, before, t + late, moment.moved(t, late).x, regime.p)
         if to:
             return to
-    element = elements[number]
+    element = regime.elements[number]
     raise SimulationError(
         f"'{element.name}' is no more {element.modes[before].words} at t = {t:.9g} s, and starts in none of its "
         "other modes. Give one of them a condition that holds there, Mode(starts=...)."
     )
 
 
-def with_modes(modes: ModeNames, changed: Mapping[int, str]) -> ModeNames:
-    """A combination of modes with some of them changed."""
-    return tuple(changed.get(k, name) for k, name in enumerate(modes))
-
-
-def refuse_beyond(regime: Regime, elements: Sequence[ModeMachine], t: float, x: Array) -> None:
+def refuse_beyond(moment: HybridState, t: float) -> None:
     """Refuse a start beyond a rigid limit, where no motion leads.
 
     Args:
-        regime: of the modes in which nothing is joined.
-        elements: of the network.
+        moment: in the modes in which nothing is joined.
         t: s.
-        x: (n,) states.
 
     Raises:
         ParameterError: names the part, its twist and the limit.
     """
-    now = regime.limits(t, x.tolist())
-    for number, made in regime.watched:
-        element, when, beyond = elements[number], made.leave.when, made.side * now[made.guard]
-        if made.leave.rebound is None or not beyond > BEYOND:
+    regime = moment.regime
+    now = regime.limits(t, moment.x.tolist())
+    for number, active in regime.watched:
+        element, when, beyond = regime.elements[number], active.leave.when, active.side * now[active.guard]
+        if active.leave.rebound is None or not beyond > BEYOND:
             continue
         slope = float(when.diff(INTEGRAL))
         limit = -slope * regime.constant(number, when.xreplace({INTEGRAL: Integer(0)}))

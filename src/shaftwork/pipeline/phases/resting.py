@@ -24,17 +24,17 @@ def at_rest(netlist: Netlist, form: StateForm) -> Netlist:
         form: of the same network.
     """
     parts = {part.name: part for part in form.graph.parts}
-    held: dict[str, tuple[ModeChoice, ...]] = {}
+    resting: dict[str, tuple[ModeChoice, ...]] = {}
     for item in netlist.placed:
         part = parts[item.part.name]
         pairs = zip(part.modes, item.choices, strict=False)  # nothing is chosen for what has no modes
-        made = tuple(_held(form, part, element, choice) for element, choice in pairs)
-        if made != item.choices:
-            held[part.name] = made
-    return netlist.with_choices(held) if held else netlist
+        choices = tuple(_choice_at_rest(form, part, element, choice) for element, choice in pairs)
+        if choices != item.choices:
+            resting[part.name] = choices
+    return netlist.with_choices(resting) if resting else netlist
 
 
-def _held(form: StateForm, part: GraphPart, element: Modes, choice: ModeChoice) -> ModeChoice:
+def _choice_at_rest(form: StateForm, part: GraphPart, element: Modes, choice: ModeChoice) -> ModeChoice:
     """What is chosen for an element, in the form of rest where it has one and is at rest."""
     forms = (mode.at_rest for mode in element.options if mode.form == choice.form and mode.at_rest is not None)
     other = next(forms, None)
@@ -53,8 +53,8 @@ def joints_across(form: StateForm, part: GraphPart, element: Modes) -> Mapping[i
     first, second = (_potential(form, part, end) for end in part.ends_of(element))
     if first is None or second is None:
         return None
-    ways = {tree: add(first.get(tree, 0), -second.get(tree, 0), []) for tree in dict.fromkeys(chain(first, second))}
-    joints = {tree: value_of(share) for tree, share in ways.items() if share != 0}
+    path = {tree: add(first.get(tree, 0), -second.get(tree, 0), []) for tree in dict.fromkeys(chain(first, second))}
+    joints = {tree: value_of(share) for tree, share in path.items() if share != 0}
     rigid = all(form.graph.branches[tree].template.kind is Kind.COUPLING for tree in joints)
     return joints if rigid else None
 

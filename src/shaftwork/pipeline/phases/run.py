@@ -27,20 +27,22 @@ from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.implicit import PRESCRIBED, at_rest
 from shaftwork.pipeline.motion_start import Ending, start_of
 from shaftwork.pipeline.phases.assemblies import ModeEquations
-from shaftwork.pipeline.phases.commutation import is_switch, takeovers
+from shaftwork.pipeline.phases.commutation import takeovers
 from shaftwork.pipeline.phases.event_iteration import EventIteration
 from shaftwork.pipeline.phases.hybrid_state import Change, HybridState, Regime, Transition
+from shaftwork.pipeline.phases.hybrid_waves import WaveRun
 from shaftwork.pipeline.phases.in_place_events import InPlaceEvents, Phase
-from shaftwork.pipeline.phases.mode_machines import NO_IMPACT
+from shaftwork.pipeline.phases.mode_machines import NO_IMPACT, with_modes
 from shaftwork.pipeline.phases.phases import FOLLOWING, Phases
-from shaftwork.pipeline.phases.regimes import with_modes
 from shaftwork.pipeline.phases.starts import refuse_incomplete, warn_of_what_may_have_begun
 from shaftwork.pipeline.phases.wave_run import WaveRun
 from shaftwork.pipeline.wave_motion import CarriedWaves, WaveStart
+from shaftwork.pipeline.start import start_of
+from shaftwork.pipeline.waves import CarriedWaves, WaveStart
 
-# So many changes of mode, each within this part of the run of the one before, are chatter. Rebounds come ever faster,
-# too, before they end: a thousand of them where nearly all speed is given back.
 CHATTER = ((200, 1e-9), (3000, 1e-6))
+"""So many changes of mode, each within this part of the run of the one before, are chatter. Rebounds come ever faster,
+too, before they end: a thousand of them where nearly all speed is given back."""
 SELDOM = max(part for _, part in CHATTER)
 TIGHTEST_RTOL = 1e-14
 
@@ -59,7 +61,7 @@ class Span:
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class Shared:
     """What runs with the same values over the same time share.
 
     Args:
@@ -73,14 +75,6 @@ class Known:
     begins: list[Transition] = field(default_factory=list)
 
 
-def _known(phases: Phases, values: Mapping[str, float], demand: Demand, *, own: bool) -> Known:
-    """What the last run with these values over the same time has found out, or nothing yet."""
-    equations = None if own else partial(phases.running, values=values, engine=demand.engine)
-    key = tuple(sorted(values.items())), demand.span, own, demand.engine
-    made: Known = phases.found(key, lambda: Known(EventIteration(phases, values, demand.span, equations)))
-    return made
-
-
 class HybridRun:
     """One motion through its phases.
 
@@ -88,13 +82,19 @@ class HybridRun:
         phases: the sets of equations.
         values: parameters that differ from the network's.
         demand: what is asked.
-        own: whether each combination of modes has equations of its own.
+        by_combination: whether each combination of modes has equations of its own.
     """
 
-    def __init__(self, phases: Phases, values: Mapping[str, float], demand: Demand, *, own: bool = False) -> None:
+    def __init__(
+        self, phases: Phases, values: Mapping[str, float], demand: Demand, *, by_combination: bool = False
+    ) -> None:
         self.phases, self.demand = phases, demand
-        self._known = _known(phases, values, demand, own=own)
-        self.settling = self._known.settling
+        equations = None if by_combination else partial(phases.running, values=values, engine=demand.engine)
+        key = tuple(sorted(values.items())), demand.span, by_combination, demand.engine
+        self._shared: Shared = phases.last_run(
+            key, lambda: Shared(EventIteration(phases, values, demand.span, equations))
+        )
+        self.settling: EventIteration = self._shared.settling
         self.spans: list[Span] = []
         self.changes: list[Change] = []
         self.jumps: list[Impact] = []
@@ -111,18 +111,17 @@ class HybridRun:
 
     def begin(self, initial: Mapping[str, float] | None) -> HybridState:
         """The states and modes at the start."""
-        start, begins = self.demand.span[0], self._known.begins
+        start, begins = self.demand.span[0], self._shared.begins
         if self.settling.regime(self.phases.first).assembly.model.form.waves:
             begins = []  # what leaves the ends before the start is of the run
         if isinstance(initial, Ending):
-            found = self._resumed(initial)
-        elif initial is not None or not begins:
-            found = self._started(initial)
-            if initial is None:
-                begins.append(found)
+            moment, changes = self._resumed(initial)
+        elif initial is None and begins:
+            moment, changes = begins[0]
         else:
-            found = begins[0]
-        moment, changes = found
+            moment, changes = self._started(initial)
+            if initial is None:
+                begins.append((moment, changes))
         if initial and start != 0 and not isinstance(initial, Ending):
             for element, mode in zip(self.phases.elements, moment.regime.modes, strict=True):
                 warn_of_what_may_have_begun(element.name, element.modes, mode, start)
@@ -134,30 +133,30 @@ class HybridRun:
         if not initial:
             return self._joined({}, self._read(initial, {}))
         readings, failed = list[tuple[int, dict[int, str], HybridState]](), None
-        closed = self._closed()
+        start, closed = self.demand.span[0], self._closed()
         for joins in [{}, closed] if closed else [{}]:
             try:
                 moment = self._read(initial, joins)
             except ParameterError as error:
                 failed = failed or error
             else:
-                held = self.settling.held(moment, self.demand.span[0])
-                readings.append((sum(held[name] != 0 for name in held.keys() - initial.keys()), joins, moment))
+                stored = self.settling.stored(moment, start)
+                readings.append((sum(stored[name] != 0 for name in stored.keys() - initial.keys()), joins, moment))
         if readings:  # what is not named rests, if the circuit lets it
             _, joins, moment = min(readings, key=itemgetter(0))
             return self._joined(joins, moment)
         for joins in takeovers(self.phases.elements, with_modes(self.phases.first, closed)):
             with suppress(ParameterError, SimulationError, NetworkError):
-                found = self._joined(closed | joins, self._read(initial, closed | joins))
-                held = self.settling.held(found[0], self.demand.span[0])
-                if all(abs(held.get(k, v) - v) <= NO_IMPACT * max(abs(v), 1.0) for k, v in initial.items()):
-                    return found
+                transition = self._joined(closed | joins, self._read(initial, closed | joins))
+                stored = self.settling.stored(transition[0], start)
+                if all(abs(stored.get(k, v) - v) <= NO_IMPACT * max(abs(v), 1.0) for k, v in initial.items()):
+                    return transition
         assert failed is not None  # noqa: S101 (as no reading is left)
         raise failed
 
     def _closed(self) -> dict[int, str]:
         """Switches that the time closes at the start, and their modes."""
-        switches = [k for k, element in enumerate(self.phases.elements) if is_switch(element.modes)]
+        switches = [k for k, element in enumerate(self.phases.elements) if element.is_switch]
         if not switches:
             return {}
         regime = self.settling.regime(self.phases.first)
@@ -210,7 +209,7 @@ class HybridRun:
 
     def _engine(self, moment: HybridState, problem: Callable[[], Problem]) -> tuple[str, str]:
         regime = moment.regime
-        judged = partial(regime.assembly.judged, moment)
+        judged = partial(regime.assembly.judged, regime.p)
         return self.phases.engine(regime.assembly, regime.modes, lambda: judged(problem()), self.demand.engine)
 
     def _suits_heyoka(self, t: float, moment: HybridState) -> bool:
@@ -219,7 +218,7 @@ class HybridRun:
 
     def timeline(self, assembly: ModeEquations, p: Array) -> Timeline:
         """The instants at which inputs jump or bend."""
-        timelines = self._known.timelines
+        timelines = self._shared.timelines
         if assembly.whole not in timelines:
             timelines[assembly.whole] = assembly.model.switching.timeline(p, *self.demand.span)
         return timelines[assembly.whole]
@@ -261,7 +260,7 @@ class HybridRun:
         demand, regime, times = self.demand, moment.regime, self._instants(moment)
         following = bisect_right(times.stops, t)
         end = min([*times.stops[following : following + 1], demand.span[1]])
-        problem = regime.assembly.problem(moment, (t, end), times)
+        problem = moment.problem((t, end), times)
         states = regime.assembly.model.states
         atol = demand.rtol * problem.atol
         atol[: len(states)] = demand.tolerances(problem.atol[: len(states)], states)
@@ -318,8 +317,8 @@ class HybridRun:
         passing = InPlaceEvents(self.settling, moment, t, self.note, self._suits_heyoka)
         problem, noted, soon = self._problem(t, moment, passing), len(self.changes), [*self._soon]
         if not problem.x0.size:
-            made = at_rest(problem, moment.regime.assembly.model.degree)
-            return replace(made, end=(problem.t_end, problem.x0)), passing
+            still = at_rest(problem, moment.regime.assembly.model.degree)
+            return replace(still, end=(problem.t_end, problem.x0)), passing
         name, why = self._engine(moment, lambda: problem)
         if self.waves is not None:
             return self._solve(problem, name, why, self.waves.solver(moment.regime)), passing

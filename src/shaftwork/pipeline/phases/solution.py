@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from itertools import chain, groupby
 from operator import attrgetter
 
@@ -14,12 +14,15 @@ from shaftwork.codegen.observer import Impact, ModelObserver
 from shaftwork.codegen.phase_observer import PhaseObserver, Stretch, Stretches
 from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.hybrid_state import Change, without_detours
+from shaftwork.pipeline.phases.hybrid_waves import WaveRun
+from shaftwork.pipeline.phases.impulses import summed
 from shaftwork.pipeline.phases.in_place_events import Phase
 from shaftwork.pipeline.phases.mode_machines import ModeMachine, ModeNames
 from shaftwork.pipeline.phases.run import HybridRun, Span
 from shaftwork.pipeline.phases.wave_run import WaveRun
 from shaftwork.results.observer import PhaseRow
 from shaftwork.results.solution import Solution
+from shaftwork.results.solution import PhaseRow, Solution
 
 
 def solution(run: HybridRun, name: str) -> Solution:
@@ -58,13 +61,13 @@ def _stores(run: HybridRun, span: Span, names: tuple[str, ...], states: Array) -
         return stores.of(lambda: first.assembly.bound(first.p), t, states)
     starts = np.array([phase.start for phase in span.phases])
     read_at = run.timeline(first.assembly, first.p).one_sided(t)
-    made = np.empty((t.size, len(names)))
+    stored = np.empty((t.size, len(names)))
     index = np.clip(np.searchsorted(starts, t, side="right") - 1, 0, None)
     for number in np.unique(index).tolist():
         here = index == number
         phase = span.phases[number]
-        made[here] = stores.of(partial(phase.assembly.bound, phase.p), read_at[here], states[here])
-    return made
+        stored[here] = stores.of(partial(phase.assembly.bound, phase.p), read_at[here], states[here])
+    return stored
 
 
 def _width(assembly: ModeEquations) -> int:
@@ -129,54 +132,47 @@ def _stretch(run: HybridRun, span: Span, phase: Phase) -> Stretch:
 def _impacts(run: HybridRun) -> tuple[Impact, ...]:
     """Changes and sources with which speeds may jump, those of one time in one, with the part that hits or changes."""
     jumps = [jump for jump in run.jumps if jump.given or jump.lost]
-    for change in sorted(run.changes, key=lambda made: (made.time, not made.impact)):
+    for change in sorted(run.changes, key=lambda change: (change.time, not change.impact)):
         modes = change.element.modes
         if change.rebound or change.given or change.lost or modes[change.before].form != modes[change.after].form:
             jumps.append(Impact(change.time, change.element.part.name, change.given, change.lost))
     by_time: dict[float, Impact] = {}
     for jump in jumps:
-        known = by_time.get(jump.time, Impact(jump.time, "", {}, {}))
-        energies = (_sums(known.given, jump.given), _sums(known.lost, jump.lost))
-        by_time[jump.time] = Impact(jump.time, known.part or jump.part, *energies)
+        earlier = by_time.get(jump.time, Impact(jump.time, "", {}, {}))
+        given, lost = summed((earlier.given, jump.given)), summed((earlier.lost, jump.lost))
+        by_time[jump.time] = Impact(jump.time, earlier.part or jump.part, given, lost)
     return tuple(by_time.values())
-
-
-def _sums(first: Mapping[str, float], second: Mapping[str, float]) -> dict[str, float]:
-    """Energies by part of two together."""
-    return {part: first.get(part, 0.0) + second.get(part, 0.0) for part in (*first, *second)}
 
 
 def _events(changes: Iterable[Change]) -> Iterator[tuple[float, str, str, str]]:
     """Changes in words, without those that lead nowhere: what says the same before and after is none."""
-    words: dict[tuple[ModeMachine, str, str, bool], tuple[str, str, str]] = {}
-    at_once = (without_detours([*made]) for _, made in groupby(changes, attrgetter("time")))
-    for time, element, before, after, rebound, *_ in chain.from_iterable(at_once):
-        key = element, before, after, rebound
-        if key not in words:
-            was, now = element.modes[before].words, "rebound" if rebound else element.modes[after].words
-            words[key] = element.name, was, now
-        name, was, now = words[key]
+
+    @cache  # a motion may have thousands of a few kinds
+    def in_words(element: ModeMachine, before: str, after: str, rebound: bool) -> tuple[str, str, str]:  # noqa: FBT001
+        return element.name, element.modes[before].words, "rebound" if rebound else element.modes[after].words
+
+    at_once = (without_detours([*one_time]) for _, one_time in groupby(changes, attrgetter("time")))
+    for time, *change in chain.from_iterable(at_once):
+        name, was, now = in_words(*change[:4])
         if was != now:
             yield time, name, was, now
 
 
 def _table(run: HybridRun) -> tuple[PhaseRow, ...]:
     """The phases in words: those that say the same are one."""
-    phases = [phase for span in run.spans for phase in span.phases]
+    phases, elements = [phase for span in run.spans for phase in span.phases], run.phases.elements
     last = run.demand.span[1]
-    ends = [*(phase.start for phase in phases[1:]), last]
-    words: dict[ModeNames, Mapping[str, str]] = {}
-    known: dict[tuple[str, ...], Mapping[str, str]] = {}
-    names = [element.name for element in run.phases.elements]
-    starts: list[float] = []
-    found: list[Mapping[str, str]] = []
-    for phase, end in zip(phases, ends, strict=True):
-        modes = words.get(phase.modes)
-        if modes is None:
-            pairs = zip(run.phases.elements, phase.modes, strict=True)
-            said = tuple(element.modes[name].words for element, name in pairs)
-            modes = words[phase.modes] = known.setdefault(said, dict(zip(names, said, strict=True)))
-        if end > phase.start and not (found and found[-1] is modes):
-            starts.append(phase.start)
-            found.append(modes)
-    return tuple(map(PhaseRow, starts, [*starts[1:], last], found))
+    by_words: dict[tuple[str, ...], Mapping[str, str]] = {}
+
+    @cache
+    def in_words(modes: ModeNames) -> Mapping[str, str]:
+        words = tuple(element.modes[name].words for element, name in zip(elements, modes, strict=True))
+        return by_words.setdefault(words, dict(zip((element.name for element in elements), words, strict=True)))
+
+    rows: list[tuple[float, Mapping[str, str]]] = []
+    for phase, end in zip(phases, [*(phase.start for phase in phases[1:]), last], strict=True):
+        modes = in_words(phase.modes)
+        if end > phase.start and not (rows and rows[-1][1] is modes):
+            rows.append((phase.start, modes))
+    ends = [*(start for start, _ in rows[1:]), last]
+    return tuple(PhaseRow(start, end, modes) for (start, modes), end in zip(rows, ends, strict=True))

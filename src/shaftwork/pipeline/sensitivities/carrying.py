@@ -15,9 +15,8 @@ from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.hybrid_state import Change
-from shaftwork.pipeline.phases.mode_machines import ModeNames
+from shaftwork.pipeline.phases.mode_machines import ModeNames, with_modes
 from shaftwork.pipeline.phases.phases import Phases
-from shaftwork.pipeline.phases.regimes import with_modes
 from shaftwork.pipeline.sensitivities.legs import Leg
 
 CLOSE = 1e-5

@@ -1,4 +1,9 @@
-"""A motion through phases beside travelling waves: one march of the delay engine through all sets of equations."""
+"""Motions through phases beside travelling waves: what arrives follows the states.
+
+Between two events what arrives at the ends of the lines is known. So a moment has it behind its states, with its rates:
+x = (states, h, dh/dt), and everything that is read at an instant is read as without waves. One march of the delay
+engine goes through all sets of equations.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +20,49 @@ from shaftwork.integrate.lossless.lines import DelayProblem, Lines
 from shaftwork.integrate.lossless.march import March, MarchEquations
 from shaftwork.integrate.lossless.waveforms import Left
 from shaftwork.integrate.problem import Problem, Trajectory
+from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.hybrid_state import Regime
 from shaftwork.pipeline.wave_motion import CarriedWaves, WaveStart, checked_lines, lines_by_shaft
+from shaftwork.pipeline.prepared import NOMINAL
+from shaftwork.pipeline.waves import CarriedWaves, WaveStart, checked_lines, lines_by_shaft
+
+RATE = "rate of "
+
+
+class WaveAssembly(ModeEquations):
+    """One set of equations with ends of waves, and its guards."""
+
+    @property
+    def clocks(self) -> tuple[int, ...]:
+        """None: panels resolve what changes with time alone by themselves."""
+        return ()
+
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """A name for what arrives at each end of a line, the same in all combinations of modes."""
+        graph = self.model.form.graph
+        owners = ((graph.part_of(k).name, graph.branches[k].template.label) for k in self.model.form.waves)
+        return tuple(f"{name}.{label} arriving" for name, label in owners)
+
+    def arriving(self, x: Array) -> dict[str, float]:
+        """What arrives, behind the states of a moment, and its rates, by name."""
+        names = (*self.ends, *(RATE + name for name in self.ends))
+        return dict(zip(names, x[len(self.model.states) :].tolist(), strict=True))
+
+    def taking(self, t: float, stored: Mapping[str, float], p: Array) -> Array:
+        """The states with which the equations take up what was stored, and what arrives; zero of what is not told."""
+        names = (*self.ends, *(RATE + name for name in self.ends))
+        return np.concatenate([super().taking(t, stored, p), [stored.get(name, 0.0) for name in names]])
+
+    def sizes(self, p: Array) -> list[float]:
+        """The nominal size of each state; of what arrives that of a wave with a nominal speed."""
+        impedances, _ = WaveSystem(self.bound(p)).lines
+        return [*super().sizes(p), *(2 * NOMINAL * np.repeat(impedances, 2)).tolist(), *np.zeros(2 * impedances.size)]
+
+    def arriving_rates(self, x: list[float]) -> list[float]:
+        """The rates of what arrives stand in the states; theirs are none."""
+        count = len(self.ends)
+        return [*x[-count:], *[0.0] * count]
 
 
 class WaveRun:
@@ -54,7 +100,7 @@ class WaveRun:
 
     def _delayed(self, system: WaveSystem, x: Array, t: float, **others: Any) -> DelayProblem:
         impedances, delays = self._system.lines
-        given: dict[str, Any] = {"t_end": self._span[1], "names": (), "atol": np.zeros(x.size)}
+        defaults: dict[str, Any] = {"t_end": self._span[1], "names": (), "atol": np.zeros(x.size)}
         return DelayProblem(
             rhs=system.rhs,
             speeds=system.speeds,
@@ -63,7 +109,7 @@ class WaveRun:
             impedances=impedances,
             x0=x,
             t0=t,
-            **given | self._start | others,
+            **defaults | self._start | others,
         )
 
     def solve(self, regime: Regime, problem: Problem) -> Trajectory:

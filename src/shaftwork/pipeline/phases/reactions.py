@@ -13,7 +13,7 @@ from dataclasses import replace
 from functools import cached_property, partial
 from itertools import chain
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from sympy import Float
@@ -30,14 +30,11 @@ from shaftwork.core.kept import Kept
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind
-from shaftwork.pipeline.phases.assemblies import ModeEquations
+from shaftwork.pipeline.model import Model
+from shaftwork.pipeline.phases.assemblies import ModeEquations, RightSide
 from shaftwork.pipeline.phases.mode_machines import ModeMachine, ModeNames, is_same
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.held_rows import HeldRows, groups, held_places
-
-if TYPE_CHECKING:
-    from shaftwork.pipeline.model import Model
-    from shaftwork.pipeline.phases.hybrid_state import HybridState
 
 MANY = 12
 """From so many elements on that hold and slip matrices are quicker than equations for each combination that is met."""
@@ -54,14 +51,10 @@ class HeldAssembly(ModeEquations):
         laws: of each element the branch of its law; None for one that is in the form that it has here.
     """
 
-    def __init__(self, model: Model, elements: Sequence[ModeMachine], laws: Sequence[int | None]) -> None:
+    def __init__(self, model: Model, elements: tuple[ModeMachine, ...], laws: Sequence[int | None]) -> None:
         self._entries = _entries(model, elements, laws)
-        forms = [
-            choice.form if law is None else None
-            for law, choice in zip(
-                laws, chain.from_iterable(item.choices for item in model.netlist.placed), strict=True
-            )
-        ]
+        choices = chain.from_iterable(item.choices for item in model.netlist.placed)
+        forms = [choice.form if law is None else None for law, choice in zip(laws, choices, strict=True)]
         super().__init__(model, elements, forms, None if self._entries is None else self._entries.rows)
         self.stores = HeldStores(model.form)
         self._laws, self._held = laws, list[int]()
@@ -69,24 +62,17 @@ class HeldAssembly(ModeEquations):
         self._joining = [self._places[number] for number in joining if number in self._places]
         self._joints: tuple[LinearPart, Joints] | None = None
         self._factors: tuple[LinearPart, Factor, Factor] | None = None
-        self._found: dict[bytes, dict[str, Any]] = {}
+        self._notes: dict[bytes, dict[str, Any]] = {}
         self._holds: tuple[Joints, Array] | None = None
         _ = self._many, self.clocks  # made once for all
 
     def holding(self, numbers: tuple[int, ...]) -> HeldAssembly:
         """The equations in which the elements of these numbers hold."""
-        made = copy(self)
-        held = [law for k in numbers if (law := self._laws[k]) is not None]
-        vars(made).update(
-            _held=held,
-            _joints=None,
-            _factors=None,
-            _holds=None,
-            _guards_made=Kept(KEPT_RATES),
-            _rates_made=Kept(KEPT_RATES),
-            _problems=Kept(KEPT_RATES),
-        )
-        return made
+        other = copy(self)
+        caches: dict[str, Any] = {name: Kept(KEPT_RATES) for name in ("_guards_by_p", "_rates_by_p", "_problems")}
+        laws = [law for k in numbers if (law := self._laws[k]) is not None]
+        vars(other).update(_held=laws, _joints=None, _factors=None, _holds=None, **caches)
+        return other
 
     def holds_by_numbers(self, number: int) -> bool:
         """Whether an element holds and gives way by other numbers in explicit rows."""
@@ -94,8 +80,8 @@ class HeldAssembly(ModeEquations):
 
     def taking_over(self, x: Array, p: Array) -> Array | None:
         """The states in which all comes to one speed that holds, or None where an impact leads there."""
-        met = self.joints(p).met(x)
-        return met if is_same(met, x) else None
+        joined = self.joints(p).met(x)
+        return joined if is_same(joined, x) else None
 
     def suits(self, engine: str) -> bool:
         """Whether what holds is numbers in explicit rows, and these are quick for an engine by name.
@@ -105,7 +91,7 @@ class HeldAssembly(ModeEquations):
         """
         if self._entries is None or not self.clocks:
             return self._entries is not None
-        noisy = any(isinstance(made, HeldNoise | SmoothNoise) for made in parts(self._expressions))
+        noisy = any(isinstance(part, HeldNoise | SmoothNoise) for part in parts(self._expressions))
         return engine in ("auto", "heyoka") and not noisy and self.program is not None
 
     @cached_property
@@ -133,9 +119,8 @@ class HeldAssembly(ModeEquations):
         """What is the same for the choice of an engine: whether an element holds or slips does not make it stiff."""
         return self.whole, tuple("" if law is not None else name for law, name in zip(self._laws, modes, strict=True))
 
-    def judged(self, moment: HybridState, problem: Problem) -> Problem:
+    def judged(self, p: Array, problem: Problem) -> Problem:
         """The motion by which an engine is chosen: with nothing held, as stiffness may be hidden in what is."""
-        p = moment.regime.p
         return replace(problem, jacobian=self.slopes(partial(self.prepared(p).bound.with_laws, p)))
 
     def _reading(self, bound: HeldArrays, matrices: ReadingMatrices) -> Callable[[Array, Array], Array]:
@@ -167,12 +152,12 @@ class HeldAssembly(ModeEquations):
         plain = self.prepared(p).bound
         return HeldArrays(plain.program, p, plain.part, self.joints(p))
 
-    def _rates(self, p: Array) -> tuple[Any, dict[str, Any]]:
+    def _rates(self, p: Array) -> tuple[RightSide, dict[str, Any]]:
         """The right-hand side and what engines find out about it, whatever holds."""
         free = p.copy()
         free[self._joining] = 0.0
-        known = self._found.setdefault(free.tobytes(), {})
-        return self._rates_made(p.tobytes(), lambda: (self._right_side(p), known))
+        notes = self._notes.setdefault(free.tobytes(), {})
+        return self._rates_by_p(p.tobytes(), lambda: (self._right_side(p), notes))
 
 
 def laws_that_hold(model: Model, elements: Sequence[ModeMachine]) -> list[int | None] | None:
@@ -189,8 +174,9 @@ def laws_that_hold(model: Model, elements: Sequence[ModeMachine]) -> list[int | 
     form = model.form
     if form.loop_laws or form.inertial or form.across_inputs or form.waves or form.dependent_through:
         return None
-    found = [_law(form, element) if holds(element) else None for element in elements]
-    return None if any(law is None and holds(element) for law, element in zip(found, elements, strict=True)) else found
+    laws = [_law(form, element) if element.holds else None for element in elements]
+    lacking = (element.holds and law is None for law, element in zip(laws, elements, strict=True))
+    return None if any(lacking) else laws
 
 
 def _entries(model: Model, elements: Sequence[ModeMachine], laws: Sequence[int | None]) -> HeldRows | None:
@@ -199,26 +185,21 @@ def _entries(model: Model, elements: Sequence[ModeMachine], laws: Sequence[int |
     links = [law for _, law in pairs]
     if not all(_vanishes(model.form, *pair) for pair in pairs):
         return None
-    rigid = (element for element, law in zip(elements, laws, strict=True) if law is None and becomes_rigid(element))
+    rigid = (element for element, law in zip(elements, laws, strict=True) if law is None and element.joined)
     others = [_places(model.form, element) for element in rigid]
-    found = groups(model.form, links, others)
-    rows = None if found is None else model.rows_of(len(others) + 1)
-    if found is None or rows is None:
+    joined = groups(model.form, links, others)
+    rows = None if joined is None else model.rows_of(len(others) + 1)
+    if joined is None or rows is None:
         return None
-    return HeldRows(rows, [(link, held_places(model.form, link)) for link in links], found)
+    return HeldRows(rows, [(link, held_places(model.form, link)) for link in links], joined)
 
 
 def _vanishes(form: StateForm, element: ModeMachine, law: int) -> bool:
     """Whether a law is zero in all modes in which an element holds."""
-    branch, (first, *others) = form.graph.branches[law], element.modes.options
-    numbers = {symbol: symbol for symbol in branch.template.symbols if symbol.name == element.modes.symbol}
-    values = {mode.value for mode in others if mode.form != first.form}
-    return all(branch.template.law.xreplace(dict.fromkeys(numbers, Float(value))) == 0 for value in values)
-
-
-def becomes_rigid(element: ModeMachine) -> bool:
-    """Whether an element joins its ends in some modes."""
-    return len({mode.form for mode in element.modes.options}) > 1
+    template = form.graph.branches[law].template
+    numbers = [symbol for symbol in template.symbols if symbol.name == element.modes.symbol]
+    values = (Float(element.modes[mode].value) for mode in element.joined)
+    return all(template.law.xreplace(dict.fromkeys(numbers, value)) == 0 for value in values)
 
 
 def _places(form: StateForm, element: ModeMachine) -> set[int]:
@@ -227,18 +208,6 @@ def _places(form: StateForm, element: ModeMachine) -> set[int]:
     rows = (form.tree.potentials[node] or {} for node in part.nodes.values() if node != GROUND)
     trees = set[int]().union(*rows)
     return {place for place, tree in enumerate(form.across_states) if tree in trees}
-
-
-def holds(element: ModeMachine) -> bool:
-    """Whether an element joins its ends in some modes alone, by a torque that ends these, as friction and contacts do.
-
-    Freewheels and diodes have no branch while they are open, in whose place a reaction could act.
-    """
-    options = element.modes.options
-    joined = [mode for mode in options if mode.form != options[0].form]
-    limited = all(mode.gives_way for mode in joined) and all(mode.at_rest is None for mode in options)
-    has_law = any(leave.rebound is not None for mode in options for leave in mode.leaves) or len(options) > 2
-    return bool(joined) and limited and has_law and not element.modes.passes_on
 
 
 def _law(form: StateForm, element: ModeMachine) -> int | None:
@@ -250,7 +219,7 @@ def _law(form: StateForm, element: ModeMachine) -> int | None:
         symbols = {symbol.name for symbol in branch.template.law.free_symbols}
         if branch.template.kind not in (Kind.LAW, Kind.THROUGH_SOURCE) or element.modes.symbol not in symbols:
             continue
-        known = index in form.tree.loops and set(form.tree.loops[index]) <= {*form.across_states}
-        if known and (branch.plus, branch.minus) == ends:
+        by_inertias = index in form.tree.loops and set(form.tree.loops[index]) <= {*form.across_states}
+        if by_inertias and (branch.plus, branch.minus) == ends:
             return index
     return None
