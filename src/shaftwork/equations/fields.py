@@ -14,7 +14,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
 
 from sympy import Add, Derivative, Eq, Expr, Function, Integer, Symbol, sqrt
 from sympy.core.function import AppliedUndef

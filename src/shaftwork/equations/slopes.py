@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from sympy import Expr, Float, Integer, Rational, Symbol
 
 from shaftwork.components.branches import ACROSS, INTEGRAL, RATE
-from shaftwork.components.laws import breakpoints
+from shaftwork.components.discontinuities import breakpoints
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import jumps, slope
 from shaftwork.core.errors import ParameterError, no_quantity
@@ -18,7 +18,7 @@ from shaftwork.equations.rows import NetworkEquations
 from shaftwork.network.controlled import readings_of
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.names import Names
+from shaftwork.reduction.form import Names
 
 VARIED = Symbol("varied", real=True)
 """Stands for what a law that jumps reads."""

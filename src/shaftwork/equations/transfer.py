@@ -17,12 +17,6 @@ from numpy.typing import NDArray
 from sympy import Add, Expr, Float, Integer, Poly, Rational, Symbol, default_sort_key
 
 from shaftwork.core.errors import CompileError, ParameterError, SignalError, no_quantity
-from shaftwork.equations.determinants import MOST_TERMS, TooManyTermsError, determinant
-from shaftwork.equations.point_values import DIGITS, Numbers, Values, exact, fraction
-from shaftwork.equations.slopes import LawSlopes, Slope
-from shaftwork.equations.tableau import S, Sum, Tableau, Unknown, refuse_waves
-from shaftwork.reduction.form import Names
-from shaftwork.reduction.source_inputs import Place, places_of
 from shaftwork.equations.assembly import FactoredTerms
 from shaftwork.equations.blocks import Blocks
 from shaftwork.equations.cramer import TooManyTermsError, in_numbers, quotient
@@ -32,9 +26,9 @@ from shaftwork.equations.rows import NetworkEquations
 from shaftwork.equations.slopes import FRACTION_DIGITS, LawSlopes, PointValues, Slope, Values
 from shaftwork.equations.spelling import escaped, without_marks
 from shaftwork.equations.tableau import S, Sum, Tableau, refuse_waves
+from shaftwork.reduction.form import Names
 from shaftwork.reduction.gains import LONGEST
-from shaftwork.reduction.inputs import Place, places_of
-from shaftwork.reduction.names import Names
+from shaftwork.reduction.source_inputs import Place, places_of
 
 STEPS, EXTRA = 1000, 10
 """Steps in which roots are improved, and the binary digits more for each of them: what cancels in a polynomial."""

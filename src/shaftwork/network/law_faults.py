@@ -18,7 +18,6 @@ from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.components.tables import Interpolation, InterpolationSlope, Table
 from shaftwork.core.domains import ROTATION
 from shaftwork.core.parameters import is_label
-from shaftwork.network.changing import StoreFaultError
 from shaftwork.network.changing_stores import StoreFaultError
 from shaftwork.network.controlled import check_readings
 from shaftwork.network.grammar import FUNCTION_NAMES, FUNCTIONS

@@ -11,9 +11,7 @@ import numpy as np
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
-from shaftwork.codegen.operating import energy_weights, lasting
 from shaftwork.codegen.time_switches import Switching
-from shaftwork.codegen.switching import Switching
 from shaftwork.codegen.valueless import in_words
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.noise import HeldNoise, SmoothNoise

@@ -13,7 +13,7 @@ import numpy as np
 from shaftwork.core.errors import ParameterError
 from shaftwork.equations.nomenclature import table as longtable
 from shaftwork.equations.printing import printed_number
-from shaftwork.pipeline.ending import rewired
+from shaftwork.pipeline.motion_start import rewired
 from shaftwork.pipeline.network import Network
 from shaftwork.reduce.tridiagonal_modes import Array
 from shaftwork.results.solution import Solution

@@ -24,8 +24,6 @@ from sympy import Expr
 from shaftwork.components.base import Signal
 from shaftwork.components.branches import RATE
 from shaftwork.core.domains import ROTATION, Domain
-from shaftwork.network.changing import is_bounded
-from shaftwork.core.domains import Domain
 from shaftwork.network.changing_stores import is_bounded
 from shaftwork.network.controlled import Reading, readings_of
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart, signals_of

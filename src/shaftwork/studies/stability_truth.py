@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.linalg import expm
 
-from shaftwork.components.laws import breakpoints
+from shaftwork.components.discontinuities import breakpoints
 from shaftwork.components.shaft_models import OneSpring, Rigid, ShaftModel, Wave
 from shaftwork.results.observer import Array
 from shaftwork.shafts.exact_motion import JunctionTorque, motion

@@ -18,7 +18,7 @@ from shaftwork.pipeline.arguments import NOMINAL
 from shaftwork.pipeline.ensemble.extremes import Index, Mask
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.assemblies import ModeEquations
-from shaftwork.pipeline.phases.courses import FEW
+from shaftwork.pipeline.phases.exceeded_guards import FEW
 from shaftwork.pipeline.phases.hybrid_state import AHEAD, AHEAD_OF_RUN, CLEAR, EPS, GOLDEN, NOTHING, ROUNDINGS
 from shaftwork.pipeline.phases.mode_machines import ModeNames
 from shaftwork.reduction.observables import Observables

@@ -16,8 +16,8 @@ from shaftwork.codegen.code import Moves
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.timeline import Timeline
 from shaftwork.components.laws import t as TIME
-from shaftwork.pipeline.arguments import NOMINAL
 from shaftwork.integrate.problem import Guards, Problem, changed
+from shaftwork.pipeline.arguments import NOMINAL
 from shaftwork.pipeline.phases.assemblies import Limits, ModeEquations, Motion, Near
 from shaftwork.pipeline.phases.mode_machines import ActiveGuard, ModeMachine, ModeNames
 

@@ -13,9 +13,6 @@ import numpy as np
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.linearization import Linearization, refuse_waves
-from shaftwork.codegen.model import CompiledModel, Cost
-from shaftwork.codegen.operating import another_start, steady_state
-from shaftwork.codegen.linear import Linearization, refuse_waves
 from shaftwork.codegen.model import CompiledModel
 from shaftwork.codegen.operating import another_start, energy_weights, lasting, steady_state
 from shaftwork.codegen.start_values import initial_state

@@ -22,10 +22,8 @@ from shaftwork.pipeline.phases.hybrid_waves import WaveAssembly
 from shaftwork.pipeline.phases.mode_machines import ModeNames, elements_of, with_modes
 from shaftwork.pipeline.phases.reactions import MANY, HeldAssembly, laws_that_hold
 from shaftwork.pipeline.phases.resting import at_rest
-from shaftwork.pipeline.waves import engine_of_waves
-from shaftwork.reduction.value_diagnosis import self_locks
 from shaftwork.pipeline.wave_motion import engine_of_waves
-from shaftwork.reduction.cancelling import self_locks
+from shaftwork.reduction.value_diagnosis import self_locks
 
 FOLLOWING = {
     "heyoka": (1.0, 1e-12),  # the cost grows only with the logarithm

@@ -11,15 +11,12 @@ from sympy import Integer
 from shaftwork.components.branches import INTEGRAL
 from shaftwork.core.errors import NetworkError, ParameterError, SimulationError
 from shaftwork.pipeline.motion_start import Ending
-from shaftwork.pipeline.ending import Ending
 from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.hybrid_state import AHEAD_OF_RUN, ROUNDINGS, HybridState, Regime
 from shaftwork.pipeline.phases.mode_machines import ModeNames, with_modes
 from shaftwork.pipeline.phases.phases import Phases
 from shaftwork.pipeline.phases.starts import begins_anew
-from shaftwork.pipeline.start import Ending
 from shaftwork.reduction.value_diagnosis import jamming
-from shaftwork.reduction.cancelling import jamming
 
 BEYOND = 1e-6
 """How far in rad a motion may start beyond a rigid limit: errors and printed digits of another run leave so much."""

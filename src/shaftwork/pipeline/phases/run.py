@@ -35,10 +35,7 @@ from shaftwork.pipeline.phases.in_place_events import InPlaceEvents, Phase
 from shaftwork.pipeline.phases.mode_machines import NO_IMPACT, with_modes
 from shaftwork.pipeline.phases.phases import FOLLOWING, Phases
 from shaftwork.pipeline.phases.starts import refuse_incomplete, warn_of_what_may_have_begun
-from shaftwork.pipeline.phases.wave_run import WaveRun
 from shaftwork.pipeline.wave_motion import CarriedWaves, WaveStart
-from shaftwork.pipeline.start import start_of
-from shaftwork.pipeline.waves import CarriedWaves, WaveStart
 
 CHATTER = ((200, 1e-9), (3000, 1e-6))
 """So many changes of mode, each within this part of the run of the one before, are chatter. Rebounds come ever faster,

@@ -16,9 +16,7 @@ from shaftwork.pipeline.analysis import Given
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import start_of
 from shaftwork.pipeline.phases.model import PhasedModel
-from shaftwork.pipeline.start import start_of
 from shaftwork.reduction.explicit_rows import Rows
-from shaftwork.reduction.rows import Rows
 
 NO_DERIVATIVE = {
     "decisive": "decides which equations hold, so nothing is smooth in it. Give it a value that is not exactly zero, "

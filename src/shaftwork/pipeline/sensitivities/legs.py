@@ -152,7 +152,7 @@ def motion_of(model: Model, span: tuple[float, float], initial: Given, rtol: flo
         SimulationError: it could not be found, or a prescribed speed jumps.
     """
     if isinstance(model, PhasedModel):
-        run = HybridRun(model.phases, {}, Demand(span, rtol, None, None, "auto", MOST_STEPS, None), own=True)
+        run = HybridRun(model.phases, {}, Demand(span, rtol, None, None, "auto", MOST_STEPS, None), by_combination=True)
         run.march(initial)
         legs, changes = tuple(_legs_of_run(run)), tuple(run.changes)
         differentiated = DifferentiatedMotion(

@@ -21,10 +21,8 @@ from shaftwork.pipeline.phases.model import PhasedModel
 from shaftwork.pipeline.sensitivities.differentiable import rows_of, smooth_parameters, without_start
 from shaftwork.pipeline.sensitivities.legs import motion_of
 from shaftwork.pipeline.sensitivities.motion_slopes import MotionSlopes
-from shaftwork.pipeline.start import refuse_motion
 from shaftwork.results.course import SMALLEST, turning_points
 from shaftwork.results.measures import KINDS, Measure
-from shaftwork.results.measures import KINDS, SMALLEST, Measure
 from shaftwork.results.sensitivities import FrequencySensitivities, MotionSensitivities
 from shaftwork.results.slopes import Complex
 from shaftwork.results.solution import Solution
