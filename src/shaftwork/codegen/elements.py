@@ -28,6 +28,8 @@ LINEAR = (Kind.ACROSS_STORE, Kind.THROUGH_STORE, Kind.CONDUCTANCE)
 FARTHEST = 1e100
 """Sizes of coefficients in SI up to it, and down to its reciprocal: products of a few leave the range of floating-point
 numbers, as that of a shaft of 1e60 m, whose diameter counts to the fourth power."""
+ROUNDING = 1e-12
+"""Part of the largest value up to which others are rounding, such as what an elimination leaves."""
 AT_ONCE = 2_000_000
 """Numbers of many instants or columns that are made at once, 16 MB."""
 

@@ -21,15 +21,12 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from shaftwork.codegen.arrays import ArrayProgram, BoundArrays
-from shaftwork.codegen.elements import Array
+from shaftwork.codegen.elements import ROUNDING, Array
 from shaftwork.codegen.matrices import LinearPart
 from shaftwork.codegen.products import Factor
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.held_rows import HeldRows
-
-SMALL = 1e-12
-"""A part of the largest entry of a row that is the rounding of its elimination."""
 
 
 class Joints:
@@ -133,7 +130,7 @@ def _followers(G: Any) -> Mapping[int, Mapping[int, float]] | None:
             for place, share in rows[column].items() if column in rows else ((column, 1.0),):
                 row[place] = row.get(place, 0.0) + gain * share
         size = max(map(abs, gains_of[first:last]), default=0.0)
-        row = {column: gain for column, gain in row.items() if abs(gain) > SMALL * size}
+        row = {column: gain for column, gain in row.items() if abs(gain) > ROUNDING * size}
         if not row:
             return None
         pivot = max(row, key=lambda column: abs(row[column]))

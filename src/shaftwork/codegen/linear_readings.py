@@ -11,13 +11,10 @@ import numpy as np
 from scipy import sparse
 
 from shaftwork.codegen.arrays import BoundArrays
-from shaftwork.codegen.elements import Array, blocks
+from shaftwork.codegen.elements import ROUNDING, Array, blocks
 from shaftwork.codegen.products import Factor
 from shaftwork.codegen.recovery import BranchHistory, GivenHistory
-
-ROUNDING = 1e-12
-"""A part of the largest value that is rounding."""
-GOLDEN = (5**0.5 - 1) / 2
+from shaftwork.codegen.sampling import GOLDEN
 
 Read = Callable[[BranchHistory], Array]
 

@@ -18,13 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.codegen.arrays import BoundArrays
-from shaftwork.codegen.elements import Array
+from shaftwork.codegen.elements import ROUNDING, Array
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind
 from shaftwork.reduction.form import StateForm
 
-ROUNDING = 1e-12
-"""A part of the largest value that is rounding."""
 ROUNDED = 1e-9
 """A part of the largest speed by which contacts may close after an impact: impulses that share it are rounded."""
 LEAST = 1e-10
