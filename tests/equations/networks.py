@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from shaftwork.components import electrical, loads, machines, rotation, sources, translation
 from shaftwork.components.base import REGISTRY
 from shaftwork.components.electrical import VoltageSource
 from shaftwork.components.laws import omega, phi, t
@@ -22,9 +21,6 @@ from shaftwork.network.builder import NetworkBuilder
 from shaftwork.network.graph import CircuitGraph, build_graph
 from shaftwork.reduction.form import state_form
 from tests.reference.mna import Piece
-
-FAMILIES = (electrical, loads, machines, rotation, sources, translation)
-"""Imported so that every component of the library is in the registry."""
 
 
 def graph_of(net: NetworkBuilder) -> CircuitGraph:
