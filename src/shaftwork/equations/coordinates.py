@@ -242,7 +242,7 @@ def _independent(rows: Mapping[int, Row], parameters: Mapping[str, float]) -> tu
 
 def shortest(ratio: Expr) -> Expr:
     """A ratio without common factors above and below; decimals are rounded only once."""
-    return in_decimals(cancel(exactly(ratio)))
+    return ratio if ratio.is_Integer else in_decimals(cancel(exactly(ratio)))
 
 
 def _solved(rows: Sequence[Row], columns: Sequence[int]) -> Iterator[tuple[int, Row]]:

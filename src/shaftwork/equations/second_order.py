@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from sympy import Add, Expr, Integer, Symbol
+from sympy import Add, Expr, Integer, Mul, Symbol
 
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.laws import t as TIME
@@ -95,6 +95,7 @@ class _SecondOrderWriter:
         self.graph, self.quantities = graph, Quantities(graph)
         self.at = coordinates(self.quantities)
         self.place = {symbol: k for k, symbol in enumerate(self.at.symbols)}
+        self.moving = frozenset((*self.place, *self.at.prescribed))
         self.matrices: dict[Kind, dict[tuple[int, int], list[Expr]]] = {
             kind: {} for kind in (Kind.ACROSS_STORE, Kind.CONDUCTANCE, Kind.THROUGH_STORE)
         }
@@ -119,26 +120,26 @@ class _SecondOrderWriter:
             nodes, tuple(self.place), mass, damping, stiffness, forces, self.laws, self.across, self.prescribed
         )
 
-    def _gains(self, twist: Expr) -> dict[int, Expr]:
-        """The factors of the coordinates in a position, by their places, in their shortest form."""
-        symbols = sorted(twist.free_symbols & self.place.keys(), key=self.place.__getitem__)
-        gains = {self.place[symbol]: shortest(twist.diff(symbol)) for symbol in symbols}
-        return {place: gain for place, gain in gains.items() if gain != 0}
-
-    def _driven(self, twist: Expr) -> tuple[Expr, ...]:
-        """The terms of a position that are prescribed."""
-        positions = [symbol for symbol in self.at.prescribed if symbol in twist.free_symbols]
-        self.prescribed |= {symbol: self.at.prescribed[symbol] for symbol in positions}
-        return tuple(shortest(twist.diff(symbol)) * symbol for symbol in positions)
+    def _parted(self, position: Expr) -> tuple[dict[int, Expr], list[Expr]]:
+        """A position as factors of the coordinates by their places, in shortest form, and the terms prescribed."""
+        factors: dict[Symbol, Expr] = {}
+        for term in Add.make_args(position):
+            for symbol in term.free_symbols & self.moving:  # one: positions are linear
+                factor = Mul(*(other for other in Mul.make_args(term) if other != symbol))
+                factors[symbol] = factors.get(symbol, Integer(0)) + factor
+        short = {symbol: gain for symbol, factor in factors.items() if (gain := shortest(factor)) != 0}
+        gains = {self.place[symbol]: gain for symbol, gain in short.items() if symbol in self.place}
+        prescribed = {symbol: speed for symbol, speed in self.at.prescribed.items() if symbol in short}
+        self.prescribed |= prescribed
+        return dict(sorted(gains.items())), [short[symbol] * symbol for symbol in prescribed]
 
     def _add_linear(self, branch: GraphBranch, kind: Kind, coefficient: Expr) -> None:
         """Add coefficient * f f' for an inertia, a damping or a stiffness; what a prescribed motion asks goes to T."""
-        twist, rate = self.at.twist(branch), self.at.rate
-        gains, driven = self._gains(twist), self._driven(twist)
+        gains, driven = self._parted(self.at.twist(branch))
         if kind is not Kind.THROUGH_STORE:
-            driven = tuple(map(rate, driven))
+            driven = list(map(self.at.rate, driven))
         if kind is Kind.ACROSS_STORE:
-            driven = tuple(map(rate, driven))
+            driven = list(map(self.at.rate, driven))
         for i, gain in gains.items():
             for j, other in gains.items():
                 self.matrices[kind].setdefault((i, j), []).append(gain * coefficient * other)
@@ -155,8 +156,8 @@ class _SecondOrderWriter:
             law, whole = law.subs(INTEGRAL, 0), False
             if law == 0:
                 return
-        at, flow, position = self.at, self.quantities.flow_of[branch.index], self.at.twist(branch)
-        gains, driven = self._gains(position), self._driven(position)
+        at, flow = self.at, self.quantities.flow_of[branch.index]
+        gains, driven = self._parted(at.twist(branch))
         twist = Add(*(gain * at.symbols[k] for k, gain in gains.items()), *driven)
         across = Add(*(gain * at.velocities[k] for k, gain in gains.items()), *map(at.rate, driven))
         law = law.xreplace({ACROSS: across, INTEGRAL: twist})
