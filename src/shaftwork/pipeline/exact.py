@@ -36,7 +36,7 @@ from shaftwork.pipeline.analysis import (
 )
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.mode_machines import ModeNames
-from shaftwork.pipeline.phases.model import PhasedModel
+from shaftwork.pipeline.phases.phased_model import PhasedModel
 from shaftwork.results.exact import ExactModel, ExactSlopes
 from shaftwork.results.exact_lines import ExactLines
 from shaftwork.results.modes import Modes, find_modes

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from shaftwork.codegen.elements import Array
 from shaftwork.pipeline.ensemble.programs import EnsembleCode
-from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.exceeded_guards import FEW
 from shaftwork.pipeline.phases.hybrid_state import AHEAD, AHEAD_OF_RUN, CLEAR, EPS, GOLDEN, NOTHING, ROUNDINGS
+from shaftwork.pipeline.phases.mode_equations import ModeEquations
 from shaftwork.pipeline.phases.mode_machines import ModeNames
 from shaftwork.pipeline.prepared import NOMINAL
 

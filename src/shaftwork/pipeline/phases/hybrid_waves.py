@@ -20,15 +20,15 @@ from shaftwork.integrate.lossless.lines import DelayProblem, Lines
 from shaftwork.integrate.lossless.march import March, MarchEquations
 from shaftwork.integrate.lossless.waveforms import Left
 from shaftwork.integrate.problem import Problem, Trajectory
-from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.hybrid_state import Regime
+from shaftwork.pipeline.phases.mode_equations import ModeEquations
 from shaftwork.pipeline.prepared import NOMINAL
 from shaftwork.pipeline.waves import CarriedWaves, WaveStart, checked_lines, lines_by_shaft
 
 RATE = "rate of "
 
 
-class WaveAssembly(ModeEquations):
+class WaveModeEquations(ModeEquations):
     """One set of equations with ends of waves, and its guards."""
 
     @property

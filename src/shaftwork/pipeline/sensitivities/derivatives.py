@@ -17,7 +17,7 @@ from shaftwork.pipeline.analysis import Given, Point, Time, operating_point
 from shaftwork.pipeline.arguments import relative_tolerance, time_span
 from shaftwork.pipeline.ending import refuse_motion
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.phases.model import PhasedModel
+from shaftwork.pipeline.phases.phased_model import PhasedModel
 from shaftwork.pipeline.sensitivities.differentiable import rows_of, smooth_parameters
 from shaftwork.pipeline.sensitivities.measure_slopes import integrand, measured
 from shaftwork.pipeline.sensitivities.motion_legs import motion_of

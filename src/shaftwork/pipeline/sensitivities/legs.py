@@ -12,7 +12,7 @@ from sympy import Expr
 from shaftwork.codegen.differentiated import Differentiated
 from shaftwork.codegen.elements import Array
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.phases.assemblies import ModeEquations
+from shaftwork.pipeline.phases.mode_equations import ModeEquations
 from shaftwork.pipeline.phases.mode_machines import ModeNames
 
 LOOKS = np.array([0.0, 0.004, 0.07, 0.19, 0.31, 0.42, 0.53, 0.61, 0.74, 0.83, 0.91, 0.996])

@@ -14,11 +14,11 @@ from shaftwork.core.errors import SimulationError
 from shaftwork.pipeline.analysis import Given
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.model import Model
+from shaftwork.pipeline.phases.hybrid_run import HybridRun, Span
+from shaftwork.pipeline.phases.hybrid_solution import solution
 from shaftwork.pipeline.phases.hybrid_state import Change
-from shaftwork.pipeline.phases.model import PhasedModel
+from shaftwork.pipeline.phases.phased_model import PhasedModel
 from shaftwork.pipeline.phases.phases import Phases
-from shaftwork.pipeline.phases.run import HybridRun, Span
-from shaftwork.pipeline.phases.solution import solution
 from shaftwork.pipeline.sensitivities.legs import Leg
 from shaftwork.pipeline.start import start_of
 from shaftwork.results.solution import Solution

@@ -10,7 +10,7 @@ from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import ParameterError
 from shaftwork.pipeline.analysis import Given
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.phases.model import PhasedModel
+from shaftwork.pipeline.phases.phased_model import PhasedModel
 from shaftwork.pipeline.start import start_of
 
 SHIFT = 1e-3
