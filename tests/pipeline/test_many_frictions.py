@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 
 import shaftwork as sw
 from shaftwork.pipeline.arguments import Demand
-from shaftwork.pipeline.phases.run import HybridRun
-from shaftwork.pipeline.phases.solution import solution
+from shaftwork.pipeline.phases.hybrid_run import HybridRun
+from shaftwork.pipeline.phases.hybrid_solution import solution
 from tests.properties.examples import share_of_examples
 
 COUNT = 14

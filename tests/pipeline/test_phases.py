@@ -17,9 +17,9 @@ import sympy
 import shaftwork as sw
 from shaftwork.integrate.problem import SeriesError
 from shaftwork.pipeline.phases.event_iteration import EventIteration
+from shaftwork.pipeline.phases.hybrid_run import HybridRun
 from shaftwork.pipeline.phases.hybrid_state import HybridState
 from shaftwork.pipeline.phases.in_place_events import InPlaceEvents
-from shaftwork.pipeline.phases.run import HybridRun
 
 ENGINES = ("heyoka", "scipy", "sundials")
 
@@ -293,7 +293,7 @@ def test_an_end_of_a_mode_that_the_series_have_hidden_is_told() -> None:
     passing.refuse_missed(None, 1.0, within)
     with pytest.raises(SeriesError, match="has not seen that 'gap' ceased to be open before t = 1 s"):
         passing.refuse_missed(None, 1.0, beyond)
-    passing.refuse_missed(next(made.guard for _, made in regime.watched if made.leave.to == "forward"), 1.0, beyond)
+    passing.refuse_missed(next(made.guard for made in regime.watched if made.leave.to == "forward"), 1.0, beyond)
 
 
 def test_the_rates_of_many_instants_are_those_of_each() -> None:
@@ -312,7 +312,7 @@ def test_a_wheel_slips_in_the_way_it_is_pulled_where_the_rounding_of_a_moment_is
     net = wheel(sw.TorqueSource("pull", tau=3.0), sw.CoulombLoad("load", tau=2.0))
     settling = EventIteration(net.compile().phases, {}, (0.0, 10.0))
     regime = settling.regime(("stuck",))
-    met = next(made.guard for _, made in regime.watched if made.leave.to == "forward")
+    met = next(made.guard for made in regime.watched if made.leave.to == "forward")
     moment = HybridState(regime, np.zeros(len(regime.assembly.model.states)))
     moment, changes = settling.settle(0.0, 0.0, moment, met)
     assert [(change.before, change.after) for change in changes] == [("stuck", "forward")]

@@ -23,8 +23,8 @@ from shaftwork.network.storage import read_netlist, write_netlist
 from shaftwork.pipeline.angles import with_angles
 from shaftwork.pipeline.arguments import as_names
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.phases.model import PhasedModel
 from shaftwork.pipeline.phases.named_phases import during, in_phase, span_of, whole_name, words_of
+from shaftwork.pipeline.phases.phased_model import PhasedModel
 from shaftwork.reduction.diagnosis import diagnose
 from shaftwork.reduction.form import StateForm, state_form
 from shaftwork.results.solution import Solution

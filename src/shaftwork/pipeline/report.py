@@ -15,8 +15,8 @@ from shaftwork.core.errors import SimulationError
 from shaftwork.core.screen import counted
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.network import Network
-from shaftwork.pipeline.phases.model import PhasedModel
 from shaftwork.pipeline.phases.named_phases import whole_name
+from shaftwork.pipeline.phases.phased_model import PhasedModel
 from shaftwork.results.modes import natural_frequencies
 
 LARGEST_DENSE = 1500

@@ -30,9 +30,9 @@ from shaftwork.pipeline.ensemble.ensemble_equations import (
 )
 from shaftwork.pipeline.ensemble.extremes import Index, Mask, first_rises, largest
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.phases.assemblies import ModeEquations
+from shaftwork.pipeline.phases.mode_equations import ModeEquations
 from shaftwork.pipeline.phases.mode_machines import ModeNames, with_modes
-from shaftwork.pipeline.phases.model import PhasedModel
+from shaftwork.pipeline.phases.phased_model import PhasedModel
 from shaftwork.pipeline.phases.starts import conditional
 from shaftwork.results.measures import Measure
 
@@ -188,10 +188,10 @@ class Ensemble:
         phased = self.phased
         assert phased is not None  # noqa: S101 (only its lanes meet guards)
         assembly = phased.phases.assembly(group.modes)
-        pairs = [pair for pair in assembly.watched(group.modes) if pair[1].guard == guard]
-        if len(pairs) != 1 or pairs[0][1].leave.rebound is not None:
+        met = [active for active in assembly.watched(group.modes) if active.guard == guard]
+        if len(met) != 1 or met[0].leave.rebound is not None:
             return []
-        (number, ended), count = pairs[0], group.lanes.size
+        ended, number, count = met[0], met[0].element, group.lanes.size
         names = [ended.leave.to] * count
         if not ended.leave.to:
             before, parameters = group.modes[number], p[: len(assembly.model.parameters)]

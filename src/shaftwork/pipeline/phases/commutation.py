@@ -47,7 +47,8 @@ class Commutation:
         """
         modes, changed = moment.regime.modes, {number: to}
         now, bands = moment.regime.limits(after, moment.x.tolist()), moment.bands
-        for k, active in moment.regime.watched:
+        for active in moment.regime.watched:
+            k = active.element
             met = active.leave.by_time and active.side * now[active.guard] >= -(bands[active.guard] if bands else 0.0)
             if k not in changed and met and self._elements[k].is_switch:
                 changed[k] = active.leave.to or anew(moment, after, k)
@@ -55,7 +56,7 @@ class Commutation:
         # diodes that begin to conduct, and those that no longer do
         options = [*_led(self._elements, new_modes, ACROSS), *_led(self._elements, new_modes, -THROUGH)]
         for new, led in self._keeping(after, moment, new_modes, _sets(options, 0), names):
-            if not any(self._elements[k].is_one_way for _, (k, _) in exceeded(new, after, new)[1]):
+            if not any(self._elements[active.element].is_one_way for _, active in exceeded(new, after, new)[1]):
                 return new, self._changes(t, modes, changed | led)
         opens = {k: to for k, to in changed.items() if not self._elements[k].joins(to)}
         if not 0 < len(opens) < len(changed):

@@ -10,11 +10,11 @@ from types import MappingProxyType
 
 from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import NetworkError, SimulationError
-from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.commutation import Commutation
-from shaftwork.pipeline.phases.exceeded_guards import ElementGuard, exceeded, passes_limit, resting
+from shaftwork.pipeline.phases.exceeded_guards import exceeded, passes_limit, resting
 from shaftwork.pipeline.phases.hybrid_state import Change, HybridState, Transition, together
 from shaftwork.pipeline.phases.impacts import Impacts
+from shaftwork.pipeline.phases.mode_equations import ModeEquations
 from shaftwork.pipeline.phases.mode_machines import ActiveGuard, ModeNames, limited, with_modes
 from shaftwork.pipeline.phases.phases import Phases
 from shaftwork.pipeline.phases.regimes import Regimes, anew, refuse_beyond
@@ -100,8 +100,8 @@ class EventIteration:
         joined, begun = self._joined(t, after, moment, joins)
         new, changes = self._settled(t, after, joined, None)
         if new.regime.modes == moment.regime.modes:  # rounding hides what was met
-            leaves = [(k, active.leave) for k, active in moment.regime.watched if active.guard == met]
-            same = (active.guard for k, active in joined.regime.watched if (k, active.leave) in leaves)
+            ended = [(active.element, active.leave) for active in moment.regime.watched if active.guard == met]
+            same = (active.guard for active in joined.regime.watched if (active.element, active.leave) in ended)
             new, changes = self._settled(t, after, joined, next(same, None))
         return new, together([*begun, *changes])
 
@@ -137,12 +137,12 @@ class EventIteration:
         """
         if met is None:
             return self._consistent(t, after, moment, None)
-        named = next(pair for pair in moment.regime.watched if pair[1].guard == met)
+        named = next(active for active in moment.regime.watched if active.guard == met)
         transitions: list[Transition] = []
         failed: list[SimulationError] = []
         met_at_once = self._at_once(moment, after, named)
         # an angle waits for nothing
-        least = max(1, len({number for number, active in met_at_once if active.leave.by_twist}))
+        least = max(1, len({active.element for active in met_at_once if active.leave.by_twist}))
         for first in met_at_once:
             try:
                 transitions.append(self._consistent(t, after, moment, first))
@@ -156,26 +156,26 @@ class EventIteration:
             raise failed[0]
         return min(transitions, key=lambda transition: len(transition[1]))
 
-    def _at_once(self, moment: HybridState, t: float, named: ElementGuard) -> list[ElementGuard]:
+    def _at_once(self, moment: HybridState, t: float, named: ActiveGuard) -> list[ActiveGuard]:
         """The guards that are met at the instant at which one is, in the order of their elements."""
-        regime, others = moment.regime, [pair for pair in moment.regime.watched if pair is not named]
+        regime, others = moment.regime, [active for active in moment.regime.watched if active is not named]
         now, bands = regime.limits(t, moment.x.tolist()), moment.bands
-        if bands and all(active.side * now[active.guard] < -NEAR * bands[active.guard] for _, active in others):
+        if bands and all(active.side * now[active.guard] < -NEAR * bands[active.guard] for active in others):
             return [named]
-        pairs = [pair for _, pair in exceeded(moment, t, moment, in_order=True)[1]]
-        if named not in pairs and (not named[1].leave.by_torque or all(pair[1].leave.by_torque for pair in pairs)):
-            pairs.append(named)
-        return sorted(pairs, key=moment.regime.watched.index)
+        met = [active for _, active in exceeded(moment, t, moment, in_order=True)[1]]
+        if named not in met and (not named.leave.by_torque or all(active.leave.by_torque for active in met)):
+            met.append(named)
+        return sorted(met, key=moment.regime.watched.index)
 
-    def _consistent(self, t: float, after: float, moment: HybridState, first: ElementGuard | None) -> Transition:
+    def _consistent(self, t: float, after: float, moment: HybridState, first: ActiveGuard | None) -> Transition:
         """Modes that are consistent with the motion that follows, by one change after another; see `settle`.
 
         Args:
             t, after, moment: as there.
-            first: the element and the guard to begin with, or None.
+            first: the guard to begin with, or None.
         """
         changes: list[Change] = []
-        idle: list[ElementGuard] = []
+        idle: list[ActiveGuard] = []
         seen: dict[ModeNames, None] = {}
         blocked, repeats, late = None, 0, 0.0
         tried: Counter[tuple[ModeNames, int]] = Counter()  # other modes than what contradicts, each of them once
@@ -185,8 +185,8 @@ class EventIteration:
         if worst is None:
             moment, worst = _worst(moment, after, ended, idle, repeats)
         while worst is not None:
-            here = moment.regime.modes, worst[0]
-            moment, latest, contradiction, since = self._follow(t, after, moment, *worst, tried[here])
+            here = moment.regime.modes, worst.element
+            moment, latest, contradiction, since = self._follow(t, after, moment, worst, tried[here])
             late += since
             changes, blocked = [*changes, *latest], contradiction or blocked
             if contradiction is not None:
@@ -211,12 +211,13 @@ class EventIteration:
         return moment, changes
 
     def _follow(
-        self, t: float, after: float, moment: HybridState, number: int, ended: ActiveGuard, tried: int
+        self, t: float, after: float, moment: HybridState, ended: ActiveGuard, tried: int
     ) -> tuple[HybridState, list[Change], NetworkError | None, float]:
         """The mode of an element changes, or what hits is thrown back; what kept it from what it wanted, and how long
         ago, in s, it was hit. Of the other modes instead of what contradicts, some have been tried.
         """
-        element, leave, regime = self.elements[number], ended.leave, moment.regime
+        number, leave, regime = ended.element, ended.leave, moment.regime
+        element = self.elements[number]
         before = regime.modes[number]
         to = leave.to or anew(moment, after, number)
         if element.is_switch and (switched := self._commutation.switched(t, after, moment, number, to)):
@@ -229,7 +230,7 @@ class EventIteration:
             to, speed = slips, 0.0
         try:
             if speed or (leave.rebound is not None and not slips):
-                hit = self._impacts.hit(t, after, moment, number, replace(ended, leave=replace(leave, to=to)))
+                hit = self._impacts.hit(t, after, moment, replace(ended, leave=replace(leave, to=to)))
                 return *hit[:2], None, hit[2]
             modes = with_modes(regime.modes, {number: to})
             new, conducting = self._commutation.commutated(moment, after, modes)
@@ -290,8 +291,8 @@ class EventIteration:
 
 
 def _worst(
-    moment: HybridState, t: float, ended: HybridState, idle: Sequence[ElementGuard], repeats: int
-) -> tuple[HybridState, ElementGuard | None]:
+    moment: HybridState, t: float, ended: HybridState, idle: Sequence[ActiveGuard], repeats: int
+) -> tuple[HybridState, ActiveGuard | None]:
     """The guard that is farthest beyond its limit, or on it and about to go beyond; the moment with its bands.
 
     Args:
@@ -304,7 +305,7 @@ def _worst(
     moment, excesses = exceeded(moment, t, ended, idle, in_order=in_order, again=in_order)
     if not excesses:
         return moment, None
-    first = min(excesses, key=lambda one: one[1][0]) if in_order else max(excesses, key=lambda one: one[0])
+    first = min(excesses, key=lambda one: one[1].element) if in_order else max(excesses, key=lambda one: one[0])
     return moment, first[1]
 
 

@@ -10,9 +10,7 @@ from shaftwork.pipeline.phases.mode_machines import ActiveGuard
 FEW = 4
 """What a look ahead gains must be more than so many rounding units."""
 
-ElementGuard = tuple[int, ActiveGuard]
-"""An element and a guard that may end its mode."""
-Excess = tuple[float, ElementGuard]
+Excess = tuple[float, ActiveGuard]
 """How far a guard is beyond its limit, or will be."""
 
 
@@ -20,7 +18,7 @@ def exceeded(
     moment: HybridState,
     t: float,
     ended: HybridState,
-    idle: Sequence[ElementGuard] = (),
+    idle: Sequence[ActiveGuard] = (),
     *,
     in_order: bool = False,
     again: bool = False,
@@ -31,7 +29,7 @@ def exceeded(
         moment: modes and states.
         t: s.
         ended: the moment before any change.
-        idle: elements and guards that were found here already and change nothing.
+        idle: guards that were met here already and change nothing.
         in_order: whether the first one will be taken, and not the worst.
         again: whether modes have come back.
     """
@@ -42,35 +40,34 @@ def exceeded(
     if ended.bands and ended.regime.assembly is regime.assembly:
         wide = list(map(max, bands, ended.bands))
     beyond, on_limit = [], []
-    for pair in regime.watched:
-        k, leave = pair[1].guard, pair[1].leave
-        value = pair[1].side * now[k]
-        if value < -wide[k] or pair in idle:
+    for active in regime.watched:
+        band, value = wide[active.guard], active.side * now[active.guard]
+        if value < -band or active in idle:
             continue
-        if value <= wide[k] or leave.rebound is not None:  # only what comes nearer is thrown back
-            on_limit.append(pair)
+        if value <= band or active.leave.rebound is not None:  # only what comes nearer is thrown back
+            on_limit.append(active)
         elif value > 0:
-            beyond.append((value, pair))
+            beyond.append((value, active))
     # impacts come first: torques are those of the motion after them
-    hits = [excess for excess in beyond if not excess[1][1].leave.by_torque]
+    hits = [excess for excess in beyond if not excess[1].leave.by_torque]
     # then what the time ends: what else gives way shows when all of that has changed
-    timed = [pair for pair in on_limit if pair[1].leave.by_time]
+    timed = [active for active in on_limit if active.leave.by_time]
     hits = hits or (leaving(regime, here, beside, timed, again=False) if timed else [])
     if on_limit and not hits:
         soon_beyond = leaving(regime, here, beside, on_limit, again=again)
-        hits = [excess for excess in soon_beyond if excess[1][1].leave.rebound is not None]
+        hits = [excess for excess in soon_beyond if excess[1].leave.rebound is not None]
         beyond = beyond + soon_beyond if in_order else beyond or soon_beyond
     return HybridState(regime, moment.x, clear_of_limits(regime, now, bands)), hits or beyond
 
 
-def leaving(regime: Regime, here: Course, beside: Course, on_limit: list[ElementGuard], *, again: bool) -> list[Excess]:
+def leaving(regime: Regime, here: Course, beside: Course, on_limit: list[ActiveGuard], *, again: bool) -> list[Excess]:
     """Of guards on their limit those that are about to go beyond it, and how far, as surely as rounding tells.
 
     Args:
         regime: the modes.
         here: the course at the moment.
         beside: rounding away from it.
-        on_limit: elements and guards.
+        on_limit: the guards.
         again: whether modes have come back: then what hardly moves yet stays as it is, and its motion will tell. The
             step may lie beyond an instant at which a law switches.
     """
@@ -79,16 +76,16 @@ def leaving(regime: Regime, here: Course, beside: Course, on_limit: list[Element
     for _ in range(1 if again else 2):  # where nothing moves yet, its acceleration tells
         ahead, ahead_beside = (_further(regime, step, course, bends=not again) for course in (ahead, ahead_beside))
         moving = []
-        for pair in on_limit:
-            k, side = pair[1].guard, pair[1].side
+        for active in on_limit:
+            k, side = active.guard, active.side
             gain, other = side * (ahead[3][k] - here[3][k]), side * (ahead_beside[3][k] - beside[3][k])
             units = abs(beside[3][k] - here[3][k]) / ROUNDINGS
             if abs(gain) > max(abs(gain - other), FEW * units):
-                moving.append((gain, pair))
+                moving.append((gain, active))
         beyond = [one for one in moving if one[0] > 0]
         if beyond:
             break
-        on_limit = [pair for pair in on_limit if all(pair is not one for _, one in moving)]
+        on_limit = [active for active in on_limit if all(active is not one for _, one in moving)]
     return beyond
 
 
@@ -107,13 +104,14 @@ def passes_limit(moment: HybridState, t: float) -> bool:
     """Whether the states are beyond a guard of the modes by more than rounding moves it."""
     now = moment.regime.limits(t, moment.x.tolist())
     wide = moment.bands or [0.0] * len(now)
-    return any(active.side * now[active.guard] > wide[active.guard] for _, active in moment.regime.watched)
+    return any(active.side * now[active.guard] > wide[active.guard] for active in moment.regime.watched)
 
 
 def resting(moment: HybridState, t: float) -> dict[int, str]:
     """Elements that slip, with no speed across them as others hold their ends, and the modes in which they hold."""
     regime, slipping = moment.regime, dict[int, ActiveGuard]()
-    for k, active in regime.watched:
+    for active in regime.watched:
+        k = active.element
         modes, name = regime.elements[k].modes, regime.modes[k]
         if active.leave.to and any(back.by_torque and back.to == name for back in modes[active.leave.to].leaves):
             slipping[k] = active

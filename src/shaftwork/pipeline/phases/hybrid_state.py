@@ -16,9 +16,11 @@ from shaftwork.codegen.code import Moves
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.timeline import Timeline
 from shaftwork.components.laws import t as TIME
+from shaftwork.components.modes import Mode
 from shaftwork.integrate.problem import Guards, Problem, changed
 from shaftwork.pipeline.arguments import NOMINAL
 from shaftwork.pipeline.phases.assemblies import Limits, ModeEquations, Motion, Near
+from shaftwork.pipeline.phases.mode_equations import Limits, ModeEquations, Motion, Near
 from shaftwork.pipeline.phases.mode_machines import ActiveGuard, ModeMachine, ModeNames
 
 ROUNDINGS = 64.0
@@ -92,7 +94,7 @@ class Regime:
         near: the guards around an instant, by the `moves` of the states.
         sides: (guards,) on which each is met.
         sizes: nominal size of each state.
-        watched: element and guard of everything that may end one of the modes.
+        watched: everything that may end one of the modes.
         tick: how far in s rounding moves the time.
         longest: how far in s the further course is looked at, at most.
         successors: by guard, where it leads in place; told when it is first met.
@@ -106,7 +108,7 @@ class Regime:
     near: Near
     sides: Array
     sizes: list[float]
-    watched: tuple[tuple[int, ActiveGuard], ...]
+    watched: tuple[ActiveGuard, ...]
     tick: float
     longest: float
     successors: dict[int, Any] = field(default_factory=dict)
@@ -115,6 +117,10 @@ class Regime:
     def elements(self) -> tuple[ModeMachine, ...]:
         """Of the network."""
         return self.assembly.elements
+
+    def mode(self, number: int) -> Mode:
+        """The mode of an element."""
+        return self.elements[number].modes[self.modes[number]]
 
     @cached_property
     def bends(self) -> bool:
@@ -125,7 +131,7 @@ class Regime:
     @cached_property
     def ends(self) -> tuple[tuple[int, float], ...]:
         """Number and side of each guard that ends one of the modes."""
-        return tuple((active.guard, active.side) for _, active in self.watched)
+        return tuple((active.guard, active.side) for active in self.watched)
 
     @cached_property
     def equations(self) -> Callable[[], Callable[[float, Array], Array]]:
@@ -262,6 +268,6 @@ def clear_of_limit(beyond: float, band: float) -> float:
 def clear_of_limits(regime: Regime, now: Sequence[float], bands: Sequence[float]) -> list[float]:
     """How far beyond zero each of the guards of a combination of modes is met."""
     clear = [0.0] * len(now)
-    for _, active in regime.watched:
+    for active in regime.watched:
         clear[active.guard] = clear_of_limit(active.side * now[active.guard], bands[active.guard])
     return clear

@@ -61,8 +61,8 @@ def touching(t: float, moment: HybridState, number: int, leave: Leave) -> Iterat
     closed = [*lasting(elements, regime.modes)]
     yield from closed
     yield from _other_flanks(moment, closed)
-    for k, active in regime.watched:
-        closes, guard = active.leave, active.guard
+    for active in regime.watched:
+        k, closes, guard = active.element, active.leave, active.guard
         wants = k == number and closes.to == leave.to
         touches = closes.rebound is not None and active.side * now[guard] > -CLEAR * bands[guard]
         side = elements[k].opening_side(closes.to) if (wants or touches) and closes.to else None

@@ -35,8 +35,8 @@ class Impacts:
 
     def meets(self, moment: HybridState, t: float, to: Mode, number: int) -> float:
         """The speed across an element that is joined from now on; zero where it is no more than an error of the run."""
-        regime, element = moment.regime, self._elements[number]
-        if not element.joins(to.name) or to.form == element.modes[regime.modes[number]].form:
+        regime = moment.regime
+        if not self._elements[number].joins(to.name) or to.form == regime.mode(number).form:
             return 0.0
         speed = moment.across(number, t)
         least = NO_IMPACT * max(1.0, moment.top_speed)
@@ -52,7 +52,7 @@ class Impacts:
         return speed if self._regimes.differ(t, moment, joined, least) else 0.0
 
     def hit(
-        self, t: float, after: float, moment: HybridState, number: int, ended: ActiveGuard
+        self, t: float, after: float, moment: HybridState, ended: ActiveGuard
     ) -> tuple[HybridState, list[Change], float]:
         """An impact; what hits stays where a rebound would lose less than it gains, as it is found late by rounding.
 
@@ -61,19 +61,20 @@ class Impacts:
         """
         late = 0.0
         if ended.leave.rebound is not None:
-            number, ended = self._fastest(after, moment, number, ended)
+            ended = self._fastest(after, moment, ended)
             late = _late(after, moment, ended)
-        new, changes = self._collided(t, after, moment.moved(after, -late), number, ended.leave)
-        if changes[0].rebound and self._is_last(after, moment, new, number, ended):
-            return *self._collided(t, after, moment, number, replace(ended.leave, rebound=None)), 0.0
+        new, changes = self._collided(t, after, moment.moved(after, -late), ended.element, ended.leave)
+        if changes[0].rebound and self._is_last(after, moment, new, ended):
+            stays = replace(ended.leave, rebound=None)
+            return *self._collided(t, after, moment, ended.element, stays), 0.0
         return new, changes, late
 
-    def _fastest(self, t: float, moment: HybridState, number: int, ended: ActiveGuard) -> tuple[int, ActiveGuard]:
-        """Of what is hit at an instant in s what closes fastest, element and guard: impacts follow each other."""
-        contact = self._collisions.fastest(t, moment, number, ended.leave)
-        if contact is None or contact.number == number:
-            return number, ended
-        return next(pair for pair in moment.regime.watched if pair[1].leave is contact.leave)
+    def _fastest(self, t: float, moment: HybridState, ended: ActiveGuard) -> ActiveGuard:
+        """Of what is hit at an instant in s the guard of what closes fastest: impacts follow each other."""
+        contact = self._collisions.fastest(t, moment, ended.element, ended.leave)
+        if contact is None or contact.number == ended.element:
+            return ended
+        return next(active for active in moment.regime.watched if active.leave is contact.leave)
 
     def _collided(self, t: float, after: float, moment: HybridState, number: int, leave: Leave) -> Transition:
         """An impact of all contacts that touch: each is joined, or for an instant where it is thrown back."""
@@ -94,16 +95,16 @@ class Impacts:
         self._refuse_gain(after, moment, new, hits[0])
         return new, changes
 
-    def _is_last(self, t: float, moment: HybridState, new: HybridState, number: int, ended: ActiveGuard) -> bool:
+    def _is_last(self, t: float, moment: HybridState, new: HybridState, ended: ActiveGuard) -> bool:
         """Whether a rebound would lose less than it gains, as it is found late by rounding.
 
         Args:
             t: s.
             moment: what was before.
             new: after it, with gears in the modes in which they have passed it on.
-            number: of the element.
-            ended: its guard.
+            ended: the guard of what hits.
         """
+        number = ended.element
         share, speed = moment.regime.constant(number, ended.leave.rebound), moment.across(number, t)
         late = ended.side * moment.course(t)[3][ended.guard]
         # gears that have not turned round go on as they were
@@ -136,16 +137,17 @@ class Impacts:
         Without it they would open and close for ever, each time as far beyond their limit as rounding hides it.
         """
         regime = moment.regime
-        parted = [
-            (k, active)
-            for k, active in regime.watched
-            if before[k] != regime.modes[k] and active.leave.to == before[k] and active.leave.rebound is not None
-        ]
-        if not parted:
+
+        def parted(active: ActiveGuard) -> bool:
+            was, leave = before[active.element], active.leave
+            return was != regime.modes[active.element] and leave.to == was and leave.rebound is not None
+
+        closing = [*filter(parted, regime.watched)]
+        if not closing:
             return moment
         bands, closed = regime.bands(moment.course(t)), {}
-        for k, active in parted:
-            slope = float(active.leave.when.diff(INTEGRAL))
+        for active in closing:
+            k, slope = active.element, float(active.leave.when.diff(INTEGRAL))
             speed, later = (slope * one.across(k, t) for one in (moment, moment.moved(t, 1.0)))
             if speed**2 < 4 * (later - speed) * CLEAR * bands[active.guard]:
                 closed[k] = before[k]

@@ -19,8 +19,8 @@ from shaftwork.codegen.recovery import BranchHistory
 from shaftwork.components.branches import ACROSS, through_of
 from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError, SimulationError
-from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.hybrid_state import EPS, ROUNDINGS, HybridState, Regime
+from shaftwork.pipeline.phases.mode_equations import ModeEquations
 from shaftwork.pipeline.phases.mode_machines import ModeNames, with_modes
 from shaftwork.pipeline.phases.regimes import Regimes
 
@@ -177,7 +177,7 @@ class Impulses:
 
     def _stopped(self, moment: HybridState) -> list[int]:
         """Gears in a mode of rest."""
-        return [k for k in self.gears if not _turns(self._elements[k].modes[moment.regime.modes[k]])]
+        return [k for k in self.gears if not _turns(moment.regime.mode(k))]
 
     def _turned(self, t: float, start: ImpactStart, rest: Blow) -> tuple[int, str] | None:
         """The gear that an impulse brings out of its mode at once, and the mode that follows."""
@@ -191,7 +191,7 @@ class Impulses:
         exceeded = [
             (_guard(assembly, k, leave, impulses, p), k, leave.to)
             for k in self.gears
-            for leave in self._elements[k].modes[start.moment.regime.modes[k]].leaves
+            for leave in start.moment.regime.mode(k).leaves
             if leave.by_torque
         ]
         exceeded = [turn for turn in exceeded if turn[0] > least]
@@ -209,7 +209,7 @@ class Impulses:
         least = NOTHING_OF * max(np.abs(x).max(initial=0.0) for x in states)
         for k, speed in start.speeds.items():
             speeds = speed, after.across(k, t)
-            for leave in self._elements[k].modes[start.moment.regime.modes[k]].leaves:
+            for leave in start.moment.regime.mode(k).leaves:
                 slope = float(leave.when.diff(ACROSS))
                 began, ends = (0.0 if abs(speed) <= least else slope * speed for speed in speeds)
                 if slope and ends > 0:

@@ -11,9 +11,9 @@ import numpy as np
 
 from shaftwork.codegen.elements import Array
 from shaftwork.integrate.problem import Reaction, SeriesError
-from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.event_iteration import EventIteration
 from shaftwork.pipeline.phases.hybrid_state import CLEAR, Change, HybridState, Regime, Transition, clear_of_limit
+from shaftwork.pipeline.phases.mode_equations import ModeEquations
 from shaftwork.pipeline.phases.mode_machines import ActiveGuard, ModeMachine, ModeNames, is_same, with_modes
 
 LATE = 1e4
@@ -153,13 +153,11 @@ class InPlaceEvents:
             error = regime.assembly.without_value(regime.p, regime.modes, np.array([t]), np.array([here[1]]))
             if error is not None:
                 raise error
-        for number, active in regime.watched:
+        for active in regime.watched:
             k, side = active.guard, active.side
             if k != met and min(side * now[k], side * before[k]) > CLEAR * bands[k]:
-                element = regime.elements[number]
-                words = (
-                    f"'{element.name}' ceased to be {element.modes[regime.modes[number]].words} before t = {t:.9g} s"
-                )
+                name, mode = regime.elements[active.element].name, regime.mode(active.element)
+                words = f"'{name}' ceased to be {mode.words} before t = {t:.9g} s"
                 cause = f"{words}, and the series of heyoka have not shown it"
                 raise SeriesError(f"The heyoka engine has not seen that {words}. Take engine='scipy'.", cause)
 
@@ -214,24 +212,24 @@ class InPlaceEvents:
         return change
 
     def _change_by(self, regime: Regime, met: int) -> ModeChange | None:
-        pairs = [pair for pair in regime.watched if pair[1].guard == met]
-        number, ended = pairs[0]
+        ended, *others = (active for active in regime.watched if active.guard == met)
+        number = ended.element
         element, leave, before = regime.elements[number], ended.leave, regime.modes[number]
-        if len(pairs) > 1 or not leave.to or leave.rebound is not None:
+        if others or not leave.to or leave.rebound is not None:
             return None
         holds = element.modes[leave.to].form != element.modes[before].form
         if holds and not regime.assembly.holds_by_numbers(number):
             return None
         to = self._settling.regime(with_modes(regime.modes, {number: leave.to}))
-        watched = tuple((one.guard, one.side, _tells(number, ended, k, one, holds=holds)) for k, one in to.watched)
+        watched = tuple((one.guard, one.side, _tells(ended, one, holds=holds)) for one in to.watched)
         return ModeChange(to, ended.side, watched, (element, before, leave.to), holds)
 
 
-def _tells(number: int, ended: ActiveGuard, other: int, active: ActiveGuard, *, holds: bool) -> bool:
+def _tells(ended: ActiveGuard, active: ActiveGuard, *, holds: bool) -> bool:
     """Whether a guard must be within its limit where another one has led to its mode: it is not the same one.
 
     What gives way is at rest, and about to move as the torque that it has met grows.
     """
     if holds:
-        return other != number or not active.leave.by_speed
+        return active.element != ended.element or not active.leave.by_speed
     return active.guard != ended.guard or active.side == ended.side

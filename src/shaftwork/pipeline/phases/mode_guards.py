@@ -46,10 +46,10 @@ class ModeGuards:
                     holds = forms[number] is None and element.joins(mode.name)
                     still = {ACROSS: Integer(0)} if holds or number in self.resting else {}
                     self._leaves[number, mode.name] = tuple(self._leaving(number, part, mode, still))
-        self.owners = {active.guard: k for (k, _), guards in self._leaves.items() for active in guards}
+        self.owners = {active.guard: active.element for guards in self._leaves.values() for active in guards}
         """The element of each guard."""
         self._sides: dict[ModeNames, Array] = {}
-        self._ends: dict[ModeNames, tuple[tuple[int, ActiveGuard], ...]] = {}
+        self._ends: dict[ModeNames, tuple[ActiveGuard, ...]] = {}
 
     def _leaving(self, number: int, part: GraphPart, mode: Mode, still: Mapping[Symbol, Expr]) -> Iterator[ActiveGuard]:
         """The guards of a mode; what another mode of the element has is shared, with the other sign as well.
@@ -77,11 +77,11 @@ class ModeGuards:
             for side, expression in ((1.0, when), (-1.0, -when)):
                 place = self._places.get((number, expression))
                 if place is not None and place not in taken:
-                    active = ActiveGuard(place, side, leave)
+                    active = ActiveGuard(number, place, side, leave)
                     break
             else:
                 self.expressions.append(when)
-                active = ActiveGuard(len(self.expressions) - 1, 1.0, leave)
+                active = ActiveGuard(number, len(self.expressions) - 1, 1.0, leave)
                 self._places.setdefault((number, when), active.guard)
             taken.append(active.guard)
             yield active
@@ -94,17 +94,17 @@ class ModeGuards:
         branch, sign = holder
         return int(sign) * self._readings.through(branch)
 
-    def watched(self, modes: ModeNames) -> tuple[tuple[int, ActiveGuard], ...]:
-        """Element and guard of everything that may end one of the modes."""
+    def watched(self, modes: ModeNames) -> tuple[ActiveGuard, ...]:
+        """Everything that may end one of the modes."""
         if modes not in self._ends:
-            self._ends[modes] = tuple((k, active) for k, name in enumerate(modes) for active in self._leaves[k, name])
+            self._ends[modes] = tuple(active for pair in enumerate(modes) for active in self._leaves[pair])
         return self._ends[modes]
 
     def sides(self, modes: ModeNames) -> Array:
         """(guards,) the side of each guard that ends one of the modes."""
         if modes not in self._sides:
             sides = np.zeros(len(self.expressions))
-            for _, active in self.watched(modes):
+            for active in self.watched(modes):
                 sides[active.guard] = active.side
             self._sides[modes] = sides
         return self._sides[modes]

@@ -120,8 +120,16 @@ def with_modes(modes: ModeNames, changed: Mapping[int, str]) -> ModeNames:
 
 @dataclass(frozen=True, eq=False)
 class ActiveGuard:
-    """What may end a mode in a set of equations: the guard's place, the side on which it is met, and what follows."""
+    """What may end a mode in a set of equations.
 
+    Args:
+        element: of the mode, by its number.
+        guard: its place among those of the equations.
+        side: on which it is met.
+        leave: what follows.
+    """
+
+    element: int
     guard: int
     side: float
     leave: Leave

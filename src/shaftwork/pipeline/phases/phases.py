@@ -17,10 +17,10 @@ from shaftwork.integrate.engines import ADAMS, available
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.phases.assemblies import ModeEquations
-from shaftwork.pipeline.phases.hybrid_waves import WaveAssembly
+from shaftwork.pipeline.phases.hybrid_waves import WaveModeEquations
+from shaftwork.pipeline.phases.mode_equations import ModeEquations
 from shaftwork.pipeline.phases.mode_machines import ModeNames, elements_of, with_modes
-from shaftwork.pipeline.phases.reactions import MANY, HeldAssembly, laws_that_hold
+from shaftwork.pipeline.phases.reactions import MANY, ReactionEquations, laws_that_hold
 from shaftwork.pipeline.phases.resting import at_rest
 from shaftwork.pipeline.wave_motion import engine_of_waves
 from shaftwork.reduction.value_diagnosis import self_locks
@@ -53,8 +53,8 @@ class Phases:
         self.elements = elements_of(base.form.graph)
         self.first: ModeNames = tuple(element.first for element in self.elements)
         self._assemblies: dict[tuple[str, ...], ModeEquations | NetworkError] = {}
-        self._slipping: dict[tuple[str, ...], HeldAssembly | None] = {}
-        self._holding: dict[tuple[tuple[str, ...], tuple[int, ...]], HeldAssembly] = {}
+        self._slipping: dict[tuple[str, ...], ReactionEquations | None] = {}
+        self._holding: dict[tuple[tuple[str, ...], tuple[int, ...]], ReactionEquations] = {}
         self._engines: dict[tuple[ModeEquations, ModeNames, str], tuple[str, str]] = {}
         self._easy: dict[ModeEquations, dict[tuple[int, str], tuple[str, str]]] = {}
         self.last_run = Kept[Any, Any](1)
@@ -74,7 +74,7 @@ class Phases:
                     model = self._rebuild(netlist)
                     if (resting := at_rest(netlist, model.form)) is not netlist:
                         model = self._rebuild(resting)
-                kind = WaveAssembly if model.form.waves else ModeEquations
+                kind = WaveModeEquations if model.form.waves else ModeEquations
                 assembly: ModeEquations | NetworkError = kind(model, self.elements, forms)
             except NetworkError as error:
                 assembly = error
@@ -116,7 +116,7 @@ class Phases:
         independent = assembly.joints(p).independent and not self._rests(assembly, modes, p)
         return assembly if independent else self.assembly(modes)
 
-    def _rests(self, assembly: HeldAssembly, modes: ModeNames, p: Array) -> bool:
+    def _rests(self, assembly: ReactionEquations, modes: ModeNames, p: Array) -> bool:
         """Whether what has another law at rest slips by its mode, and yet cannot turn as others hold its ends."""
         pairs = enumerate(zip(self.elements, modes, strict=True))
         slipping = [k for k, (element, name) in pairs if element.modes[name].at_rest is not None]
@@ -126,14 +126,14 @@ class Phases:
         speeds = assembly.across(slipping, 0.0, assembly.joints(p).alike(x), p)
         return any(abs(speed) < STILL for speed in speeds)
 
-    def _all_slipping(self, free: ModeNames) -> HeldAssembly | None:
+    def _all_slipping(self, free: ModeNames) -> ReactionEquations | None:
         """One set of equations for all that hold, from the modes in which none does; None where there is none."""
         try:
             model = self.assembly(free).model
         except NetworkError:  # as of a gear that jams only while a clutch behind it slips
             return None
         laws = laws_that_hold(model, self.elements)
-        return None if laws is None else HeldAssembly(model, self.elements, laws)
+        return None if laws is None else ReactionEquations(model, self.elements, laws)
 
     def _netlist(self, forms: tuple[str, ...]) -> Netlist:
         chosen: dict[str, tuple[ModeChoice, ...]] = {}

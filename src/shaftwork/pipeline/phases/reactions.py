@@ -31,7 +31,7 @@ from shaftwork.integrate.problem import Problem
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.phases.assemblies import ModeEquations, RightSide
+from shaftwork.pipeline.phases.mode_equations import ModeEquations, RightSide
 from shaftwork.pipeline.phases.mode_machines import ModeMachine, ModeNames, is_same
 from shaftwork.reduction.form import StateForm
 from shaftwork.reduction.held_rows import HeldRows, groups, held_places
@@ -42,7 +42,7 @@ KEPT_RATES = 2
 """Parameter vectors whose right-hand sides are kept in one combination of what holds."""
 
 
-class HeldAssembly(ModeEquations):
+class ReactionEquations(ModeEquations):
     """One set of equations for all modes of parts that hold, with those of them that do so; at first none.
 
     Args:
@@ -66,7 +66,7 @@ class HeldAssembly(ModeEquations):
         self._holds: tuple[Joints, Array] | None = None
         _ = self._many, self.clocks  # made once for all
 
-    def holding(self, numbers: tuple[int, ...]) -> HeldAssembly:
+    def holding(self, numbers: tuple[int, ...]) -> ReactionEquations:
         """The equations in which the elements of these numbers hold."""
         other = copy(self)
         caches: dict[str, Any] = {name: Kept(KEPT_RATES) for name in ("_guards_by_p", "_rates_by_p", "_problems")}

@@ -12,7 +12,9 @@ from shaftwork.components.branches import INTEGRAL
 from shaftwork.core.errors import NetworkError, ParameterError, SimulationError
 from shaftwork.pipeline.motion_start import Ending
 from shaftwork.pipeline.phases.assemblies import ModeEquations
+from shaftwork.pipeline.ending import Ending
 from shaftwork.pipeline.phases.hybrid_state import AHEAD_OF_RUN, ROUNDINGS, HybridState, Regime
+from shaftwork.pipeline.phases.mode_equations import ModeEquations
 from shaftwork.pipeline.phases.mode_machines import ModeNames, with_modes
 from shaftwork.pipeline.phases.phases import Phases
 from shaftwork.pipeline.phases.starts import begins_anew
@@ -162,12 +164,12 @@ def refuse_beyond(moment: HybridState, t: float) -> None:
     """
     regime = moment.regime
     now = regime.limits(t, moment.x.tolist())
-    for number, active in regime.watched:
-        element, when, beyond = regime.elements[number], active.leave.when, active.side * now[active.guard]
+    for active in regime.watched:
+        element, when, beyond = regime.elements[active.element], active.leave.when, active.side * now[active.guard]
         if active.leave.rebound is None or not beyond > BEYOND:
             continue
         slope = float(when.diff(INTEGRAL))
-        limit = -slope * regime.constant(number, when.xreplace({INTEGRAL: Integer(0)}))
+        limit = -slope * regime.constant(active.element, when.xreplace({INTEGRAL: Integer(0)}))
         raise ParameterError(
             f"{type(element.part.component).__name__} '{element.name}' would start at a twist of "
             f"{limit + slope * beyond:.9g} rad, {'above its upper' if slope > 0 else 'below its lower'} limit of "

@@ -13,8 +13,8 @@ from shaftwork.codegen.differentiation import Differentiated
 from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.hybrid_state import Change
+from shaftwork.pipeline.phases.mode_equations import ModeEquations
 from shaftwork.pipeline.phases.mode_machines import ModeNames, with_modes
 from shaftwork.pipeline.phases.phases import Phases
 from shaftwork.pipeline.sensitivities.legs import Leg

@@ -20,6 +20,7 @@ from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import start_of
 from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.hybrid_state import Change
+from shaftwork.pipeline.phases.mode_equations import ModeEquations
 from shaftwork.pipeline.phases.mode_machines import ModeNames
 from shaftwork.pipeline.phases.model import PhasedModel
 from shaftwork.pipeline.phases.phases import Phases

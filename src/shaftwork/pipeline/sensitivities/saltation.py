@@ -242,8 +242,8 @@ class JumpConditions:
             return
         for change in changes:
             first.setdefault(id(change.element), change)
-        for number, watched in leg.assembly.watched(leg.modes):
-            ended = first.get(id(leg.assembly.elements[number]))
+        for watched in leg.assembly.watched(leg.modes):
+            ended = first.get(id(leg.assembly.elements[watched.element]))
             if ended is not None:
                 guard = leg.assembly.guards_shown[watched.guard]
                 value, rate = self._course(old, guard)

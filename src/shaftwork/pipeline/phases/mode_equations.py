@@ -271,22 +271,22 @@ class ModeEquations:
 
     def without_value(self, p: Array, modes: ModeNames, times: Array, states: Array) -> SimulationError | None:
         """The error of the first time at which a law or a guard of the modes has no value."""
-        error, pairs = without_value(self.bound(p), times, states), self.watched(modes)
-        missing = first_missing(times, self.guards(p)(times, states)[:, [watched.guard for _, watched in pairs]])
+        error, watched = without_value(self.bound(p), times, states), self.watched(modes)
+        missing = first_missing(times, self.guards(p)(times, states)[:, [active.guard for active in watched]])
         if error is not None or missing is None:
             return error
-        number, watched = pairs[missing[1]]
-        return no_value(missing[0], in_words(self.elements[number].part, watched.leave.when))
+        active = watched[missing[1]]
+        return no_value(missing[0], in_words(self.elements[active.element].part, active.leave.when))
 
     def _rough(self, p: Array, modes: ModeNames, times: Array, states: Array) -> tuple[float, str] | None:
         """The first time at which a law or a guard has no value in some branch, and which one."""
         law, symbols = rough(self.bound(p), times, states), (TIME, *self._readings.symbols, *self._parameters)
-        for number, active in () if law is not None else self.watched(modes):
+        for active in () if law is not None else self.watched(modes):
             function = vectorised(symbols, self._expressions[active.guard])
             quantities = np.array([*self._read(p)(times, states)]).reshape(-1, times.size)
             for time, values in zip(times, quantities.T, strict=True):
                 if is_rough(function, (time, *values, *self.values(p))):
-                    return float(time), in_words(self.elements[number].part, active.leave.when)
+                    return float(time), in_words(self.elements[active.element].part, active.leave.when)
         return law
 
     def _rates(self, p: Array) -> tuple[RightSide, dict[str, Any]]:

@@ -12,15 +12,17 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.codegen.observer import Impact, ModelObserver
 from shaftwork.codegen.phase_observer import PhaseObserver, Stretch, Stretches
-from shaftwork.pipeline.phases.assemblies import ModeEquations
+from shaftwork.pipeline.phases.hybrid_run import HybridRun, Span
 from shaftwork.pipeline.phases.hybrid_state import Change, without_detours
 from shaftwork.pipeline.phases.hybrid_waves import WaveRun
 from shaftwork.pipeline.phases.impulses import summed
 from shaftwork.pipeline.phases.in_place_events import Phase
+from shaftwork.pipeline.phases.mode_equations import ModeEquations
 from shaftwork.pipeline.phases.mode_machines import ModeMachine, ModeNames
 from shaftwork.pipeline.phases.run import HybridRun, Span
 from shaftwork.results.observer import PhaseRow
 from shaftwork.results.solution import Solution
+from shaftwork.results.solution import PhaseRow, Solution
 
 
 def solution(run: HybridRun, name: str) -> Solution:

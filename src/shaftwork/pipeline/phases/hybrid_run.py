@@ -32,6 +32,7 @@ from shaftwork.pipeline.phases.event_iteration import EventIteration
 from shaftwork.pipeline.phases.hybrid_state import Change, HybridState, Regime, Transition
 from shaftwork.pipeline.phases.hybrid_waves import WaveRun
 from shaftwork.pipeline.phases.in_place_events import InPlaceEvents, Phase
+from shaftwork.pipeline.phases.mode_equations import ModeEquations
 from shaftwork.pipeline.phases.mode_machines import NO_IMPACT, with_modes
 from shaftwork.pipeline.phases.phases import FOLLOWING, Phases
 from shaftwork.pipeline.phases.starts import refuse_incomplete, warn_of_what_may_have_begun
@@ -58,7 +59,7 @@ class Span:
 
 
 @dataclass(frozen=True, eq=False)
-class Shared:
+class SharedByRuns:
     """What runs with the same values over the same time share.
 
     Args:
@@ -88,8 +89,8 @@ class HybridRun:
         self.phases, self.demand = phases, demand
         equations = None if by_combination else partial(phases.running, values=values, engine=demand.engine)
         key = tuple(sorted(values.items())), demand.span, by_combination, demand.engine
-        self._shared: Shared = phases.last_run(
-            key, lambda: Shared(EventIteration(phases, values, demand.span, equations))
+        self._shared: SharedByRuns = phases.last_run(
+            key, lambda: SharedByRuns(EventIteration(phases, values, demand.span, equations))
         )
         self.settling: EventIteration = self._shared.settling
         self.spans: list[Span] = []

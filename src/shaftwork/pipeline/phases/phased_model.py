@@ -36,11 +36,11 @@ from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.event_iteration import EventIteration
 from shaftwork.pipeline.phases.exceeded_guards import passes_limit
+from shaftwork.pipeline.phases.hybrid_run import HybridRun
+from shaftwork.pipeline.phases.hybrid_solution import solution
 from shaftwork.pipeline.phases.hybrid_state import HybridState
 from shaftwork.pipeline.phases.named_phases import known_modes, modes_in, whole_name, words_of
 from shaftwork.pipeline.phases.phases import Phases
-from shaftwork.pipeline.phases.run import HybridRun
-from shaftwork.pipeline.phases.solution import solution
 from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels
 from shaftwork.pipeline.sizes import in_its_size
 from shaftwork.reduction.form import StateForm
@@ -240,9 +240,9 @@ def warn_of_held_torques(moment: HybridState, when: float) -> None:
     """
     regime, x = moment.regime, moment.x
     holding = [
-        (regime.elements[k].name, active.guard)
-        for k, active in regime.watched
-        if active.leave.by_torque and len(regime.elements[k].modes[regime.modes[k]].gives_way) > 1
+        (regime.elements[active.element].name, active.guard)
+        for active in regime.watched
+        if active.leave.by_torque and len(regime.mode(active.element).gives_way) > 1
     ]
     if not (holding and x.size):
         return
