@@ -36,12 +36,9 @@ from shaftwork.pipeline.analysis import (
 )
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.mode_machines import ModeNames
-from shaftwork.pipeline.phases.model import PhasedModel
+from shaftwork.pipeline.phases.phased_model import PhasedModel
 from shaftwork.results.exact_lines import ExactLines, ExactSlopes
 from shaftwork.results.linear import ExactModel
-from shaftwork.pipeline.phases.phased_model import PhasedModel
-from shaftwork.results.exact import ExactModel, ExactSlopes
-from shaftwork.results.exact_lines import ExactLines
 from shaftwork.results.modes import Modes, find_modes
 from shaftwork.results.solution import Solution
 

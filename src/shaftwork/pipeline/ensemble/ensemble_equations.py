@@ -17,9 +17,9 @@ from shaftwork.core.errors import CompileError
 from shaftwork.pipeline.arguments import NOMINAL
 from shaftwork.pipeline.ensemble.extremes import Index, Mask
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.exceeded_guards import FEW
 from shaftwork.pipeline.phases.hybrid_state import AHEAD, AHEAD_OF_RUN, CLEAR, EPS, GOLDEN, NOTHING, ROUNDINGS
+from shaftwork.pipeline.phases.mode_equations import ModeEquations
 from shaftwork.pipeline.phases.mode_machines import ModeNames
 from shaftwork.reduction.observables import Observables
 from shaftwork.results.measures import Measure

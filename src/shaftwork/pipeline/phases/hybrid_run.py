@@ -26,7 +26,6 @@ from shaftwork.integrate.problem import Problem, SeriesError, StickingError, Tra
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.implicit import PRESCRIBED, at_rest
 from shaftwork.pipeline.motion_start import Ending, start_of
-from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.commutation import takeovers
 from shaftwork.pipeline.phases.event_iteration import EventIteration
 from shaftwork.pipeline.phases.hybrid_state import Change, HybridState, Regime, Transition

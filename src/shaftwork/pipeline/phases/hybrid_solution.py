@@ -19,10 +19,8 @@ from shaftwork.pipeline.phases.impulses import summed
 from shaftwork.pipeline.phases.in_place_events import Phase
 from shaftwork.pipeline.phases.mode_equations import ModeEquations
 from shaftwork.pipeline.phases.mode_machines import ModeMachine, ModeNames
-from shaftwork.pipeline.phases.run import HybridRun, Span
 from shaftwork.results.observer import PhaseRow
 from shaftwork.results.solution import Solution
-from shaftwork.results.solution import PhaseRow, Solution
 
 
 def solution(run: HybridRun, name: str) -> Solution:

@@ -19,7 +19,6 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Mode
 from shaftwork.integrate.problem import Guards, Problem, changed
 from shaftwork.pipeline.arguments import NOMINAL
-from shaftwork.pipeline.phases.assemblies import Limits, ModeEquations, Motion, Near
 from shaftwork.pipeline.phases.mode_equations import Limits, ModeEquations, Motion, Near
 from shaftwork.pipeline.phases.mode_machines import ActiveGuard, ModeMachine, ModeNames
 

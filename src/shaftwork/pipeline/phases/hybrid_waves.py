@@ -21,12 +21,9 @@ from shaftwork.integrate.lossless.march import March, MarchEquations
 from shaftwork.integrate.lossless.waveforms import Left
 from shaftwork.integrate.problem import Problem, Trajectory
 from shaftwork.pipeline.arguments import NOMINAL
-from shaftwork.pipeline.phases.assemblies import ModeEquations
 from shaftwork.pipeline.phases.hybrid_state import Regime
-from shaftwork.pipeline.wave_motion import CarriedWaves, WaveStart, checked_lines, lines_by_shaft
 from shaftwork.pipeline.phases.mode_equations import ModeEquations
-from shaftwork.pipeline.prepared import NOMINAL
-from shaftwork.pipeline.waves import CarriedWaves, WaveStart, checked_lines, lines_by_shaft
+from shaftwork.pipeline.wave_motion import CarriedWaves, WaveStart, checked_lines, lines_by_shaft
 
 RATE = "rate of "
 

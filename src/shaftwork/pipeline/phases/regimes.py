@@ -11,8 +11,6 @@ from sympy import Integer
 from shaftwork.components.branches import INTEGRAL
 from shaftwork.core.errors import NetworkError, ParameterError, SimulationError
 from shaftwork.pipeline.motion_start import Ending
-from shaftwork.pipeline.phases.assemblies import ModeEquations
-from shaftwork.pipeline.ending import Ending
 from shaftwork.pipeline.phases.hybrid_state import AHEAD_OF_RUN, ROUNDINGS, HybridState, Regime
 from shaftwork.pipeline.phases.mode_equations import ModeEquations
 from shaftwork.pipeline.phases.mode_machines import ModeNames, with_modes

@@ -15,7 +15,7 @@ from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.pipeline.analysis import Given
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import start_of
-from shaftwork.pipeline.phases.model import PhasedModel
+from shaftwork.pipeline.phases.phased_model import PhasedModel
 from shaftwork.reduction.explicit_rows import Rows
 
 NO_DERIVATIVE = {

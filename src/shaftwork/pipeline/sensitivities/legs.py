@@ -18,14 +18,13 @@ from shaftwork.pipeline.analysis import Given
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import start_of
-from shaftwork.pipeline.phases.assemblies import ModeEquations
+from shaftwork.pipeline.phases.hybrid_run import HybridRun, Span
+from shaftwork.pipeline.phases.hybrid_solution import solution
 from shaftwork.pipeline.phases.hybrid_state import Change
 from shaftwork.pipeline.phases.mode_equations import ModeEquations
 from shaftwork.pipeline.phases.mode_machines import ModeNames
-from shaftwork.pipeline.phases.model import PhasedModel
+from shaftwork.pipeline.phases.phased_model import PhasedModel
 from shaftwork.pipeline.phases.phases import Phases
-from shaftwork.pipeline.phases.run import HybridRun, Span
-from shaftwork.pipeline.phases.solution import solution
 from shaftwork.results.solution import Solution
 
 SILENT = 1e-12

@@ -17,13 +17,9 @@ from shaftwork.pipeline.analysis import Given, Point, Time, operating_point
 from shaftwork.pipeline.arguments import relative_tolerance, time_span
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import refuse_motion
-from shaftwork.pipeline.phases.model import PhasedModel
+from shaftwork.pipeline.phases.phased_model import PhasedModel
 from shaftwork.pipeline.sensitivities.differentiable import rows_of, smooth_parameters, without_start
 from shaftwork.pipeline.sensitivities.legs import motion_of
-from shaftwork.pipeline.phases.phased_model import PhasedModel
-from shaftwork.pipeline.sensitivities.differentiable import rows_of, smooth_parameters
-from shaftwork.pipeline.sensitivities.measure_slopes import integrand, measured
-from shaftwork.pipeline.sensitivities.motion_legs import motion_of
 from shaftwork.pipeline.sensitivities.motion_slopes import MotionSlopes
 from shaftwork.results.course import SMALLEST, turning_points
 from shaftwork.results.measures import KINDS, Measure
