@@ -102,7 +102,7 @@ def campbell(
     *,
     constant: bool,
 ) -> Campbell:
-    """The interference diagram of a network.
+    """The interference diagram of a network; see `Network.campbell`.
 
     Law: a crossing is a speed n with f(n) = order n / 2 pi, f a natural frequency at n itself. It is sought between
     two of the speeds, in each phase of the network for itself, and refined until it no longer changes.
@@ -113,8 +113,7 @@ def campbell(
             the phase that they belong to.
         speeds: (k,) rad/s, ascending.
         orders: excitations per turn, each above 0.
-        f_max: highest frequency of interest, Hz; by default the highest order at the highest speed. The axis then ends
-            above the highest mode.
+        f_max: highest frequency of interest, Hz; without one the axis ends above the highest mode.
         constant: whether the modes are the same at all speeds.
 
     Raises:

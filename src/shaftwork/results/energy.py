@@ -146,17 +146,16 @@ class _Work:
         self._observer, self._dense = observer, dense
         self._rows = _width(observer, dense, steps) * len(NODES)
         self._by_step = np.zeros((2, len(steps) - 1))
-        self._clear()
-        panels = _Panels(np.arange(len(steps) - 1), steps[:-1], np.diff(steps))
-        for block in blocks(len(panels.step), self._rows):
-            self._add(panels.taken(block), *self._powers(panels.taken(block)))
-        whole, self._each = self._by_step.copy(), max(self.work, float(np.abs(self.lost).max())) / len(steps)
-        self._clear()
-        self._settle(panels, whole, np.full(len(panels.step), np.inf), HALVINGS)
-
-    def _clear(self) -> None:
-        self._by_step[:] = 0.0
         self.work, self.lost_in, self.supplied_by = 0.0, dict[str, float](), dict[str, float]()
+        panels = _Panels(np.arange(len(steps) - 1), steps[:-1], np.diff(steps))
+        whole, turnover = np.zeros_like(self._by_step), 0.0
+        for block in blocks(len(panels.step), self._rows):
+            part = panels.taken(block)
+            powers = self._powers(part)
+            whole[:, block] = part.works(powers)
+            turnover += part.turnover(powers[1])
+        self._each = max(turnover, float(np.abs(np.cumsum(whole[0])).max(initial=0.0))) / len(steps)
+        self._settle(panels, whole, np.full(len(panels.step), np.inf), HALVINGS)
 
     @property
     def lost(self) -> Array:
@@ -188,7 +187,7 @@ class _Work:
         for block in blocks(len(panels.step), 2 * self._rows):
             halves = panels.taken(block).halved()
             powers = self._powers(halves)
-            parts = np.stack([halves.integrals(_total(by_part, halves.times.shape)) for by_part in powers])
+            parts = halves.works(powers)
             change = np.abs(parts.reshape(2, -1, 2).sum(axis=2) - whole[:, block]).sum(axis=0)
             noisy = (change > FALLS * before[block]) & (change <= NOISE * self._each)
             still = (change > TIGHT * self._each) & ~noisy if halvings > 1 else np.zeros(len(change), dtype=bool)
@@ -205,7 +204,7 @@ class _Work:
                 work = panels.integrals(power)
                 np.add.at(self._by_step[row], panels.step, work)
                 totals[name] = totals.get(name, 0.0) + float(work.sum())
-        self.work += sum(float(panels.integrals(np.abs(power)).sum()) for power in supplied.values())
+        self.work += panels.turnover(supplied)
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,6 +230,14 @@ class _Panels:
     def integrals(self, values: Array) -> Array:
         """(p,) over each of values (p, 12) at the nodes."""
         return np.asarray(values @ WEIGHTS * self.length / 2)
+
+    def works(self, powers: Iterable[Mapping[str, Array]]) -> Array:
+        """(2, p) integrals over each of all that is lost and of all that is supplied, from powers (p, 12) by part."""
+        return np.stack([self.integrals(_total(by_part, self.times.shape)) for by_part in powers])
+
+    def turnover(self, supplied: Mapping[str, Array]) -> float:
+        """The integral over all of them of the sizes of supplied powers (p, 12)."""
+        return sum(float(self.integrals(np.abs(power)).sum()) for power in supplied.values())
 
     def halved(self) -> _Panels:
         """Two for each."""
