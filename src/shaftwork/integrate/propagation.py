@@ -269,7 +269,7 @@ def _in_floats(problem: Problem, system: LinearSystem) -> Callable[[SmoothInterv
     dense_form = problem.straight is None or prefers_dense(problem, problem.straight)
     modes = system.modes if dense_form else None
     if modes is None:
-        return partial(_by_exponentials, problem, system, dense_form)
+        return partial(_by_exponentials, problem, system, dense_form=dense_form)
     linear = problem.linear
     inputs = None if linear is None or linear.straight else _inputs(problem, linear)
 
@@ -294,11 +294,7 @@ def _in_floats(problem: Problem, system: LinearSystem) -> Callable[[SmoothInterv
 
 
 def _by_exponentials(
-    problem: Problem,
-    system: LinearSystem,
-    dense_form: bool,  # noqa: FBT001
-    piece: SmoothInterval,
-    x: Array,
+    problem: Problem, system: LinearSystem, piece: SmoothInterval, x: Array, *, dense_form: bool
 ) -> _ExactInterval:
     """The motion in a piece from node to node; times between start from the node before them."""
     times, (level, slope) = _nodes(problem, piece), straight_line(problem, system.forcing, piece)
