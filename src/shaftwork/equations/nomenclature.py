@@ -14,7 +14,7 @@ from shaftwork.equations.notation import INDEX_CLOSES, INDEX_OPENS, Letter, spli
 from shaftwork.equations.printing import Writer, printed_number
 from shaftwork.equations.series import Numbers, listed, replaced, series_in
 from shaftwork.equations.spelling import in_text
-from shaftwork.network.effective import effective
+from shaftwork.network.graph import effective
 
 if TYPE_CHECKING:  # the records print themselves through this module
     from shaftwork.equations.records import Equations
