@@ -8,7 +8,7 @@ import pytest
 import sympy
 
 import shaftwork as sw
-from shaftwork.network.effective import effective
+from shaftwork.network.graph import effective
 from tests.beds import bed_of, registered
 
 FREQUENCY = sw.Table([0.0, 0.5, 2.0, 6.0, 8.0, 30.0], [0.7, 0.7, 10.0, 10.25, 0.7, 0.7])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -14,13 +14,13 @@ from shaftwork.components.base import Component, Derived, Signal
 from shaftwork.components.branches import End, named_in
 from shaftwork.components.clips import replaced
 from shaftwork.components.laws import as_expression
-from shaftwork.components.modes import Modes
+from shaftwork.components.modes import ModeChoice, Modes
 from shaftwork.components.tables import Table
 from shaftwork.core.domains import ROTATION, Domain
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed, overview
 from shaftwork.network.sharing import Shared
-from shaftwork.network.templates import BranchTemplate, make_template, with_factors
+from shaftwork.network.templates import BranchTemplate, Template, make_template, with_factors
 
 GROUND = -1
 """Node number of the reference."""
@@ -288,3 +288,42 @@ def _place(template: BranchTemplate, index: int, part: int, nodes: Mapping[str, 
         return GraphBranch(index, part, template, GROUND, GROUND, terms)
     plus, minus = template.ends
     return GraphBranch(index, part, template, number(plus), number(minus), ())
+
+
+def effective(graph: CircuitGraph) -> frozenset[str]:
+    """The parameters, "part.name", that a law reads in any mode of its part, or that say when a mode begins or ends."""
+    templates = Shared(make_template)
+    return frozenset(f"{part.name}.{name}" for part in graph.parts for name in _effective_of(part, templates))
+
+
+def _effective_of(part: GraphPart, templates: Shared[Template]) -> Iterator[str]:
+    values = resolve(Placed(part.component, ()))[0].values
+    forms = [templates.of(part.component, values, choices)[0] for choices in _mode_choices(part.modes)]
+    laws = {item.name: item.law for template in forms for item in template.derived}
+    pending, read = list(_symbols_of(forms)), set(part.consulted)
+    while pending:
+        name = pending.pop().name
+        pending += laws.pop(name).free_symbols if name in laws else ()
+        read.add(name)
+    return (name for name in part.component.declared if name in read)
+
+
+def _mode_choices(elements: tuple[Modes, ...]) -> Iterator[tuple[ModeChoice, ...]]:
+    """What may be chosen: each form of each element beside the first ones of the others."""
+    firsts = tuple(ModeChoice(element.options[0].form) for element in elements)
+    yield firsts
+    for place, element in enumerate(elements):
+        for form in dict.fromkeys(form for mode in element.options for form in mode.forms):
+            yield (*firsts[:place], ModeChoice(form), *firsts[place + 1 :])
+
+
+def _symbols_of(templates: Iterable[Template]) -> Iterator[Symbol]:
+    """The symbols in laws, in what is stored, and in what begins and ends modes."""
+    for template in templates:
+        for branch in template.branches:
+            yield from branch.symbols
+        for mode in (mode for element in template.modes for mode in element.options):
+            yield from mode.starts.free_symbols
+            for leave in mode.leaves:
+                for guard in (leave.when, leave.rebound, leave.rest):
+                    yield from () if guard is None else guard.free_symbols

@@ -19,8 +19,12 @@ def title(part: Component) -> str:
 
 def listed(names: Sequence[str], most: int = 6) -> str:
     """Names in quotes; of many, the first few and the number of the others."""
-    shown = [f"'{name}'" for name in names[:most]]
-    return ", ".join(shown) + (f" and {len(names) - most} more" if len(names) > most else "")
+    return first_few([f"'{name}'" for name in names], most)
+
+
+def first_few(texts: Sequence[str], most: int = 3, separator: str = ", ") -> str:
+    """The first few of some texts, and the number of the others."""
+    return separator.join(texts[:most]) + (f" and {len(texts) - most} more" if len(texts) > most else "")
 
 
 def at_nodes(names: Sequence[str]) -> str:

@@ -17,7 +17,7 @@ from shaftwork.core.notices import warn
 from shaftwork.core.parameters import in_si
 from shaftwork.network.checks import resting_trains
 from shaftwork.network.graph import CircuitGraph
-from shaftwork.network.wording import listed
+from shaftwork.network.wording import first_few, listed
 from shaftwork.pipeline.prepared import EngineModel, Prepared
 from shaftwork.results.solution import Solution
 
@@ -28,8 +28,6 @@ _RESTING: WeakKeyDictionary[CircuitGraph, tuple[Diagnostic, ...]] = WeakKeyDicti
 """What `resting_trains` gives: it takes as long as a short run."""
 SAME_TIME = 1e-12
 """Times that differ by less than this fraction are one: units are converted."""
-NAMED = 3
-"""Parts of another network that a message names."""
 
 
 def waving(graph: CircuitGraph) -> tuple[str, ...]:
@@ -116,10 +114,9 @@ def ending_of(motion: Solution, graph: CircuitGraph) -> Ending:
         ParameterError: it is a motion of another network; names what differs.
     """
     if other := rewired(graph.wiring, motion.observer.wiring):
-        more = f" and {len(other) - NAMED} more" if len(other) > NAMED else ""
         raise ParameterError(
             f"initial is a motion of '{motion.name}', which is another network than '{graph.name}': "
-            f"{', '.join(other[:NAMED])}{more}. Give a motion of the same network; numbers of its parts may differ. "
+            f"{first_few(other)}. Give a motion of the same network; numbers of its parts may differ. "
             "Or begin with start values, initial={name: sol[name][-1] for name in sol.states} and t_start=sol.t[-1]."
         )
     t, x = float(motion.t[-1]), motion.x[-1]

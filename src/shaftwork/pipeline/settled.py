@@ -18,14 +18,13 @@ from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.errors import NetworkWarning, SimulationError
 from shaftwork.core.notices import hint, warn
 from shaftwork.network.kinds import Kind
+from shaftwork.network.wording import first_few, listed
 
 if TYPE_CHECKING:
     from shaftwork.network.graph import CircuitGraph, GraphBranch
 
 SAME = 1e-6
 """Levels of a law that differ by less than this fraction are one."""
-NAMED = 3
-"""Laws that a message shows."""
 MIDDLE = (1.0, 1.0 + SAME, 1.0)
 """Of a level that lasts its middle is named."""
 
@@ -57,7 +56,7 @@ def refuse_moving(bound: BoundArrays, t: float, switching: Switching) -> None:
     if not moving:
         return
     laws = [*dict.fromkeys(in_words(graph.parts[branch.part], branch.template.law) for branch in moving)]
-    shown = "; ".join(laws[:NAMED]) + (f" and {len(laws) - NAMED} more" if len(laws) > NAMED else "")
+    shown = first_few(laws, separator="; ")
     noise = ", or take the noise out (std = 0 for its mean)" if any(map(_is_noise, moving)) else ""
     raise SimulationError(
         f"steady_state() of '{graph.name}' finds no time from which on all laws stay as they are: {shown} "

@@ -43,39 +43,39 @@ class _StatesAndWaves:
     """Dense output of the states, with the histories behind them.
 
     Args:
-        found: by the engine.
+        motion: as the engine found it.
         before: what left the ends before the start.
         impedances: (lines,) in N m s.
         lines: by shaft.
     """
 
-    found: DelayTrajectory
+    motion: DelayTrajectory
     before: Past
     impedances: Array
     lines: Mapping[str, Array]
 
     @property
     def steps(self) -> Array:
-        return self.found.dense.steps
+        return self.motion.dense.steps
 
     def __call__(self, times: Array) -> Array:
-        return np.hstack([self.found.dense(times), self.found.waves(times)[0]])
+        return np.hstack([self.motion.dense(times), self.motion.waves(times)[0]])
 
     def held(self, times: Array) -> Array:
         """(k, lines) energy in J in each line at times (k,): the waves f and g in it hold (f^2 + g^2) / (4 Z)."""
-        squares = self.found.squares(times)
+        squares = self.motion.squares(times)
         return np.asarray((squares[:, ::2] + squares[:, 1::2]) / (4 * self.impedances))
 
     def leaving(self, times: Array) -> Array:
         """(k, ends) the waves 2 Z v + h in N m that leave the ends at times (k,), also before the start."""
         start, past = self.steps[0], self.before
-        h, v = self.found.waves(np.maximum(times, start))
+        h, v = self.motion.waves(np.maximum(times, start))
         before = Polynomials(past.starts, past.lengths, past.waves @ POWERS, 0.0)(np.minimum(times, start))
         return np.where((times < start)[:, None], before, 2 * np.repeat(self.impedances, 2) * v + h)
 
     def carried(self, t: float) -> CarriedWaves | None:
         """What is on its way at a time in s; None where leaps do not know it."""
-        return None if self.found.past is None else CarriedWaves(self.found.past(t), self.lines)
+        return None if self.motion.past is None else CarriedWaves(self.motion.past(t), self.lines)
 
 
 @dataclass(frozen=True)
