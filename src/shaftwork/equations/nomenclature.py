@@ -14,8 +14,6 @@ from shaftwork.equations.printing import Writer, printed_number
 from shaftwork.equations.rows import NetworkEquations
 from shaftwork.equations.series import Numbers, listed, replaced, series_in
 from shaftwork.equations.spelling import INDEX_CLOSES, INDEX_OPENS, in_text, split_index, without_marks
-from shaftwork.network.effective import effective
-from shaftwork.equations.spelling import in_text
 from shaftwork.network.graph import effective
 
 LAWS = "Formula, or points of a table, over $t$ in s if nothing else is said"
