@@ -17,9 +17,9 @@ from shaftwork.components.sources import ForceSource, SpeedSource, TorqueSource
 from shaftwork.components.translation import Drum, Mass, TranslationalDamper, TranslationalSpring, Wheel
 from shaftwork.equations.kirchhoff import kirchhoff
 from shaftwork.equations.records import Equations
+from shaftwork.formulation.form import state_form
 from shaftwork.network.builder import NetworkBuilder
 from shaftwork.network.graph import CircuitGraph, build_graph
-from shaftwork.reduction.form import state_form
 from tests.reference.mna import Piece
 
 

@@ -32,9 +32,9 @@ from shaftwork.core.parameters import parameter
 from shaftwork.equations.kirchhoff import kirchhoff
 from shaftwork.equations.quantities import rate_of
 from shaftwork.equations.records import Equations
+from shaftwork.formulation.explicit_rows import BlockTooLargeError, explicit_rows
+from shaftwork.formulation.form import state_form
 from shaftwork.network.builder import NetworkBuilder
-from shaftwork.reduction.explicit_rows import BlockTooLargeError, explicit_rows
-from shaftwork.reduction.form import state_form
 from shaftwork.scenes import SCENES
 from tests.equations.networks import (
     MECHANICAL,

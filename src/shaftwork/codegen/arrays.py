@@ -18,8 +18,8 @@ from shaftwork.codegen.matrices import LinearPart, MatrixAssembly
 from shaftwork.codegen.products import Factor, by_diagonals
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.laws import t as TIME
+from shaftwork.formulation.form import StateForm
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.form import StateForm
 
 
 class ArrayProgram:

@@ -25,10 +25,10 @@ from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.discontinuities import switches, switches_of
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import slope
-from shaftwork.reduction.explicit_rows import Rows
-from shaftwork.reduction.form import State, StateForm
-from shaftwork.reduction.gains import Number, exact_of
-from shaftwork.reduction.observables import Observables
+from shaftwork.formulation.explicit_rows import Rows
+from shaftwork.formulation.form import State, StateForm
+from shaftwork.formulation.gains import Number, exact_of
+from shaftwork.formulation.observables import Observables
 
 
 class Values:

@@ -14,12 +14,12 @@ from sympy import Expr
 
 from shaftwork.codegen.code import scalar, vectorised
 from shaftwork.core.errors import ParameterError
+from shaftwork.formulation.form import StateForm
+from shaftwork.formulation.gains import Gain, Number, any_sum_vanishes, coefficients_in, fold, value_of
+from shaftwork.formulation.tree import Row
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.kinds import Kind
 from shaftwork.network.templates import BranchTemplate
-from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.gains import Gain, Number, any_sum_vanishes, coefficients_in, fold, value_of
-from shaftwork.reduction.tree import Row
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]

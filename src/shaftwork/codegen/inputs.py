@@ -17,10 +17,10 @@ from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.discontinuities import bells, switches
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import jumps, slope
+from shaftwork.formulation.form import StateForm
 from shaftwork.network.controlled import Reading, readings_of
 from shaftwork.network.kinds import Kind
 from shaftwork.network.templates import BranchTemplate
-from shaftwork.reduction.form import StateForm
 
 Function = Callable[..., Any]
 

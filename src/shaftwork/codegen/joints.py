@@ -25,8 +25,8 @@ from shaftwork.codegen.elements import ROUNDING, Array
 from shaftwork.codegen.matrices import LinearPart
 from shaftwork.codegen.products import Factor
 from shaftwork.codegen.state_transfer import StateTransfer
-from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.held_rows import HeldRows
+from shaftwork.formulation.form import StateForm
+from shaftwork.formulation.held_rows import HeldRows
 
 
 class Joints:

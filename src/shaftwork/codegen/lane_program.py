@@ -17,8 +17,8 @@ from shaftwork.codegen.heyoka_expressions import Translator
 from shaftwork.codegen.heyoka_parameters import Fixed
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError
+from shaftwork.formulation.explicit_rows import Rows
 from shaftwork.numerics.hermite import JET
-from shaftwork.reduction.explicit_rows import Rows
 
 FREE_TIME = heyoka.expression("time")
 """By its own time heyoka does not differentiate."""

@@ -26,10 +26,10 @@ from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.slopes import jumps, slope
 from shaftwork.core.errors import SimulationError
 from shaftwork.core.notices import hint
+from shaftwork.formulation.form import StateForm
+from shaftwork.formulation.source_inputs import places_of, with_inputs
 from shaftwork.network.graph import GROUND, GraphPart
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.source_inputs import places_of, with_inputs
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 NEARBY = 1e-9

@@ -4,7 +4,7 @@
 
 with w the through variables of the nonlinear laws and sources, e the prescribed across variables, y the across
 variables that the laws and the integrals read, and after them what laws read of others, rates of speeds at last. The
-equations are those of `reduction.form`.
+equations are those of `formulation.form`.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from scipy.sparse.csgraph import connected_components
 from shaftwork.codegen.elements import Array, Coefficients, GainMatrix, inverse_of_fractions, link_matrix, node_matrix
 from shaftwork.codegen.products import Factor
 from shaftwork.core.errors import CompileError
+from shaftwork.formulation.form import StateForm
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.form import StateForm
 
 SINGULAR = 1e-13
 """Reciprocal condition below which a block of algebraic equations has no solution to speak of."""

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from shaftwork.codegen.arrays import BoundArrays
 from shaftwork.codegen.elements import ROUNDING, Array
+from shaftwork.formulation.form import StateForm
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.form import StateForm
 
 ROUNDED = 1e-9
 """A part of the largest speed by which contacts may close after an impact: impulses that share it are rounded."""

@@ -23,10 +23,10 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError, MissingExtraError, ParameterError
 from shaftwork.core.kept import Kept
 from shaftwork.core.parameters import in_si, is_quantity, without_unit
+from shaftwork.formulation.explicit_rows import BlockTooLargeError, Rows, explicit_rows
+from shaftwork.formulation.form import StateForm
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.explicit_rows import BlockTooLargeError, Rows, explicit_rows
-from shaftwork.reduction.form import StateForm
 
 SCALAR_STATES, SCALAR_BRANCHES = 64, 400
 """Above this many states or branches the unrolled code costs more to make than it saves."""

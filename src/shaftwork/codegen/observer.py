@@ -16,9 +16,9 @@ from shaftwork.codegen.timeline import NOTHING, Timeline
 from shaftwork.codegen.waves import DenseWaves, WaveReadings, along_lines
 from shaftwork.components.base import Component, Profile
 from shaftwork.core.errors import SignalError
+from shaftwork.formulation.form import Names, StateForm
 from shaftwork.network.graph import CircuitGraph, GraphPart
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.form import Names, StateForm
 
 
 class Impact(NamedTuple):

@@ -13,7 +13,7 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.wound_shafts import inner_nodes, node_of, speed_at
 from shaftwork.core.errors import SimulationError
 from shaftwork.core.notices import hint
-from shaftwork.reduction.form import StateForm
+from shaftwork.formulation.form import StateForm
 
 ROUNDING, TINY = float(np.finfo(float).eps), float(np.finfo(float).tiny)
 SMALLEST_STEP = 1e-6

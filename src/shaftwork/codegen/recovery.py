@@ -16,11 +16,11 @@ from shaftwork.components.base import Profile, Signal
 from shaftwork.components.branches import INTEGRAL, RATE, End
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import slope
+from shaftwork.formulation.form import StateForm
+from shaftwork.formulation.observables import Observable
 from shaftwork.network.graph import CircuitGraph, GraphPart
 from shaftwork.network.kinds import Kind
 from shaftwork.network.templates import BranchTemplate
-from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.observables import Observable
 
 
 class BranchHistory:

@@ -23,7 +23,7 @@ from shaftwork.codegen.heyoka_parameters import Fixed
 from shaftwork.components.laws import NUMERICAL
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError, ParameterError
-from shaftwork.reduction.explicit_rows import Rows
+from shaftwork.formulation.explicit_rows import Rows
 
 SHORTEST = 4
 """Fewer equal rows are written one by one."""

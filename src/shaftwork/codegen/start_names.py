@@ -18,8 +18,8 @@ from shaftwork.codegen.wound_shafts import wound_shafts
 from shaftwork.core.errors import SignalError
 from shaftwork.core.notices import hint
 from shaftwork.core.parameters import in_si
+from shaftwork.formulation.form import store_name
 from shaftwork.network.graph import GraphPart
-from shaftwork.reduction.form import store_name
 
 
 class StartNames:

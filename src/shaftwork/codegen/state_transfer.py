@@ -22,8 +22,8 @@ from shaftwork.codegen.matrices import LinearPart
 from shaftwork.codegen.mobility import Mobility
 from shaftwork.codegen.recovery import BranchHistory
 from shaftwork.core.errors import CompileError
+from shaftwork.formulation.form import StateForm, store_name
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.form import StateForm, store_name
 
 
 class StateTransfer:

@@ -19,9 +19,9 @@ from shaftwork.components.discontinuities import line, narrow_places, switches, 
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.kept import Kept
+from shaftwork.formulation.form import StateForm
 from shaftwork.network.graph import GraphPart
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.form import StateForm
 
 # Rounding of a linear argument, in units of its terms.
 ROUNDINGS = 8

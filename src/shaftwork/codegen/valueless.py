@@ -15,11 +15,11 @@ from shaftwork.components.laws import as_expression
 from shaftwork.components.slopes import slope
 from shaftwork.components.tables import Table
 from shaftwork.core.errors import SimulationError, no_value
+from shaftwork.formulation.form import StateForm
 from shaftwork.network.graph import GraphPart
 from shaftwork.network.templates import substitution
 from shaftwork.network.wording import title
 from shaftwork.numerics.zeros import zero
-from shaftwork.reduction.form import StateForm
 
 LONGEST = 60
 """Characters of a law in a message."""

@@ -13,9 +13,9 @@ from shaftwork.codegen.elements import Array
 from shaftwork.codegen.linear_readings import GivenSpeeds
 from shaftwork.codegen.recovery import BranchHistory
 from shaftwork.components.base import Profile
+from shaftwork.formulation.form import StateForm, store_name
 from shaftwork.network.graph import GraphPart
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.form import StateForm, store_name
 
 
 @dataclass(frozen=True)

@@ -15,10 +15,10 @@ from sympy import Add, Expr, Integer, Mul
 from shaftwork.components.branches import ACROSS, HISTORY, INTEGRAL
 from shaftwork.components.laws import t as TIME
 from shaftwork.equations.quantities import Quantities, ThroughQuantity, rate_of
+from shaftwork.formulation.form import StateForm
+from shaftwork.formulation.gains import Number, simplified
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.gains import Number, simplified
 
 Terms = tuple[Expr, ...]
 

@@ -16,9 +16,9 @@ from sympy.polys.matrices import DomainMatrix
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.laws import t as TIME
 from shaftwork.equations.quantities import Quantities, ThroughQuantity, rate_of
+from shaftwork.formulation.gains import exactly, in_decimals
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.gains import exactly, in_decimals
 
 INDEPENDENT = 1e-9
 """A coupling whose row is within this of the rows before it, in units of its own length, says nothing new."""

@@ -20,10 +20,10 @@ from shaftwork.equations.rows import (
     StateEquation,
 )
 from shaftwork.equations.solution import EliminationSystem, SolvedForm
+from shaftwork.formulation.form import StateForm, branch_name
+from shaftwork.formulation.gains import Number
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.form import StateForm, branch_name
-from shaftwork.reduction.gains import Number
 
 Origin = tuple[tuple[str, ...], tuple[int, ...], tuple[str, ...]]
 

@@ -24,8 +24,8 @@ from shaftwork.equations.coordinates import coordinates
 from shaftwork.equations.lagrange_equations import LagrangeEquations
 from shaftwork.equations.quantities import rate_of
 from shaftwork.equations.rows import Row
+from shaftwork.formulation.gains import exactly, in_decimals
 from shaftwork.network.graph import GROUND
-from shaftwork.reduction.gains import exactly, in_decimals
 
 CLOSE = 1e-8
 """A ratio solved for is the given one within this: ratios are typed to some ten digits."""

@@ -15,9 +15,9 @@ from shaftwork.core.parameters import Parameter
 from shaftwork.equations.notations import Letter, Notation
 from shaftwork.equations.quantities import Quantities, ThroughQuantity, running_number
 from shaftwork.equations.spelling import GREEK, chosen_subscript, escaped, indexed, split_index, without_marks
+from shaftwork.formulation.form import StateForm
 from shaftwork.network.graph import GraphBranch
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.form import StateForm
 
 WORDS = {
     "omega": "angular speed",

@@ -17,10 +17,10 @@ from sympy import Expr, Integer, Symbol
 from shaftwork.components.branches import INTEGRAL, RATE, End
 from shaftwork.core.domains import ELECTRICAL, Domain, Quantity
 from shaftwork.core.errors import CompileError
+from shaftwork.formulation.form import branch_name, integral_name
 from shaftwork.network.controlled import readings_of
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.form import branch_name, integral_name
 
 Ends = tuple[int, int]
 INSTEAD = " Take form='state'."

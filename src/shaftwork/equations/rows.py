@@ -19,7 +19,7 @@ from shaftwork.equations.notations import OWN, Letter, Notation, inverses_of
 from shaftwork.equations.second_order import SecondOrder, second_order
 from shaftwork.equations.solution import EliminationSystem
 from shaftwork.equations.topology import NamedMatrix, cutsets, incidence, loops
-from shaftwork.reduction.form import StateForm
+from shaftwork.formulation.form import StateForm
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,10 +15,10 @@ from shaftwork.components.slopes import jumps, slope
 from shaftwork.core.errors import ParameterError, no_quantity
 from shaftwork.equations.quantities import Quantities, is_rate
 from shaftwork.equations.rows import NetworkEquations
+from shaftwork.formulation.form import Names
 from shaftwork.network.controlled import readings_of
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.form import Names
 
 VARIED = Symbol("varied", real=True)
 """Stands for what a law that jumps reads."""

@@ -16,8 +16,8 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import slope
 from shaftwork.equations.assembly import Assembly, FactoredTerms, Sides, Terms, rising_first, sides
 from shaftwork.equations.quantities import rate_of
+from shaftwork.formulation.explicit_rows import LARGEST_BLOCK, solve_blocks
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.explicit_rows import LARGEST_BLOCK, solve_blocks
 
 Matrix = Mapping[tuple[int, int], Expr]
 

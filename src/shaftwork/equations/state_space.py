@@ -13,12 +13,12 @@ from shaftwork.core.errors import CompileError, SignalError, no_quantity
 from shaftwork.equations.rows import NetworkEquations
 from shaftwork.equations.slopes import LawSlopes, Slope
 from shaftwork.equations.tableau import refuse_waves
+from shaftwork.formulation.explicit_rows import BlockTooLargeError, explicit_rows
+from shaftwork.formulation.form import Names, StateForm
+from shaftwork.formulation.observables import Observables
+from shaftwork.formulation.source_inputs import places_of, source_inputs, with_inputs
 from shaftwork.network.graph import GraphBranch
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.explicit_rows import BlockTooLargeError, explicit_rows
-from shaftwork.reduction.form import Names, StateForm
-from shaftwork.reduction.observables import Observables
-from shaftwork.reduction.source_inputs import places_of, source_inputs, with_inputs
 
 
 @dataclass(frozen=True, eq=False)

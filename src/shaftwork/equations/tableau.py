@@ -19,11 +19,11 @@ from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.core.errors import CompileError
 from shaftwork.equations.assembly import Assembly
 from shaftwork.equations.slopes import LawSlopes
+from shaftwork.formulation.form import StateForm
+from shaftwork.formulation.source_inputs import Place
 from shaftwork.network.controlled import Reading, readings_of
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.source_inputs import Place
 
 S = Symbol("s")
 """The variable of the image domain, 1/s."""

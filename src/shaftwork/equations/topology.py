@@ -10,9 +10,9 @@ from functools import cached_property
 from sympy import Add, Expr, ImmutableMatrix, Integer
 
 from shaftwork.equations.assembly import Assembly
+from shaftwork.formulation.form import branch_name
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.form import branch_name
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,9 +26,9 @@ from shaftwork.equations.rows import NetworkEquations
 from shaftwork.equations.slopes import FRACTION_DIGITS, LawSlopes, PointValues, Slope, Values
 from shaftwork.equations.spelling import escaped, without_marks
 from shaftwork.equations.tableau import S, Sum, Tableau, refuse_waves
-from shaftwork.reduction.form import Names
-from shaftwork.reduction.gains import LONGEST
-from shaftwork.reduction.source_inputs import Place, places_of
+from shaftwork.formulation.form import Names
+from shaftwork.formulation.gains import LONGEST
+from shaftwork.formulation.source_inputs import Place, places_of
 
 STEPS, EXTRA = 1000, 10
 """Steps in which roots are improved, and the binary digits more for each of them: what cancels in a polynomial."""

@@ -15,12 +15,12 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.notices import hint, once
 from shaftwork.core.parameters import briefly, in_si
+from shaftwork.formulation.source_inputs import source_inputs
 from shaftwork.network.kinds import Kind
 from shaftwork.network.wording import listed
 from shaftwork.pipeline.arguments import as_names
 from shaftwork.pipeline.point_speeds import as_multiple, speeds_to_give, warn_of_speeds_left, warn_of_turning_angles
 from shaftwork.pipeline.settled import SteadyState
-from shaftwork.reduction.source_inputs import source_inputs
 from shaftwork.results import campbell as diagram
 from shaftwork.results.linear import ExactModel, LinearModel, linear_model
 from shaftwork.results.modes import Modes

@@ -11,12 +11,12 @@ from shaftwork.components.base import Component
 from shaftwork.components.branches import End
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import SignalError
+from shaftwork.formulation.form import StateForm, state_form
+from shaftwork.formulation.gains import exact_of
 from shaftwork.network.graph import CircuitGraph, GraphBranch
 from shaftwork.network.kinds import Kind
 from shaftwork.network.templates import BranchTemplate
 from shaftwork.network.wording import listed
-from shaftwork.reduction.form import StateForm, state_form
-from shaftwork.reduction.gains import exact_of
 
 
 def with_angles(graph: CircuitGraph, names: Sequence[str]) -> StateForm:

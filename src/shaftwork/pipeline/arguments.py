@@ -13,9 +13,9 @@ from shaftwork.components.base import Component
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si, numbers_in_si, whole
+from shaftwork.formulation.form import StateForm
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.netlist import Netlist, by_part
-from shaftwork.reduction.form import StateForm
 
 OUTPUTS, MOST_OUTPUTS = 1001, 10_000_000
 """Output times when the user gives none, and the most that can be asked for."""

@@ -22,6 +22,7 @@ from shaftwork.core.kept import Kept
 from shaftwork.core.notices import PulsationWarning, muted
 from shaftwork.core.parameters import in_si
 from shaftwork.core.screen import counted, named, on_one_screen
+from shaftwork.formulation.form import StateForm
 from shaftwork.integrate import choice
 from shaftwork.integrate.engines import EngineName, available
 from shaftwork.integrate.problem import Problem, Trajectory
@@ -51,7 +52,6 @@ from shaftwork.pipeline.prepared import EngineModel, Prepared
 from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels
 from shaftwork.pipeline.sizes import in_its_size, with_accuracy
 from shaftwork.pipeline.stored import Repetition, call_of, model_again, remember
-from shaftwork.reduction.form import StateForm
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:

@@ -16,6 +16,8 @@ from shaftwork.core.errors import Diagnostic, NetworkError, NetworkWarning, Para
 from shaftwork.core.notices import warn
 from shaftwork.equations.kirchhoff import kirchhoff
 from shaftwork.equations.records import Equations, NamedPhase
+from shaftwork.formulation.diagnosis import diagnose
+from shaftwork.formulation.form import StateForm, state_form
 from shaftwork.network.builder import NetworkBuilder
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.netlist import Netlist
@@ -25,8 +27,6 @@ from shaftwork.pipeline.arguments import as_names
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.named_phases import during, in_phase, span_of, whole_name, words_of
 from shaftwork.pipeline.phases.phased_model import PhasedModel
-from shaftwork.reduction.diagnosis import diagnose
-from shaftwork.reduction.form import StateForm, state_form
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:

@@ -18,14 +18,14 @@ from shaftwork.components.slopes import jumps, slope
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import NetworkWarning
 from shaftwork.core.notices import PulsationWarning, hint, warn
+from shaftwork.formulation.form import StateForm
+from shaftwork.formulation.gains import value_of
+from shaftwork.formulation.tree import column_of
+from shaftwork.formulation.value_diagnosis import speeds_along
 from shaftwork.network.controlled import Reading, readings_of
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.kinds import Kind
 from shaftwork.network.wording import listed
-from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.gains import value_of
-from shaftwork.reduction.tree import column_of
-from shaftwork.reduction.value_diagnosis import speeds_along
 
 SAME = 1e-9
 """Ratios that differ by less are equal, and a speed below this part of the largest is none."""

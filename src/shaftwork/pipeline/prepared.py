@@ -19,12 +19,12 @@ from shaftwork.codegen.time_switches import Switching
 from shaftwork.codegen.valueless import rough, without_value
 from shaftwork.core.errors import CompileError
 from shaftwork.core.kept import Kept
+from shaftwork.formulation.form import StateForm
 from shaftwork.integrate.engines import available
 from shaftwork.integrate.problem import Fractions, LinearInputs, Observed, Problem
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind
 from shaftwork.pipeline.arguments import NOMINAL, Demand
-from shaftwork.reduction.form import StateForm
 
 
 @dataclass(frozen=True, eq=False)

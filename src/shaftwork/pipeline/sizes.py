@@ -11,10 +11,10 @@ import numpy as np
 from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import AccuracyWarning
 from shaftwork.core.notices import warn
+from shaftwork.formulation.form import StateForm
 from shaftwork.integrate.engines import too_fine
 from shaftwork.pipeline.arguments import NOMINAL, Demand, Sizes
 from shaftwork.pipeline.prepared import Prepared
-from shaftwork.reduction.form import StateForm
 from shaftwork.results.solution import Solution
 
 HIDDEN = 10.0

@@ -20,6 +20,7 @@ from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import AccuracyWarning, NetworkWarning, ParameterError
 from shaftwork.core.notices import warn
 from shaftwork.core.times import just_after
+from shaftwork.formulation.form import StateForm
 from shaftwork.integrate.lossless.collocation import POWERS
 from shaftwork.integrate.lossless.engine import solve
 from shaftwork.integrate.lossless.lines import DelayProblem, DelayTrajectory, Past, past_of
@@ -27,7 +28,6 @@ from shaftwork.integrate.lossless.waveforms import Polynomials
 from shaftwork.integrate.problem import Problem, Trajectory
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import Netlist
-from shaftwork.reduction.form import StateForm
 
 WHY = "Shafts are travelling waves, so states and delays are solved together."
 LIGHT = 0.1

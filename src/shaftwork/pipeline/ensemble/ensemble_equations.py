@@ -14,6 +14,7 @@ from shaftwork.codegen.lane_program import LaneProgram, lane_expressions, lane_f
 from shaftwork.codegen.lane_step import LaneStep, Use
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.core.errors import CompileError
+from shaftwork.formulation.observables import Observables
 from shaftwork.pipeline.arguments import NOMINAL
 from shaftwork.pipeline.ensemble.extremes import Index, Mask
 from shaftwork.pipeline.model import Model
@@ -21,7 +22,6 @@ from shaftwork.pipeline.phases.exceeded_guards import FEW
 from shaftwork.pipeline.phases.hybrid_state import AHEAD, AHEAD_OF_RUN, CLEAR, EPS, GOLDEN, NOTHING, ROUNDINGS
 from shaftwork.pipeline.phases.mode_equations import ModeEquations
 from shaftwork.pipeline.phases.mode_machines import ModeNames
-from shaftwork.reduction.observables import Observables
 from shaftwork.results.measures import Measure
 
 EXTREMES = {"max": (1.0,), "min": (-1.0,), "peak": (1.0, -1.0)}

@@ -27,6 +27,9 @@ from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError, SimulationError, no_value
 from shaftwork.core.kept import Kept
+from shaftwork.formulation.explicit_rows import Rows
+from shaftwork.formulation.form import Names
+from shaftwork.formulation.observables import NamedReadings, Observables
 from shaftwork.integrate.engines import available
 from shaftwork.integrate.problem import Guards, Problem
 from shaftwork.pipeline.model import Model
@@ -34,9 +37,6 @@ from shaftwork.pipeline.phases.mode_guards import ModeGuards
 from shaftwork.pipeline.phases.mode_machines import ModeMachine, ModeNames
 from shaftwork.pipeline.phases.starts import ElementReadings
 from shaftwork.pipeline.prepared import Prepared
-from shaftwork.reduction.explicit_rows import Rows
-from shaftwork.reduction.form import Names
-from shaftwork.reduction.observables import NamedReadings, Observables
 
 KEPT = 64
 """Parameter vectors whose matrices are kept."""

@@ -11,11 +11,11 @@ from shaftwork.codegen.elements import Array
 from shaftwork.components.branches import ACROSS
 from shaftwork.components.modes import Mode, Modes
 from shaftwork.core.errors import CompileError
+from shaftwork.formulation.form import StateForm
+from shaftwork.formulation.observables import Observables
 from shaftwork.network.graph import GraphPart
 from shaftwork.pipeline.phases.mode_machines import ActiveGuard, ModeMachine, ModeNames
 from shaftwork.pipeline.phases.resting import holds_at_rest, rests
-from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.observables import Observables
 
 
 class ModeGuards:

@@ -17,10 +17,10 @@ from sympy.core.relational import Ge, Gt, Le, Lt, Relational
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Mode, ModeChoice, Modes
 from shaftwork.core.errors import ParameterError
+from shaftwork.formulation.form import state_form
 from shaftwork.network.graph import CircuitGraph, GraphPart, build_graph
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.phases.resting import at_rest
-from shaftwork.reduction.form import state_form
 
 Span = tuple[float, float]
 """From a time up to another, s."""

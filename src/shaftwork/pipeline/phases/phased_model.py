@@ -20,6 +20,7 @@ from shaftwork.core.errors import CompileError, NetworkWarning, SimulationError
 from shaftwork.core.notices import warn
 from shaftwork.core.parameters import in_si
 from shaftwork.equations.records import NamedPhase
+from shaftwork.formulation.form import StateForm
 from shaftwork.network.wording import listed
 from shaftwork.pipeline.analysis import (
     Given,
@@ -43,7 +44,6 @@ from shaftwork.pipeline.phases.named_phases import known_modes, modes_in, whole_
 from shaftwork.pipeline.phases.phases import Phases
 from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels
 from shaftwork.pipeline.sizes import in_its_size
-from shaftwork.reduction.form import StateForm
 from shaftwork.results.linear import LinearModel, linear_model
 from shaftwork.results.solution import Solution
 

@@ -12,6 +12,7 @@ from shaftwork.components.modes import ModeChoice
 from shaftwork.core.errors import NetworkError, NetworkWarning, ParameterError
 from shaftwork.core.kept import Kept
 from shaftwork.core.notices import muted
+from shaftwork.formulation.value_diagnosis import self_locks
 from shaftwork.integrate import choice
 from shaftwork.integrate.engines import ADAMS, available
 from shaftwork.integrate.problem import Problem
@@ -23,7 +24,6 @@ from shaftwork.pipeline.phases.mode_machines import ModeNames, elements_of, with
 from shaftwork.pipeline.phases.reactions import MANY, ReactionEquations, laws_that_hold
 from shaftwork.pipeline.phases.resting import at_rest
 from shaftwork.pipeline.wave_motion import engine_of_waves
-from shaftwork.reduction.value_diagnosis import self_locks
 
 FOLLOWING = {
     "heyoka": (1.0, 1e-12),  # the cost grows only with the logarithm

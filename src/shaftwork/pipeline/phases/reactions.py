@@ -27,14 +27,14 @@ from shaftwork.codegen.products import Factor
 from shaftwork.components.discontinuities import parts
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.kept import Kept
+from shaftwork.formulation.form import StateForm
+from shaftwork.formulation.held_rows import HeldRows, groups, held_places
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.phases.mode_equations import ModeEquations, RightSide
 from shaftwork.pipeline.phases.mode_machines import ModeMachine, ModeNames, is_same
-from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.held_rows import HeldRows, groups, held_places
 
 MANY = 12
 """From so many elements on that hold and slip matrices are quicker than equations for each combination that is met."""

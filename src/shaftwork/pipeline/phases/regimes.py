@@ -10,13 +10,13 @@ from sympy import Integer
 
 from shaftwork.components.branches import INTEGRAL
 from shaftwork.core.errors import NetworkError, ParameterError, SimulationError
+from shaftwork.formulation.value_diagnosis import jamming
 from shaftwork.pipeline.motion_start import Ending
 from shaftwork.pipeline.phases.hybrid_state import AHEAD_OF_RUN, ROUNDINGS, HybridState, Regime
 from shaftwork.pipeline.phases.mode_equations import ModeEquations
 from shaftwork.pipeline.phases.mode_machines import ModeNames, with_modes
 from shaftwork.pipeline.phases.phases import Phases
 from shaftwork.pipeline.phases.starts import begins_anew
-from shaftwork.reduction.value_diagnosis import jamming
 
 BEYOND = 1e-6
 """How far in rad a motion may start beyond a rigid limit: errors and printed digits of another run leave so much."""

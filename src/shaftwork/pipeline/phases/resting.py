@@ -9,11 +9,11 @@ from itertools import chain
 
 from shaftwork.components.branches import End
 from shaftwork.components.modes import ModeChoice, Modes
+from shaftwork.formulation.form import StateForm
+from shaftwork.formulation.gains import Number, add, value_of
 from shaftwork.network.graph import GROUND, GraphPart
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import Netlist
-from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.gains import Number, add, value_of
 
 
 def at_rest(netlist: Netlist, form: StateForm) -> Netlist:

@@ -21,9 +21,9 @@ from shaftwork.components.modes import ANEW, Modes
 from shaftwork.core.errors import AccuracyWarning, ParameterError, no_value
 from shaftwork.core.kept import Kept
 from shaftwork.core.notices import warn
+from shaftwork.formulation.observables import Observables
 from shaftwork.network.graph import GraphPart
 from shaftwork.pipeline.phases.mode_machines import ModeMachine, ModeNames
-from shaftwork.reduction.observables import Observables
 
 SPEEDS = 256
 """Speeds across elements that are kept with values of the parameters."""

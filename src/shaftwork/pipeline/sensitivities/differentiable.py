@@ -12,11 +12,11 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.components.slopes import slope
 from shaftwork.core.errors import CompileError, ParameterError
+from shaftwork.formulation.explicit_rows import Rows
 from shaftwork.pipeline.analysis import Given
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import start_of
 from shaftwork.pipeline.phases.phased_model import PhasedModel
-from shaftwork.reduction.explicit_rows import Rows
 
 NO_DERIVATIVE = {
     "decisive": "decides which equations hold, so nothing is smooth in it. Give it a value that is not exactly zero, "

@@ -12,6 +12,7 @@ from shaftwork.codegen.differentiation import Differentiated, ValueWithSlopes
 from shaftwork.codegen.elements import Array
 from shaftwork.core.errors import AccuracyWarning, ParameterError, SimulationError
 from shaftwork.core.notices import warn
+from shaftwork.formulation.observables import Observables
 from shaftwork.integrate.variation import Coefficients, Variation, variation
 from shaftwork.numerics.zeros import zero
 from shaftwork.pipeline.model import Model
@@ -20,7 +21,6 @@ from shaftwork.pipeline.sensitivities.carrying import End, SensitivityTransfer
 from shaftwork.pipeline.sensitivities.differentiable import rows_of
 from shaftwork.pipeline.sensitivities.legs import DifferentiatedMotion, Leg, parted
 from shaftwork.pipeline.sensitivities.saltation import ADVICE, TOGETHER, Jump, JumpConditions, by_chance
-from shaftwork.reduction.observables import Observables
 
 ROUNDING = 1e-3
 """What a change of a parameter by all of itself does to a state is rounding below this part of the state's size."""

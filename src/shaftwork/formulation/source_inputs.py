@@ -11,12 +11,12 @@ from sympy import Integer
 
 from shaftwork.components.base import Signal
 from shaftwork.core.errors import SignalError
+from shaftwork.formulation.form import StateForm
+from shaftwork.formulation.gains import add
+from shaftwork.formulation.tree import Row
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart, signals_of
 from shaftwork.network.kinds import Kind
 from shaftwork.network.templates import BranchTemplate
-from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.gains import add
-from shaftwork.reduction.tree import Row
 
 
 @dataclass(frozen=True, eq=False)

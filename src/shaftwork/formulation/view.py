@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 from shaftwork.components.branches import ACROSS
 from shaftwork.core.domains import Domain
+from shaftwork.formulation.form import StateForm
 from shaftwork.network.graph import GROUND, ends_of
 from shaftwork.network.kinds import Kind
 from shaftwork.network.wording import Spelling, title
-from shaftwork.reduction.form import StateForm
 
 
 @dataclass(frozen=True)

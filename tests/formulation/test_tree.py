@@ -6,10 +6,10 @@ import pytest
 import sympy
 
 import shaftwork as sw
+from shaftwork.formulation.gains import exact_of, value_of
+from shaftwork.formulation.tree import NormalTree, normal_tree
 from shaftwork.network.graph import CircuitGraph, build_graph
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.gains import exact_of, value_of
-from shaftwork.reduction.tree import NormalTree, normal_tree
 
 Placed = tuple[sw.Component, tuple[str, ...]]
 

@@ -16,12 +16,12 @@ from shaftwork.components.branches import ACROSS, INTEGRAL, RATE
 from shaftwork.components.clips import replaced
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.slopes import slope
+from shaftwork.formulation.form import StateForm
+from shaftwork.formulation.gains import exact_of
+from shaftwork.formulation.tree import Row
 from shaftwork.network.controlled import Reading, readings_of
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.gains import exact_of
-from shaftwork.reduction.tree import Row
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,13 +14,13 @@ from sympy import Float, Symbol
 
 from shaftwork.components.branches import THROUGH
 from shaftwork.core.errors import Diagnostic
+from shaftwork.formulation.form import StateForm
+from shaftwork.formulation.gains import Gain, Number, fold, value_of
+from shaftwork.formulation.tree import Row, balance_of, column_of
+from shaftwork.formulation.view import View
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
 from shaftwork.network.kinds import Kind
 from shaftwork.network.wording import at_nodes, listed, title
-from shaftwork.reduction.form import StateForm
-from shaftwork.reduction.gains import Gain, Number, fold, value_of
-from shaftwork.reduction.tree import Row, balance_of, column_of
-from shaftwork.reduction.view import View
 
 SINGULAR = 1e-13
 """Reciprocal condition below which coupled values cancel; the same as in the assembly of the matrices."""

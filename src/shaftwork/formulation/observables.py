@@ -22,11 +22,11 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Modes
 from shaftwork.components.slopes import slope
 from shaftwork.core.errors import Diagnostic, NetworkError
+from shaftwork.formulation.explicit_rows import Rows
+from shaftwork.formulation.form import StateForm, store_name
+from shaftwork.formulation.gains import exact_of
 from shaftwork.network.graph import GROUND, GraphBranch, GraphPart, signals_of
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.explicit_rows import Rows
-from shaftwork.reduction.form import StateForm, store_name
-from shaftwork.reduction.gains import exact_of
 
 
 def _no_limit(name: str) -> Diagnostic:

@@ -13,8 +13,8 @@ from shaftwork.components.base import REGISTRY
 from shaftwork.components.laws import Ramp, Step, omega, phi, t
 from shaftwork.components.tables import Table
 from shaftwork.core.errors import Diagnostic, ParameterError
+from shaftwork.formulation.diagnosis import diagnose
 from shaftwork.network.netlist import Netlist, Placed
-from shaftwork.reduction.diagnosis import diagnose
 from tests.malformations import malformed_networks
 from tests.strategies import Network, networks
 

@@ -24,11 +24,11 @@ from sympy import Expr
 from shaftwork.components.base import Signal
 from shaftwork.components.branches import RATE
 from shaftwork.core.domains import ROTATION, Domain
+from shaftwork.formulation.tree import NormalTree, normal_tree
 from shaftwork.network.changing_stores import is_bounded
 from shaftwork.network.controlled import Reading, readings_of
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart, signals_of
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.tree import NormalTree, normal_tree
 
 KINDS = ("across", "through", "integral", "rate")
 """What laws read besides what is across their own branches, in the order of `StateForm.readings`."""

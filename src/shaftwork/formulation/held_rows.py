@@ -16,8 +16,8 @@ from dataclasses import replace
 import networkx as nx
 from sympy import Add, Expr, Symbol
 
-from shaftwork.reduction.explicit_rows import Rows
-from shaftwork.reduction.form import StateForm
+from shaftwork.formulation.explicit_rows import Rows
+from shaftwork.formulation.form import StateForm
 
 LARGEST_GROUP = 8
 """States that such laws may connect: each of their rows has as many terms."""

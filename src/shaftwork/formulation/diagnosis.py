@@ -14,17 +14,17 @@ from shaftwork.components.discontinuities import breakpoints
 from shaftwork.components.laws import t
 from shaftwork.components.tables import InterpolationSlope
 from shaftwork.core.errors import Diagnostic
+from shaftwork.formulation.controlled_sources import controlled_problems, reads_itself
+from shaftwork.formulation.form import StateForm, state_form
+from shaftwork.formulation.gains import value_of
+from shaftwork.formulation.tree import column_of
+from shaftwork.formulation.value_diagnosis import extreme_ratios, notes_of, numeric_problems
+from shaftwork.formulation.view import View, words_of
 from shaftwork.network.checks import LEFT_OUT, connection_problems, examine
 from shaftwork.network.graph import CircuitGraph, GraphPart, build_graph
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import Netlist
 from shaftwork.network.wording import at_nodes, listed, title
-from shaftwork.reduction.controlled_sources import controlled_problems, reads_itself
-from shaftwork.reduction.form import StateForm, state_form
-from shaftwork.reduction.gains import value_of
-from shaftwork.reduction.tree import column_of
-from shaftwork.reduction.value_diagnosis import extreme_ratios, notes_of, numeric_problems
-from shaftwork.reduction.view import View, words_of
 
 _LACKING = (
     *("floating part", "loose end", "controlled source", "massless node", "algebraic loop", "undetermined speed"),

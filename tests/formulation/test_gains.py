@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sympy import Symbol, cancel
 
-from shaftwork.reduction.gains import Gain, add, coefficient, divide, simplified
+from shaftwork.formulation.gains import Gain, add, coefficient, divide, simplified
 
 VALUES = {Symbol("a", real=True): 2.0, Symbol("b", real=True): 0.5, Symbol("c", real=True): 3.0}
 COMBINED = {"*": operator.mul, "+": lambda first, second: add(first, second, []), "/": divide}

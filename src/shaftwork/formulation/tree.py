@@ -23,9 +23,9 @@ from functools import partial
 
 from sympy import Expr
 
+from shaftwork.formulation.gains import Gain, Number, add, coefficient, coefficients_in, divide, value_of
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch
 from shaftwork.network.kinds import Kind
-from shaftwork.reduction.gains import Gain, Number, add, coefficient, coefficients_in, divide, value_of
 
 Row = dict[int, Number]
 

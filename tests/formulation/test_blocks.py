@@ -7,7 +7,7 @@ import pytest
 from sympy import Expr, Symbol
 
 import shaftwork as sw
-from shaftwork.reduction.explicit_rows import BlockTooLargeError, Tie, explicit_rows, solve_tied
+from shaftwork.formulation.explicit_rows import BlockTooLargeError, Tie, explicit_rows, solve_tied
 
 SIZES = (2.0, 0.5, 3.0, 1.5, 0.8, 4.0)
 RATIOS = (0.7, 1.3, 0.4, 2.5, 0.9)
@@ -81,8 +81,8 @@ def test_many_that_are_carried_by_many_are_left_to_the_matrices() -> None:
 def test_the_formulas_of_a_large_sum_stay_short() -> None:
     """Each rate has the one reaction in it: what is written once does not grow with the square of the inertias."""
     from shaftwork.components.discontinuities import parts
+    from shaftwork.formulation.form import state_form
     from shaftwork.network.graph import build_graph
-    from shaftwork.reduction.form import state_form
 
     rows = explicit_rows(state_form(build_graph(summed(1.7).netlist())))
     assert len(list(parts(rows.rates))) < 40 * len(SIZES)

@@ -9,8 +9,8 @@ import pytest
 
 import shaftwork as sw
 from shaftwork.components.base import REGISTRY
-from shaftwork.reduction.form import state_form
-from shaftwork.reduction.view import View
+from shaftwork.formulation.form import state_form
+from shaftwork.formulation.view import View
 
 with patch.dict(REGISTRY):  # the documentation and other tests list the parts of the package alone
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import shaftwork as sw
+from shaftwork.formulation.explicit_rows import explicit_rows
+from shaftwork.formulation.form import StateForm, state_form
 from shaftwork.network.graph import build_graph
-from shaftwork.reduction.explicit_rows import explicit_rows
-from shaftwork.reduction.form import StateForm, state_form
 
 Placed = tuple[sw.Component, tuple[str, ...]]
 

@@ -10,11 +10,11 @@ from collections.abc import Iterable, Iterator
 
 from shaftwork.components.branches import ACROSS
 from shaftwork.core.errors import Diagnostic
+from shaftwork.formulation.view import View, Words, words_of
 from shaftwork.network.controlled import Reading, readings_of
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind
 from shaftwork.network.wording import at_nodes, title
-from shaftwork.reduction.view import View, Words, words_of
 
 
 def reads_itself(view: View, law: int) -> bool:
