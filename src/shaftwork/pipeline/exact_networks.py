@@ -280,4 +280,5 @@ def _on_meshes(at: Point, t: Time, model: Model, meshed: Model, shafts: tuple[st
         return at, t
     time, x = moment_of(at, model.states)
     ends = {name: float(at[name][0]) for shaft in shafts for name in (f"{shaft}.omega_a", f"{shaft}.omega_b")}
-    return {**dict(zip(model.states, x.tolist(), strict=True)), **ends}, time if t is None else t
+    values = x[: len(model.states)].tolist()  # behind the states x has the waves
+    return {**dict(zip(model.states, values, strict=True)), **ends}, time if t is None else t

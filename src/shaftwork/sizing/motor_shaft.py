@@ -70,11 +70,11 @@ class MotorShaft:
         """Of the motor, or of the torque."""
         return self.part.name if self.part else self.torque
 
-    @cached_property
+    @property
     def _tau(self) -> Read:
         return self.solution.reader.quantity(self.torque)
 
-    @cached_property
+    @property
     def _omega(self) -> Read:
         return self.solution.reader.quantity(self.speed)
 
