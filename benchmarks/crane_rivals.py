@@ -25,9 +25,9 @@ from scipy.integrate import solve_ivp
 from scipy.integrate._ivp import dop853_coefficients as tableau
 
 import shaftwork as sw
-from shaftwork.codegen.heyoka import build
-from shaftwork.integrate import heyoka_taylor
+from shaftwork.codegen.taylor.heyoka import build
 from shaftwork.integrate.problem import Problem
+from shaftwork.integrate.taylor import heyoka_taylor
 
 Array = NDArray[np.float64]
 Solve = Callable[[float], Array]

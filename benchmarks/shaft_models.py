@@ -27,8 +27,8 @@ from scipy.integrate import solve_ivp
 
 import shaftwork as sw
 from shaftwork.scenes.long_shafts import LOAD_INERTIA, MOTOR_INERTIA, RATED_TORQUE
-from shaftwork.shafts.exact_motion import JunctionTorque, motion
-from shaftwork.shafts.line import Section, SectionLine
+from shaftwork.studies.exact_shafts.exact_motion import JunctionTorque, motion
+from shaftwork.studies.exact_shafts.line import Section, SectionLine
 
 Array = NDArray[np.float64]
 

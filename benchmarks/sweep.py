@@ -19,7 +19,7 @@ import numpy as np
 
 import shaftwork as sw
 from shaftwork.studies import Sweep, sweep
-from shaftwork.studies.sweep_task import CHUNK, Chunk, Worker
+from shaftwork.sweep.sweep_task import CHUNK, Chunk, Worker
 
 T_END = 6.5
 MEASURES = {"peak": "max shaft.tau", "speed": "end J2.omega"}

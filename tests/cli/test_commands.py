@@ -231,7 +231,7 @@ def test_a_point_of_a_diagram_is_a_multiple_of_its_speed(
 def test_a_sweep_that_is_interrupted_goes_on_from_its_store(
     model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from shaftwork.studies.sweep_store import Store
+    from shaftwork.sweep.sweep_store import Store
 
     store, done = tmp_path / "store", []
     append = Store.append

@@ -14,7 +14,7 @@ import sympy
 from scipy.integrate import solve_ivp
 
 import shaftwork as sw
-from shaftwork.codegen.model import CompiledModel
+from shaftwork.codegen.compiled_model import CompiledModel
 from shaftwork.components.branches import ACROSS, Branch, across_of, integral_of, through_of
 from shaftwork.core.domains import ELECTRICAL, ROTATION
 

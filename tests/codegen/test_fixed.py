@@ -5,7 +5,7 @@ import pytest
 import sympy
 from sympy import Heaviside, Max, Piecewise, cos, exp, floor, sin, sqrt
 
-from shaftwork.codegen.heyoka_parameters import Fixed
+from shaftwork.codegen.taylor.heyoka_parameters import Fixed
 
 x, t, a, b, mode = sympy.symbols("x t a b mode", real=True)
 PARAMETERS = (a, b, mode)

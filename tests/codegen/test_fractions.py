@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from shaftwork.codegen.elements import inverse_of_fractions
+from shaftwork.codegen.array_form.elements import inverse_of_fractions
 
 ENTRIES = st.fractions(-5, 5, max_denominator=7) | st.just(Fraction(0))
 

@@ -10,11 +10,12 @@ import pytest
 import sympy
 from sympy import Abs, Eq, Heaviside, Max, Min, Ne, Piecewise, Rational, sign
 
-from shaftwork.codegen.heyoka import build
+from shaftwork.codegen.taylor.heyoka import build
 from shaftwork.components.tables import Table
 from shaftwork.core.errors import CompileError, MissingExtraError
-from shaftwork.integrate import heyoka_taylor, scipy_ivp
+from shaftwork.integrate import scipy_ivp
 from shaftwork.integrate.problem import Problem
+from shaftwork.integrate.taylor import heyoka_taylor
 
 x, v, t, a, b = sympy.symbols("x v t a b", real=True)
 

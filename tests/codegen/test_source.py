@@ -248,6 +248,6 @@ def shaft_of_waves() -> sw.Network:
 
 def test_without_numba_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     model = MODELS["lumped"]()
-    monkeypatch.setattr("shaftwork.codegen.model.find_spec", lambda _name: None)
+    monkeypatch.setattr("shaftwork.codegen.compiled_model.find_spec", lambda _name: None)
     with pytest.raises(MissingExtraError, match=r"numba.*shaftwork\[fast\]"):
         model.compiled()

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from sympy import Symbol
 
-from shaftwork.codegen.differentiation import StateTransferJacobian
 from shaftwork.codegen.state_transfer import StateTransfer
+from shaftwork.sensitivities.differentiation import StateTransferJacobian
 from tests.properties.examples import Array, compiled, share_of_examples
 from tests.strategies import Network, networks
 

@@ -17,7 +17,7 @@ import sympy
 import shaftwork as sw
 from shaftwork.components import noise
 from shaftwork.components.discontinuities import breakpoints, pieces_degree
-from shaftwork.components.slopes import slope
+from shaftwork.components.law_slopes import slope
 from shaftwork.network import expressions
 
 FALSE_ALARM = 1e-6

@@ -6,8 +6,8 @@ import pytest
 import sympy
 from sympy import Abs, Derivative, DiracDelta, Heaviside, Max, Piecewise, sign, sqrt
 
+from shaftwork.components.law_slopes import jumps, slope, wraps
 from shaftwork.components.laws import omega, phi, t
-from shaftwork.components.slopes import jumps, slope, wraps
 from shaftwork.components.tables import Table
 
 

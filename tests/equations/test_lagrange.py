@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from sympy import Rational, Symbol, cancel, expand, powsimp
 
 import shaftwork as sw
-from shaftwork.equations.lagrange import Lagrangian, lagrangian
 from shaftwork.equations.quantities import rate_of
 from shaftwork.equations.second_order import second_order
 from shaftwork.formulation.tree import normal_tree
+from shaftwork.lagrange.lagrange import Lagrangian, lagrangian
 from tests.beds import bed_of, registered
 from tests.equations.networks import MECHANICAL, dc_drive, equations_of, from_pieces, mixed_train, shaft
 from tests.properties.examples import inner_drives, share_of_examples

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import shaftwork as sw
-from shaftwork.equations.lagrange import Lagrangian
+from shaftwork.lagrange.lagrange import Lagrangian
 from tests.equations.test_lagrange import WHOLE, closed_gears, of
 from tests.equations.test_latex import compile_latex, compiles, overfull
 

@@ -68,7 +68,7 @@ def test_every_point_of_a_law_stands_there_whatever_the_phase(phase: str, form: 
         phase = phase.partition(",")[0]
     equations = net.equations(phase=phase)
     if form == "lagrange":
-        from shaftwork.equations.lagrange import lagrangian
+        from shaftwork.lagrange.lagrange import lagrangian
 
         document = lagrangian(equations).document()
     else:

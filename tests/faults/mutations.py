@@ -13,8 +13,8 @@ from random import Random
 
 import shaftwork as sw
 from shaftwork.components import REGISTRY
+from shaftwork.modelfiles.storage import netlist_text
 from shaftwork.network.grammar import FUNCTIONS
-from shaftwork.network.storage import netlist_text
 from tests.beds import bed_of, registered
 
 ODD_NUMBERS = (

@@ -63,7 +63,9 @@ RUNS = (
 def test_what_progress_raises_comes_out_of_every_engine(
     name: str, engine: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("shaftwork.integrate.heyoka_taylor.UNINTERRUPTED", 5)  # heyoka tells it in runs as short, too
+    monkeypatch.setattr(
+        "shaftwork.integrate.taylor.heyoka_taylor.UNINTERRUPTED", 5
+    )  # heyoka tells it in runs as short, too
     model = NETWORKS[name]().compile()
     for kind in ERRORS:
         error = kind("of the user")
@@ -83,7 +85,7 @@ def test_what_progress_raises_comes_out_of_every_engine(
 @pytest.mark.parametrize("engine", ["heyoka", "sundials", "scipy"])
 def test_progress_is_told_of_the_run_and_not_when_it_is_read(engine: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Some engines make parts of a run again for what is read between output times."""
-    monkeypatch.setattr("shaftwork.integrate.heyoka_taylor.UNINTERRUPTED", 5)
+    monkeypatch.setattr("shaftwork.integrate.taylor.heyoka_taylor.UNINTERRUPTED", 5)
     told: list[float] = []
     motion = NETWORKS["nonlinear"]().simulate(0.5, engine=engine, progress=told.append)
     assert told

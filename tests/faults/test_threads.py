@@ -115,7 +115,9 @@ def test_threads_read_one_motion_as_one_does() -> None:
 def test_a_run_within_a_run_leaves_it_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     """What `progress` calls may simulate the same model."""
     pytest.importorskip("heyoka")
-    monkeypatch.setattr("shaftwork.integrate.heyoka_taylor.UNINTERRUPTED", 12)  # else a run so short has no time for it
+    monkeypatch.setattr(
+        "shaftwork.integrate.taylor.heyoka_taylor.UNINTERRUPTED", 12
+    )  # else a run so short has no time for it
     model = NETWORKS["nonlinear"]().compile()
     alone = told(model.simulate(0.3, engine="heyoka"))
     within: list[tuple[Any, ...]] = []

@@ -10,7 +10,7 @@ import pytest
 import sympy
 from scipy import sparse
 
-from shaftwork.codegen.heyoka import build
+from shaftwork.codegen.taylor.heyoka import build
 from shaftwork.integrate.problem import Array, LinearInputs, Problem
 
 STEP_TIME, T_END = 1.0, 3.0

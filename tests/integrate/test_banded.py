@@ -13,9 +13,11 @@ from scipy.optimize import brentq
 
 import shaftwork as sw
 from shaftwork.core.errors import ParameterError, SimulationError
-from shaftwork.integrate import banded, choice, propagation, scipy_ivp
-from shaftwork.integrate.banded_matrix import ShiftedMatrix
-from shaftwork.integrate.banded_method import shifted_collocation
+from shaftwork.integrate import choice, scipy_ivp
+from shaftwork.integrate.collocation import banded
+from shaftwork.integrate.collocation.banded_matrix import ShiftedMatrix
+from shaftwork.integrate.collocation.banded_method import shifted_collocation
+from shaftwork.integrate.linear import propagation
 from shaftwork.integrate.problem import LinearInputs, Problem
 
 # A steel shaft of 1 m and 20 mm between a motor and a load: polar moment, inertia, torsional stiffness.

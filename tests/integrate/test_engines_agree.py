@@ -9,8 +9,10 @@ from functools import partial
 import numpy as np
 import pytest
 
-from shaftwork.integrate import heyoka_taylor, propagation, scipy_ivp, sundials
+from shaftwork.integrate import scipy_ivp, sundials
+from shaftwork.integrate.linear import propagation
 from shaftwork.integrate.problem import Problem, Trajectory
+from shaftwork.integrate.taylor import heyoka_taylor
 
 Solve = Callable[[Problem], Trajectory]
 ENGINES: dict[str, Solve] = {

@@ -11,9 +11,9 @@ import pytest
 from scipy import sparse
 
 import shaftwork as sw
-from shaftwork.integrate import linear_system, propagation
-from shaftwork.integrate.modal import find_modes
-from shaftwork.integrate.precise import FixedPoint
+from shaftwork.integrate.linear import linear_system, propagation
+from shaftwork.integrate.linear.modal import find_modes
+from shaftwork.integrate.linear.precise import FixedPoint
 from shaftwork.integrate.problem import LinearInputs, Problem
 
 

@@ -9,7 +9,7 @@ import pytest
 import sympy
 from scipy import sparse
 
-from shaftwork.codegen.heyoka import build
+from shaftwork.codegen.taylor.heyoka import build
 from shaftwork.core.errors import MissingExtraError, ParameterError, SimulationError
 from shaftwork.integrate import choice
 from shaftwork.integrate.engines import available

@@ -67,7 +67,7 @@ def test_breaks_leave_a_compiled_run_as_it_is(monkeypatch: pytest.MonkeyPatch) -
     """The steps are the same; heyoka drops what its time holds beyond a double, so that states round otherwise."""
     compiled = drive("pump").compile()
     whole = compiled.simulate(0.5, engine="heyoka")
-    monkeypatch.setattr("shaftwork.integrate.heyoka_taylor.UNINTERRUPTED", 1)
+    monkeypatch.setattr("shaftwork.integrate.taylor.heyoka_taylor.UNINTERRUPTED", 1)
     parts = compiled.simulate(0.5, engine="heyoka", max_steps=whole.statistics["steps"])  # to the very last
     np.testing.assert_allclose(whole.x, parts.x, rtol=1e-12, atol=1e-12 * np.abs(whole.x).max())
     assert whole.statistics == parts.statistics

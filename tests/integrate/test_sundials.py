@@ -9,7 +9,8 @@ import pytest
 from scipy import sparse
 
 from shaftwork.core.errors import SimulationError
-from shaftwork.integrate import propagation, sundials
+from shaftwork.integrate import sundials
+from shaftwork.integrate.linear import propagation
 from shaftwork.integrate.problem import DaeProblem, LinearInputs, Problem
 
 

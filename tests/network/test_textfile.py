@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 from shaftwork.components.tables import Table
 from shaftwork.core.errors import ModelFileError
-from shaftwork.network import textfile
-from shaftwork.network.textfile import ModelText, PartText, read, write
+from shaftwork.modelfiles import textfile
+from shaftwork.modelfiles.textfile import ModelText, PartText, read, write
 
 HEAD = 'format = 1\nname = "crane"\n'
 PART = HEAD + '\n[[part]]\ntype = "Spring"\nname = "shaft"\nnodes = ["rotor", "wheel"]\n'
@@ -213,7 +213,7 @@ HOSTILE = {
 READ_ALL = """
 import json, sys
 from shaftwork.core.errors import ModelFileError
-from shaftwork.network.textfile import read
+from shaftwork.modelfiles.textfile import read
 for kind, text in json.load(sys.stdin).items():
     try:
         read(text)

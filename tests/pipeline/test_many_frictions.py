@@ -16,9 +16,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import shaftwork as sw
+from shaftwork.hybrid.hybrid_run import HybridRun
+from shaftwork.hybrid.hybrid_solution import solution
 from shaftwork.pipeline.arguments import Demand
-from shaftwork.pipeline.phases.hybrid_run import HybridRun
-from shaftwork.pipeline.phases.hybrid_solution import solution
 from tests.properties.examples import share_of_examples
 
 COUNT = 14

@@ -15,11 +15,11 @@ import pytest
 import sympy
 
 import shaftwork as sw
+from shaftwork.hybrid.event_iteration import EventIteration
+from shaftwork.hybrid.hybrid_run import HybridRun
+from shaftwork.hybrid.hybrid_state import HybridState
+from shaftwork.hybrid.in_place_events import InPlaceEvents
 from shaftwork.integrate.problem import SeriesError
-from shaftwork.pipeline.phases.event_iteration import EventIteration
-from shaftwork.pipeline.phases.hybrid_run import HybridRun
-from shaftwork.pipeline.phases.hybrid_state import HybridState
-from shaftwork.pipeline.phases.in_place_events import InPlaceEvents
 
 ENGINES = ("heyoka", "scipy", "sundials")
 
@@ -416,7 +416,7 @@ def test_a_motion_is_freed_with_its_last_holder(engine: str) -> None:
 
 @pytest.mark.parametrize("load", [sw.CoulombLoad("load", tau=1.0), sw.Damper("load", d=1.0)], ids=["phases", "none"])
 def test_a_motion_is_not_run_again_for_what_nobody_asks(load: sw.Component, monkeypatch: pytest.MonkeyPatch) -> None:
-    heyoka = pytest.importorskip("shaftwork.integrate.heyoka_taylor")
+    heyoka = pytest.importorskip("shaftwork.integrate.taylor.heyoka_taylor")
 
     def refuse(_: object) -> None:
         raise AssertionError("the motion is run again")

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import shaftwork as sw
-from shaftwork.codegen.elements import Array
-from shaftwork.pipeline.ensemble.extremes import first_rises
+from shaftwork.codegen.array_form.elements import Array
 from shaftwork.studies import sweep
+from shaftwork.sweep.lane_extremes import first_rises
 
 
 def wave(phase: Array, level: Array, t: Array) -> Array:

@@ -8,7 +8,7 @@ from hypothesis import Phase, find, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
-from shaftwork.results.linear import LinearModel
+from shaftwork.frequency.linear_model import LinearModel
 from tests.properties.examples import (
     across_signals,
     assert_equal_signals,

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import shaftwork as sw
-from shaftwork.codegen.observer import ModelObserver
+from shaftwork.codegen.model_observer import ModelObserver
 from shaftwork.codegen.state_transfer import StateTransfer
 from tests.properties.examples import compiled, network_of, share_of_examples
 from tests.strategies import Network, networks

@@ -9,7 +9,7 @@ import pytest
 import sympy
 
 import shaftwork as sw
-from shaftwork.equations.report import PREAMBLE
+from shaftwork.latex.document import PREAMBLE
 from tests.equations.test_latex import compile_latex, compiles, overfull
 from tests.reduce.test_simplify import chain
 

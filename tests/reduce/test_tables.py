@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import shaftwork as sw
-from shaftwork.equations.report import PREAMBLE
+from shaftwork.latex.document import PREAMBLE
 from tests.equations.test_latex import compile_latex, compiles, overfull
 
 

@@ -11,9 +11,9 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 import shaftwork as sw
-from shaftwork.results import exact_spectrum
-from shaftwork.shafts.exact_response import frequency_response
-from shaftwork.shafts.line import Section, SectionLine
+from shaftwork.frequency.exact_shafts import exact_spectrum
+from shaftwork.studies.exact_shafts.exact_response import frequency_response
+from shaftwork.studies.exact_shafts.line import Section, SectionLine
 from tests.properties.examples import share_of_examples
 from tests.reference.line_modes import modes as line_modes
 from tests.reference.line_modes import natural_frequencies

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import shaftwork as sw
-from shaftwork.results.eigenvalues import LARGEST_DENSE
+from shaftwork.frequency.eigenvalues import LARGEST_DENSE
 
 
 def _two_masses(d: float = 0.0, *, rename: str = "", scale: float = 1.0) -> sw.Network:

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 import shaftwork as sw
 from shaftwork.sizing.catalogue import OWN, TYPICAL
-from shaftwork.sizing.choice import _reasons
+from shaftwork.sizing.motor_choice import _reasons
 from tests.properties.examples import share_of_examples
 
 MOTORS = {motor.name: motor for motor in sw.sizing.catalogue()}

@@ -10,7 +10,7 @@ import sympy
 
 import shaftwork as sw
 from shaftwork.results.measures import Measure
-from shaftwork.results.sensitivities import MotionSensitivities
+from shaftwork.sensitivities.sensitivity_tables import MotionSensitivities
 from shaftwork.studies import motion_sensitivities
 
 STEP = 2e-5

@@ -16,7 +16,7 @@ import sympy
 import shaftwork as sw
 from shaftwork.results.measures import Measure
 from shaftwork.studies import Sweep, sweep
-from shaftwork.studies.sweep_task import Task, Worker
+from shaftwork.sweep.sweep_task import Task, Worker
 
 MEASURES = ("max shaft.tau", "rms shaft.tau", "mean motor.tau", "min J1.omega", "end J2.omega", "peak shaft.tau")
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import shaftwork as sw
-from shaftwork.studies.sweep_store import check_of
+from shaftwork.sweep.sweep_store import check_of
 
 STIFFNESSES = np.linspace(500.0, 900.0, 20)
 """More than two chunks of variants that run one by one."""

@@ -32,7 +32,7 @@ def scenes(_: Namespace, say: Say) -> Data:
 @command("structure, states, time constants, stiffness, and the engine that auto would take", machines=True)
 def check(options: Namespace, say: Say) -> Data:
     """What can be said of a network before anything is simulated."""
-    from shaftwork.pipeline.report import structure_report
+    from shaftwork.cli.check_report import structure_report
 
     net, scene = load(options)
     model, t_end = net.compile(), scene.t_end if scene else FALLBACK_END
@@ -61,7 +61,7 @@ def latex_options(parser: ArgumentParser) -> None:
 @command("print the equations as LaTeX", latex_options)
 def latex(options: Namespace, say: Say) -> Data:
     """The equations of a phase: of those that the source of a scene has, or of the one in which the motion begins."""
-    from shaftwork.equations.report import joined
+    from shaftwork.latex.document import joined
 
     net, scene = load(options)
     phases = (options.phase,) if options.phase else (scene.phases if scene else ()) or (net.start_phase(),)
@@ -79,7 +79,7 @@ def latex(options: Namespace, say: Say) -> Data:
 def _typeset(equations: Equations, options: Namespace) -> str:
     equations = equations.written_as(options.notation)
     if options.form == "lagrange":
-        from shaftwork.equations.lagrange import lagrangian
+        from shaftwork.lagrange.lagrange import lagrangian
 
         lagrange = lagrangian(equations)
         return (lagrange.document if options.document else lagrange.latex)(values=options.values)
@@ -95,7 +95,7 @@ def export_options(parser: ArgumentParser) -> None:
 @command("the model file of a scene, to change and run", export_options)
 def export(options: Namespace, say: Say) -> Data:
     """The model file of a scene, or of another model file with other values."""
-    from shaftwork.network.storage import netlist_text
+    from shaftwork.modelfiles.storage import netlist_text
 
     net, scene = load(options)
     if options.file is None:

@@ -108,7 +108,7 @@ def _angles(net: Network, wanted: tuple[str, ...]) -> tuple[str, ...]:
 
 def _refuse_unknown(model: Model, wanted: tuple[str, ...]) -> None:
     """Refuse a quantity that there will not be, before anything is computed."""
-    from shaftwork.codegen.observer import ModelObserver
+    from shaftwork.codegen.model_observer import ModelObserver
     from shaftwork.core.errors import no_quantity
 
     observer = ModelObserver(model.form, lambda: model.bind(model.defaults))

@@ -195,7 +195,7 @@ def _value(name: str, declared: Parameter, text: str) -> Any:
         pass
     why = f"give a number in {declared.unit} ({declared.meaning}), or with a unit."
     if declared.law:
-        from shaftwork.network.storage import law_of
+        from shaftwork.modelfiles.storage import law_of
 
         try:
             return law_of(name.rpartition(".")[2], text)

@@ -17,8 +17,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from shaftwork.codegen.arrays import BoundArrays
-from shaftwork.codegen.elements import ROUNDING, Array
+from shaftwork.codegen.array_form.arrays import BoundArrays
+from shaftwork.codegen.array_form.elements import ROUNDING, Array
 from shaftwork.formulation.form import StateForm
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind

@@ -17,9 +17,9 @@ from sympy import Add, Basic, Expr, Function, Integer, Mul, Rational, Symbol
 from sympy.printing.c import C99CodePrinter
 from sympy.printing.str import StrPrinter
 
+from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.code import ArrayPrinter, FloatPrinter, RealNumbers, executed
-from shaftwork.codegen.elements import Array
-from shaftwork.codegen.heyoka_parameters import Fixed
+from shaftwork.codegen.taylor.heyoka_parameters import Fixed
 from shaftwork.components.laws import NUMERICAL
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError, ParameterError

@@ -16,11 +16,11 @@ from functools import cached_property
 
 import numpy as np
 
-from shaftwork.codegen.arrays import BoundArrays
-from shaftwork.codegen.elements import Array
-from shaftwork.codegen.matrices import LinearPart
+from shaftwork.codegen.array_form.arrays import BoundArrays
+from shaftwork.codegen.array_form.elements import Array
+from shaftwork.codegen.array_form.matrices import LinearPart
+from shaftwork.codegen.array_form.recovery import BranchHistory
 from shaftwork.codegen.mobility import Mobility
-from shaftwork.codegen.recovery import BranchHistory
 from shaftwork.core.errors import CompileError
 from shaftwork.formulation.form import StateForm, store_name
 from shaftwork.network.kinds import Kind

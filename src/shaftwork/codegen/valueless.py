@@ -8,11 +8,11 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from sympy import Basic, Expr
 
-from shaftwork.codegen.arrays import BoundArrays
-from shaftwork.codegen.elements import Array
+from shaftwork.codegen.array_form.arrays import BoundArrays
+from shaftwork.codegen.array_form.elements import Array
 from shaftwork.components.branches import RATE
+from shaftwork.components.law_slopes import slope
 from shaftwork.components.laws import as_expression
-from shaftwork.components.slopes import slope
 from shaftwork.components.tables import Table
 from shaftwork.core.errors import SimulationError, no_value
 from shaftwork.formulation.form import StateForm

@@ -8,9 +8,9 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from shaftwork.codegen.arrays import BoundArrays
+from shaftwork.codegen.array_form.arrays import BoundArrays
+from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.code import scalar
-from shaftwork.codegen.elements import Array
 from shaftwork.components.base import Profile
 from shaftwork.network.graph import GraphPart
 from shaftwork.network.templates import BranchTemplate

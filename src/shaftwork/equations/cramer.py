@@ -10,7 +10,7 @@ import numpy as np
 from sympy import Expr, Integer, Poly, Rational, Symbol, lcm, prime, sring, together
 from sympy.combinatorics import Permutation
 
-from shaftwork.equations.slopes import exact, fraction
+from shaftwork.equations.point_slopes import exact, fraction
 from shaftwork.equations.tableau import S, Sum, Unknown
 
 Polynomial = Any

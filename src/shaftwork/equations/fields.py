@@ -25,9 +25,9 @@ from shaftwork.core.domains import ROTATION
 from shaftwork.equations.assembly import branches_of, sides, terms_of
 from shaftwork.equations.letters import parameter_letters
 from shaftwork.equations.notations import Letter, in_letters, inverses_of
-from shaftwork.equations.printing import Line, Writer, with_rates
 from shaftwork.equations.rows import NetworkEquations, with_derived
-from shaftwork.equations.spelling import without_marks
+from shaftwork.latex.printing import Line, Writer, with_rates
+from shaftwork.latex.spelling import without_marks
 from shaftwork.network.graph import GROUND, GraphPart
 
 X = Symbol("x", real=True)

@@ -19,7 +19,7 @@ from shaftwork.equations.rows import (
     NodeEquation,
     StateEquation,
 )
-from shaftwork.equations.solution import EliminationSystem, SolvedForm
+from shaftwork.equations.solved_rows import EliminationSystem, SolvedForm
 from shaftwork.formulation.form import StateForm, branch_name
 from shaftwork.formulation.gains import Number
 from shaftwork.network.graph import GROUND

@@ -14,8 +14,8 @@ from shaftwork.core.domains import ELECTRICAL, Quantity
 from shaftwork.core.parameters import Parameter
 from shaftwork.equations.notations import Letter, Notation
 from shaftwork.equations.quantities import Quantities, ThroughQuantity, running_number
-from shaftwork.equations.spelling import GREEK, chosen_subscript, escaped, indexed, split_index, without_marks
 from shaftwork.formulation.form import StateForm
+from shaftwork.latex.spelling import GREEK, chosen_subscript, escaped, indexed, split_index, without_marks
 from shaftwork.network.graph import GraphBranch
 from shaftwork.network.kinds import Kind
 

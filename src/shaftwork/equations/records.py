@@ -14,9 +14,9 @@ from shaftwork.equations.rows import NetworkEquations
 
 if TYPE_CHECKING:
     from shaftwork.equations.fields import Field
-    from shaftwork.equations.report import Form
     from shaftwork.equations.state_space import StateSpace
     from shaftwork.equations.transfer import TransferFunction
+    from shaftwork.latex.document import Form
 
 SHOWN = 5
 """Rows of a kind that are shown on a screen."""
@@ -127,7 +127,7 @@ class Equations(NetworkEquations):
             CompileError: second-order form of a network with electrical nodes; no shaft to print before division.
             ParameterError: there is no such phase or notation.
         """
-        from shaftwork.equations.report import blocks_of, typeset
+        from shaftwork.latex.document import blocks_of, typeset
 
         if phase is not None:
             if self.in_phase is None:
@@ -167,11 +167,11 @@ class Equations(NetworkEquations):
             values: print the parameters' values instead of their symbols.
             notation: letters of another source, as in `written_as`.
         """
-        from shaftwork.equations.report import document
+        from shaftwork.latex.document import document
 
         return document(self.written_as(notation), form, values=values)
 
     def _repr_latex_(self) -> str:
-        from shaftwork.equations.report import blocks_of, rendered
+        from shaftwork.latex.document import blocks_of, rendered
 
         return rendered(self, blocks_of(self, None, values=False))

@@ -17,7 +17,7 @@ from shaftwork.equations.assembly import Assembly, FactoredTerms, Sides
 from shaftwork.equations.letters import letters_of
 from shaftwork.equations.notations import OWN, Letter, Notation, inverses_of
 from shaftwork.equations.second_order import SecondOrder, second_order
-from shaftwork.equations.solution import EliminationSystem
+from shaftwork.equations.solved_rows import EliminationSystem
 from shaftwork.equations.topology import NamedMatrix, cutsets, incidence, loops
 from shaftwork.formulation.form import StateForm
 

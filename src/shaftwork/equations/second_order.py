@@ -13,8 +13,8 @@ from functools import cached_property
 from sympy import Add, Expr, Integer, Mul, Symbol
 
 from shaftwork.components.branches import ACROSS, INTEGRAL
+from shaftwork.components.law_slopes import jumps, slope
 from shaftwork.components.laws import t as TIME
-from shaftwork.components.slopes import jumps, slope
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import CompileError
 from shaftwork.equations.coordinates import coordinates, shortest

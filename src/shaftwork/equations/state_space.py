@@ -10,8 +10,8 @@ from sympy import Add, Dummy, Expr, ImmutableMatrix, Integer, Symbol, cancel
 
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError, SignalError, no_quantity
+from shaftwork.equations.point_slopes import LawSlopes, Slope
 from shaftwork.equations.rows import NetworkEquations
-from shaftwork.equations.slopes import LawSlopes, Slope
 from shaftwork.equations.tableau import refuse_waves
 from shaftwork.formulation.explicit_rows import BlockTooLargeError, explicit_rows
 from shaftwork.formulation.form import Names, StateForm

@@ -18,7 +18,7 @@ from shaftwork.components.base import Signal
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.core.errors import CompileError
 from shaftwork.equations.assembly import Assembly
-from shaftwork.equations.slopes import LawSlopes
+from shaftwork.equations.point_slopes import LawSlopes
 from shaftwork.formulation.form import StateForm
 from shaftwork.formulation.source_inputs import Place
 from shaftwork.network.controlled import Reading, readings_of

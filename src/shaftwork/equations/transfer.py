@@ -18,17 +18,17 @@ from sympy import Add, Expr, Float, Integer, Poly, Rational, Symbol, default_sor
 
 from shaftwork.core.errors import CompileError, ParameterError, SignalError, no_quantity
 from shaftwork.equations.assembly import FactoredTerms
-from shaftwork.equations.blocks import Blocks
 from shaftwork.equations.cramer import TooManyTermsError, in_numbers, quotient
 from shaftwork.equations.notations import QUANTITIES
-from shaftwork.equations.printing import LINE_WIDTH, Line, Writer, aligned, printed_width
+from shaftwork.equations.point_slopes import FRACTION_DIGITS, LawSlopes, PointValues, Slope, Values
 from shaftwork.equations.rows import NetworkEquations
-from shaftwork.equations.slopes import FRACTION_DIGITS, LawSlopes, PointValues, Slope, Values
-from shaftwork.equations.spelling import escaped, without_marks
 from shaftwork.equations.tableau import S, Sum, Tableau, refuse_waves
 from shaftwork.formulation.form import Names
 from shaftwork.formulation.gains import LONGEST
 from shaftwork.formulation.source_inputs import Place, places_of
+from shaftwork.latex.blocks import Blocks
+from shaftwork.latex.printing import LINE_WIDTH, Line, Writer, aligned, printed_width
+from shaftwork.latex.spelling import escaped, without_marks
 
 STEPS, EXTRA = 1000, 10
 """Steps in which roots are improved, and the binary digits more for each of them: what cancels in a polynomial."""

@@ -14,8 +14,8 @@ from sympy import Add, Dummy, Expr, Integer, Matrix, Symbol
 
 from shaftwork.components.branches import ACROSS, INTEGRAL, RATE
 from shaftwork.components.clips import replaced
+from shaftwork.components.law_slopes import slope
 from shaftwork.components.laws import t as TIME
-from shaftwork.components.slopes import slope
 from shaftwork.formulation.form import StateForm
 from shaftwork.formulation.gains import exact_of
 from shaftwork.formulation.tree import Row

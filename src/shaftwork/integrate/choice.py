@@ -44,7 +44,7 @@ def choose(problem: Problem) -> tuple[str, str]:
     It looks at eigenvalues at a few states (milliseconds), so keep the answer where many similar problems are solved.
     """
     if problem.straight is not None:
-        from shaftwork.integrate.propagation import cost
+        from shaftwork.integrate.linear.propagation import cost
 
         seconds = cost(problem, problem.straight)
         longest = LONGEST_EXACT_CHAIN if seconds > LONGEST_EXACT_CHAIN and _is_damped_chain(problem) else LONGEST_EXACT
@@ -53,7 +53,7 @@ def choose(problem: Problem) -> tuple[str, str]:
         if _is_chain(problem):
             return "banded", f"The system is a long linear chain: exact propagation would take about {seconds:.2g} s."
     elif problem.linear is not None:
-        from shaftwork.integrate.propagation import drivable
+        from shaftwork.integrate.linear.propagation import drivable
 
         if drivable(problem):
             return "exact", "The system is linear with smooth inputs, so its modes are propagated without a step error."
@@ -130,8 +130,8 @@ def no_series(failed: SeriesError, name: str) -> str:
 
 def _guarded(problem: Problem, trajectory: Trajectory, name: str) -> Trajectory:
     """The run, with what makes it worth less than it should be."""
-    from shaftwork.integrate.cancellation import spoiled
-    from shaftwork.integrate.verification import objection
+    from shaftwork.integrate.linear.cancellation import spoiled
+    from shaftwork.integrate.linear.verification import objection
 
     said = objection(problem, trajectory, name)
     if said is None and problem.observed is None and name not in EXPLICIT and trajectory.t.size:
@@ -204,12 +204,12 @@ def _stiff(problem: Problem, *, compiled: bool) -> tuple[str, str] | None:
 
 
 def _is_chain(problem: Problem) -> bool:
-    from shaftwork.integrate.banded import is_chain
+    from shaftwork.integrate.collocation.banded import is_chain
 
     return is_chain(problem)
 
 
 def _is_damped_chain(problem: Problem) -> bool:
-    from shaftwork.integrate.banded import is_undamped
+    from shaftwork.integrate.collocation.banded import is_undamped
 
     return _is_chain(problem) and not is_undamped(problem)

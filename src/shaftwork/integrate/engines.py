@@ -44,13 +44,13 @@ class EngineEntry:
 # stage equations of the banded engine is larger, and so is that of coefficients of rounded numbers on a wave.
 EPS = sys.float_info.epsilon
 _SCIPY = EngineEntry("shaftwork.integrate.scipy_ivp:solve", "everything that is not stiff", finest=100 * EPS)
-WAVE = EngineEntry("shaftwork.integrate.lossless.engine:solve", "travelling waves", finest=1e-12)
+WAVE = EngineEntry("shaftwork.waves.delay_engine.engine:solve", "travelling waves", finest=1e-12)
 """The engine of networks with waves, which no others can take."""
 
 ENGINES: dict[str, EngineEntry] = {
-    "exact": EngineEntry("shaftwork.integrate.propagation:solve", "linear systems, without a step error"),
+    "exact": EngineEntry("shaftwork.integrate.linear.propagation:solve", "linear systems, without a step error"),
     "heyoka": EngineEntry(
-        "shaftwork.integrate.heyoka_taylor:solve",
+        "shaftwork.integrate.taylor.heyoka_taylor:solve",
         "smooth and piecewise laws, compiled",
         "heyoka",
         "heyoka",
@@ -62,7 +62,7 @@ ENGINES: dict[str, EngineEntry] = {
     ),
     "scipy": _SCIPY,
     "scipy-radau": replace(_SCIPY, purpose="stiff systems", options=(("method", "Radau"),)),
-    "banded": EngineEntry("shaftwork.integrate.banded:solve", "long chains, linear or stiff", finest=1e-11),
+    "banded": EngineEntry("shaftwork.integrate.collocation.banded:solve", "long chains, linear or stiff", finest=1e-11),
 }
 
 # Another method of an engine, which a run chooses by itself.

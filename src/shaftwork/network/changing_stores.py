@@ -17,8 +17,8 @@ from sympy import AccumBounds, Basic, Expr, Symbol, oo
 from sympy.core.relational import Relational
 
 from shaftwork.components.branches import ACROSS, INTEGRAL, RATE, readings_in
+from shaftwork.components.law_slopes import STEPS, slope, wraps
 from shaftwork.components.laws import t as TIME
-from shaftwork.components.slopes import STEPS, slope, wraps
 from shaftwork.core.errors import ShaftworkError
 
 CHANGE = "change"

@@ -24,8 +24,7 @@ from shaftwork.network.kinds import Kind
 from shaftwork.network.law_faults import Fault, instead_of, law_faults
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
 from shaftwork.network.sharing import Shared
-from shaftwork.network.textfile import MAXIMUM_NAME, is_name
-from shaftwork.network.wording import Spelling, at_nodes, listed, title
+from shaftwork.network.wording import MAXIMUM_NAME, Spelling, at_nodes, is_name, listed, title
 
 LEFT_OUT = ("node name", "node count", "wrong domain", "no effect", "component")
 """Kinds of problems whose part is left out of what is examined further."""

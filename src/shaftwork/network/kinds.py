@@ -18,10 +18,10 @@ from shaftwork.components.branches import (
     ThroughStore,
     readings_in,
 )
+from shaftwork.components.law_slopes import jumps, slope
 from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import has_mode
-from shaftwork.components.slopes import jumps, slope
 from shaftwork.core.errors import ParameterError, ShaftworkError
 
 

@@ -8,8 +8,15 @@ from itertools import chain
 
 from shaftwork.components.base import Component
 
+MAXIMUM_NAME = 200
+"""Characters of a name of a part, node, type or symbol."""
 SHORTEST = 4
 """Letters of a name that another may be a slip of: of shorter ones too many are alike."""
+
+
+def is_name(value: object) -> bool:
+    """Whether something can name a part or a node: 1 to `MAXIMUM_NAME` printable characters."""
+    return isinstance(value, str) and 0 < len(value) <= MAXIMUM_NAME and value.isprintable() and bool(value.strip())
 
 
 def title(part: Component) -> str:

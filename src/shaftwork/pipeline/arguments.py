@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from shaftwork.codegen.elements import Array
+from shaftwork.codegen.array_form.elements import Array
 from shaftwork.components.base import Component
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import ParameterError

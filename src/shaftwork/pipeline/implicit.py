@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shaftwork.codegen.arrays import BoundArrays
-from shaftwork.codegen.elements import Array
+from shaftwork.codegen.array_form.arrays import BoundArrays
+from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import DaeProblem, DenseOutput, Problem, Trajectory

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from shaftwork.codegen.arrays import BoundArrays
-from shaftwork.codegen.elements import Array
-from shaftwork.codegen.observer import ModelObserver
-from shaftwork.codegen.operating import steady_state
-from shaftwork.codegen.start_values import initial_state, with_others
+from shaftwork.codegen.array_form.arrays import BoundArrays
+from shaftwork.codegen.array_form.elements import Array
+from shaftwork.codegen.model_observer import ModelObserver
+from shaftwork.codegen.starts.operating import steady_state
+from shaftwork.codegen.starts.start_values import initial_state, with_others
 from shaftwork.codegen.valueless import refuse_vanishing
 from shaftwork.core.calls import Callback
 from shaftwork.core.errors import ParameterError
@@ -55,9 +55,9 @@ from shaftwork.pipeline.stored import Repetition, call_of, model_again, remember
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
-    from shaftwork.pipeline.analysis import Given, Names, Point, Time
-    from shaftwork.pipeline.wave_motion import CarriedWaves, WaveStart
-    from shaftwork.results.linear import LinearModel
+    from shaftwork.frequency.analysis import Given, Names, Point, Time
+    from shaftwork.frequency.linear_model import LinearModel
+    from shaftwork.waves.wave_motion import CarriedWaves, WaveStart
 
 VARIANTS = 8
 """Models of other structure, and choices of an engine, that are kept for later calls."""
@@ -244,7 +244,7 @@ class Model(EngineModel):
 
     def near(self, at: Point, t: Time, inputs: Names, outputs: Names = None, values: Given = None) -> LinearModel:
         """The same for values of parameters that have been looked at and change no structure."""
-        from shaftwork.pipeline.analysis import linearized
+        from shaftwork.frequency.analysis import linearized
 
         p = self.vector(values or {})
         return linearized(self, p, at, t, self.settled(p), inputs, outputs)
@@ -264,7 +264,7 @@ class Model(EngineModel):
         """The run, the engine that made it, and why that one."""
         name, why = self._engine(prepared, problem, engine)
         if name == "wave":
-            from shaftwork.pipeline.wave_motion import solve_waves
+            from shaftwork.waves.wave_motion import solve_waves
 
             steady = self.degree == 0
             return solve_waves(prepared.bound, problem, waves, linear=self.linear, steady=steady), name, why
@@ -279,7 +279,7 @@ class Model(EngineModel):
     def _engine(self, prepared: Prepared, problem: Problem, engine: str) -> tuple[str, str]:
         """The engine for a motion, and why."""
         if self.form.waves:
-            from shaftwork.pipeline.wave_motion import engine_of_waves
+            from shaftwork.waves.wave_motion import engine_of_waves
 
             return engine_of_waves(engine)
         choice.check(engine)
@@ -300,7 +300,7 @@ class Model(EngineModel):
     @cached_property
     def twin(self) -> Model:
         """The network with springs in place of its waves: it stands and turns steadily as they do."""
-        from shaftwork.pipeline.wave_motion import twin
+        from shaftwork.waves.wave_motion import twin
 
         return self._rebuild(twin(self.netlist))
 

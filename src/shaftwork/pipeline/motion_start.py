@@ -9,8 +9,8 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from shaftwork.codegen.elements import Array
-from shaftwork.codegen.start_values import initial_state
+from shaftwork.codegen.array_form.elements import Array
+from shaftwork.codegen.starts.start_values import initial_state
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.core.errors import AccuracyWarning, Diagnostic, NetworkWarning, ParameterError
 from shaftwork.core.notices import warn
@@ -22,7 +22,7 @@ from shaftwork.pipeline.prepared import EngineModel, Prepared
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
-    from shaftwork.pipeline.wave_motion import CarriedWaves, WaveStart
+    from shaftwork.waves.wave_motion import CarriedWaves, WaveStart
 
 _RESTING: WeakKeyDictionary[CircuitGraph, tuple[Diagnostic, ...]] = WeakKeyDictionary()
 """What `resting_trains` gives: it takes as long as a short run."""
@@ -192,7 +192,7 @@ def start_of(
         return _taken_up(prepared, initial, after, changes=bool(initial.changed(values))), initial.waves
     if not model.form.waves:
         return initial_state(prepared.bound, {} if initial is None else initial, after), None
-    from shaftwork.pipeline.wave_motion import start_of_waves
+    from shaftwork.waves.wave_motion import start_of_waves
 
     if isinstance(initial, Ending):
         warn_of_lost_waves(span[0], in_leaps=True)

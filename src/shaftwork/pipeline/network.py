@@ -18,23 +18,23 @@ from shaftwork.equations.kirchhoff import kirchhoff
 from shaftwork.equations.records import Equations, NamedPhase
 from shaftwork.formulation.diagnosis import diagnose
 from shaftwork.formulation.form import StateForm, state_form
+from shaftwork.hybrid.named_phases import during, in_phase, span_of, whole_name, words_of
+from shaftwork.hybrid.phased_model import PhasedModel
+from shaftwork.modelfiles.storage import read_netlist, write_netlist
 from shaftwork.network.builder import NetworkBuilder
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.netlist import Netlist
-from shaftwork.network.storage import read_netlist, write_netlist
 from shaftwork.pipeline.angles import with_angles
 from shaftwork.pipeline.arguments import as_names
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.phases.named_phases import during, in_phase, span_of, whole_name, words_of
-from shaftwork.pipeline.phases.phased_model import PhasedModel
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
-    from shaftwork.equations.lagrange import Lagrangian
-    from shaftwork.pipeline.analysis import Point, SmallMotions, Time
-    from shaftwork.results.campbell import Campbell
-    from shaftwork.results.frequency import FrequencyResponse
-    from shaftwork.results.modes import Modes
+    from shaftwork.frequency.analysis import Point, SmallMotions, Time
+    from shaftwork.frequency.campbell import Campbell
+    from shaftwork.frequency.frequency_response import FrequencyResponse
+    from shaftwork.frequency.natural_modes import Modes
+    from shaftwork.lagrange.lagrange import Lagrangian
 
 LOOP = "algebraic loop"
 """The kind of problem that `algebraic_loops="solve"` accepts."""
@@ -122,7 +122,7 @@ class Network(NetworkBuilder):
             NetworkError: the network cannot be assembled; lists every reason.
             ParameterError: as for `equations`.
         """
-        from shaftwork.equations.lagrange import lagrangian
+        from shaftwork.lagrange.lagrange import lagrangian
 
         return lagrangian(self.equations(expand=expand, phase=phase))
 
@@ -229,14 +229,14 @@ class Network(NetworkBuilder):
             exact: every shaft but a rigid one and one spring is taken as it is, without a mesh; a wave always is.
             t: time at which laws are read, s; by default as for `Model.linearize`.
         """
-        from shaftwork.pipeline.analysis import campbell
+        from shaftwork.frequency.analysis import campbell
 
         model = self.compile()
         return campbell(model, self._small_motions(model, exact=exact), speeds, orders, f_max, at, count, t)
 
     @staticmethod
     def _small_motions(model: Model, *, exact: bool) -> SmallMotions:
-        from shaftwork.pipeline.exact_networks import small_motions
+        from shaftwork.frequency.exact_shafts.exact_networks import small_motions
 
         return small_motions(model, Compiler((), LOOP), every=exact)
 

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from shaftwork.codegen.arrays import BoundArrays
-from shaftwork.codegen.elements import Array
-from shaftwork.codegen.model import CompiledModel
-from shaftwork.codegen.recovery import BranchHistory
-from shaftwork.codegen.time_switches import Switching
+from shaftwork.codegen.array_form.arrays import BoundArrays
+from shaftwork.codegen.array_form.elements import Array
+from shaftwork.codegen.array_form.recovery import BranchHistory
+from shaftwork.codegen.compiled_model import CompiledModel
+from shaftwork.codegen.times.time_switches import Switching
 from shaftwork.codegen.valueless import rough, without_value
 from shaftwork.core.errors import CompileError
 from shaftwork.core.kept import Kept
@@ -95,7 +95,7 @@ class EngineModel(CompiledModel, ABC):
         """The heyoka program, where there are rows, heyoka is installed and knows every function in them."""
         if self.rows is None or not available("heyoka"):
             return None
-        from shaftwork.codegen.heyoka import build
+        from shaftwork.codegen.taylor.heyoka import build
         from shaftwork.components.laws import t as time
 
         try:

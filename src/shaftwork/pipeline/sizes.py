@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shaftwork.codegen.elements import Array
+from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import AccuracyWarning
 from shaftwork.core.notices import warn
 from shaftwork.formulation.form import StateForm

@@ -14,9 +14,9 @@ from shaftwork.components.contacts import Backlash
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import whole
 from shaftwork.core.screen import in_columns
-from shaftwork.equations.nomenclature import breakable, column, unit
-from shaftwork.equations.nomenclature import table as longtable
-from shaftwork.equations.printing import printed_number
+from shaftwork.latex.nomenclature import breakable, column, unit
+from shaftwork.latex.nomenclature import table as longtable
+from shaftwork.latex.printing import printed_number
 from shaftwork.reduce.chain import Chain, Station, series
 
 MOST = 20_000

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.equations.nomenclature import table as longtable
-from shaftwork.equations.printing import printed_number
+from shaftwork.latex.nomenclature import table as longtable
+from shaftwork.latex.printing import printed_number
 from shaftwork.pipeline.motion_start import rewired
 from shaftwork.pipeline.network import Network
 from shaftwork.reduce.tridiagonal_modes import Array

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from shaftwork.codegen.observer import ModelObserver
+from shaftwork.codegen.model_observer import ModelObserver
 from shaftwork.components.base import Component
 from shaftwork.components.rotation import Inertia
 from shaftwork.components.tables import Table, interpolate

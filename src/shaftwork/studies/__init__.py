@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from shaftwork.studies.sensitivities import frequency_sensitivities, motion_sensitivities
+from shaftwork.sensitivities.study import frequency_sensitivities, motion_sensitivities
 from shaftwork.studies.stability import Cell, Stability, stability
 from shaftwork.studies.stability_cases import Case
-from shaftwork.studies.sweep import sweep
-from shaftwork.studies.sweep_result import Sweep
 from shaftwork.studies.work_precision import work_precision
 from shaftwork.studies.work_precision_result import Trial, WorkPrecision
+from shaftwork.sweep.sweep import sweep
+from shaftwork.sweep.sweep_result import Sweep
 
 __all__ = [
     "Case",

@@ -19,7 +19,7 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
 from shaftwork.pipeline.network import Network
 from shaftwork.results.observer import Array
-from shaftwork.shafts.line import Section
+from shaftwork.studies.exact_shafts.line import Section
 
 DENSITY, SHEAR_MODULUS = 7900.0, 77.5e9
 """Of steel, kg/m^3 and Pa."""

@@ -14,9 +14,9 @@ from scipy.linalg import expm
 from shaftwork.components.discontinuities import breakpoints
 from shaftwork.components.shaft_models import OneSpring, Rigid, ShaftModel, Wave
 from shaftwork.results.observer import Array
-from shaftwork.shafts.exact_motion import JunctionTorque, motion
-from shaftwork.shafts.exact_response import Complex, laplace_response
-from shaftwork.shafts.line import Section, SectionLine
+from shaftwork.studies.exact_shafts.exact_motion import JunctionTorque, motion
+from shaftwork.studies.exact_shafts.exact_response import Complex, laplace_response
+from shaftwork.studies.exact_shafts.line import Section, SectionLine
 from shaftwork.studies.stability_cases import TORQUE, Case
 from shaftwork.studies.truth import function_of_time
 

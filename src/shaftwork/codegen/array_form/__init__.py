@@ -1,0 +1,1 @@
+"""The equations as arrays: a linear part and the laws beside it."""

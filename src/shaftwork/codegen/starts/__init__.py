@@ -1,0 +1,1 @@
+"""Start states, and the states of steady operation."""

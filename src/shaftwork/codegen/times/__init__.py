@@ -1,0 +1,1 @@
+"""The instants at which laws switch because of the time alone."""

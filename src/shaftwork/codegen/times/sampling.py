@@ -1,0 +1,138 @@
+"""Where a function of time changes sides, or leaves a plain course for a short while, found from samples of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from shaftwork.codegen.array_form.elements import Array, Index
+from shaftwork.codegen.times.timeline import CLEARANCE
+
+# A law of time is looked at so many times, and again at four times as many, until it changes sides no more often.
+FEWEST_SAMPLES, MOST_SAMPLES = 2**12, 2**22
+RESOLVED = 8
+"""Samples that there must be for each change of side."""
+# An argument rounds badly where its terms cancel: it is looked at farther and farther from a change of side, up to this
+# part of the run and of the way to the next change, until it keeps its sides.
+FARTHEST, CLEAR = 1e-6, 1 / 8
+PROBES = np.array([1.0, 1.5, 2.0, 3.0, 4.0])
+SAMPLES = 2**14
+"""Of a run: what is narrower than a few of its parts of that number may be missed."""
+PLAIN = 1e-4
+"""A function goes straight on, to this part of its range, where no bump is: waves of up to 50 periods do everywhere."""
+APART = 2.0
+"""A bump has so many times its width of plain course on one side: no step passes what lasts longer unawares."""
+STOPS = np.linspace(-0.5, 1.5, 13)
+"""Where steps end at a bump, in its widths: where it shows it is 1e-4 high, and began before."""
+GOLDEN = (math.sqrt(5) - 1) / 2
+Sides = Callable[[Array], Index]
+"""From times (k,) to the sides of a switch (k,): numbers that differ where it jumps or bends."""
+
+
+def irregular(t0: float, t_end: float, size: int) -> Array:
+    """Times (size + 1,) from t0 to t_end without a frequency that they mistake for another."""
+    places = np.arange(size)
+    return np.append(t0 + (t_end - t0) * ((places + places * GOLDEN % 1.0) / size), t_end)
+
+
+def sampled(sides: Sides, t0: float, t_end: float) -> Array | None:
+    """Times (k,) from t0 to t_end between which a switch changes sides at most once, or None."""
+    size, before = FEWEST_SAMPLES, -1
+    while size <= MOST_SAMPLES:
+        t = irregular(t0, t_end, size)
+        changes = int(np.count_nonzero(np.diff(sides(t))))
+        if changes == before and changes * RESOLVED <= size:
+            return np.unique(t)
+        size, before = 4 * size, changes
+    return None
+
+
+def nearest(distance: Callable[[Array], Array], t: Array) -> Array:
+    """The times of the least distances between the times (k,), by golden sections."""
+    x = distance(t)
+    valleys = 1 + np.flatnonzero((x[1:-1] < x[:-2]) & (x[1:-1] < x[2:]))
+    low, high = t[valleys - 1], t[valleys + 1]
+    for _ in range(80):
+        early, late = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+        left = distance(early) < distance(late)
+        low, high = np.where(left, low, early), np.where(left, late, high)
+    return np.asarray((low + high) / 2)
+
+
+def changes_of(sides: Sides, t: Array) -> list[tuple[float, float]]:
+    """Times in s at which a switch changes sides between the times (k,), and the reach of their rounding."""
+    grain = math.ulp(max(abs(float(t[0])), abs(float(t[-1]))))
+    low, high, old, new = _bisected(sides, t, grain / 1024)
+    order = np.argsort(high)
+    low, high, old, new = low[order], high[order], old[order], new[order]
+    # A zero that is met exactly is a side of its own: two changes, and one instant.
+    apart = np.diff(high) > CLEARANCE * grain
+    first, last = np.append(True, apart)[: high.size], np.append(apart, True)[: high.size]
+    times, width, old, new = high[first], high[last] - high[first], old[first], new[last]
+    passed = old != new
+    times, width, old, new = times[passed], width[passed], old[passed], new[passed]
+    return list(zip(times.tolist(), (width + _reach(sides, t, times, old, new, grain)).tolist(), strict=True))
+
+
+def _bisected(sides: Sides, t: Array, grain: float) -> tuple[Array, Array, Index, Index]:
+    """Every change of side between the times (k,): the last time before it, the first after it, and the two sides."""
+    at = sides(t)
+    changed = np.flatnonzero(np.diff(at))
+    low, high, old, new = t[changed], t[changed + 1], at[changed], at[changed + 1]
+    while True:
+        middle = low + (high - low) / 2
+        done = (high - low <= grain) | (middle <= low) | (middle >= high)
+        if done.all():
+            return low, high, old, new
+        here = sides(middle)
+        left, right = ~done & (old != here), ~done & (here != new)
+        low = np.concatenate([low[done], low[left], middle[right]])
+        high = np.concatenate([high[done], middle[left], high[right]])
+        old, new = (
+            np.concatenate([old[done], old[left], here[right]]),
+            np.concatenate([new[done], here[left], new[right]]),
+        )
+
+
+def _reach(sides: Sides, t: Array, times: Array, old: Index, new: Index, grain: float) -> Array:
+    """How far from the times (k,) of changes the sides are the old and the new ones, whatever the rounding, in s."""
+    gaps = np.diff(times, prepend=-np.inf, append=np.inf)
+    farthest = np.minimum(FARTHEST * (t[-1] - t[0]), CLEAR * np.minimum(gaps[:-1], gaps[1:]))
+    reach = np.full(times.shape, CLEARANCE * grain)
+    while True:
+        offsets = reach[:, None] * PROBES
+        early, late = np.maximum(times[:, None] - offsets, t[0]), np.minimum(times[:, None] + offsets, t[-1])
+        keeps = (sides(early.ravel()).reshape(early.shape) == old[:, None]) | (early == t[0])
+        keeps &= (sides(late.ravel()).reshape(late.shape) == new[:, None]) | (late == t[-1])
+        farther = ~keeps.all(axis=1) & (4 * reach <= farthest)
+        if not farther.any():
+            return reach
+        reach[farther] *= 4
+
+
+def bumps(function: Callable[[Array], Array], t0: float, t_end: float) -> Array:
+    """Times in s, increasing, at which steps end so that none passes a bump unawares.
+
+    Args:
+        function: from times (k,) in s to values (k,).
+        t0: start of the run, s.
+        t_end: its end, s.
+    """
+    t = irregular(t0, t_end, SAMPLES)
+    x = function(t)
+    if not np.isfinite(x).all() or not np.ptp(x) > 0:
+        return np.empty(0)
+    straight = x[:-2] + (x[2:] - x[:-2]) * ((t[1:-1] - t[:-2]) / (t[2:] - t[:-2]))
+    bent = np.concatenate([[False], np.abs(x[1:-1] - straight) > PLAIN * np.ptp(x), [False]])
+    edges = np.flatnonzero(np.diff(bent))
+    stretches: list[tuple[float, float]] = []
+    for begin, end in zip(t[edges[::2]].tolist(), t[edges[1::2] + 1].tolist(), strict=True):
+        # where a flank turns, a bump is straight too
+        joined = stretches and begin - stretches[-1][1] < APART * max(end - begin, np.ptp(stretches[-1]))
+        stretches.append((stretches.pop()[0] if joined else begin, end))
+    begins, ends = np.array(stretches).reshape(-1, 2).T
+    plain = np.maximum(begins - np.append(t0, ends[:-1]), np.append(begins[1:], t_end) - ends)
+    width = ends - begins
+    return np.unique((begins + STOPS[:, None] * width)[:, APART * width < plain])

@@ -1,0 +1,1 @@
+"""Small motions about a point: modes, frequency response, Campbell diagram."""

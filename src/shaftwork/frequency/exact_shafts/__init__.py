@@ -1,0 +1,1 @@
+"""Shafts without a mesh in the frequency domain."""

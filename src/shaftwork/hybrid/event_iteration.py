@@ -1,0 +1,326 @@
+"""Which modes go on at an instant: one changes after another until all are consistent with the motion that follows."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from itertools import islice
+from types import MappingProxyType
+
+from shaftwork.codegen.array_form.elements import Array
+from shaftwork.core.errors import NetworkError, SimulationError
+from shaftwork.hybrid.hybrid_state import Change, HybridState, Transition, together
+from shaftwork.hybrid.impacts.impacts import Impacts
+from shaftwork.hybrid.modes.commutation import Commutation
+from shaftwork.hybrid.modes.exceeded_guards import exceeded, passes_limit, resting
+from shaftwork.hybrid.modes.mode_equations import ModeEquations
+from shaftwork.hybrid.modes.mode_machines import ActiveGuard, ModeNames, limited, with_modes
+from shaftwork.hybrid.phases import Phases
+from shaftwork.hybrid.regimes import Regimes, anew, refuse_beyond
+
+MOST_AT_ONCE = 2000
+"""So many changes within one instant have no end: of two rigid flanks without a gap between them, say."""
+MOST_REPEATS = 2
+NEAR = 64
+"""A guard that is farther from its limit than this many times what it is met by is not met now."""
+
+
+class EventIteration:
+    """Changes modes at an instant.
+
+    Args:
+        phases: the sets of equations.
+        values: parameters that differ from the network's.
+        span: start and end of the run, s.
+        equations: for a combination of modes; by default each has its own, as an analysis reads them.
+    """
+
+    def __init__(
+        self,
+        phases: Phases,
+        values: Mapping[str, float],
+        span: tuple[float, float],
+        equations: Callable[[ModeNames], ModeEquations] | None = None,
+    ) -> None:
+        self.elements = phases.elements
+        self._regimes = Regimes(phases, values, span, equations or phases.assembly)
+        self.regime, self.stored, self.resumed = self._regimes.regime, self._regimes.stored, self._regimes.resumed
+        self._impacts = Impacts(self._regimes, together=phases.netlist.impacts == "together")
+        self._commutation = Commutation(self._regimes)
+        self.jumped, self.possible = self._impacts.jumped, self._regimes.possible
+
+    def started(self, t: float, x: Array, joins: Mapping[int, str] = MappingProxyType({})) -> HybridState:
+        """The modes in which a motion starts, from the states of the equations in which no mode joins anything.
+
+        An element that nothing else lets start in its mode, as a friction that a prescribed speed is about to turn,
+        starts in one to which that mode leads.
+
+        Args:
+            t: time in s at which inputs are read.
+            x: (n,) states.
+            joins: elements that do join something in these equations, and the modes in which they do.
+
+        Raises:
+            ParameterError: a twist lies beyond a rigid limit.
+        """
+        loose = HybridState(self.regime(with_modes(self._regimes.first, joins)), x)
+        refuse_beyond(loose, t)
+        regime, modes = loose.regime, loose.regime.modes
+        wanted = with_modes(regime.assembly.first_modes(t, x, regime.p), joins)
+        if self.possible(wanted):
+            return self._regimes.changed(loose, t, wanted)
+        # of switches the time tells, so that others give way
+        for k in sorted(range(len(wanted)), key=lambda k: not self.elements[k].is_switch):
+            leaves = (leave for leave in self.elements[k].modes[wanted[k]].leaves if not leave.by_time)
+            names = (wanted[k], *(leave.to for leave in leaves if leave.to))
+            options = (with_modes(modes, {k: name}) for name in names)
+            modes = next(filter(self.possible, options), modes)
+        return self._regimes.changed(loose, t, modes)
+
+    def settle(self, t: float, after: float, moment: HybridState, met: int | None) -> Transition:
+        """The modes that go on, and the changes that lead there.
+
+        Args:
+            t: the instant, s.
+            after: a time just after it, s, at which inputs are read.
+            moment: what was before.
+            met: the guard that ended the phase, or None.
+
+        Raises:
+            SimulationError: no modes are consistent; names the pair that changes for ever.
+        """
+        ends = met is not None or passes_limit(moment._replace(bands=()), after)
+        joins = resting(moment, after) if ends else {}
+        if not joins:
+            return self._settled(t, after, moment, met)
+        # Who carries is told anew. A law that falls at once would tell a way in which nothing moves: of two frictions
+        # one has given way at rest, and now the other one does, backward. Once it moves, the first one has less torque
+        # than it holds at rest, and would move forward instead, which the other one does not let it.
+        joined, begun = self._joined(t, after, moment, joins)
+        new, changes = self._settled(t, after, joined, None)
+        if new.regime.modes == moment.regime.modes:  # rounding hides what was met
+            ended = [(active.element, active.leave) for active in moment.regime.watched if active.guard == met]
+            same = (active.guard for active in joined.regime.watched if (active.element, active.leave) in ended)
+            new, changes = self._settled(t, after, joined, next(same, None))
+        return new, together([*begun, *changes])
+
+    def _settled(self, t: float, after: float, moment: HybridState, met: int | None) -> Transition:
+        """The same where nothing rests by now; what does so then is joined, in the order of the network."""
+        new, changes = self._fewest(t, after, moment, met)
+        joins = resting(new, after) if changes else {}
+        if not joins:
+            return new, changes
+        try:  # joined all at once: what was slipping a change ago must not tell who carries
+            joined, at_once = self._joined(t, after, new, joins)
+            settled, further = self._consistent(t, after, joined, None)
+        except (NetworkError, SimulationError):
+            return new, changes
+        # back where it came from: a limit has just been exceeded there
+        if settled.regime.modes == moment.regime.modes or any(one.impact for one in further):
+            return new, changes
+        if settled.regime.modes == new.regime.modes:
+            return new, together(changes) or changes
+        return settled, together([*changes, *at_once, *further])
+
+    def _joined(self, t: float, after: float, moment: HybridState, joins: Mapping[int, str]) -> Transition:
+        """The same instant with elements in modes in which they hold, and the changes to these."""
+        modes, joinable = moment.regime.modes, self._regimes.joinable(moment.regime.modes, joins)
+        changes = [Change(t, self.elements[k], modes[k], name) for k, name in joinable.items()]
+        return self._regimes.changed(moment, after, with_modes(modes, joinable)), changes
+
+    def _fewest(self, t: float, after: float, moment: HybridState, met: int | None) -> Transition:
+        """Of several guards that are met at one instant, rounding tells which of them ends the phase.
+
+        So each is followed first, and the fewest changes are taken: two flanks that one torque has pressed together
+        part where they have to, and not at both.
+        """
+        if met is None:
+            return self._consistent(t, after, moment, None)
+        named = next(active for active in moment.regime.watched if active.guard == met)
+        transitions: list[Transition] = []
+        failed: list[SimulationError] = []
+        met_at_once = self._at_once(moment, after, named)
+        # an angle waits for nothing
+        least = max(1, len({active.element for active in met_at_once if active.leave.by_twist}))
+        for first in met_at_once:
+            try:
+                transitions.append(self._consistent(t, after, moment, first))
+            except SimulationError as error:
+                failed.append(error)
+            else:
+                changes = transitions[-1][1]
+                if len(changes) == 1 or (len(changes) == least and not any(one.impact for one in changes)):
+                    break  # none can be fewer
+        if not transitions:
+            raise failed[0]
+        return min(transitions, key=lambda transition: len(transition[1]))
+
+    def _at_once(self, moment: HybridState, t: float, named: ActiveGuard) -> list[ActiveGuard]:
+        """The guards that are met at the instant at which one is, in the order of their elements."""
+        regime, others = moment.regime, [active for active in moment.regime.watched if active is not named]
+        now, bands = regime.limits(t, moment.x.tolist()), moment.bands
+        if bands and all(active.side * now[active.guard] < -NEAR * bands[active.guard] for active in others):
+            return [named]
+        met = [active for _, active in exceeded(moment, t, moment, in_order=True)[1]]
+        if named not in met and (not named.leave.by_torque or all(active.leave.by_torque for active in met)):
+            met.append(named)
+        return sorted(met, key=moment.regime.watched.index)
+
+    def _consistent(self, t: float, after: float, moment: HybridState, first: ActiveGuard | None) -> Transition:
+        """Modes that are consistent with the motion that follows, by one change after another; see `settle`.
+
+        Args:
+            t, after, moment: as there.
+            first: the guard to begin with, or None.
+        """
+        changes: list[Change] = []
+        idle: list[ActiveGuard] = []
+        seen: dict[ModeNames, None] = {}
+        blocked, repeats, late = None, 0, 0.0
+        tried: Counter[tuple[ModeNames, int]] = Counter()  # other modes than what contradicts, each of them once
+        # a guard is met where it is beyond zero by its band, which then still is the band of what is the same after it
+        ended = moment
+        worst = first
+        if worst is None:
+            moment, worst = _worst(moment, after, ended, idle, repeats)
+        while worst is not None:
+            here = moment.regime.modes, worst.element
+            moment, latest, contradiction, since = self._follow(t, after, moment, worst, tried[here])
+            late += since
+            changes, blocked = [*changes, *latest], contradiction or blocked
+            if contradiction is not None:
+                tried[here] += 1
+                if tried[here] > 1:
+                    seen.clear()
+            impact = bool(latest) and latest[0].impact
+            again = bool(latest) and not impact and moment.regime.modes in seen
+            repeats += again
+            if repeats > MOST_REPEATS or len(changes) > MOST_AT_ONCE:
+                raise _endless(t, changes, blocked)
+            if again or impact:
+                seen.clear()
+            if impact:
+                tried.clear()  # what contradicted others need not do so at other speeds
+            idle = [] if latest else [*idle, worst]
+            seen[moment.regime.modes] = None
+            moment, worst = _worst(moment, after, ended, idle, repeats)
+            if worst is None and late:  # in the modes that go on, how long ago it was hit
+                moment, worst = _worst(moment.moved(after, late), after, ended, idle, repeats)
+                late = 0.0
+        return moment, changes
+
+    def _follow(
+        self, t: float, after: float, moment: HybridState, ended: ActiveGuard, tried: int
+    ) -> tuple[HybridState, list[Change], NetworkError | None, float]:
+        """The mode of an element changes, or what hits is thrown back; what kept it from what it wanted, and how long
+        ago, in s, it was hit. Of the other modes instead of what contradicts, some have been tried.
+        """
+        number, leave, regime = ended.element, ended.leave, moment.regime
+        element = self.elements[number]
+        before = regime.modes[number]
+        to = leave.to or anew(moment, after, number)
+        if element.is_switch and (switched := self._commutation.switched(t, after, moment, number, to)):
+            return *switched, None, 0.0
+        speed = self._impacts.meets(moment, after, element.modes[to], number)
+        slips = next((name for side, name in element.modes[to].gives_way if side * speed > 0), "")
+        if slips == before:  # it was met by rounding alone: it is moving away
+            return moment, [], None, 0.0
+        if slips:  # its torque is limited, so it takes no speed away at once
+            to, speed = slips, 0.0
+        try:
+            if speed or (leave.rebound is not None and not slips):
+                hit = self._impacts.hit(t, after, moment, replace(ended, leave=replace(leave, to=to)))
+                return *hit[:2], None, hit[2]
+            modes = with_modes(regime.modes, {number: to})
+            new, conducting = self._commutation.commutated(moment, after, modes)
+            others = [Change(t, self.elements[k], regime.modes[k], name) for k, name in conducting.items()]
+            return new, [Change(t, element, before, to), *others], None, 0.0
+        except NetworkError as error:
+            return *self._instead(t, after, moment, (number, to), error, tried), error, 0.0
+
+    def _instead(
+        self, t: float, after: float, moment: HybridState, wanted: tuple[int, str], error: NetworkError, tried: int
+    ) -> Transition:
+        """Past a mode whose equations contradict others: into one to which it leads, or something else gives way.
+
+        A friction that a prescribed speed turns cannot stick: it passes from slipping one way to slipping the other.
+        """
+        modes, (number, to) = moment.regime.modes, wanted
+        element, before = self.elements[number], modes[number]
+        gears = self._impacts.gears
+        if number in gears and (other := self._passing_on(after, moment, number, to)) is not None:
+            return other[0], [Change(t, element, before, other[1])]
+        leads = (leave for leave in element.modes[to].leaves if leave.to not in ("", before))
+        # neither the other flank nor a time to come is there
+        leads_on = [{number: leave.to} for leave in leads if leave.rebound is None and not leave.by_twist]
+        sides = limited(self.elements, modes).items()
+        yields = [{number: to, k: name} for k, gives_way in sides for _, name in gives_way if k != number]
+        # a gear jams only where nothing beside it gives way
+        options = [*yields, *leads_on] if number in gears else [*leads_on, *yields]
+        for k in gears:
+            options += [{number: to, k: leave.to} for leave in self.elements[k].modes[modes[k]].leaves if k != number]
+        combinations = filter(self.possible, (with_modes(modes, option) for option in options))
+        for combination in islice(combinations, tried, None):
+            try:
+                new = self._impacts.jammed(after, moment, self._regimes.changed(moment, after, combination))
+            except NetworkError:  # what slips behind the gear lets another one jam
+                continue
+            pairs = zip(self.elements, modes, new.regime.modes, strict=True)
+            return new, [Change(t, *names) for names in pairs if names[1] != names[2]]
+        raise SimulationError(
+            f"'{element.name}' can neither stay {element.modes[before].words} nor become {element.modes[to].words} "
+            f"at t = {t:.9g} s. {error.problems[0]}"
+        ) from error
+
+    def _passing_on(self, t: float, moment: HybridState, number: int, to: str) -> tuple[HybridState, str] | None:
+        """Another mode of a gear at rest, and what follows, that contradicts nothing and leaves all else as it is."""
+        modes, options = moment.regime.modes, self.elements[number].modes
+        if moment.across(number, t) != 0:
+            return None
+        stored = self.stored(moment, t)
+        leads = [leave.to for name in (to, modes[number]) for leave in options[name].leaves]
+        for name in dict.fromkeys(leads):
+            combination = with_modes(modes, {number: name})
+            if name in (to, modes[number]) or not self.possible(combination):
+                continue
+            new = self._regimes.changed(moment, t, combination)
+            if self.stored(new, t) == stored and not exceeded(new, t, new)[1]:
+                return new, name
+        return None
+
+
+def _worst(
+    moment: HybridState, t: float, ended: HybridState, idle: Sequence[ActiveGuard], repeats: int
+) -> tuple[HybridState, ActiveGuard | None]:
+    """The guard that is farthest beyond its limit, or on it and about to go beyond; the moment with its bands.
+
+    Args:
+        moment, t, ended, idle: as in `exceeded`.
+        repeats: how often modes have come back. After the first time the first guard is taken. The worst leads faster
+            to modes that are consistent, as a rule; but this always does where parts hold each other (Murty, Linear
+            Complementarity, 1988, section 4.1).
+    """
+    in_order = repeats > 0
+    moment, excesses = exceeded(moment, t, ended, idle, in_order=in_order, again=in_order)
+    if not excesses:
+        return moment, None
+    first = min(excesses, key=lambda one: one[1].element) if in_order else max(excesses, key=lambda one: one[0])
+    return moment, first[1]
+
+
+def _endless(t: float, changes: list[Change], blocked: NetworkError | None) -> SimulationError:
+    """The error of changes within one instant that come to no end, or of what contradicts what among them."""
+    last = changes[-1]
+    others = dict.fromkeys(change.element.name for change in changes)
+    before, after = (last.element.modes[name].words for name in (last.before, last.after))
+    if blocked is not None:
+        advice = str(blocked.problems[0])
+    elif last.rebound:
+        after, advice = "rebound", "Take a restitution below 1, a larger omega_rest, or a gap between its limits."
+    else:
+        advice = "Give the node between them an inertia or damping."
+    return SimulationError(
+        f"At t = {t:.9g} s no modes of {', '.join(others)} are consistent: '{last.element.name}' changes for ever "
+        f"between {before} and {after}. {advice}"
+    )

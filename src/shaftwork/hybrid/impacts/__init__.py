@@ -1,0 +1,1 @@
+"""Impacts: speeds that change at once."""

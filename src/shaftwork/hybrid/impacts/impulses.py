@@ -1,0 +1,308 @@
+"""An impulse on its way through parts that pass torques on by their direction: gears that rub.
+
+While an impulse grows, all speeds change in proportion to it as long as each gear turns the way it did and the same
+side drives it. A gear that comes to rest is held by the rest of the impulse, or turned on or back. So an impact is a
+motion of its own, with the impulse in the place of time (Routh, Dynamics of a System of Rigid Bodies, part I, 1905,
+article 198); it is what a contact does that is stiff enough.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import chain
+from typing import NamedTuple
+
+import numpy as np
+
+from shaftwork.codegen.array_form.elements import Array
+from shaftwork.codegen.array_form.recovery import BranchHistory
+from shaftwork.components.branches import ACROSS, through_of
+from shaftwork.components.modes import Leave, Mode
+from shaftwork.core.errors import NetworkError, SimulationError
+from shaftwork.hybrid.hybrid_state import EPS, ROUNDINGS, HybridState, Regime
+from shaftwork.hybrid.modes.mode_equations import ModeEquations
+from shaftwork.hybrid.modes.mode_machines import ModeNames, with_modes
+from shaftwork.hybrid.regimes import Regimes
+
+MOST_STAGES = 100
+"""So many times gears may come to rest in one impact."""
+NOTHING_OF = ROUNDINGS * EPS
+"""What rounding leaves of speeds and impulses, as part of the largest."""
+
+
+class Blow(NamedTuple):
+    """What an impulse leads to.
+
+    Args:
+        after: what follows.
+        passing: the modes in which it passes.
+        pressed: (contacts,) the impulses of contacts that are open in these modes.
+        through: (branches,) what of them passes through tree branches.
+    """
+
+    after: HybridState
+    passing: Regime
+    pressed: Array = np.zeros(0)
+    through: Array | float = 0.0
+
+
+class ImpactStart(NamedTuple):
+    """Where a part of an impact begins: all that is stored, and the speeds of gears; its inputs are those of a time."""
+
+    moment: HybridState
+    t: float
+    stored: Mapping[str, float]
+    speeds: Mapping[int, float]
+
+
+class ImpactStage(NamedTuple):
+    """A part of an impact in which speeds change in proportion: from where, to what, and how much of that."""
+
+    start: ImpactStart
+    blow: Blow
+    share: float
+
+
+class Impulses:
+    """Follows impulses through gears.
+
+    Args:
+        regimes: combinations of modes.
+    """
+
+    def __init__(self, regimes: Regimes) -> None:
+        self._regimes, self._elements = regimes, regimes.elements
+        self.gears = tuple(k for k, element in enumerate(self._elements) if element.modes.passes_on)
+        """Elements that pass torques on by their direction."""
+
+    def begins(self, moment: HybridState, t: float) -> ImpactStart:
+        """Where an impact begins, with the inputs of a time in s."""
+        speeds = dict(zip(self.gears, moment.speeds(self.gears, t), strict=True))
+        return ImpactStart(moment, t, self._regimes.stored(moment, t), speeds)
+
+    def stages(
+        self, t: float, start: ImpactStart, blow: Callable[[ImpactStart, Sequence[ImpactStage]], Blow]
+    ) -> tuple[ImpactStage, ...]:
+        """All parts of an impulse, of which the last leads to its end.
+
+        Args:
+            t: time after it in s at which inputs are read.
+            start: before it.
+            blow: the rest of it from a start on, all in the modes that gears have there, and after what stages.
+
+        Raises:
+            SimulationError: gears come to rest again and again.
+        """
+        stages: list[ImpactStage] = []
+        while len(stages) < MOST_STAGES:
+            start, rest = self._consistent(t, start, lambda begun: blow(begun, stages))
+            share, number = min(self._coming_to_rest(t, start, rest.after), default=(1.0, -1))
+            stages.append(ImpactStage(start, rest, share))
+            if number < 0:
+                return tuple(stages)
+            modes = self._at_rest(rest.after.regime.modes, number)
+            start = self._reached(t, stages[-1], modes, number)
+        raise SimulationError(
+            f"'{self._elements[number].name}' comes to rest again and again in one impact at t = {t:.9g} s. Give the "
+            "contact that is hit a stiffness c and a damping d."
+        )
+
+    def _reached(self, t: float, stage: ImpactStage, modes: ModeNames, number: int) -> ImpactStart:
+        """The end of a stage, at which a gear is at rest, in the modes that go on."""
+        start, blow, share = stage
+        stored = {
+            name: value + share * gain
+            for (name, value), gain in zip(start.stored.items(), self._gained(t, start, blow).values(), strict=True)
+        }
+        speeds = {k: v + share * (blow.after.across(k, t) - v) for k, v in start.speeds.items()}
+        return ImpactStart(self._regimes.taking(modes, t, stored), t, stored, {**speeds, number: 0.0})
+
+    def _in_modes(self, t: float, start: ImpactStart, modes: ModeNames) -> ImpactStart:
+        """The same start in other modes of gears; one that jams has stopped in it."""
+        new = ImpactStart(self._regimes.taking(modes, t, start.stored), t, start.stored, start.speeds)
+        halted = {*self._stopped(new.moment)} - {*self._stopped(start.moment)}
+        return self.begins(new.moment, t) if any(start.speeds[k] for k in halted) else new
+
+    def _consistent(
+        self, t: float, start: ImpactStart, blow: Callable[[ImpactStart], Blow]
+    ) -> tuple[ImpactStart, Blow]:
+        """The modes of gears in which an impulse passes as they say; a gear that turns, and has none, jams at once."""
+        rest, jammed, seen = self._passed(start, blow), set[int](), {start.moment.regime.modes}
+        while True:
+            if rest is None or rest.after is start.moment:
+                start, rest = self._released(t, start, blow) or (start, rest or blow(start))
+            turn = self._turned(t, start, rest)
+            if turn is None:
+                return start, rest
+            number, to = turn
+            modes = self._led(start.moment.regime.modes, number, to)
+            if modes in seen:
+                if number in jammed:
+                    return start, rest
+                jammed.add(number)
+                seen.clear()
+                modes = self._at_rest(modes, number)
+            start = self._in_modes(t, start, modes)
+            rest = self._passed(start, blow)
+            seen.add(modes)
+
+    def _passed(self, start: ImpactStart, blow: Callable[[ImpactStart], Blow]) -> Blow | None:
+        """What an impulse leads to; None where the equations of a gear at rest contradict what it meets."""
+        try:
+            return blow(start)
+        except NetworkError:
+            if not self._stopped(start.moment):
+                raise
+            return None
+
+    def _released(
+        self, t: float, start: ImpactStart, blow: Callable[[ImpactStart], Blow]
+    ) -> tuple[ImpactStart, Blow] | None:
+        """Where gears at rest and what they meet hold each other, no impulse tells its way: which gear it turns.
+
+        It is one of which the modes say so as well.
+        """
+        for k in self._stopped(start.moment):
+            turning = (mode.name for mode in self._elements[k].modes.options if _turns(mode))
+            options = (with_modes(start.moment.regime.modes, {k: name}) for name in turning)
+            for modes in filter(self._regimes.possible, options):
+                here = self._in_modes(t, start, modes)
+                rest = self._passed(here, blow)
+                if rest is None or rest.after is here.moment:
+                    continue
+                turned = self._turned(t, here, rest)
+                if turned is None or turned[0] != k:
+                    return here, rest
+        return None
+
+    def _stopped(self, moment: HybridState) -> list[int]:
+        """Gears in a mode of rest."""
+        return [k for k in self.gears if not _turns(moment.regime.mode(k))]
+
+    def _turned(self, t: float, start: ImpactStart, rest: Blow) -> tuple[int, str] | None:
+        """The gear that an impulse brings out of its mode at once, and the mode that follows."""
+        if not self.gears:
+            return None
+        assembly, p = rest.passing.assembly, rest.passing.p
+        impulses = self._impulses(t, start, rest)
+        # a gear elsewhere has the rounding of what moves there, however small the impact is
+        momentum = assembly.stores.momentum(assembly.bound(p), start.stored)
+        least = NOTHING_OF * max(np.abs(impulses).max(initial=0.0), momentum)
+        exceeded = [
+            (_guard(assembly, k, leave, impulses, p), k, leave.to)
+            for k in self.gears
+            for leave in start.moment.regime.mode(k).leaves
+            if leave.by_torque
+        ]
+        exceeded = [turn for turn in exceeded if turn[0] > least]
+        turning = (turn for turn in self._stopping(t, start, rest.after) if turn[0] >= 0)
+        exceeded = exceeded or [(ends, k, to) for _, ends, k, to in turning]
+        return max(exceeded)[1:] if exceeded else None
+
+    def _coming_to_rest(self, t: float, start: ImpactStart, after: HybridState) -> Iterator[tuple[float, int]]:
+        """The share of an impulse after which a gear is at rest, and which one."""
+        return ((began / (began - ends), k) for began, ends, k, _ in self._stopping(t, start, after) if began < 0)
+
+    def _stopping(self, t: float, start: ImpactStart, after: HybridState) -> Iterator[tuple[float, float, int, str]]:
+        """Gears that would turn round: their speeds before and after, negative the way they turn, and what follows."""
+        states = (one.x[: len(one.regime.assembly.model.states)] for one in (start.moment, after))
+        least = NOTHING_OF * max(np.abs(x).max(initial=0.0) for x in states)
+        for k, speed in start.speeds.items():
+            speeds = speed, after.across(k, t)
+            for leave in start.moment.regime.mode(k).leaves:
+                slope = float(leave.when.diff(ACROSS))
+                began, ends = (0.0 if abs(speed) <= least else slope * speed for speed in speeds)
+                if slope and ends > 0:
+                    yield began, ends, k, leave.to
+
+    def _at_rest(self, modes: ModeNames, number: int) -> ModeNames:
+        """Modes with a gear at rest, or as it then goes on where it cannot be held."""
+        leaves = self._elements[number].modes[modes[number]].leaves
+        return self._led(modes, number, next((leave.to for leave in leaves if leave.when.has(ACROSS)), modes[number]))
+
+    def _led(self, modes: ModeNames, number: int, to: str) -> ModeNames:
+        """Modes with another one of a gear; where its equations contradict others, one to which it leads."""
+        names = (to, *(leave.to for leave in self._elements[number].modes[to].leaves if leave.to != modes[number]))
+        return next(filter(self._regimes.possible, (with_modes(modes, {number: name}) for name in names)), modes)
+
+    def _gained(self, t: float, start: ImpactStart, blow: Blow) -> dict[str, float]:
+        """What all that is stored gains by the whole of an impulse."""
+        then = self._regimes.stored(blow.after, t)
+        return {name: then[name] - value for name, value in start.stored.items()}
+
+    def given(self, t: float, stages: Sequence[ImpactStage], before: float | None = None) -> dict[str, float]:
+        """What ideal sources give in an impulse, in J by part, their impulse times the mean of their speeds.
+
+        Args:
+            t: time after it in s at which they are read.
+            stages: of the impulse.
+            before: time before it, where it is they that jump; they do so in proportion to the impulse.
+        """
+        energies, jumped = list[Mapping[str, float]](), 0.0
+        for stage in stages:
+            assembly, p = stage.blow.passing.assembly, stage.blow.passing.p
+            bound, stores, gained = assembly.bound(p), assembly.stores, self._gained(t, stage.start, stage.blow)
+            then = jumped + stage.share * (1.0 - jumped)
+            late = 1.0 if before is None else (jumped + then) / 2
+            for time, weight in ((t, late), (before, 1.0 - late)):
+                if time is None:
+                    continue
+                whole = stores.given(bound, bound.sources(time), gained, stage.blow.through)
+                energies.append({part: stage.share * weight * energy for part, energy in whole.items()})
+            jumped = then
+        return summed(energies)
+
+    def lost(self, t: float, stages: Sequence[ImpactStage]) -> dict[str, float]:
+        """What gears lose in an impulse, in J by part: what passes through the mesh at the mean of the speeds there."""
+        energies: list[Mapping[str, float]] = []
+        for stage in stages if self.gears else ():
+            impulses = self._impulses(t, stage.start, stage.blow)
+            for k, began in stage.start.speeds.items():
+                name, passing = self._elements[k].part.name, stage.blow.passing.assembly
+                ends = stage.blow.after.across(k, t)
+                moment, time, speed = (stage.blow.after, t, ends) if ends else (*stage.start[:2], began)
+                # the speeds of a mesh are in proportion to that of its gear
+                mean = (began + stage.share / 2 * (ends - began)) / speed if speed else 0.0
+                pairs = zip(_meshes(passing, name), _across_meshes(moment, time, name), strict=True)
+                energies += [{name: float(sum(stage.share * impulses[mesh] * mean * across for mesh, across in pairs))}]
+        return summed(energies)
+
+    def _impulses(self, t: float, start: ImpactStart, blow: Blow) -> Array:
+        """(branches,) what passes through every branch at once."""
+        assembly, p = blow.passing.assembly, blow.passing.p
+        return assembly.stores.impulses(assembly.bound(p), self._gained(t, start, blow)) + blow.through
+
+
+def summed(energies: Iterable[Mapping[str, float]]) -> dict[str, float]:
+    """Energies by part of several together."""
+    total: dict[str, float] = {}
+    for part, energy in chain.from_iterable(each.items() for each in energies):
+        total[part] = total.get(part, 0.0) + energy
+    return total
+
+
+def _turns(mode: Mode) -> bool:
+    """Whether a gear turns in a mode: then its speed ends it."""
+    return any(leave.when.has(ACROSS) for leave in mode.leaves)
+
+
+def _guard(assembly: ModeEquations, number: int, leave: Leave, impulses: Array, p: Array) -> float:
+    """A guard by torques where impulses (branches,) act, beside which nothing else counts."""
+    graph, total = assembly.model.form.graph, 0.0
+    for branch in assembly.parts[assembly.elements[number].part.name].branches:
+        share = leave.when.diff(through_of(graph.branches[branch].template.label))
+        total += assembly.constant(number, share, p) * float(impulses[branch]) if share else 0.0
+    return total
+
+
+def _meshes(assembly: ModeEquations, name: str) -> list[int]:
+    """The branches of a part in which power is lost on its way."""
+    branches = assembly.model.form.graph.branches
+    return [branch for branch in assembly.parts[name].branches if branches[branch].template.through]
+
+
+def _across_meshes(moment: HybridState, t: float, name: str) -> list[float]:
+    """The speeds on which the lambdas of a gear's meshes act."""
+    assembly = moment.regime.assembly
+    history = BranchHistory(assembly.bound(moment.regime.p), np.array([t]), moment.x[None, :])
+    return [float(history.acted_on(assembly.parts[name], branch)[0]) for branch in _meshes(assembly, name)]

@@ -1,0 +1,1 @@
+"""What changes its mode, what ends a mode, and the equations that hold in each."""

@@ -1,0 +1,198 @@
+"""Parts that hold their ends together by a torque of their own, in the equations of the network in which they slip.
+
+A stuck friction, a locked brake and an engaged clutch pass what keeps the speed across them at zero, their reaction:
+
+    0 = G x,    x' = A x + B u + B_H lambda,    (G B_H) lambda = -G (A x + B u),
+
+with G the speeds across what is held, from the speeds of inertias, and lambda in the place of its law. So one set of
+equations serves for whatever holds and whatever slips; an impact by which they come to one speed takes the place of
+lambda in the same system. Source: Brogliato, Nonsmooth Mechanics, 2016.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from shaftwork.codegen.array_form.arrays import ArrayProgram, BoundArrays
+from shaftwork.codegen.array_form.elements import ROUNDING, Array
+from shaftwork.codegen.array_form.matrices import LinearPart
+from shaftwork.codegen.array_form.products import Factor
+from shaftwork.codegen.state_transfer import StateTransfer
+from shaftwork.formulation.form import StateForm
+from shaftwork.hybrid.modes.held_rows import HeldRows
+
+
+class Joints:
+    """Law branches whose torque holds the speed across them at zero.
+
+    Args:
+        form: of the equations.
+        part: their matrices.
+        branches: of the laws, all of them links; their speeds follow from those of the states.
+    """
+
+    def __init__(self, form: StateForm, part: LinearPart, branches: Sequence[int]) -> None:
+        across, size = len(form.across_states), len(form.states)
+        self.places = np.array([form.laws.index(branch) for branch in branches], dtype=np.intp)
+        self._branches = tuple(branches)
+        loops = sparse.csr_array(part.loops)[list(form.across_states)][:, list(branches)]
+        none = sparse.csr_array((len(branches), size - across))
+        G = sparse.csr_array(sparse.hstack([loops.T, none]))
+        B = sparse.csc_array(part.B)[:, self.places]
+        followers = _followers(G)
+        self.independent = followers is not None and not B[across:].nnz
+        """Whether each of them holds inertias that the others do not."""
+        if followers is None or not self.independent:
+            return
+        reactions, alike = _reactions(G, B), _alike(followers, size)
+        self._B, self._reactions, self._alike = Factor(B), Factor(reactions), Factor(alike)
+        self._joined = joined = sparse.csr_array(alike @ (sparse.eye_array(size, format="csr") + B @ reactions))
+        others = sparse.diags_array(np.where(np.isin(np.arange(part.B.shape[1]), self.places), 0.0, 1.0))
+        self.moving = replace(
+            part, A=joined @ part.A, B=joined @ part.B @ others, B1=joined @ part.B1, C=part.C @ alike
+        )
+        """The equations with what holds moving as one, to which its own laws add nothing."""
+
+    def reactions(self, rates: Array) -> Array:
+        """(h,) or (h, k): what cancels rates (n,) or (n, k) in the speeds across."""
+        return self._reactions @ rates
+
+    def alike(self, x: Array) -> Array:
+        """States or rates in which what is held follows the others to the last bit."""
+        return self._alike @ x
+
+    def read(self, by_state: Any, by_input: Any, part: LinearPart) -> tuple[Factor, Factor]:
+        """What reads states and inputs (q, n) and (q, m), of scipy.sparse, with the reactions among the inputs.
+
+        It reads the inputs without the laws of what holds.
+        """
+        react = by_input[:, self.places] @ self._reactions.sparse
+        return Factor(by_state @ self._alike.sparse + react @ part.A @ self._alike.sparse), Factor(
+            by_input + react @ part.B
+        )
+
+    def entries(self, rows: HeldRows) -> Array:
+        """(k,) the numbers of the symbols in rows: those of P and of R."""
+        number = {branch: k for k, branch in enumerate(self._branches)}
+        entries = np.zeros(len(rows.symbols))
+        entries[: len(rows.joins)] = _at(self._joined, [*rows.joins])
+        reactions = [
+            (k, (number[branch], place)) for k, (branch, place) in enumerate(rows.reactions) if branch in number
+        ]
+        entries[[len(rows.joins) + k for k, _ in reactions]] = _at(
+            self._reactions.sparse, [place for _, place in reactions]
+        )
+        return entries
+
+    def met(self, x: Array) -> Array:
+        """(n,) the states after an inelastic impact that joins what is held: every momentum is kept."""
+        return self.alike(x + self._B @ self.reactions(x))
+
+
+def _at(matrix: Any, places: Sequence[tuple[int, int]]) -> Array:
+    """(k,) entries of one of scipy.sparse."""
+    rows, columns = np.array(places, dtype=np.intp).reshape(-1, 2).T
+    return np.asarray(matrix[rows, columns], dtype=float).ravel() if rows.size else np.empty(0)
+
+
+def _reactions(G: Any, B: Any) -> Any:
+    """(h, n) sparse: R with G (1 + B R) = 0."""
+    met = np.unique(G.indices)
+    if not met.size:
+        return sparse.csr_array(G.shape)
+    solved = sparse.coo_array(-splu(sparse.csc_array(G @ B)).solve(G[:, met].toarray()))
+    return sparse.csr_array((solved.data, (solved.row, met[solved.col])), shape=G.shape)
+
+
+def _alike(followers: Mapping[int, Mapping[int, float]], size: int) -> Any:
+    """(n, n) sparse: each follower from the states that it follows, the others as they are."""
+    entries = [(1.0, place, place) for place in range(size) if place not in followers]
+    entries += [(gain, place, column) for place, row in followers.items() for column, gain in row.items()]
+    gains, rows, columns = zip(*entries, strict=True) if entries else ((), (), ())
+    return sparse.csr_array((np.array(gains), (rows, columns)), shape=(size, size))
+
+
+def _followers(G: Any) -> Mapping[int, Mapping[int, float]] | None:
+    """For each row of G x = 0 a state that follows from others, and its gains; None where rows depend on each other."""
+    rows: dict[int, dict[int, float]] = {}
+    followed: dict[int, dict[int, None]] = {}  # by state, those that follow it
+    starts, columns, gains_of = G.indptr.tolist(), G.indices.tolist(), G.data.tolist()
+    for first, last in pairwise(starts):
+        row: dict[int, float] = {}
+        for column, gain in zip(columns[first:last], gains_of[first:last], strict=True):
+            for place, share in rows[column].items() if column in rows else ((column, 1.0),):
+                row[place] = row.get(place, 0.0) + gain * share
+        size = max(map(abs, gains_of[first:last]), default=0.0)
+        row = {column: gain for column, gain in row.items() if abs(gain) > ROUNDING * size}
+        if not row:
+            return None
+        pivot = max(row, key=lambda column: abs(row[column]))
+        gains = {column: -gain / row[pivot] for column, gain in row.items() if column != pivot}
+        followers = [*followed.pop(pivot, ())]
+        for place in followers:
+            share = rows[place].pop(pivot)
+            for column, gain in gains.items():
+                rows[place][column] = rows[place].get(column, 0.0) + share * gain
+        rows[pivot] = gains
+        for column in gains:
+            followed.setdefault(column, {}).update(dict.fromkeys((*followers, pivot)))
+    return rows
+
+
+class HeldArrays(BoundArrays):
+    """The equations of a network in which law branches hold their ends together.
+
+    Args:
+        program: the equations in which all of them slip, without algebraic loops.
+        p: parameters.
+        part: matrices.
+        joints: what holds.
+    """
+
+    def __init__(self, program: ArrayProgram, p: Array, part: LinearPart, joints: Joints) -> None:
+        super().__init__(program, p, part)
+        self.joints, self._moving = joints, BoundArrays(program, p, joints.moving, full=True)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return HeldArrays, (self.program, self.p, self.part, self.joints)
+
+    def values(self, t: Any, x: Array) -> tuple[Array, Array]:
+        """Outputs y and inputs u, with reactions in the place of the laws of what holds."""
+        y, u = super().values(t, x)
+        u[self.joints.places] = 0.0
+        u[self.joints.places] = self.joints.reactions(super().rates(t, x, y, u))
+        return y, u
+
+    def rates(self, t: Any, x: Array, y: Array, u: Array) -> Array:
+        """x', in which what is held moves as one."""
+        return self.joints.alike(super().rates(t, x, y, u))
+
+    def others(self, t: Any, x: Array) -> Array:
+        """Inputs u without those of what holds."""
+        u = self._moving.values(t, x)[1]
+        u[self.joints.places] = 0.0
+        return u
+
+    def rhs(self, t: Any, x: Array) -> Array:
+        """x' at time t."""
+        return self._moving.rhs(t, x)
+
+    def jacobian(self, t: float, x: Array) -> Any:
+        """d rhs / d x as scipy.sparse.csc_array (n, n)."""
+        return self._moving.jacobian(t, x)
+
+
+class HeldStores(StateTransfer):
+    """What is stored where inertias are held together, and each is a state all the same."""
+
+    def states(self, bound: BoundArrays, t: float, stored: Mapping[str, float]) -> Array:
+        """(n,) the states that the equations start with: those of what is held come to one speed."""
+        assert isinstance(bound, HeldArrays)  # noqa: S101 (equations of this kind are made with it)
+        return bound.joints.met(super().states(bound, t, stored))

@@ -1,0 +1,262 @@
+"""The model of a network whose parts change their mode."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import cached_property, partial
+from types import MappingProxyType
+from typing import Any, NoReturn
+
+import numpy as np
+
+from shaftwork.codegen.array_form.arrays import BoundArrays
+from shaftwork.codegen.array_form.elements import Array
+from shaftwork.codegen.compiled_model import CompiledModel
+from shaftwork.codegen.starts.operating import another_start, energy_weights, lasting, steady_state
+from shaftwork.codegen.starts.start_values import initial_state
+from shaftwork.core.errors import CompileError, NetworkWarning, SimulationError
+from shaftwork.core.notices import warn
+from shaftwork.core.parameters import in_si
+from shaftwork.equations.records import NamedPhase
+from shaftwork.formulation.form import StateForm
+from shaftwork.frequency.analysis import (
+    Given,
+    Names,
+    Point,
+    Time,
+    about,
+    input_names,
+    moment_of,
+    operating_point,
+    titled,
+)
+from shaftwork.frequency.linear_model import LinearModel, linear_model
+from shaftwork.frequency.linearization import Linearization, refuse_waves
+from shaftwork.hybrid.event_iteration import EventIteration
+from shaftwork.hybrid.hybrid_run import HybridRun
+from shaftwork.hybrid.hybrid_solution import solution
+from shaftwork.hybrid.hybrid_state import HybridState
+from shaftwork.hybrid.modes.exceeded_guards import passes_limit
+from shaftwork.hybrid.named_phases import known_modes, modes_in, whole_name, words_of
+from shaftwork.hybrid.phases import Phases
+from shaftwork.network.wording import listed
+from shaftwork.pipeline.arguments import Demand
+from shaftwork.pipeline.model import Model
+from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels
+from shaftwork.pipeline.sizes import in_its_size
+from shaftwork.results.solution import Solution
+
+MOST_CHANGES = 100
+"""Changes of mode on the way to a steady operation."""
+LEFT = 1e-3
+"""What is left of a disturbance in a torque is more than this fraction where it stays: rounding leaves some 1e-4."""
+
+
+class PhaseModel(CompiledModel):
+    """The equations of a network in one phase, as a function of time, states and parameters.
+
+    They hold while every part stays in its mode, which whoever integrates them has to watch.
+
+    Args:
+        form: the state form in this phase.
+        name: the mode of every part, "gap open, load stuck".
+        numbers: of the modes, "part.mode", which stand among the parameters where laws of equal form differ.
+    """
+
+    def __init__(self, form: StateForm, name: str, numbers: Mapping[str, float]) -> None:
+        super().__init__(form)
+        self.name = name
+        of_laws = {key: value for key, value in numbers.items() if key in self.parameters}
+        self.parameters = MappingProxyType({**self.parameters, **of_laws})
+        self.defaults = np.array(list(self.parameters.values()), dtype=float)
+
+    def __repr__(self) -> str:
+        return f"<PhaseModel of '{self.form.graph.name}', {self.name}: {', '.join(self.states) or 'no states'}>"
+
+
+def _of_a_phase(what: str) -> Any:
+    """What one phase has and a whole network has not."""
+
+    def refuse(self: PhasedModel, *_args: Any, **_options: Any) -> NoReturn:
+        """There is one for each phase.
+
+        Raises:
+            CompileError: always; says how to choose the phase.
+        """
+        graph = self.form.graph
+        raise CompileError(
+            f"model.{what} of '{self.name}': parts change their mode, and each phase has equations of its own. Name "
+            f"one, model.phase('{whole_name(graph)}').{what}, or a row of sol.phases. {known_modes(graph)}"
+        )
+
+    return refuse
+
+
+class PhasedModel(Model):
+    """A network with parts that change their mode, ready to be simulated again and again.
+
+    Each phase has equations of its own, see `phase`.
+    """
+
+    @cached_property
+    def states(self) -> tuple[str, ...]:
+        """All that is stored in any phase, as in a solution; which of it are states depends on the phase."""
+        return self.phases.assembly(self.phases.first).stores.names
+
+    @cached_property
+    def _phase_models(self) -> dict[str, PhaseModel]:
+        return {}
+
+    def phase(self, name: str | NamedPhase) -> PhaseModel:
+        """The equations of one phase; see `Model.phase`."""
+        graph, words = self.form.graph, words_of(name)
+        whole, modes = whole_name(graph, words), tuple(mode.name for mode in modes_in(graph, words))
+        if whole not in self._phase_models:
+            form, numbers = self.phases.assembly(modes).model.form, self.phases.numbers(modes)
+            self._phase_models[whole] = PhaseModel(form, whole, numbers)
+        return self._phase_models[whole]
+
+    rhs, jacobian, cost, source, compiled = map(_of_a_phase, ("rhs", "jacobian", "cost()", "source()", "compiled()"))
+    code = property(_of_a_phase("code"))
+
+    @cached_property
+    def phases(self) -> Phases:
+        """The equations of every combination of modes that a motion has come to."""
+        return Phases(self, self._rebuild)
+
+    def _motion(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
+        first = self.phases.assembly(self.phases.first)
+        prepared = first.prepared(first.vector(values, {}))
+        return in_its_size(first.model.form, prepared, demand, lambda sized: self._run_through(values, initial, sized))
+
+    def _run_through(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
+        run = HybridRun(self.phases, values, demand)
+        run.march(initial)
+        return solution(run, self.name)
+
+    def start_phase(self) -> str:
+        """The phase in which a motion from rest begins, "gap open, brake locked".
+
+        Raises:
+            SimulationError: no modes go together there.
+        """
+        demand = Demand((0.0, 1.0), 1e-8, None, None, "auto", 1, None)
+        return self.words(HybridRun(self.phases, {}, demand).begin(None))
+
+    def _choice(self, demand: Demand) -> tuple[str, str]:
+        return HybridRun(self.phases, {}, demand).choose()
+
+    def _steady(self, values: Mapping[str, float], t: float, initial: Given) -> SteadyState:
+        """Steady states of one set of equations after another, until no mode changes there."""
+        if self.form.waves:
+            return self.twin.steady_state(t, initial=initial, parameters=values)
+        first = self.phases.assembly(self.phases.first)
+        when = t if math.isfinite(t) else first.model.settled(first.vector(values, {}))
+        settling = EventIteration(self.phases, values, (0.0, 1.0))
+        p = settling.regime(self.phases.first).p
+        moment = settling.started(when, initial_state(first.bound(p), initial or {}, when))
+        moment, _ = settling.settle(when, when, moment, None)
+        for _ in range(MOST_CHANGES):
+            bound = moment.regime.assembly.bound(moment.regime.p)
+            if not math.isfinite(t):
+                refuse_moving(bound, when, moment.regime.assembly.model.switching)
+            ends = partial(_ends, moment, when)
+            x = steady_state(bound, moment.x, when, ends=ends) if moment.x.size else moment.x
+            beyond = ends(x)
+            moment, changes = settling.settle(when, when, moment._replace(x=x), None)
+            if not (changes or beyond):
+                if not math.isfinite(t):
+                    assembly = moment.regime.assembly
+                    warn_of_earlier_levels(assembly.bound(moment.regime.p), moment.x, when, assembly.model.switching)
+                warn_of_held_torques(moment, when)
+                return SteadyState(settling.stored(moment, when), when)
+        raise SimulationError(
+            f"No steady operation was found: after {MOST_CHANGES} changes of its modes '{self.name}' still goes on, "
+            f"with {self.words(moment)}. {another_start(self.form)}"
+        )
+
+    def point(self, values: Mapping[str, float], at: Point, t: Time) -> tuple[float, HybridState]:
+        """Time in s at a point, and the modes that go on there with their states.
+
+        Args:
+            values: parameters that differ from the network's.
+            at: the point, as for `linearize`.
+            t: time at which laws are read, s; by default as for `linearize`.
+
+        Raises:
+            ParameterError: the point is none.
+            SignalError: there is no such quantity.
+            SimulationError: a shaft is a wave.
+        """
+        refuse_waves(self.form)
+        first = self.phases.assembly(self.phases.first)
+        settling = EventIteration(self.phases, values, (0.0, 1.0))
+        p = settling.regime(self.phases.first).p
+        if isinstance(at, Solution):
+            time, stored = moment_of(at, self.states)
+            time = time if t is None else in_si("t", t, "s")
+            x = first.stores.states(first.bound(p), time, dict(zip(self.states, stored.tolist(), strict=True)))
+        else:
+            usual = 0.0 if at is None else first.model.settled(p)  # what rests has not begun to move
+            time, x = operating_point(first.model, p, at, t, usual)
+        return time, settling.settle(time, time, settling.started(time, x), None)[0]
+
+    def near(self, at: Point, t: Time, inputs: Names, outputs: Names = None, values: Given = None) -> LinearModel:
+        """The network near a point, in the phase that goes on there."""
+        time, moment = self.point(values or {}, at, t)
+        model = moment.regime.assembly.model
+        slopes = Linearization(model, moment.regime.p, moment.x, time, input_names(model, inputs))
+        named = None if outputs is None else (outputs,) if isinstance(outputs, str) else tuple(outputs)
+        phase = self.words(moment)
+        title = titled(self.name, about(model, at, time), phase)
+        return linear_model(title, slopes, named, moment.x, time, phase)
+
+    def words(self, moment: HybridState) -> str:
+        """The phase of a moment, "gap open, brake locked"."""
+        pairs = zip(self.phases.elements, moment.regime.modes, strict=True)
+        return ", ".join(f"{element.name} {element.modes[name].words}" for element, name in pairs)
+
+    def start_equations(self, values: Mapping[str, float]) -> BoundArrays:
+        """The equations of the first phase, of which start values tell the states."""
+        if self.form.waves:
+            return self.twin.start_equations(values)
+        first = self.phases.assembly(self.phases.first)
+        return first.bound(first.vector(values, {}))
+
+
+def _ends(moment: HybridState, t: float, x: Array) -> bool:
+    return passes_limit(moment._replace(x=x), t)
+
+
+def warn_of_held_torques(moment: HybridState, when: float) -> None:
+    """Warn where what sticks can hold other torques as well: a spring between two of them, or from one to the frame.
+
+    The states are disturbed, and of that is read what is left for ever: it tells equilibria side by side.
+
+    Args:
+        moment: the steady state.
+        when: time at which laws are read, s.
+    """
+    regime, x = moment.regime, moment.x
+    holding = [
+        (regime.elements[active.element].name, active.guard)
+        for active in regime.watched
+        if active.leave.by_torque and len(regime.mode(active.element).gives_way) > 1
+    ]
+    if not (holding and x.size):
+        return
+    bound = regime.assembly.bound(regime.p)
+    shares = np.random.default_rng(0).uniform(1.0, 2.0, x.size)  # no state makes up for another
+    disturbed = shares / energy_weights(bound)
+    left = lasting(bound, x, disturbed, when)
+    now, soon, late = (np.array(regime.limits(when, (x + change).tolist())) for change in (0 * x, disturbed, left))
+    moves = np.abs(late - now) > LEFT * np.abs(soon - now).max()
+    if names := tuple(dict.fromkeys(name for name, guard in holding if moves[guard])):
+        network = bound.program.form.graph.name
+        warn(
+            f"steady_state() of '{network}': {listed(names)} can hold within a range, so the torques given are one of "
+            "many that last; which of them stays depends on how the drive came to rest, and simulate(...) gives that "
+            "of its own motion.",
+            NetworkWarning,
+        )

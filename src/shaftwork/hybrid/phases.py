@@ -1,0 +1,194 @@
+"""The sets of equations of a network whose parts change their mode, and the engines that follow them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from shaftwork.codegen.array_form.elements import Array
+from shaftwork.components.modes import ModeChoice
+from shaftwork.core.errors import NetworkError, NetworkWarning, ParameterError
+from shaftwork.core.kept import Kept
+from shaftwork.core.notices import muted
+from shaftwork.formulation.value_diagnosis import self_locks
+from shaftwork.hybrid.modes.mode_equations import ModeEquations
+from shaftwork.hybrid.modes.mode_machines import ModeNames, elements_of, with_modes
+from shaftwork.hybrid.modes.reactions import MANY, ReactionEquations, laws_that_hold
+from shaftwork.hybrid.modes.resting import at_rest
+from shaftwork.integrate import choice
+from shaftwork.integrate.engines import ADAMS, available
+from shaftwork.integrate.problem import Problem
+from shaftwork.network.netlist import Netlist
+from shaftwork.pipeline.model import Model
+from shaftwork.waves.hybrid_waves import WaveModeEquations
+from shaftwork.waves.wave_motion import engine_of_waves
+
+FOLLOWING = {
+    "heyoka": (1.0, 1e-12),  # the cost grows only with the logarithm
+    "scipy": (1 / 30, 1e-7),
+    "scipy-radau": (1 / 30, 1e-7),
+    "sundials": (1 / 300, 1e-8),
+    ADAMS: (1 / 100, 1e-8),
+    "wave": (1.0, 1e-6),  # its panels leave out a tenth of the tolerance
+}
+"""Engines that follow guards. An error grows with every change of mode, by some hundreds through sixty contacts, so
+they run with this part of the tolerance that is asked for, and with no looser one than the second number."""
+STILL = 1e-9
+"""A speed that is no more than this, where all speeds are about 1, is none."""
+_ENGINES = ", ".join(name for name in FOLLOWING if name not in (ADAMS, "wave"))
+
+
+class Phases:
+    """All sets of equations of a network whose parts change their mode; each is made when a motion first needs it.
+
+    Args:
+        base: the model in the first mode of each element, in which no mode joins anything rigidly.
+        rebuild: makes the model of a changed netlist.
+    """
+
+    def __init__(self, base: Model, rebuild: Callable[[Netlist], Model]) -> None:
+        self.netlist, self._rebuild = base.netlist, rebuild
+        self.elements = elements_of(base.form.graph)
+        self.first: ModeNames = tuple(element.first for element in self.elements)
+        self._assemblies: dict[tuple[str, ...], ModeEquations | NetworkError] = {}
+        self._slipping: dict[tuple[str, ...], ReactionEquations | None] = {}
+        self._holding: dict[tuple[tuple[str, ...], tuple[int, ...]], ReactionEquations] = {}
+        self._engines: dict[tuple[ModeEquations, ModeNames, str], tuple[str, str]] = {}
+        self._easy: dict[ModeEquations, dict[tuple[int, str], tuple[str, str]]] = {}
+        self.last_run = Kept[Any, Any](1)
+        """What the last run has learned, by its values and times: the next like it goes on with that."""
+
+    def assembly(self, modes: ModeNames) -> ModeEquations:
+        """The equations for a combination of modes.
+
+        Raises:
+            NetworkError: they contradict each other, as where a stuck brake is turned by a prescribed speed.
+        """
+        forms = tuple(element.modes[name].form for element, name in zip(self.elements, modes, strict=True))
+        if forms not in self._assemblies:
+            try:
+                with muted(NetworkWarning):  # of the network as it is wired compilation has warned
+                    netlist = self._netlist(forms)
+                    model = self._rebuild(netlist)
+                    if (resting := at_rest(netlist, model.form)) is not netlist:
+                        model = self._rebuild(resting)
+                kind = WaveModeEquations if model.form.waves else ModeEquations
+                assembly: ModeEquations | NetworkError = kind(model, self.elements, forms)
+            except NetworkError as error:
+                assembly = error
+            self._assemblies.setdefault(forms, assembly)  # another thread may have been first
+        assembly = self._assemblies[forms]
+        if isinstance(assembly, NetworkError):
+            raise assembly.with_traceback(None)  # else it would keep the frames of every time that it was raised
+        return assembly
+
+    def running(self, modes: ModeNames, values: Mapping[str, float], engine: str) -> ModeEquations:
+        """The equations in which a motion goes on: those of `assembly`, or one set for all that hold.
+
+        Args:
+            modes: of every element.
+            values: parameters that differ from the network's.
+            engine: name of the engine that is asked for.
+
+        Raises:
+            NetworkError: as there.
+        """
+        able = [k for k, element in enumerate(self.elements) if element.holds]
+        if not able:
+            return self.assembly(modes)
+        holding = tuple(k for k in able if self.elements[k].joins(modes[k]))
+        free = with_modes(modes, {k: self.first[k] for k in holding})
+        forms = tuple(element.modes[name].form for element, name in zip(self.elements, free, strict=True))
+        if forms not in self._slipping:
+            self._slipping[forms] = self._all_slipping(free)
+        slipping = self._slipping[forms]
+        if slipping is None or not (slipping.suits(engine) or (len(able) >= MANY and engine != "heyoka")):
+            return self.assembly(modes)
+        if self_locks(slipping.model.form, {**slipping.model.parameters, **values}):
+            return self.assembly(modes)  # whether it jams depends on what is held
+        if (forms, holding) not in self._holding:
+            self._holding[forms, holding] = slipping.holding(holding)
+        assembly = self._holding[forms, holding]
+        p = assembly.vector(values, self.numbers(modes))
+        # where parts share what they hold, the first carries as much as it can
+        independent = assembly.joints(p).independent and not self._rests(assembly, modes, p)
+        return assembly if independent else self.assembly(modes)
+
+    def _rests(self, assembly: ReactionEquations, modes: ModeNames, p: Array) -> bool:
+        """Whether what has another law at rest slips by its mode, and yet cannot turn as others hold its ends."""
+        pairs = enumerate(zip(self.elements, modes, strict=True))
+        slipping = [k for k, (element, name) in pairs if element.modes[name].at_rest is not None]
+        if not slipping:
+            return False
+        x = np.random.default_rng(0).uniform(1.0, 2.0, len(assembly.model.states))  # no two alike by chance
+        speeds = assembly.across(slipping, 0.0, assembly.joints(p).alike(x), p)
+        return any(abs(speed) < STILL for speed in speeds)
+
+    def _all_slipping(self, free: ModeNames) -> ReactionEquations | None:
+        """One set of equations for all that hold, from the modes in which none does; None where there is none."""
+        try:
+            model = self.assembly(free).model
+        except NetworkError:  # as of a gear that jams only while a clutch behind it slips
+            return None
+        laws = laws_that_hold(model, self.elements)
+        return None if laws is None else ReactionEquations(model, self.elements, laws)
+
+    def _netlist(self, forms: tuple[str, ...]) -> Netlist:
+        chosen: dict[str, tuple[ModeChoice, ...]] = {}
+        for element, form in zip(self.elements, forms, strict=True):
+            chosen[element.part.name] = (*chosen.get(element.part.name, ()), ModeChoice(form))
+        return self.netlist.with_choices(chosen)
+
+    def numbers(self, modes: ModeNames) -> dict[str, float]:
+        """The number of each element's mode by the name of its parameter."""
+        pairs = zip(self.elements, modes, strict=True)
+        return {element.number: element.modes[name].value for element, name in pairs}
+
+    def engine(
+        self, assembly: ModeEquations, modes: ModeNames, problem: Callable[[], Problem], engine: str
+    ) -> tuple[str, str]:
+        """The engine for a phase, and why: a light wheel that runs free is no trouble, and stiff in contact.
+
+        Args:
+            assembly: the equations.
+            modes: in which they are solved.
+            problem: makes the motion from there on, which is looked at once for these modes.
+            engine: its name, or "auto".
+
+        Raises:
+            ParameterError: the one that is asked for follows no modes.
+        """
+        if assembly.model.form.waves:
+            return engine_of_waves(engine)
+        assembly, modes = assembly.alike(modes)
+        key = assembly, modes, engine
+        if engine != "auto":
+            choice.check(engine)
+            if engine not in FOLLOWING or engine == "wave":
+                raise ParameterError(
+                    f"The engine '{engine}' follows no parts that change their mode "
+                    f"({', '.join(element.name for element in self.elements)}). Take one of: {_ENGINES}."
+                )
+            if engine != "sundials":
+                return engine, "asked for"
+            if key not in self._engines:
+                adams = ADAMS, "asked for; the motion is not stiff, so Adams' formulas are taken."
+                self._engines[key] = (engine, "asked for") if choice.is_stiff(problem()) else adams
+            return self._engines[key]
+        if key not in self._engines:
+            easy = self._easy.setdefault(assembly, {})
+            if easy.keys() >= {*enumerate(modes)}:  # each of them was no trouble beside others
+                return next(iter(easy.values()))
+            name, why = choice.choose(problem())
+            if name not in FOLLOWING:  # that of long chains
+                name = "sundials" if available("sundials") else "scipy-radau"
+            if name == "heyoka":
+                easy |= dict.fromkeys(enumerate(modes), (name, why))
+            self._engines[key] = name, why
+        return self._engines[key]
+
+    def tries_heyoka(self, assembly: ModeEquations) -> bool:
+        """Whether heyoka has been taken for these equations in other modes: a stiff phase may be over at once."""
+        return bool(self._easy.get(assembly))

@@ -1,0 +1,1 @@
+"""The engine for long chains: collocation with banded systems."""

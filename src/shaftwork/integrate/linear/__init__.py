@@ -1,0 +1,1 @@
+"""The engine for linear networks, exact at any step."""

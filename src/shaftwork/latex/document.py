@@ -1,0 +1,146 @@
+"""The equations as LaTeX: the body for a report or a notebook, and a complete document with units and nomenclature."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Literal, get_args
+
+from shaftwork.core.errors import CompileError, ShaftworkError
+from shaftwork.equations.quantities import INSTEAD
+from shaftwork.equations.rows import NetworkEquations
+from shaftwork.latex.blocks import Block, Blocks
+from shaftwork.latex.nomenclature import nomenclature
+from shaftwork.latex.printing import aligned
+from shaftwork.latex.series import shortened
+from shaftwork.latex.spelling import in_text, without_marks
+
+Form = Literal["kirchhoff", "state", "second-order", "field"]
+PREAMBLE = r"""\documentclass[11pt,a4paper]{article}
+\usepackage[utf8]{inputenc}
+\usepackage[T1]{fontenc}
+\usepackage[margin=25mm]{geometry}
+\usepackage{amsmath}
+\usepackage{array}
+\usepackage{booktabs}
+\usepackage{longtable}
+\allowdisplaybreaks"""
+TITLES = {
+    "kirchhoff": "Kirchhoff's equations",
+    "state": "State form",
+    "second-order": "Second-order form",
+    "field": "Along the shafts",
+}
+BEGIN = r"""\date{}
+\begin{document}
+\sloppy
+\maketitle"""
+
+
+def typeset(equations: NetworkEquations, blocks: Iterable[Block]) -> str:
+    """Blocks for a document, below the phase for which they hold."""
+    return "\n".join(("\\allowdisplaybreaks", *_phase(equations), *map(_paragraph, blocks)))
+
+
+def _phase(equations: NetworkEquations) -> tuple[str, ...]:
+    """The modes for which the equations hold, under a heading; nothing where no part changes its mode."""
+    return (f"\\paragraph{{Phase}}\\mbox{{}}\n{in_text(equations.phase)}",) if equations.phase else ()
+
+
+def _paragraph(block: Block) -> str:
+    return f"\\paragraph{{{block.heading}}}\\mbox{{}}\n{_content(block)}"
+
+
+def rendered(equations: NetworkEquations, blocks: Iterable[Block]) -> str:
+    """Blocks for a notebook, below the phase for which they hold."""
+    phase = (f"$\\textbf{{Phase}}$ {in_text(equations.phase)}\n",) if equations.phase else ()
+    return "\n".join((*phase, *(f"$\\textbf{{{block.heading}}}$\n{_content(block)}" for block in blocks)))
+
+
+def blocks_of(equations: NetworkEquations, form: Form | None, *, values: bool) -> tuple[Block, ...]:
+    """The blocks that say anything: of one form, or of Kirchhoff's equations and the state form.
+
+    Raises:
+        ShaftworkError: there is no such form.
+    """
+    blocks = Blocks(equations, values)
+    both = (*blocks.kirchhoff(twists=False), *blocks.state(laws=False)) if form is None else _form(blocks, form)
+    derived = () if form == "field" else (blocks.derived(),)
+    return tuple(block for block in (*both, *derived) if block.lines)
+
+
+def _form(blocks: Blocks, form: Form) -> Iterable[Block]:
+    """The blocks of one form, without the derived quantities.
+
+    Raises:
+        ShaftworkError: there is no such form.
+    """
+    match form:
+        case "kirchhoff":
+            return blocks.kirchhoff()
+        case "state":
+            return blocks.state()
+        case "second-order":
+            return blocks.second_order()
+        case "field":
+            return blocks.fields()
+    *names, last = map(repr, get_args(Form))
+    raise ShaftworkError(f"There is no form {form!r}; take {', '.join(names)} or {last}.")
+
+
+def _content(block: Block) -> str:
+    remark = f"{block.remark}\n" if block.remark else ""
+    rows = without_marks(aligned(shortened(block.lines)))
+    return f"{remark}\\begin{{align*}}\n{rows}\n\\end{{align*}}"
+
+
+def document(equations: NetworkEquations, form: Form | None, *, values: bool) -> str:
+    """A LaTeX document that compiles as it is, of one form or of all."""
+    blocks = Blocks(equations, values)
+    states = {state.name: "state" for state in equations.form.states}
+    symbols = {symbol.name for row in equations.rows for symbol in row.left.free_symbols | row.right.free_symbols}
+    if form is None:
+        sections = {
+            TITLES["kirchhoff"]: section((*blocks.kirchhoff(twists=False), blocks.derived())),
+            TITLES["state"]: section(blocks.state(laws=False)),
+            TITLES["second-order"]: _second_order(blocks),
+        }
+    else:
+        printed = _form(blocks, form)
+        derived = (blocks.derived(),) if form == "kirchhoff" else ()
+        sections = {TITLES[form]: _second_order(blocks) if form == "second-order" else section((*printed, *derived))}
+    sections["Nomenclature"] = nomenclature(equations, symbols | states.keys(), states)
+    return in_sections(equations, sections)
+
+
+def joined(documents: Sequence[str]) -> str:
+    """One document of several, such as of all phases of a motion, each from a new page on.
+
+    Args:
+        documents: complete ones of the same network, at least one.
+    """
+    end = "\\end{document}\n"
+    head, begin, _ = documents[0].partition(BEGIN)
+    bodies = "\\clearpage".join(text.partition(BEGIN)[2].removesuffix(end) for text in documents)
+    return f"{head}{begin}{bodies}{end}"
+
+
+def in_sections(equations: NetworkEquations, sections: Mapping[str, str]) -> str:
+    """A LaTeX document of sections that say anything, after the phase and before remarks."""
+    remarks = "\n\n".join(in_text(note) for note in equations.notes)
+    whole = {"Phase": in_text(equations.phase), **sections, "Remarks": remarks}
+    printed = (f"\\section{{{title}}}\n{text}" for title, text in whole.items() if text)
+    title = in_text(equations.form.graph.name)
+    return "\n".join((PREAMBLE, f"\\title{{{title}}}", BEGIN, *printed, r"\end{document}", ""))
+
+
+def _second_order(blocks: Blocks) -> str:
+    """The second-order form, or why there is none."""
+    try:
+        return section(blocks.second_order())
+    except CompileError as reason:
+        return in_text(str(reason).removesuffix(INSTEAD))
+
+
+def section(blocks: Iterable[Block]) -> str:
+    """Blocks that say anything, each under a paragraph heading."""
+    return "\n".join(_paragraph(block) for block in blocks if block.lines)

@@ -1,0 +1,157 @@
+"""Tables of a report: the variables with their units, the parameters with their values."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Container, Iterator, Mapping, Sequence
+from itertools import zip_longest
+
+from sympy import Basic
+
+from shaftwork.components.tables import Table
+from shaftwork.equations.notations import Letter
+from shaftwork.equations.rows import NetworkEquations
+from shaftwork.latex.printing import Writer, printed_number
+from shaftwork.latex.series import Numbers, listed, replaced, series_in
+from shaftwork.latex.spelling import INDEX_CLOSES, INDEX_OPENS, in_text, split_index, without_marks
+from shaftwork.network.graph import effective
+
+LAWS = "Formula, or points of a table, over $t$ in s if nothing else is said"
+ALL_DIGITS = 15
+"""Of the points of tables, which may lie close together."""
+POINTS = 40
+"""Of a table in one row: rows do not run over pages."""
+UNITS = {"1": "--", "ohm": r"$\Omega$"}
+Cells = tuple[str, ...]
+
+
+def nomenclature(
+    equations: NetworkEquations, used: Container[str], noted: Mapping[str, str], besides: Sequence[Cells] = ()
+) -> str:
+    """The tables of the variables that equations contain, of the parameters, and of the laws that are given.
+
+    Left out are parameters that have no effect. Laws stand there with all points of their tables, of which formulas
+    show some, and also where the phase has another one.
+
+    Args:
+        equations: what knows all letters.
+        used: names of the variables.
+        noted: what some of them are besides, as "state", by name.
+        besides: rows before them, of quantities that belong to no part.
+    """
+    names, values = equations.symbol_names, equations.values
+    read = effective(equations.form.graph)
+    variables = [
+        (_formula(names[letter.name]), _meaning(letter, noted), _owner(letter), unit(letter.unit))
+        for letter in equations.letters
+        if not letter.parameter and letter.name in used
+    ]
+    parameters = [
+        (
+            _formula(names[letter.name]),
+            in_text(letter.meaning),
+            _owner(letter),
+            f"${printed_number(values[letter.name])}$",
+            unit(letter.unit),
+        )
+        for letter in equations.letters
+        if letter.parameter and (letter.name in read or letter.name not in equations.form.graph.parameters)
+    ]
+    tables = (
+        table(_columns(48, 40, 38, 21), ("Variable", "Meaning", "Of", "Unit"), (*besides, *variables)),
+        table(_columns(34, 38, 30, 21, 20), ("Parameter", "Meaning", "Of", "Value", "Unit"), parameters),
+        table(_columns(34, 24, 68, 20), ("Law", "Of", LAWS, "Unit"), [*_laws(equations)]),
+    )
+    return "\n".join(filter(None, tables))
+
+
+def _laws(equations: NetworkEquations) -> Iterator[Cells]:
+    """Rows of the laws that are given as tables or formulas."""
+    writer = Writer({}, (), (), {})
+    for part in equations.form.graph.parts:
+        for name, declared in part.component.declared.items():
+            law, _ = declared.magnitude(getattr(part.component, name))
+            if not (declared.law and isinstance(law, Basic)):
+                continue
+            cells = [] if isinstance(law, Table) else [_formula(writer.latex(law))]
+            for curve in sorted(law.atoms(Table), key=str):
+                points = [
+                    rf"${printed_number(x, ALL_DIGITS)} \mapsto {printed_number(y, ALL_DIGITS)}$"
+                    for x, y in zip(curve.xs, curve.ys, strict=True)
+                ]
+                cells += [", ".join(points[first : first + POINTS]) for first in range(0, len(points), POINTS)]
+            heads = [(in_text(declared.meaning), breakable(part.name), unit(declared.unit))]
+            for (meaning, owner, measure), cell in zip_longest(heads, cells, fillvalue=("", "", "")):
+                yield meaning, owner, str(cell), measure
+
+
+def _formula(latex: str) -> str:
+    return f"${latex}$"
+
+
+def _meaning(letter: Letter, noted: Mapping[str, str]) -> str:
+    return in_text(f"{letter.meaning} ({noted[letter.name]})" if letter.name in noted else letter.meaning)
+
+
+def _owner(letter: Letter) -> str:
+    stem, index = split_index(letter.owner)
+    text = breakable(stem)
+    return f"{text}{INDEX_OPENS}{index}{INDEX_CLOSES}" if index else text
+
+
+def breakable(name: str) -> str:
+    """The name of a part, which may be broken after an underscore."""
+    return r"\allowbreak ".join(map(in_text, re.findall("[^_]*_|[^_]+", name)))
+
+
+def column(width: int) -> str:
+    """A column of a fixed width in millimetres: LaTeX needs a second run to know the widths of others."""
+    return rf">{{\raggedright\arraybackslash}}p{{{width}mm}}"
+
+
+def _columns(*widths: int) -> str:
+    return "".join(map(column, widths))
+
+
+def unit(text: str) -> str:
+    """A unit in LaTeX."""
+    spaced = text.replace("*", r"\,")
+    return UNITS.get(text) or rf"$\mathrm{{{spaced}}}$"
+
+
+def table(columns: str, headings: Cells, rows: Sequence[Cells]) -> str:
+    """A table that may run over pages; rows that differ by a running number are drawn together. Empty without rows."""
+    if not rows:
+        return ""
+    body = "\n".join(f"{' & '.join(cells)} \\\\" for cells in _condensed(rows))
+    text = f"""\\begin{{longtable}}{{@{{}}{columns}@{{}}}}
+\\toprule
+{" & ".join(headings)} \\\\
+\\midrule
+\\endhead
+\\bottomrule
+\\endfoot
+{body}
+\\end{{longtable}}"""
+    return without_marks(text)
+
+
+def _condensed(rows: Sequence[Cells]) -> Iterator[Cells]:
+    series = series_in(["\n".join(cells) for cells in rows])
+    inside = replaced(series)
+    for place, cells in enumerate(rows):
+        if place in series:
+            for stretch in series[place].stretches:
+                yield _drawn_together(stretch, {number: rows[series[place].members[number]] for number in stretch})
+        elif place not in inside:
+            yield cells
+
+
+def _drawn_together(stretch: Numbers, members: Mapping[int, Cells]) -> Cells:
+    """The rows of a stretch as one: every cell lists what is in it, once where that is always the same."""
+    columns = range(len(members[stretch[0]]))
+    cells = ({number: row[column] for number, row in members.items()} for column in columns)
+    return tuple(
+        cell[stretch[0]] if len(set(cell.values())) == 1 else listed(stretch, cell.__getitem__, r"\ldots")
+        for cell in cells
+    )

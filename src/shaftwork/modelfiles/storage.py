@@ -1,0 +1,190 @@
+"""Networks to text files and back: what `textfile` reads and writes, in terms of components."""
+
+from __future__ import annotations
+
+import reprlib
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from sympy import Expr
+
+from shaftwork.components import REGISTRY, Component, Table
+from shaftwork.components.tables import Interpolation
+from shaftwork.core.errors import ModelFileError, ParameterError
+from shaftwork.core.files import replaced
+from shaftwork.modelfiles import textfile
+from shaftwork.modelfiles.textfile import ModelText, PartText
+from shaftwork.network import expressions
+from shaftwork.network.expression_reader import parse
+from shaftwork.network.grammar import fault_of, words_of
+from shaftwork.network.netlist import Netlist, Origin, Placed
+from shaftwork.network.wording import title
+
+MAXIMUM_LAW_WORDS = 4000
+"""Numbers, names and signs of all laws of a file together, some 400 laws: more take too long to read."""
+
+
+def netlist_text(netlist: Netlist) -> str:
+    """The text of a model file.
+
+    A law without symbols, such as pi or 2 pi, is written as its number.
+
+    Raises:
+        ModelFileError: a parameter has no text form.
+    """
+    return textfile.write(
+        ModelText(netlist.name, tuple(_part_text(placed) for placed in netlist.placed), netlist.ports, netlist.impacts)
+    )
+
+
+def write_netlist(netlist: Netlist, path: str | Path) -> None:
+    """Write a netlist to a file, as `netlist_text`.
+
+    Raises:
+        ModelFileError: a parameter has no text form, or the file cannot be written.
+    """
+    place, text = _path_of(path), netlist_text(netlist)
+    try:
+        with replaced(place) as file:
+            file.write(text)
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise ModelFileError(
+            f"{place} cannot be written: {why}. Give the path of a file in a folder that exists."
+        ) from None
+
+
+def read_netlist(path: str | Path) -> Netlist:
+    """Read a netlist from a file.
+
+    Raises:
+        ModelFileError: the file is no model; says where and what would be right.
+    """
+    model = textfile.read(_path_of(path))
+    try:
+        _refuse_endless_laws(model)
+        placed = tuple(_placed(part, str(path)) for part in model.parts)
+        return Netlist(model.name, placed, model.ports, model.impacts)
+    except ModelFileError as error:
+        raise ModelFileError(f"{path}: {error}") from None
+
+
+def law_of(key: str, text: str) -> float | Expr | Table:
+    """The law that a text means: a number, an expression, or a table alone, whose argument the part chooses.
+
+    Args:
+        key: name of the parameter.
+        text: an expression, or a table `{ x = [...], y = [...] }`.
+
+    Raises:
+        ModelFileError: it is none.
+    """
+    if text.lstrip().startswith("{"):
+        return textfile.read_table(key, text)
+    law = parse(text)
+    if isinstance(law, Interpolation) and text.rstrip().endswith("])"):  # without an argument of its own
+        return law.table
+    return law if law.free_symbols else float(law)
+
+
+def _path_of(path: str | Path) -> Path:
+    try:
+        return Path(path)
+    except TypeError:
+        raise ModelFileError(f"{path!r} is no path. Give the place of a model file, such as 'crane.toml'.") from None
+
+
+def _refuse_endless_laws(model: ModelText) -> None:
+    words = 0
+    for part in model.parts:
+        for name, value in part.parameters.items():
+            if not isinstance(value, str) or not _is_law(REGISTRY.get(part.type), name):
+                continue
+            try:
+                words += len(words_of(value))
+            except ModelFileError as error:
+                raise _fault(part, name, f"{name}: {error}") from None
+            if words > MAXIMUM_LAW_WORDS:
+                raise ModelFileError(
+                    f"The laws of the file have more than {MAXIMUM_LAW_WORDS} words together. Give curves as tables, "
+                    "or build the network in Python."
+                )
+
+
+def _is_law(cls: type[Component] | None, name: str) -> bool:
+    """Whether a text of this parameter is read as a law."""
+    return cls is not None and name in cls.declared and cls.declared[name].law
+
+
+def _part_text(placed: Placed) -> PartText:
+    part = placed.part
+    values = {name: _written(part, name) for name in part.declared if not _is_default(part, name)}
+    return PartText(type(part).__name__, part.name, placed.nodes, values, part.symbol)
+
+
+def _is_default(part: Component, name: str) -> bool:
+    declared = part.declared[name]
+    if declared.default is None:
+        return getattr(part, name) is None
+    kinds = (float,) if declared.record is None else (declared.record,)
+    return not declared.required and isinstance(value := getattr(part, name), kinds) and value == declared.default
+
+
+def _written(part: Component, name: str) -> Any:
+    declared = part.declared[name]
+    value, objection = declared.magnitude(getattr(part, name))
+    if objection is not None:
+        raise ModelFileError(f"{title(part)}: {name} {objection}, so it cannot be saved.")
+    if declared.record is not None:
+        return repr(value)
+    if not isinstance(value, Expr) or isinstance(value, Table):
+        return value
+    if fault := fault_of(value):  # before the text is made, which would be refused where it is read again
+        raise ModelFileError(f"{title(part)}: {name} {fault}, so it cannot be saved. Write large numbers as floats.")
+    try:
+        return expressions.write(value)
+    except ModelFileError as error:
+        raise ModelFileError(f"{title(part)}: {name} cannot be saved: {error}") from None
+
+
+def _placed(part: PartText, path: str) -> Placed:
+    cls = REGISTRY.get(part.type)
+    if cls is None:
+        close = get_close_matches(part.type, REGISTRY, n=3) or tuple(REGISTRY)
+        raise _fault(
+            part,
+            "type",
+            f"there is no component '{part.type}'. Close to it: {', '.join(close)}. "
+            "A component of your own must be imported before the file is loaded.",
+        )
+    values = {name: _read(part, cls, name, value) for name, value in part.parameters.items()}
+    try:
+        component = cls(part.name, symbol=part.symbol, **values)
+    except ParameterError as error:
+        reason = str(error).removeprefix(f"{part.type} '{part.name}': ")
+        named = [name for name in values if name not in cls.declared] or [reason.split(maxsplit=1)[0]]
+        raise _fault(part, named[0], reason) from None
+    return Placed(component, part.nodes, origin=Origin(path, part.lines))
+
+
+def _read(part: PartText, cls: type[Component], name: str, value: Any) -> Any:
+    """A value of the file as the component takes it."""
+    declared = cls.declared.get(name)
+    if declared is None or declared.record is not None or not isinstance(value, str):
+        return value
+    if not declared.law:
+        unit = "pure number" if declared.unit == "1" else f"number in {declared.unit}"
+        reason = f"{name} = {reprlib.repr(value)} must be a {unit} ({declared.meaning}), written without quotes"
+        raise _fault(part, name, f"{reason} and without a unit, such as {name} = 1.0.")
+    try:
+        return law_of(name, value)
+    except ModelFileError as error:
+        raise _fault(part, name, f"{name}: {error}") from None
+
+
+def _fault(part: PartText, key: str, reason: str) -> ModelFileError:
+    """What is wrong with a part, with its line in the file and, of a law, the unit of its values."""
+    declared = getattr(REGISTRY.get(part.type), "declared", {}).get(key)
+    unit = f" It is a law for {key} in {declared.unit}." if declared is not None and declared.law else ""
+    return ModelFileError(f"line {part.lines.get(key, part.lines[''])}, {part.type} '{part.name}': {reason}{unit}")

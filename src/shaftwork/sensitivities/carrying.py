@@ -1,0 +1,212 @@
+"""Derivatives of states that go over into other equations: parts that become joined, let go, or hit each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+from sympy import Expr
+
+from shaftwork.codegen.array_form.elements import Array
+from shaftwork.core.errors import NetworkError, SimulationError
+from shaftwork.hybrid.hybrid_state import Change
+from shaftwork.hybrid.modes.mode_equations import ModeEquations
+from shaftwork.hybrid.modes.mode_machines import ModeNames, with_modes
+from shaftwork.hybrid.phases import Phases
+from shaftwork.pipeline.model import Model
+from shaftwork.sensitivities.differentiation import Differentiated
+from shaftwork.sensitivities.legs import Leg
+
+CLOSE = 1e-5
+"""The run took a path whose states differ from its own by no more than this part of their size: it meets hard stops
+late by what rounding moves them, which is much for what hardly moves any more."""
+ALIKE = 1e-10
+"""Paths lead to the same states where these differ by no more than this part of their size."""
+
+
+class _ModeStep(NamedTuple):
+    """Into other modes; where something is thrown back, for an instant alone, and then into others.
+
+    Args:
+        modes: that take up what is stored.
+        rebound: element and its share of the speed that comes back, or None.
+        parted: the modes in which it flies on.
+    """
+
+    modes: ModeNames
+    rebound: tuple[int, Expr] | None = None
+    parted: ModeNames = ()
+
+
+class End(NamedTuple):
+    """Where one leg goes over into the next.
+
+    Args:
+        before: (n,) states.
+        after: (n',) states that follow.
+        slopes: (n, m) total derivatives of those before.
+        shift: (m,) derivatives of the time.
+    """
+
+    before: Array
+    after: Array
+    slopes: Array
+    shift: Array
+
+
+class _StoredWithDerivatives(NamedTuple):
+    """All that is stored by name, and its total derivatives (m,)."""
+
+    values: Mapping[str, float]
+    slopes: Mapping[str, Array]
+
+
+class SensitivityTransfer:
+    """Takes states and their derivatives over from one set of equations to another.
+
+    Args:
+        phases: the sets of equations.
+        equations: those of a model, ready for sensitivities.
+        sizes: (n,) of the states of a model.
+    """
+
+    def __init__(
+        self, phases: Phases, equations: Callable[[Model], Differentiated], sizes: Callable[[Model], Array]
+    ) -> None:
+        self._phases, self._equations, self._sizes = phases, equations, sizes
+
+    def over(self, before: Leg, after: Leg, ends: Sequence[End], changes: Sequence[Change]) -> tuple[int, Array]:
+        """Which of the ends it was, and the total derivatives (n', m) of the new states.
+
+        The modes that a run goes through within an instant are tried as they may follow each other; what leads to the
+        states of the run is the path that it took.
+
+        Args:
+            before: the leg that ends.
+            after: the next one.
+            ends: where one leg goes over into the other, as far as that is known; the likeliest first.
+            changes: of mode, at that time.
+
+        Raises:
+            SimulationError: none of them leads there.
+        """
+        sizes, candidates = self._sizes(after.model), list[tuple[float, int, Array]]()
+        for (k, end), steps in product(enumerate(ends), self._paths(before, after, changes)):
+            try:
+                states, slopes = self._along(steps, before, after.low, end)
+            except NetworkError:
+                continue
+            candidates.append((float((np.abs(states - end.after) / sizes).max(initial=0.0)), k, slopes))
+        nearest = min((away for away, *_ in candidates), default=np.inf)
+        if nearest <= CLOSE:
+            return next((k, slopes) for away, k, slopes in candidates if away <= nearest + ALIKE)
+        names = ", ".join(dict.fromkeys(f"'{change.element.name}'" for change in changes)) or "parts"
+        raise SimulationError(
+            f"At t = {after.start:.9g} s {names} change together, and how the derivatives pass that is not known here. "
+            "Take the difference of two variants, studies.sweep(...)."
+        )
+
+    def _paths(self, before: Leg, after: Leg, changes: Sequence[Change]) -> Iterator[tuple[_ModeStep, ...]]:
+        """Paths to the modes that follow, the plainest first."""
+        seen: list[tuple[_ModeStep, ...]] = []
+        for every in (False, True):
+            for besides in (False, True):
+                steps = self._path(before.modes, after.modes, changes, every=every, besides=besides)
+                if steps not in seen:
+                    seen.append(steps)
+                    yield steps
+
+    def _path(
+        self, modes: ModeNames, last: ModeNames, changes: Sequence[Change], *, every: bool, besides: bool
+    ) -> tuple[_ModeStep, ...]:
+        """One path.
+
+        Args:
+            modes: before.
+            last: after.
+            changes: in their order.
+            every: each change takes up what is stored by itself; else impacts alone do, and in the end all.
+            besides: in an impact other elements are already in the modes that follow.
+        """
+        numbers = {id(element): k for k, element in enumerate(self._phases.elements)}
+        steps: list[_ModeStep] = []
+        for place, change in enumerate(changes):
+            number = numbers[id(change.element)]
+            if not change.impact:
+                modes = with_modes(modes, {number: change.after})
+                steps += [_ModeStep(modes)] if every else []
+                continue
+            others = {numbers[id(later.element)]: later.after for later in changes[place + 1 :] if not later.impact}
+            modes = with_modes(modes, {**(others if besides else {}), number: change.after})
+            if not change.rebound:
+                steps.append(_ModeStep(modes))
+                continue
+            leaves = change.element.modes[change.before].leaves
+            share = next(leave.rebound for leave in leaves if leave.rebound is not None and leave.to == change.after)
+            parted = with_modes(modes, {number: change.before})
+            steps.append(_ModeStep(modes, (number, share), parted))
+            modes = parted
+        if not steps or (steps[-1].parted or steps[-1].modes) != last:
+            steps.append(_ModeStep(last))
+        return tuple(steps)
+
+    def _along(self, steps: Sequence[_ModeStep], before: Leg, t: float, end: End) -> tuple[Array, Array]:
+        """States (n',) and their total derivatives (n', m) at the end of a path."""
+        model, p, (x, _, slopes, shift) = before.model, before.p, end
+        for step in steps:
+            assembly, old = self._phases.assembly(step.modes), p
+            p = assembly.vector({}, self._phases.numbers(step.modes))
+            if assembly.model is model and step.rebound is None:
+                continue
+            stored = self._stored(model, t, x, old, slopes, shift)
+            x, slopes = self._taken_over(assembly, t, p, stored, shift)
+            if step.rebound is not None:
+                stored = self._thrown(
+                    assembly, p, stored, self._stored(assembly.model, t, x, p, slopes, shift), step.rebound
+                )
+                assembly = self._phases.assembly(step.parted)
+                p = assembly.vector({}, self._phases.numbers(step.parted))
+                x, slopes = self._taken_over(assembly, t, p, stored, shift)
+            model = assembly.model
+        return x, slopes
+
+    def _stored(
+        self, model: Model, t: float, x: Array, p: Array, slopes: Array, shift: Array
+    ) -> _StoredWithDerivatives:
+        takeover = self._equations(model).takeover
+        values, derivatives = takeover.given(t, x, p, slopes, shift)
+        return _StoredWithDerivatives(
+            dict(zip(takeover.names, values.tolist(), strict=True)), dict(zip(takeover.names, derivatives, strict=True))
+        )
+
+    def _taken_over(
+        self, assembly: ModeEquations, t: float, p: Array, stored: _StoredWithDerivatives, shift: Array
+    ) -> tuple[Array, Array]:
+        takeover = self._equations(assembly.model).takeover
+        x = assembly.stores.states(assembly.bound(p), t, stored.values)
+        values = np.array([stored.values[name] for name in takeover.names])
+        slopes = np.array([stored.slopes[name] for name in takeover.names]).reshape(len(values), shift.size)
+        return x, takeover.taken(t, x, p, values, slopes, shift)
+
+    def _thrown(
+        self,
+        assembly: ModeEquations,
+        p: Array,
+        before: _StoredWithDerivatives,
+        joined: _StoredWithDerivatives,
+        rebound: tuple[int, Expr],
+    ) -> _StoredWithDerivatives:
+        """After an impact that throws back: v_joined + e (v_joined - v_before)."""
+        expression = assembly.of_element(*rebound)
+        shown, nowhere = self._equations(assembly.model).shown(expression), np.zeros(len(assembly.model.states))
+        share = float(shown.value(np.zeros(1), nowhere[None, :], p)[0, 0])
+        by_parameters = shown.slopes(0.0, nowhere, p)[1]
+        change = {name: value - before.values[name] for name, value in joined.values.items()}
+        values = {name: value + share * change[name] for name, value in joined.values.items()}
+        slopes = {
+            name: slope + share * (slope - before.slopes[name]) + by_parameters * change[name]
+            for name, slope in joined.slopes.items()
+        }
+        return _StoredWithDerivatives(values, slopes)

@@ -1,0 +1,250 @@
+"""One set of equations of many variants: its compiled code, and whether modes are consistent with the motion in it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from shaftwork.codegen.array_form.elements import Array
+from shaftwork.codegen.state_transfer import StateTransfer
+from shaftwork.core.errors import CompileError
+from shaftwork.formulation.observables import Observables
+from shaftwork.hybrid.hybrid_state import AHEAD, AHEAD_OF_RUN, CLEAR, EPS, GOLDEN, NOTHING, ROUNDINGS
+from shaftwork.hybrid.modes.exceeded_guards import FEW
+from shaftwork.hybrid.modes.mode_equations import ModeEquations
+from shaftwork.hybrid.modes.mode_machines import ModeNames
+from shaftwork.pipeline.arguments import NOMINAL
+from shaftwork.pipeline.model import Model
+from shaftwork.results.measures import Measure
+from shaftwork.sweep.lane_extremes import Index, Mask
+from shaftwork.sweep.lane_program import LaneProgram, lane_expressions, lane_function, lane_program
+from shaftwork.sweep.lane_step import LaneStep, Use
+
+EXTREMES = {"max": (1.0,), "min": (-1.0,), "peak": (1.0, -1.0)}
+"""Measures that are the largest value of a quantity, times these signs."""
+POWERS = {"mean": 1, "rms": 2}
+"""Measures that are integrals of a quantity to some power."""
+Course = tuple[Array, Array, Array, Array]
+"""Times (k,), states (n, k), their rates, and guards (guards, k)."""
+
+
+class EnsembleCode:
+    """The programs of one set of equations.
+
+    Args:
+        model: the equations.
+        program: the heyoka program for one variant.
+        stores: what the equations store.
+        measures: what is read.
+
+    Raises:
+        CompileError: variants cannot run side by side in them.
+    """
+
+    def __init__(self, model: Model, program: Any, stores: StateTransfer, measures: Sequence[Measure]) -> None:
+        if model.rows is None or program is None or not model.states:
+            raise CompileError("These equations have no program of their own.")
+        self.model, self._rows, self._stores = model, model.rows, stores
+        self._expressed = Observables(model.form, model.rows)
+        quantities = [self._expressed.quantity(measure.quantity) for measure in measures]
+        read = [expression for expression in quantities if expression is not None]
+        if len(read) < len(quantities):
+            raise CompileError("A measure is of a power, an energy or a place along a shaft.")
+        self._extremes = [row for row, measure in enumerate(measures) if measure.kind in EXTREMES]
+        integrated = [row for row, measure in enumerate(measures) if measure.kind in POWERS]
+        self.integral_of = {row: k for k, row in enumerate(integrated)}
+        """By measure, which of the integrals behind the states is its."""
+        self.program: LaneProgram = lane_program(program, model.rows, read)
+        uses = [Use(EXTREMES.get(measure.kind, ()), POWERS.get(measure.kind, 0)) for measure in measures]
+        self.step = LaneStep(self.program, tuple(uses))
+        self._parts = {"rates": self.program.rates, "guards": self.program.guards, "shown": self.program.quantities}
+        stored = [self._expressed.store(name) for name in stores.names] if self.program.guards else []
+        self._parts["stored"] = lane_expressions(self._rows, stored)
+        expressions = tuple(one for part in self._parts.values() for one in part)
+        self._points = lane_function(expressions, self.program.variables)
+        """What is asked for at the ends of phases."""
+
+    def extreme(self, row: int) -> int:
+        """Which of the quantities that a step shows is that of a measure that is an extreme."""
+        return self._extremes.index(row)
+
+    def guard(self, number: int) -> int:
+        """Which of the quantities that a step shows is a guard."""
+        return len(self._extremes) + number
+
+    def motion(self, t: Array, x: Array, p: Array) -> tuple[Array, Array]:
+        """Rates (n, k) and guards (guards, k) at times (k,), states (n, k), parameters (parameters, k)."""
+        parts = self._part(t, x, p)
+        return parts["rates"], parts["guards"]
+
+    def stored(self, t: Array, x: Array, p: Array) -> Array:
+        """All that is stored, in the order of the names of `StateTransfer`; arguments as for `motion`."""
+        return self._part(t, x, p)["stored"]
+
+    def shown(self, t: Array, x: Array, p: Array) -> Array:
+        """What the measures read; arguments as for `motion`."""
+        return self._part(t, x, p)["shown"]
+
+    def _part(self, t: Array, x: Array, p: Array) -> dict[str, Array]:
+        ends = np.cumsum([len(part) for part in self._parts.values()])[:-1]
+        return dict(zip(self._parts, np.split(self._points(t, x, p), ends), strict=True))
+
+    @cached_property
+    def state_rows(self) -> list[int]:
+        """For each state, its place among all that is stored."""
+        return [self._stores.names.index(name) for name in self.model.states]
+
+    @cached_property
+    def kinds(self) -> tuple[list[int], list[int]]:
+        """Places of torques and currents among all that is stored, and of the rest."""
+        through = [k for k, name in enumerate(self._stores.names) if name in self._stores.through]
+        return through, [k for k in range(len(self._stores.names)) if k not in through]
+
+
+@dataclass(frozen=True, eq=False)
+class PhaseEntry:
+    """Where variants enter a phase.
+
+    Args:
+        good: (k,) whether its modes are consistent with the motion.
+        offsets: (guards, k) how far beyond zero each guard has to go.
+    """
+
+    good: Mask
+    offsets: Array
+
+
+class EnsembleEquations:
+    """The equations of one combination of modes.
+
+    Args:
+        code: its programs.
+        assembly: the equations with their guards, or None where nothing changes its mode.
+        modes: the combination.
+        first: a variant, of which sizes are taken.
+        names: of the parameters that vary.
+        span: start and end of the motion, s.
+    """
+
+    def __init__(
+        self,
+        code: EnsembleCode,
+        assembly: ModeEquations | None,
+        modes: ModeNames,
+        first: Mapping[str, float],
+        names: Sequence[str],
+        span: tuple[float, float],
+    ) -> None:
+        self.code, model = code, code.model
+        if assembly is None:
+            self._base = model.vector(first)
+            self.sides, sizes = np.zeros(0), model.prepare(self._base).atol.tolist()
+        else:
+            pairs = zip(assembly.elements, modes, strict=True)
+            numbers = {element.number: element.modes[name].value for element, name in pairs}
+            self._base = assembly.vector(first, numbers)
+            self.sides, sizes = assembly.sides(modes), assembly.sizes(self._base)
+        places = {name: k for k, name in enumerate(model.parameters)}
+        self._places = [(places[name], column) for column, name in enumerate(names) if name in places]
+        self.watched, self.sizes = np.flatnonzero(self.sides), np.array(sizes)
+        self._tick = ROUNDINGS * float(np.spacing(max(map(abs, span))))
+        self._ahead = AHEAD_OF_RUN * (span[1] - span[0])
+
+    def parameters(self, columns: Array) -> Array:
+        """(parameters, k) for the values (names, k) of those that vary, with what is derived from them."""
+        p = np.repeat(np.asarray(self._base)[:, None], columns.shape[1], axis=1)
+        for place, column in self._places:
+            p[place] = columns[column]
+        return self.code.program.parameters(p)
+
+    def entered(self, t: Array, x: Array, p: Array) -> PhaseEntry:
+        """Whether every guard is on its own side, or on its limit and about to be, as `EventIteration` would find.
+
+        Args:
+            t: (k,) s.
+            x: (n, k) states.
+            p: (parameters, k).
+        """
+        if not len(self.sides):
+            return PhaseEntry(np.ones(t.size, dtype=bool), np.zeros((0, t.size)))
+        rates, now = self.code.motion(t, x, p)
+        moved = self._rounded(x, rates)
+        near_rates, near = self.code.motion(t + self._tick, moved, p)
+        side, bands, step = self.sides[:, None], np.abs(near - now), self._step(rates)
+        value = side * now
+        falls, decided = np.zeros_like(value, dtype=bool), np.zeros_like(value, dtype=bool)
+        here, beside = (t, x, rates, now), (t + self._tick, moved, near_rates, near)
+        for _ in range(2):  # where nothing moves yet, its acceleration tells
+            here, beside = self._later(step, here, p), self._later(step, beside, p)
+            gain, other = side * (here[3] - now), side * (beside[3] - near)
+            sure = np.abs(gain) > np.maximum(np.abs(gain - other), FEW * bands / ROUNDINGS)
+            falls |= ~decided & sure & (gain < 0)
+            decided |= sure
+        good = (value < -bands) | ((value <= bands) & falls)
+        clear = np.where(2 * value > -CLEAR * bands, np.maximum(value, 0.0) + CLEAR * bands, bands)
+        return PhaseEntry(np.all(good[self.watched], axis=0), np.maximum(clear, NOTHING))
+
+    def _rounded(self, x: Array, rates: Array) -> Array:
+        """The states so far away as rounding may move them, and the time by a tick; see `moments.Regime.rounded`."""
+        signs = np.array([(-1.0) ** k for k in range(len(x))])[:, None]
+        part = signs * np.array([(0.5 + k * GOLDEN % 1) * ROUNDINGS * EPS for k in range(len(x))])[:, None]
+        least = part * self.sizes[:, None] / NOMINAL
+        return np.asarray(x + part * np.abs(x) + least + signs * self._tick * np.abs(rates))
+
+    def _step(self, rates: Array) -> Array:
+        """(k,) how far in s the further course is looked at."""
+        with np.errstate(divide="ignore"):
+            steps = (AHEAD * self.sizes[:, None] / np.abs(rates)).min(axis=0)
+        return np.asarray(np.minimum(self._ahead, steps))
+
+    def _later(self, step: Array, course: Course, p: Array) -> Course:
+        """A step further along a straight line."""
+        t, x, rates, _ = course
+        later = x + step * rates
+        return t + step, later, *self.code.motion(t + step, later, p)
+
+    def leaves_behind(self, before: EnsembleEquations, guard: int) -> bool:
+        """Whether the guard by which these modes were entered is met no more; `entered` looks at all the others."""
+        return before.code is not self.code or not self.sides[guard] == before.sides[guard] != 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class VariantGroup:
+    """Variants in the same modes, ready to go on.
+
+    Args:
+        modes: of every element; empty where nothing changes its mode.
+        lanes: (k,) numbers of the variants.
+        t: (k,) s.
+        x: (n, k) states.
+    """
+
+    modes: ModeNames
+    lanes: Index
+    t: Array
+    x: Array
+
+    def some(self, on: Mask | Index) -> VariantGroup:
+        """Those of the lanes (k,) that are marked, or those that are named."""
+        return VariantGroup(self.modes, self.lanes[on], self.t[on], self.x[:, on])
+
+
+def joined(groups: Sequence[VariantGroup]) -> list[VariantGroup]:
+    """Groups in the same modes as one."""
+    alike: dict[ModeNames, list[VariantGroup]] = {}
+    for group in groups:
+        if group.lanes.size:
+            alike.setdefault(group.modes, []).append(group)
+    return [
+        VariantGroup(
+            modes,
+            np.concatenate([one.lanes for one in several]),
+            np.concatenate([one.t for one in several]),
+            np.concatenate([one.x for one in several], axis=1),
+        )
+        for modes, several in alike.items()
+    ]

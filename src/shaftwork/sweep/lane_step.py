@@ -1,0 +1,290 @@
+"""Many variants side by side: one compiled step whose lanes are variants, each with its own time, state, parameters.
+
+The step is one function of heyoka's, straight through all stages of the method, with the control of the step size in
+it: a lane that is not accurate enough stays where it is and gets a smaller step. So no lane waits for another, and what
+comes out for one does not depend on those beside it.
+
+Dormand and Prince's method of order 8(5,3) compares its result with two of lower order: Hairer, Norsett, Wanner,
+Solving Ordinary Differential Equations I, II.10. What a step misses counts for the states, and for what is measured as
+well: a stiff damper's torque may be wrong where the speeds are right, and what a source gives may swing without them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache, reduce
+from operator import mul
+from typing import Any
+
+import heyoka
+import numpy as np
+from scipy.integrate import DOP853
+
+from shaftwork.codegen.array_form.elements import Array
+from shaftwork.numerics.hermite import BEYOND, JET, apart, inner
+from shaftwork.sweep.lane_program import FREE_TIME, KEPT, LaneFunction, LaneProgram, at
+
+SAFETY, LEAST_FACTOR, MOST_FACTOR = 0.85, 0.2, 5.0
+"""Of the next step by the error of this one."""
+NOWHERE = -1e300
+"""So far comes what has not been seen yet."""
+BOTH = (1.0, -1.0)
+"""The signs of what may matter on both sides."""
+OF_A_QUANTITY, CANCELLED = 10.0, 1e-4
+"""What is measured may be wrong by so many times as much as a state, and by the error of so small a part of what it is
+the difference of: of a stiff damper's torque more would be lost in rounding."""
+TINY = 1e-30
+"""Beside an error."""
+
+
+@dataclass(frozen=True)
+class Use:
+    """What is wanted of a quantity.
+
+    Args:
+        signs: 1 for its maximum, -1 for its minimum.
+        power: of the quantity, of which the integral over the motion is wanted; 0 for none.
+    """
+
+    signs: tuple[float, ...] = ()
+    power: int = 0
+
+
+@dataclass(frozen=True)
+class LaneStep:
+    """One step of a lane, with its error and the size of the next one.
+
+    The tolerance is a part of the size of a state: of its value, of its change in the step and of its nominal size
+    together.
+
+    A lane is a column: first its *rows*, which are states, integrals, time, and the size of the next step; then what
+    has been seen, which is the time at the start of the step that led here, jets at that time, and how far each
+    quantity, times a sign, can have come. Behind its parameters come its *limits*: the tolerance, the end and the
+    longest step, and nominal sizes of the states.
+
+    Args:
+        program: the system.
+        uses: what is wanted of each of its quantities. There are jets of those with signs, and of the guards.
+    """
+
+    program: LaneProgram
+    uses: tuple[Use, ...]
+
+    @cached_property
+    def _integrals(self) -> list[tuple[Any, int]]:
+        """Quantities and the powers that are integrated."""
+        pairs = zip(self.program.quantities, self.uses, strict=True)
+        return [(quantity, use.power) for quantity, use in pairs if use.power]
+
+    @cached_property
+    def _seen(self) -> list[tuple[Any, tuple[float, ...]]]:
+        """Quantities of which there are jets, and the signs that matter."""
+        pairs = zip(self.program.quantities, self.uses, strict=True)
+        extremes = [(quantity, use.signs) for quantity, use in pairs if use.signs]
+        return [*extremes, *((guard, BOTH) for guard in self.program.guards)]
+
+    @property
+    def states(self) -> int:
+        """Number of states."""
+        return len(self.program.variables)
+
+    @cached_property
+    def rows(self) -> int:
+        """Number of rows: states, integrals, time, and the size of the next step."""
+        return self.states + len(self._integrals) + 2
+
+    @cached_property
+    def jets(self) -> slice:
+        """Rows of what is seen of the quantities."""
+        return slice(self.rows + 1, self.rows + 1 + JET * len(self._seen))
+
+    @cached_property
+    def _reaches(self) -> dict[tuple[int, float], int]:
+        """Rows of how far quantities can have come, by quantity and sign."""
+        pairs = [(number, sign) for number, (_, signs) in enumerate(self._seen) for sign in signs]
+        return {pair: self.jets.stop + k for k, pair in enumerate(pairs)}
+
+    @property
+    def height(self) -> int:
+        """Number of values in a column."""
+        return self.rows + 1 + JET * len(self._seen) + len(self._reaches)
+
+    @cached_property
+    def _function(self) -> LaneFunction:
+        return _function(self)
+
+    def jet(self, number: int) -> slice:
+        """Where, among the jets, is that of a quantity."""
+        return slice(JET * number, JET * (number + 1))
+
+    def reach(self, number: int, sign: float) -> int:
+        """The row of how far a quantity can have come, times a sign."""
+        return self._reaches[number, sign]
+
+    def forget(self, columns: Array) -> None:
+        """Let nothing be seen in columns (height, k) yet but the jets at the start."""
+        columns[self.rows], columns[self.jets.stop :] = columns[self.rows - 2], NOWHERE
+
+    def taken(self, p: Array, sizes: Array) -> Array:
+        """What is read of parameters (parameters, k) and limits, with nominal sizes (n,) and no limits yet."""
+        limits = np.ones((3, p.shape[1]))
+        return self._function.taken(np.concatenate([p, limits, np.repeat(sizes[:, None], p.shape[1], axis=1)]))
+
+    def limit(self, taken: Array, tolerance: float, end: Array | float, longest: float) -> None:
+        """Set the limits in what is `taken`: the tolerance, the end and the longest step, s."""
+        first = -(3 + self.states)
+        taken[first], taken[first + 1], taken[first + 2] = tolerance, end, longest
+
+    def __call__(self, columns: Array, taken: Array, after: Array) -> None:
+        """Write what a step makes of columns (height, k), both contiguous."""
+        self._function.into(after, columns, taken)
+
+    def written(self) -> LaneFunction:
+        """The step as a function."""
+        program, quantities = self.program, [quantity for quantity, _ in self._seen]
+        time, step, before = heyoka.make_vars("time", "step", "before")
+        integrals = [heyoka.expression(f"integral{k}") for k in range(len(self._integrals))]
+        limit = [heyoka.par[program.parameter_count + k] for k in range(3 + self.states)]
+        (tolerance, end, longest), sizes = limit[:3], limit[3:]
+        left = end - time
+        wanted = _lower(step, longest)
+        size = _lower(wanted, left)
+        old = [*program.variables, *integrals]
+        blind = [quantity for quantity in dict.fromkeys(quantities) if at(quantity, FREE_TIME) != quantity]
+        integrands = [reduce(mul, [quantity] * power) for quantity, power in self._integrals]
+        stages = _stages(program.variables, [*program.rates, *integrands, *blind], time, size)
+        new = [_moved(x, size, DOP853.B, slopes) for x, slopes in zip(old, stages, strict=False)]
+        begun = [(x, *of) for x, of in zip(integrals, self._integrals, strict=True)]
+        error = _step_error(_LaneStart(program, time, size, sizes), begun, blind, stages) / tolerance
+        factor = SAFETY / heyoka.sqrt(heyoka.sqrt(heyoka.sqrt(error + TINY)))  # the error is of order 8
+        factor = _higher(_lower(factor, heyoka.expression(MOST_FACTOR)), heyoka.expression(LEAST_FACTOR))
+        good = heyoka.lte(error, 1.0)
+        arrived = heyoka.select(heyoka.lt(wanted, left), time + size, end)
+        after = [heyoka.select(good, moved, x) for x, moved in zip([*old, time], [*new, arrived], strict=True)]
+        here = [at(one, time) for quantity in quantities for one in program.jet(quantity)]
+        last = [heyoka.expression(f"seen{k}") for k in range(len(here))]
+        come = {pair: heyoka.expression(f"reach{k}") for k, pair in enumerate(self._reaches)}
+        column = (*after, size * factor, time, *here, *self._come(time - before, last, here, come))
+        return LaneFunction(column, (*old, time, step, before, *last, *come.values()))
+
+    def _come(
+        self, length: Any, last: Sequence[Any], here: Sequence[Any], come: Mapping[tuple[int, float], Any]
+    ) -> list[Any]:
+        """How far quantities can have come by now, from where they have come before the last interval."""
+        reaches = []
+        for (number, sign), before in come.items():
+            jets = last[self.jet(number)], here[self.jet(number)]
+            missed = apart(length, *jets)
+            between = reduce(_higher, [sign * value for value in inner(length, *jets)])
+            beyond = BEYOND * _higher(missed, -missed)
+            reaches.append(reduce(_higher, [before, sign * jets[1][0], between + beyond]))
+        return reaches
+
+
+@lru_cache(maxsize=KEPT)
+def _function(step: LaneStep) -> LaneFunction:
+    """The function of a step; those of sweeps that differ in their numbers alone share it."""
+    return step.written()
+
+
+def _lower(a: Any, b: Any) -> Any:
+    """The lower of two expressions."""
+    return heyoka.select(heyoka.lt(a, b), a, b)
+
+
+def _higher(a: Any, b: Any) -> Any:
+    """The higher of two expressions."""
+    return heyoka.select(heyoka.gt(a, b), a, b)
+
+
+def _stages(states: Sequence[Any], slopes: Sequence[Any], time: Any, size: Any) -> list[list[Any]]:
+    """Values of slopes, first those of the states, at the stages of a step."""
+    stages: list[list[Any]] = [[] for _ in slopes]
+    for weights, part in zip(DOP853.A, DOP853.C, strict=True):
+        there = {x: _moved(x, size, weights, before) for x, before in zip(states, stages, strict=False)}
+        values = heyoka.subs(list(slopes), {**there, heyoka.time: time + part * size})
+        for before, slope in zip(stages, values, strict=True):
+            before.append(slope)
+    return stages
+
+
+def _moved(x: Any, size: Any, weights: Array, slopes: Sequence[Any]) -> Any:
+    """A state moved along slopes."""
+    return x + size * _weighted(weights, slopes)
+
+
+@dataclass(frozen=True, eq=False)
+class _LaneStart:
+    """Where a step starts, as heyoka's expressions.
+
+    Args:
+        program: of the lanes.
+        time: s.
+        size: of the step, s.
+        nominal: sizes of the states.
+    """
+
+    program: LaneProgram
+    time: Any
+    size: Any
+    nominal: Sequence[Any]
+
+    def gradient(self, quantity: Any) -> list[Any]:
+        """Derivatives of a quantity by the states."""
+        return [at(slope, self.time) for slope in self.program.gradient(quantity)]
+
+    def least(self, quantity: Any) -> Any:
+        """The square of what matters of a quantity whatever its value."""
+        states = zip(self.gradient(quantity), self.nominal, self.program.variables, strict=True)
+        return TINY + _squares([slope * part for slope, least, x in states for part in (least, CANCELLED * x)])
+
+
+def _step_error(
+    start: _LaneStart, integrals: Sequence[tuple[Any, Any, int]], blind: Sequence[Any], stages: Sequence[Sequence[Any]]
+) -> Any:
+    """The error of a step in units of the tolerance.
+
+    Args:
+        start: of the step.
+        integrals: the value at the start, the quantity, and its power that is integrated.
+        blind: quantities that may change without the states.
+        stages: slopes at the stages of the step: of states, of integrals, and what is blind.
+    """
+    program, size = start.program, start.size
+    states, first = program.variables, [slopes[0] for slopes in stages]
+    allowed = [
+        _squares([x, least, size * slope]) for x, least, slope in zip(states, start.nominal, first, strict=False)
+    ]
+    means = [_squares(slopes) * (1 / len(slopes)) for slopes in stages[len(states) :]]
+    for (value, quantity, power), mean in zip(integrals, means, strict=False):
+        allowed.append(_squares([value]) + size * size * (mean + start.least(quantity) ** float(power)))
+    for quantity, mean in zip(blind, means[len(integrals) :], strict=True):
+        allowed.append(OF_A_QUANTITY**2 * size * size * (mean + start.least(quantity)))
+    gradients = {quantity: start.gradient(quantity) for quantity in program.quantities}
+    for quantity, slopes in gradients.items():
+        value, change = at(quantity, start.time), size * _inner(slopes, first)
+        allowed.append(OF_A_QUANTITY**2 * (_squares([value, change]) + start.least(quantity)))
+    squares = []
+    for weights in (DOP853.E5, DOP853.E3):
+        missed = [_weighted(weights, slopes) for slopes in stages]
+        missed += [_inner(slopes, missed) for slopes in gradients.values()]
+        squares.append(heyoka.sum([one * one / most for one, most in zip(missed, allowed, strict=True)]))
+    fifth, third = squares
+    return size * fifth / heyoka.sqrt(fifth + 0.01 * third + TINY * TINY)
+
+
+def _squares(parts: Sequence[Any]) -> Any:
+    """The sum of their squares."""
+    return heyoka.sum([part * part for part in parts])
+
+
+def _inner(slopes: Sequence[Any], changes: Sequence[Any]) -> Any:
+    """The sum of their products, of as many as there are slopes."""
+    return heyoka.sum([slope * change for slope, change in zip(slopes, changes, strict=False)])
+
+
+def _weighted(weights: Array, slopes: Sequence[Any]) -> Any:
+    """The sum of slopes with weights."""
+    terms = [weight * slope for weight, slope in zip(weights.tolist(), slopes, strict=False) if weight]
+    return heyoka.sum(terms) if terms else heyoka.expression(0.0)

@@ -1,0 +1,276 @@
+"""Variants of a network: every combination of values, or a table of samples; measured, judged and ranked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import nullcontext
+from itertools import compress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shaftwork.core.errors import NetworkWarning, ParameterError
+from shaftwork.core.notices import muted
+from shaftwork.core.parameters import whole, without_unit
+from shaftwork.core.screen import progress
+from shaftwork.network.netlist import Netlist
+from shaftwork.pipeline.arguments import OutputTimes, checked_parameter, relative_tolerance, time_span
+from shaftwork.pipeline.motion_start import ending_of, refuse_motion, time_of_start
+from shaftwork.pipeline.network import Network, network_of
+from shaftwork.results.fatigue import SNLine
+from shaftwork.results.measures import Measure
+from shaftwork.results.observer import Array
+from shaftwork.results.solution import Solution
+from shaftwork.studies.study_arguments import by_name, engine_names, repeated
+from shaftwork.sweep.sweep_result import VERDICTS, Limits, Sweep
+from shaftwork.sweep.sweep_store import Store
+from shaftwork.sweep.sweep_task import Chunk, Reader, Task, Worker, chunks
+
+LEFT = "a zero, an impact, a stiff motion or a change of mode that is not beyond doubt is left to `simulate`"
+"""Why variants have left those beside them."""
+
+MOST_VARIANTS = 10_000_000
+"""Of a grid: so many take hours, and more are a typing error."""
+
+Measures = Mapping[str, "str | Callable[[Solution], float]"] | Iterable[str]
+
+
+def sweep(
+    net: Network,
+    parameters: Mapping[str, Iterable[float]] | None = None,
+    *,
+    t_end: float,
+    measures: Measures,
+    samples: Any = None,
+    require: Mapping[str, tuple[float | None, float | None]] | None = None,
+    sn: SNLine | Mapping[str, SNLine] | None = None,
+    rtol: float = 1e-8,
+    engine: str = "auto",
+    initial: Mapping[str, float] | Solution | None = None,
+    steady: bool = False,
+    t_eval: OutputTimes = None,
+    processes: int | None = None,
+    store: str | Path | None = None,
+) -> Sweep:
+    """Simulate variants of a network and measure each of them; nothing is compiled anew.
+
+    Where all measures have names, many variants run side by side in compiled code (extra `fast`), and those that it
+    cannot follow run one by one. Results do not depend on the number of processes, and that of a variant not on those
+    beside it, except the first: that one gives the nominal sizes of the states, for the absolute tolerance, and says in
+    which modes variants run side by side. Another first one changes results within the tolerance.
+
+    Args:
+        net: the network.
+        parameters: a grid, {"shaft.c": [2e4, 3e4], "motor.tau_k": [8, 9, 10]}: all combinations, the last name fastest.
+        samples: instead of it a table, a mapping to columns of equal length or a pandas data frame: a variant each row.
+        t_end: end of the motions, s.
+        measures: names such as "max shaft.tau", or a mapping from names of your own to these, or to functions of a
+            solution. First words are "max", "min", "peak", "mean", "rms", "end" and "damage", see
+            `results.measures.KINDS`.
+        require: by measure, (low, high); None leaves a side open.
+        sn: S-N line for measures of damage, or one by quantity.
+        rtol: relative tolerance of a step; the absolute one beside it is `rtol` times the size of a state at a speed of
+            0.001 rad/s.
+        engine: as in `Model.simulate`.
+        initial: start values, or a motion that each variant goes on from, as there.
+        steady: whether each variant starts in its own steady state at t = 0, of which `initial` changes some values.
+        t_eval: output times of the solutions that functions get, as there; names measure the motion, not the outputs.
+        processes: how many; by default as many as there are cores, where the sweep takes long enough. Variants side by
+            side are divided only then: in the seconds that a process needs to start, 50 000 are done.
+        store: a file to which all that is done is appended. The same call with the same file goes on where it stopped.
+
+    Raises:
+        ParameterError: an argument is out of its range, there is no such parameter or measure, or the store is that of
+            another sweep, in use by one, damaged in a line that is not the last, or cannot be written any more.
+        NetworkError: the network cannot be assembled.
+        SignalError: a measure is of a quantity that does not exist.
+    """
+    columns = _columns(network_of(net).netlist(), parameters, samples)
+    start = _start(net, initial, steady=steady)
+    readers = _readers(measures, columns)
+    limits = _limits(require, readers)
+    _, end = time_span(time_of_start(None, start), t_end)
+    options = _options(readers, rtol, engine, start, t_eval)
+    count = _count(processes)
+    task = Task(net, columns, readers, _lines(sn, readers), end, options, steady)
+    values, reasons, why = _run(task, count, store)
+    return Sweep(net.name, columns, dict(zip(readers, values.T, strict=True)), limits, reasons, why)
+
+
+def _start(net: Network, initial: Any, *, steady: bool) -> Any:
+    """Start values; of a motion what it ends with."""
+    if steady:
+        refuse_motion(initial, "sweep(steady=True)")
+    if not isinstance(initial, Solution):
+        return initial
+    with muted(NetworkWarning):  # compilation warns
+        return ending_of(initial, net.graph())
+
+
+def _options(
+    readers: Mapping[str, Reader], rtol: float, engine: str, initial: Any, t_eval: OutputTimes
+) -> dict[str, Any]:
+    """What each simulation is told."""
+    (name,) = engine_names([engine])
+    if t_eval is None and all(isinstance(reader, Measure) for reader in readers.values()):
+        t_eval = 2  # they read the motion between these
+    return {"rtol": relative_tolerance(rtol), "engine": name, "initial": initial, "t_eval": t_eval}
+
+
+def _count(processes: int | None) -> int | None:
+    """How many processes; None for as many as there are cores."""
+    if processes is not None and (count := whole(processes)) is None:
+        raise ParameterError(f"processes = {processes!r} must be a number, 1 or more; leave it out for all cores.")
+    return None if processes is None else count
+
+
+def _run(task: Task, processes: int | None, path: str | Path | None) -> tuple[Array, tuple[str, ...], str]:
+    """(variants, measures), why variants failed, and why some or all ran one by one."""
+    worker = Worker(task)
+    values, reasons = np.full((len(task), len(task.measures)), np.nan), [""] * len(task)
+    open_, alone, failed = np.ones(len(task), dtype=bool), 0, 0
+
+    def take(chunk: Chunk) -> None:
+        nonlocal alone, failed
+        new = open_[chunk.variants]  # two calls at once on one store have done some twice
+        alone += min(chunk.left, int(new.sum()))
+        failed += sum(bool(reason) for reason in compress(chunk.reasons, new))
+        values[chunk.variants], open_[chunk.variants] = chunk.values, False
+        for variant, reason in zip(chunk.variants.tolist(), chunk.reasons, strict=True):
+            reasons[variant] = reason
+
+    with nullcontext() if path is None else Store(path, task) as store:
+        for chunk in store.chunks if store else []:
+            take(chunk)
+        with progress(len(task), "variants", "compiling") as show:
+            for chunk in chunks(worker, task, np.flatnonzero(open_), processes):
+                if store:
+                    store.append(chunk)
+                take(chunk)
+                show(len(task) - int(open_.sum()), f"{failed} failed" if failed else "sweep")
+    why = worker.why or (f"{alone} of {len(task)} variants ran one by one: {LEFT}" if alone else "")
+    return values, tuple(reasons), why
+
+
+def _columns(netlist: Netlist, parameters: Any, samples: Any) -> dict[str, Array]:
+    """(variants,) values by parameter, in SI.
+
+    Raises:
+        ParameterError: there is no such parameter, a value is not admissible, or columns differ in length.
+    """
+    if (parameters is None) == (samples is None):
+        raise ParameterError(
+            "Give a grid, sweep(net, {'shaft.c': [...]}, ...), or a table, samples={'shaft.c': [...]}."
+        )
+    table = samples if parameters is None else parameters
+    if not hasattr(table, "items"):
+        raise ParameterError(f"{table!r} must map parameters to their values, such as {{'shaft.c': [2e4, 3e4]}}.")
+    named = [(str(name), _plain(values)) for name, values in table.items()]
+    if twice := repeated(name for name, _ in named):  # a data frame may have two columns of one name
+        raise ParameterError(f"There are two columns '{twice}'. Give each parameter one.")
+    checked = {name: _checked(netlist, name, values) for name, values in named}
+    if not checked or not all(len(values) for values in checked.values()):
+        raise ParameterError("A sweep needs at least one parameter, and a value for each.")
+    if parameters is None:
+        if len({len(values) for values in checked.values()}) > 1:
+            lengths = ", ".join(f"{name} {len(values)}" for name, values in checked.items())
+            raise ParameterError(f"The columns of samples differ in length: {lengths}.")
+        return checked
+    return _grid(checked)
+
+
+def _grid(values: Mapping[str, Array]) -> dict[str, Array]:
+    """Every combination of values, the last name fastest."""
+    count = math.prod(map(len, values.values()))
+    if count > MOST_VARIANTS:
+        sizes = " x ".join(f"{len(column)}" for column in values.values())
+        raise ParameterError(
+            f"A grid of {sizes} values has {count} variants, more than {MOST_VARIANTS}. Give fewer values, or draw "
+            "samples={...} of them."
+        )
+    grids = np.meshgrid(*values.values(), indexing="ij")
+    return {name: grid.ravel() for name, grid in zip(values, grids, strict=True)}
+
+
+def _checked(netlist: Netlist, name: str, values: Any) -> Array:
+    """(k,) values of one parameter in SI, each admissible by itself."""
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise ParameterError(f"'{name}': {values!r} must be a sequence of values. Write [{values!r}].")
+    if not isinstance(values, np.ndarray):
+        values = list(values)
+        values = np.array(values) if all(type(value) is float for value in values) else values
+    numbers = values if isinstance(values, np.ndarray) and values.dtype == float and values.ndim == 1 else None
+    examples = values if numbers is None else _telling(numbers)
+    admissible = [checked_parameter(netlist, name, value) for value in examples]
+    return np.array(admissible if numbers is None else numbers, dtype=float)
+
+
+def _plain(values: Any) -> Any:
+    """A column of a data frame as an array."""
+    return values.to_numpy() if hasattr(values, "to_numpy") else values
+
+
+def _telling(values: Array) -> list[float]:
+    """Of many numbers those that tell whether all are admissible.
+
+    Bounds are on values and on sizes, refuse zero, or refuse what is not whole.
+    """
+    if not np.isfinite(values).all():
+        return [float(values[~np.isfinite(values)][0])]
+    ends = [values[pick(values)] for pick in (np.argmin, np.argmax)] if values.size else []
+    sizes = np.abs(values[values != 0.0])
+    smallest = values[values != 0.0][[sizes.argmin()]] if sizes.size else sizes
+    broken = values[[np.abs(values - np.round(values)).argmax()]] if values.size else values
+    return [*map(float, ends), *smallest.tolist(), *broken.tolist(), *([0.0] if sizes.size < values.size else [])]
+
+
+def _readers(measures: Measures, columns: Iterable[str]) -> dict[str, Reader]:
+    """Measures by name, none of them that of another column of the table."""
+    readers: dict[str, Reader] = {}
+    for name, reader in by_name(measures).items():
+        if not isinstance(reader, str) and not callable(reader):
+            raise ParameterError(f"measure '{name}' = {reader!r} must be a name, 'max shaft.tau', or a function.")
+        readers[name] = Measure.read(reader) if isinstance(reader, str) else reader
+    if taken := [name for name in (*columns, *VERDICTS) if name in readers]:
+        raise ParameterError(
+            f"No measure can be called '{taken[0]}': the table has another column of that name. Give it another one, "
+            f"measures={{'my {taken[0]}': ...}}."
+        )
+    return readers
+
+
+def _limits(require: Mapping[str, Any] | None, readers: Mapping[str, Reader]) -> dict[str, Limits]:
+    limits: dict[str, Limits] = {}
+    for name, pair in (require or {}).items():
+        if name not in readers:
+            raise ParameterError(f"require: there is no measure '{name}'. There are: {', '.join(readers)}.")
+        for side in pair if isinstance(pair, tuple | list) else ():
+            without_unit(f"require['{name}']", side, "of the measure, as N m")
+            if isinstance(side, str | bytes):
+                raise ParameterError(
+                    f"require['{name}'] = {pair!r}: {side!r} is a text. Give a number in the SI unit of the measure."
+                )
+        try:
+            low, high = (None if side is None else float(side) for side in pair)
+        except (TypeError, ValueError):
+            raise ParameterError(
+                f"require['{name}'] = {pair!r} must be (low, high); None leaves a side open."
+            ) from None
+        if not (-math.inf if low is None else low) <= (math.inf if high is None else high):
+            raise ParameterError(
+                f"require['{name}'] = {pair!r}: no value is at least {low} and at most {high}. Write (low, high)."
+            )
+        limits[name] = (low, high)
+    return limits
+
+
+def _lines(sn: Any, readers: Mapping[str, Reader]) -> dict[str, SNLine]:
+    """The S-N line of every quantity whose damage is measured."""
+    named = (reader for reader in readers.values() if isinstance(reader, Measure))
+    quantities = [measure.quantity for measure in named if measure.kind == "damage"]
+    lines = dict(sn) if isinstance(sn, Mapping) else dict.fromkeys(quantities, sn)
+    if missing := [name for name in quantities if not isinstance(lines.get(name), SNLine)]:
+        raise ParameterError(f"The damage of '{missing[0]}' needs an S-N line: sn=SNLine(...), or sn={{name: SNLine}}.")
+    return {name: lines[name] for name in quantities}

@@ -1,0 +1,342 @@
+"""What a sweep computes, chunk by chunk: each variant by itself or many side by side, in one process or several."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shaftwork.codegen.model_observer import ModelObserver
+from shaftwork.components.base import Component
+from shaftwork.core.errors import (
+    AccuracyWarning,
+    CompileError,
+    NetworkWarning,
+    ParameterError,
+    ShaftworkError,
+    SimulationError,
+    in_one_line,
+    no_quantity,
+)
+from shaftwork.core.notices import muted
+from shaftwork.integrate.engines import available
+from shaftwork.network.netlist import Netlist
+from shaftwork.pipeline.model import steady_start
+from shaftwork.pipeline.motion_start import Ending
+from shaftwork.pipeline.network import Network
+from shaftwork.results.fatigue import SNLine
+from shaftwork.results.measures import Measure
+from shaftwork.results.observer import Array
+from shaftwork.results.solution import Solution
+
+if TYPE_CHECKING:
+    from shaftwork.sweep.ensemble import Ensemble
+
+SIDE_BY_SIDE = 16
+"""Variants from which on it is worth while to compile a program for many of them."""
+CHUNK, LONE_CHUNK = 2048, 8
+"""Variants that are computed and stored at once: side by side, and one by one."""
+
+Reader = Measure | Callable[[Solution], float]
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """A sweep, as every process gets it.
+
+    Args:
+        network: of which there are variants.
+        columns: (k,) values by parameter, "shaft.c", in SI.
+        measures: by name.
+        sn: S-N lines by quantity.
+        t_end: end of the motions, s.
+        options: of `Model.simulate`.
+        steady: whether each variant starts in its own steady state at t = 0.
+    """
+
+    network: Network
+    columns: Mapping[str, Array]
+    measures: Mapping[str, Reader]
+    sn: Mapping[str, SNLine]
+    t_end: float
+    options: Mapping[str, Any]
+    steady: bool = False
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values())))
+
+    def values(self, variant: int) -> dict[str, float]:
+        """The parameters of a variant that differ from the network's."""
+        return {name: float(column[variant]) for name, column in self.columns.items()}
+
+
+@dataclass(frozen=True, eq=False)
+class Chunk:
+    """What came out for some variants.
+
+    Args:
+        variants: (k,) their numbers.
+        values: (k, measures); NaN where a variant failed.
+        reasons: k texts; empty where it did not.
+        left: how many could not be followed side by side and ran one by one.
+    """
+
+    variants: NDArray[np.intp]
+    values: Array
+    reasons: tuple[str, ...]
+    left: int = 0
+
+
+class Worker:
+    """Computes variants of a sweep; each process has its own.
+
+    Args:
+        task: the sweep.
+
+    Raises:
+        NetworkError: the network cannot be assembled.
+        ParameterError: the start values are no mapping.
+        SignalError: a measure or a start value is of a quantity that does not exist.
+    """
+
+    def __init__(self, task: Task) -> None:
+        self._task, self._model = task, task.network.compile()
+        self._netlist: Netlist = task.network.netlist()
+        self._refuse_unknown()
+        self.why = ""
+        """Why variants run one by one."""
+        self._ensemble = self._side_by_side()
+        self.chunk = LONE_CHUNK if self._ensemble is None else CHUNK
+
+    def _refuse_unknown(self) -> None:
+        observer = ModelObserver(self._model.form, self._model.bind)
+        initial = self._task.options["initial"] or {}
+        if not isinstance(initial, Mapping):
+            raise ParameterError(f"initial = {initial!r} must map quantities to values, such as {{'J1.omega': 3.0}}.")
+        read = [reader.quantity for reader in self._task.measures.values() if isinstance(reader, Measure)]
+        start_names = () if isinstance(initial, Ending) else map(str, initial)
+        for quantity in (*read, *start_names):
+            if quantity not in {**observer.units, **observer.profiles}:
+                raise no_quantity(quantity, self._model.name, observer.units)
+
+    def _side_by_side(self) -> Ensemble | None:
+        task, options = self._task, self._task.options
+        read = [reader for reader in task.measures.values() if isinstance(reader, Measure)]
+        reasons = {
+            f"there are fewer than {SIDE_BY_SIDE} variants": len(task) < SIDE_BY_SIDE,
+            "a measure is a function of a whole solution": len(read) < len(task.measures),
+            f"engine = '{options['engine']}' was asked for": options["engine"] not in ("auto", "heyoka"),
+            "start values are given": bool(options["initial"]),
+            "each variant starts in its own steady state": task.steady,
+            "heyoka is not installed (extra 'fast')": not available("heyoka"),
+        }
+        self.why = next((reason for reason, holds in reasons.items() if holds), "")
+        if self.why:
+            return None
+        from shaftwork.sweep.ensemble import Ensemble
+
+        span, names = (0.0, task.t_end), tuple(task.columns)
+        for first in (task.values(0), {}):  # the network itself, where the first variant fails
+            try:
+                return Ensemble(self._model, names, first, read, span, options["rtol"])
+            except CompileError as error:
+                reason = str(error).splitlines()[0].rstrip(".")
+                self.why = reason[0].lower() + reason[1:]
+                return None
+            except ShaftworkError:
+                self.why = "the first of them fails, and the network as it is too"
+        return None
+
+    def run(self, variants: NDArray[np.intp]) -> Chunk:
+        """Measures of some variants."""
+        values = np.full((variants.size, len(self._task.measures)), np.nan)
+        reasons = [self._objection(variant) if self._choosy else "" for variant in variants.tolist()]
+        open_ = np.array([not reason for reason in reasons])
+        if self._ensemble is not None and open_.any():
+            here = np.flatnonzero(open_)
+            columns = np.array([column[variants[here]] for column in self._task.columns.values()])
+            measured, done = self._ensemble.run(columns)
+            values[here[done]] = measured[:, done].T
+            open_[here[done]] = False
+        left = 0 if self._ensemble is None else int(open_.sum())
+        for row in np.flatnonzero(open_).tolist():
+            values[row], reasons[row] = self._alone(int(variants[row]))
+        return Chunk(variants, values, tuple(reasons), left)
+
+    @cached_property
+    def _choosy(self) -> list[tuple[Component, list[tuple[str, Array]]]]:
+        """Parts that check whether their values go together, with the columns of those that vary.
+
+        Left out are those whose check reads nothing that varies: it says the same of all variants as of the network.
+        """
+        by_part: dict[str, list[tuple[str, Array]]] = {}
+        for name, column in self._task.columns.items():
+            owner, _, parameter = name.rpartition(".")
+            by_part.setdefault(owner, []).append((parameter, column))
+        parts = (placed.part for placed in self._netlist.placed)
+        varied = [(part, by_part[part.name]) for part in parts if part.name in by_part]
+        return [(part, table) for part, table in varied if not _checked(part).isdisjoint({"__dict__", *dict(table)})]
+
+    def _objection(self, variant: int) -> str:
+        """Why the values of a variant do not go together; empty where they do."""
+        for part, columns in self._choosy:
+            changed: Any = object.__new__(type(part))  # its values have been looked at one by one
+            vars(changed).update(vars(part))
+            vars(changed).update({parameter: float(column[variant]) for parameter, column in columns})
+            try:
+                changed.__post_init__()
+            except ParameterError as error:
+                return in_one_line(error)
+        return ""
+
+    def _alone(self, variant: int) -> tuple[Array, str]:
+        """Measures of one variant, and why it failed."""
+        task, nothing = self._task, np.full(len(self._task.measures), np.nan)
+        parameters, options = task.values(variant), dict(task.options)
+        try:
+            if task.steady:
+                options["initial"] = steady_start(self._model, options["initial"] or {}, parameters)
+            solution = self._model.simulate(task.t_end, parameters=parameters, **options)
+        except ShaftworkError as error:
+            return nothing, in_one_line(error)
+        values = []
+        for name, reader in task.measures.items():
+            try:
+                value = reader.of(solution, task.sn) if isinstance(reader, Measure) else float(reader(solution))
+            except Exception as error:  # noqa: BLE001 (of the user's own function: a reason, not the end of the sweep)
+                return nothing, f"measure '{name}': {type(error).__name__}: {in_one_line(error)}"
+            if not np.isfinite(value):
+                return nothing, f"measure '{name}' is {value}"
+            values.append(value)
+        return np.array(values), ""
+
+
+def _checked(part: Component) -> set[str]:
+    """The names that a part's check of its values reads, for the values that it has."""
+    read = set[str]()
+
+    class ToldParts(type(part)):  # type: ignore[misc] # the same part, which tells what is read of it
+        def __getattribute__(self, name: str) -> Any:
+            read.add(name)
+            return super().__getattribute__(name)
+
+    told: Any = object.__new__(ToldParts)
+    object.__getattribute__(told, "__dict__").update(vars(part))
+    with muted(NetworkWarning, AccuracyWarning):  # what is odd about it was said when it was made
+        told.__post_init__()
+    return read - {"__post_init__"}
+
+
+WORTH = 8.0
+"""Processes are started where what is left would take so long in s: each needs seconds to import and to compile."""
+
+Index = NDArray[np.intp]
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def chunks(worker: Worker, task: Task, variants: Index, processes: int | None) -> Iterator[Chunk]:
+    """Chunks as they are done.
+
+    Args:
+        worker: of this process.
+        task: the sweep.
+        variants: (k,) what is to be done.
+        processes: how many; None for as many as there are cores. Variants side by side take to them only where what is
+            left takes long enough, others also where so many are asked for.
+    """
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        sys.exit(1)  # a script without a guard, run again by a process that it has started: the first one says so
+    parts = [variants[first : first + worker.chunk] for first in range(0, variants.size, worker.chunk)]
+    count = processes if processes is not None else cores() if _can_be_sent(task) else 1
+    if processes is not None and count > 1 and worker.why:
+        yield from _in_processes(task, parts, count)
+        return
+    for number, part in enumerate(parts):
+        began = time.monotonic()
+        yield worker.run(part)
+        left = len(parts) - number - 1
+        if number and count > 1 and (time.monotonic() - began) * left > WORTH:  # the first one compiles
+            yield from _in_processes(task, parts[number + 1 :], count)
+            return
+
+
+def _can_be_sent(task: Task) -> bool:
+    """Whether another process finds the functions that measure: those of a notebook or of `python -c` it does not."""
+    functions = [reader for reader in task.measures.values() if not isinstance(reader, Measure)]
+    main = sys.modules["__main__"]
+    here = any(getattr(function, "__module__", "") == "__main__" for function in functions)
+    local = any("<" in getattr(function, "__qualname__", "") for function in functions)
+    return not local and not (here and not hasattr(main, "__file__"))
+
+
+def _in_processes(task: Task, parts: Sequence[Index], count: int) -> Iterator[Chunk]:
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(min(count, len(parts)) or 1, context, _begin, (task,))
+    try:
+        with _uninterrupted():
+            pending: set[Future[Chunk]] = {pool.submit(_run, part) for part in parts}
+        while pending:
+            done, pending = wait(pending, return_when=FIRST_COMPLETED)
+            for future in done:
+                yield future.result()
+    except BrokenProcessPool as error:
+        raise SimulationError(
+            "A process of the sweep has ended before its work was done. A script that starts processes must do so "
+            "under 'if __name__ == \"__main__\":', and memory must be enough for all; processes=1 needs neither."
+        ) from error
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+@contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Processes that start meanwhile ignore Ctrl-C from their first moment: that which a user stops ends them."""
+    before = signal.getsignal(signal.SIGINT)
+    if before is None or threading.current_thread() is not threading.main_thread():  # not to be changed from here
+        yield
+        return
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+_worker: Worker | None = None
+
+
+def _begin(task: Task) -> None:
+    global _worker  # noqa: PLW0603 (a process has one task)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process that a user stops says what happens
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    _worker = Worker(task)
+
+
+def _end_with_parent() -> None:
+    """An idle process waits for work, which comes no more once its parent has been killed."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None  # noqa: S101 (a process of a sweep has one)
+    parent.join()
+    os._exit(1)
+
+
+def _run(part: Index) -> Chunk:
+    assert _worker is not None  # noqa: S101 (`_begin` came first)
+    return _worker.run(part)

@@ -1,0 +1,1 @@
+"""Shafts as travelling waves: their equations, the engine that follows delays, and phases beside them."""

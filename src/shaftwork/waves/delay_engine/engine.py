@@ -1,0 +1,170 @@
+"""The engine for lossless lines: a network of ordinary differential equations whose lines are delays."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+
+from shaftwork.core.errors import AccuracyWarning
+from shaftwork.core.notices import warn
+from shaftwork.integrate.engines import WAVE
+from shaftwork.waves.delay_engine.collocation import STAGES
+from shaftwork.waves.delay_engine.lattice import ROUNDING, Lattice, Matrices, panel_map
+from shaftwork.waves.delay_engine.lines import DelayProblem, DelayTrajectory
+from shaftwork.waves.delay_engine.march import March
+from shaftwork.waves.delay_engine.periodic_propagation import Far, PeriodicPropagation
+from shaftwork.waves.delay_engine.waveforms import trajectory
+
+# Delays are whole multiples of a part of the shortest one, up to rounding, and no longer than so many of them.
+MOST_PARTS, MOST_PERIODS = 12, 64
+# More panels in a period, or unknowns in a panel, are left to the march.
+MOST_PANELS, MOST_ROWS = 16, 400
+MOST_PANELS_FAR = 64
+# A motion of fewer panels is short. One of more, and of more for each output, is leapt through after so many periods.
+SHORT, LONG, LONG_GAP, BEGINNING = 2_000, 20_000, 100, 256
+
+
+def solve(problem: DelayProblem) -> DelayTrajectory:
+    """Integrate by Gauss collocation of order 16 on panels between the kinks, none longer than the shortest delay.
+
+    Law: on such a panel all h are known, so only the states are solved for. A jump or kink of a wave, born at t0, at
+    a breakpoint or in a law, ends a panel, and ends one again a delay later at the far end of its line, for as long
+    as it moves a wave by more than the tolerance. Delays without a common measure so make ever more panels, in
+    proportion to the square of the time for two of them; kinks nearer than a part 1e-4 rtol of a delay are one, and
+    weak ones stay inside a panel, which is then halved at the kink if it does not resolve them: the error follows
+    rtol, and `max_steps` is the bound. Where the panels of a line repeat with its delay the nodes coincide, h is
+    taken from them, and Gauss quadrature of the exchanged power is exact: energy is kept to rounding. Elsewhere h is
+    the polynomial of its panel, one-sided at the panel's ends, checked between the nodes.
+
+    A panel is halved until the Legendre coefficients that states and waves leave out are below a tenth of the
+    tolerance, so the panels are graded towards the boundary layer of a light end. A layer that is narrower than the
+    hundredth part of rtol times the shortest delay is stepped over by Radau IIA, which leaves no ringing; in it the
+    output is that of a straightened layer. Linear networks whose delays have a common measure are solved by one
+    constant map a panel, and long ones with constant inputs and few outputs by its powers
+    (`on_lattice`).
+
+    Raises:
+        SimulationError: a value is not finite, Newton's method fails, a layer cannot be resolved, or too many panels.
+
+    Source: Bergeron, Du coup de belier en hydraulique au coup de foudre en electricite, 1949; Bellen and Zennaro,
+    Numerical Methods for Delay Differential Equations, 2003; Hairer, Lubich, Wanner, Geometric Numerical Integration,
+    IV.2.
+    """
+    with np.errstate(all="ignore"):
+        if problem.linear and problem.past is None and (periodic := on_lattice(problem)) is not None:
+            return periodic
+        march = March(problem)
+        march.run()
+    return trajectory(problem, *march.panels())
+
+
+def on_lattice(problem: DelayProblem) -> DelayTrajectory | None:
+    """Integrate a linear network whose delays have a common measure, or None where they have not.
+
+    Law: every period, of the length of that measure, is divided alike, at t0 and at the breakpoints and where a layer
+    needs it, so each panel is one constant map from (x, h) to (x, waves). Blocks of periods are marched side by side
+    from zero and from unit vectors, then their true starts are carried from block to block, and they are marched again.
+    A long motion under constant inputs with few outputs is leapt through: the map over 256 periods is marched, squared
+    again and again, and applied from output to output. What is asked for is checked as elsewhere; where modes
+    have run too far out of step for 64 panels a period, a warning says how much of the waves is not resolved.
+
+    Raises:
+        SimulationError: as `solve`.
+    """
+    measured = _measure(problem)
+    if measured is None:
+        return None
+    period, multiples = measured
+    pattern = _first_pattern(problem, period)
+    matrices, twice = Matrices.of(problem), 2 * np.repeat(problem.impedances, 2)
+    map_of = cache(lambda length: panel_map(matrices, twice, length * period))
+    rtol = max(problem.rtol, WAVE.finest)
+    # A beginning shows which panels are too long; a short motion shows it as fast.
+    resolved = (problem.t_end - problem.t0) / period * len(pattern) < SHORT
+    while True:
+        lattice = Lattice(problem, map_of, period, multiples, pattern)
+        far = _is_long(lattice)  # a long motion scrambles its modes, and the march cannot take it over
+        if resolved:
+            motion, bad = _far(lattice, rtol) if far else _whole(lattice, rtol)
+            if motion is not None:
+                return motion
+        else:
+            beginning = (2 * max(multiples) + 2) * lattice.size
+            bad = lattice.unresolved(lattice.run(min(lattice.count, beginning)), rtol)
+        resolved = not any(bad)
+        pattern = _refined(pattern, bad)
+        if not far and not resolved and len(pattern) > MOST_PANELS:
+            return None
+
+
+def _is_long(lattice: Lattice) -> bool:
+    problem = lattice.problem
+    if not problem.steady or problem.t_eval is None:
+        return False
+    return bool(lattice.count - lattice.edges[-2] > max(LONG, LONG_GAP * problem.t_eval.size))
+
+
+def _whole(lattice: Lattice, rtol: float) -> tuple[DelayTrajectory | None, list[bool]]:
+    """The trajectory, or None and which panels of the period must be finer."""
+    if lattice.count > lattice.problem.max_steps:
+        raise lattice.failure(0, lattice.problem.x0, f"{lattice.problem.max_steps} steps are not enough")
+    run = lattice.run(lattice.count)
+    bad = lattice.unresolved(run, rtol)
+    return (None if any(bad) else lattice.trajectory(run, lattice.problem.t_eval)), bad
+
+
+def _far(lattice: Lattice, rtol: float) -> tuple[DelayTrajectory | None, list[bool]]:
+    """As `_whole`, for a long motion of few outputs."""
+    times = np.asarray(lattice.problem.t_eval, dtype=float)
+    run = lattice.run(lattice.edges[-2] + max(BEGINNING * lattice.size, lattice.reach))
+    leaps = PeriodicPropagation(lattice, run)
+    read = np.unique(lattice.panels(times))
+    late = leaps.run(np.append(read[read >= leaps.first], lattice.count - 1))
+    bad = [any(both) for both in zip(lattice.unresolved(run, rtol), lattice.unresolved(late, rtol), strict=True)]
+    if any(bad):
+        if 2 * lattice.size <= MOST_PANELS_FAR:
+            return None, bad
+        warn(
+            f"After {lattice.count // lattice.size:g} delays the modes have run out of step and the waves have "
+            f"wrinkles finer than {lattice.size} panels in a delay: about {lattice.wrinkles(late):.1g} of the largest "
+            f"wave is not resolved (asked: {rtol:.1g}). The energy is kept all the same. An input without jumps, or a "
+            "little damping with model=Spectral(16), leaves fewer wrinkles.",
+            AccuracyWarning,
+        )
+        bad = [False] * lattice.size
+    far = Far(lattice.trajectory(run, np.empty(0)), leaps, lattice)
+    x, h, v = far.all(times)
+    statistics = {"steps": len(run.numbers) + len(read)}
+    return DelayTrajectory(times, x, far, statistics, h, v, waves=far.waves, squares=far.squares, past=None), bad
+
+
+def _measure(problem: DelayProblem) -> tuple[float, tuple[int, ...]] | None:
+    """A period in s and how many of them the delay of each line lasts."""
+    size = (problem.x0.size + 2 * problem.delays.size) * STAGES
+    shortest = float(problem.delays.min())
+    for parts in range(1, MOST_PARTS + 1):
+        ratios = problem.delays * parts / shortest
+        multiples = np.round(ratios)
+        if (np.abs(ratios - multiples) <= ROUNDING * multiples).all() and multiples.max() <= MOST_PERIODS:
+            return (shortest / parts, tuple(multiples.astype(int).tolist())) if size <= MOST_ROWS else None
+    return None
+
+
+def _first_pattern(problem: DelayProblem, period: float) -> tuple[float, ...]:
+    marks = [*problem.breakpoints] if problem.steady else [*problem.breakpoints, problem.t_end]
+    offsets = [0.0]
+    near = 8 * math.ulp(max(abs(problem.t0), abs(problem.t_end))) / period + ROUNDING
+    for mark in marks:
+        offset = math.fmod((mark - problem.t0) / period, 1.0)
+        if all(near < abs(offset - other) < 1 - near for other in offsets):
+            offsets.append(offset)
+    return tuple(sorted(offsets))
+
+
+def _refined(pattern: tuple[float, ...], bad: list[bool]) -> tuple[float, ...]:
+    """Halve the bad panels."""
+    spans = zip(pairwise((*pattern, 1.0)), bad, strict=True)
+    return tuple(start for (low, high), split in spans for start in ((low, (low + high) / 2) if split else (low,)))

@@ -1,0 +1,164 @@
+"""Motions through phases beside travelling waves: what arrives follows the states.
+
+Between two events what arrives at the ends of the lines is known. So a moment has it behind its states, with its rates:
+x = (states, h, dh/dt), and everything that is read at an instant is read as without waves. One march of the delay
+engine goes through all sets of equations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+
+from shaftwork.codegen.array_form.arrays import BoundArrays
+from shaftwork.codegen.array_form.elements import Array
+from shaftwork.codegen.waves import WaveSystem
+from shaftwork.hybrid.hybrid_state import Regime
+from shaftwork.hybrid.modes.mode_equations import ModeEquations
+from shaftwork.integrate.problem import Problem, Trajectory
+from shaftwork.pipeline.arguments import NOMINAL
+from shaftwork.waves.delay_engine.lines import DelayProblem, Lines
+from shaftwork.waves.delay_engine.march import March, MarchEquations
+from shaftwork.waves.delay_engine.waveforms import Left
+from shaftwork.waves.wave_motion import CarriedWaves, WaveStart, checked_lines, lines_by_shaft
+
+RATE = "rate of "
+
+
+class WaveModeEquations(ModeEquations):
+    """One set of equations with ends of waves, and its guards."""
+
+    @property
+    def clocks(self) -> tuple[int, ...]:
+        """None: panels resolve what changes with time alone by themselves."""
+        return ()
+
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """A name for what arrives at each end of a line, the same in all combinations of modes."""
+        graph = self.model.form.graph
+        owners = ((graph.part_of(k).name, graph.branches[k].template.label) for k in self.model.form.waves)
+        return tuple(f"{name}.{label} arriving" for name, label in owners)
+
+    def arriving(self, x: Array) -> dict[str, float]:
+        """What arrives, behind the states of a moment, and its rates, by name."""
+        names = (*self.ends, *(RATE + name for name in self.ends))
+        return dict(zip(names, x[len(self.model.states) :].tolist(), strict=True))
+
+    def taking(self, t: float, stored: Mapping[str, float], p: Array) -> Array:
+        """The states with which the equations take up what was stored, and what arrives; zero of what is not told."""
+        names = (*self.ends, *(RATE + name for name in self.ends))
+        return np.concatenate([super().taking(t, stored, p), [stored.get(name, 0.0) for name in names]])
+
+    def sizes(self, p: Array) -> list[float]:
+        """The nominal size of each state; of what arrives that of a wave with a nominal speed."""
+        impedances, _ = WaveSystem(self.bound(p)).lines
+        return [*super().sizes(p), *(2 * NOMINAL * np.repeat(impedances, 2)).tolist(), *np.zeros(2 * impedances.size)]
+
+    def arriving_rates(self, x: list[float]) -> list[float]:
+        """The rates of what arrives stand in the states; theirs are none."""
+        count = len(self.ends)
+        return [*x[-count:], *[0.0] * count]
+
+
+class WaveRun:
+    """The waves of one motion, from its start on.
+
+    Args:
+        bound: the equations in which it starts.
+        start: of the lines, or what is on its way in them; None for rest.
+        span: start and end of the motion, s.
+
+    Raises:
+        ParameterError: the waves are those of a line with another impedance or delay.
+
+    Warns:
+        AccuracyWarning: bearing friction is too heavy to be lumped.
+        NetworkWarning: a line is so short that the run hardly ends.
+    """
+
+    def __init__(self, bound: BoundArrays, start: WaveStart | CarriedWaves | None, span: tuple[float, float]) -> None:
+        self._system, self._span = WaveSystem(bound), span
+        self.lines: Mapping[str, Array] = lines_by_shaft(bound, self._system)
+        checked_lines(bound, self._system, start, span[1] - span[0], linear=False)
+        self._start: dict[str, Any] = {}
+        if isinstance(start, CarriedWaves):
+            self._start = {"past": start.past}
+        elif start is not None:
+            self._start = {"speeds0": start.speeds, "torque0": start.torques}
+        self._march: March | None = None
+        self._equations: dict[Regime, MarchEquations] = {}
+
+    def arriving(self, t: float) -> Array:
+        """(2 q,) what arrives at the ends of the lines at a time in s, and its rates."""
+        march = self._march or March(self._delayed(self._system, np.zeros(0), t), self._span)
+        return march.arriving(t)
+
+    def _delayed(self, system: WaveSystem, x: Array, t: float, **others: Any) -> DelayProblem:
+        impedances, delays = self._system.lines
+        defaults: dict[str, Any] = {"t_end": self._span[1], "names": (), "atol": np.zeros(x.size)}
+        return DelayProblem(
+            rhs=system.rhs,
+            speeds=system.speeds,
+            jacobian=system.jacobian,
+            delays=delays,
+            impedances=impedances,
+            x0=x,
+            t0=t,
+            **defaults | self._start | others,
+        )
+
+    def solve(self, regime: Regime, problem: Problem) -> Trajectory:
+        """One span of the motion, in the modes of a regime; states, and behind them what arrives."""
+        assembly = regime.assembly
+        size = len(assembly.model.states)
+        delayed = self._delayed(
+            WaveSystem(assembly.bound(regime.p)),
+            problem.x0[:size],
+            problem.t0,
+            t_end=problem.t_end,
+            names=problem.names,
+            atol=problem.atol,
+            rtol=problem.rtol,
+            sides=problem.sides,
+            t_eval=problem.t_eval,
+            explain=problem.explain,
+            max_steps=problem.max_steps,
+            earlier_steps=problem.earlier_steps,
+            progress=problem.progress,
+            guards=problem.guards,
+            timed=assembly.timed,
+            linear=assembly.model.linear,
+        )
+        with np.errstate(all="ignore"):
+            if self._march is None:
+                self._march = March(delayed, self._span)
+            self._equations[regime] = self._march.go_on(delayed, self._equations.get(regime))
+            self._march.run()
+            return self._march.last()
+
+    def solver(self, regime: Regime) -> Callable[[Problem], Trajectory]:
+        """What solves a span in the modes of a regime."""
+        return partial(self.solve, regime)
+
+    @cached_property
+    def left(self) -> Left:
+        """The waves that have left the ends; asked for when the motion is over."""
+        assert self._march is not None  # noqa: S101 (a motion has a span)
+        return Left(Lines.of(self._system.lines[1]), self._march.left())
+
+    def held(self, times: Array) -> Array:
+        """(k, lines) energy in J in each line at times (k,): the waves f and g in it hold (f^2 + g^2) / (4 Z)."""
+        squares = self.left.squares(times)
+        return np.asarray((squares[:, ::2] + squares[:, 1::2]) / (4 * self._system.lines[0]))
+
+    def leaving(self, times: Array) -> Array:
+        """(k, ends) the waves 2 Z v + h in N m that leave the ends at times (k,), also before the start."""
+        return self.left.waves(times)
+
+    def carried(self, t: float) -> CarriedWaves:
+        """What is on its way at a time in s."""
+        return CarriedWaves(self.left.past(t), self.lines)
