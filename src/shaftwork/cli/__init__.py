@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from shaftwork.cli import frequencies, inspection, run, studies
+from shaftwork.cli import drawings, frequencies, inspection, run, studies
 from shaftwork.cli.command import Command
 from shaftwork.core.errors import ShaftworkError, SimulationError
 from shaftwork.core.notices import VALUES, on_the_command_line
@@ -23,6 +23,7 @@ COMMANDS: tuple[Command, ...] = (
     inspection.scenes,
     inspection.check,
     inspection.latex,
+    drawings.draw,
     run.run,
     frequencies.modes,
     frequencies.campbell,

@@ -57,8 +57,17 @@ def whole_name(graph: CircuitGraph, phase: str = "") -> str:
     Raises:
         ParameterError: no part or mode has this name.
     """
+    return ", ".join(f"{name} {words}" for name, words in words_of_modes(graph, phase).items())
+
+
+def words_of_modes(graph: CircuitGraph, phase: str) -> dict[str, str]:
+    """The mode of every part in words, also of those that a phase does not name.
+
+    Raises:
+        ParameterError: no part or mode has this name.
+    """
     names = (name for name, _, _ in _elements(graph))
-    return ", ".join(f"{name} {mode.words}" for name, mode in zip(names, modes_in(graph, phase), strict=True))
+    return {name: mode.words for name, mode in zip(names, modes_in(graph, phase), strict=True)}
 
 
 def modes_in(graph: CircuitGraph, phase: str) -> tuple[Mode, ...]:

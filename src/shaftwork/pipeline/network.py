@@ -18,7 +18,7 @@ from shaftwork.equations.kirchhoff import kirchhoff
 from shaftwork.equations.records import Equations, NamedPhase
 from shaftwork.formulation.diagnosis import diagnose
 from shaftwork.formulation.form import StateForm, state_form
-from shaftwork.hybrid.named_phases import during, in_phase, span_of, whole_name, words_of
+from shaftwork.hybrid.named_phases import during, in_phase, span_of, whole_name, words_of, words_of_modes
 from shaftwork.hybrid.phased_model import PhasedModel
 from shaftwork.modelfiles.storage import read_netlist, write_netlist
 from shaftwork.network.builder import NetworkBuilder
@@ -30,6 +30,7 @@ from shaftwork.pipeline.model import Model
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
+    from shaftwork.drawing.canvas import Drawing
     from shaftwork.frequency.analysis import Point, SmallMotions, Time
     from shaftwork.frequency.campbell import Campbell
     from shaftwork.frequency.frequency_response import FrequencyResponse
@@ -239,6 +240,36 @@ class Network(NetworkBuilder):
         from shaftwork.frequency.exact_shafts.exact_networks import small_motions
 
         return small_motions(model, Compiler((), LOOP), every=exact)
+
+    def draw(
+        self,
+        *,
+        as_circuit: bool = False,
+        values: bool = False,
+        expand: bool = False,
+        phase: str | NamedPhase | None = None,
+    ) -> Drawing:
+        """The network as a drawing, placed without hints: shown in notebooks, `save` writes SVG, PDF, PNG and TikZ.
+
+        Args:
+            as_circuit: the analogue circuit (inertias are capacitors, compliances inductors, damping conductances,
+                gears transformers) instead of the symbols of drive trains.
+            values: the values of parameters below their letters.
+            expand: of the network with its shafts written out part by part.
+            phase: a phase of the motion, as for `equations`.
+
+        Raises:
+            NetworkError: the network cannot be assembled; lists every reason.
+            ParameterError: as for `equations`.
+            MissingExtraError: matplotlib is not installed.
+        """
+        from shaftwork.drawing.canvas import drawn
+        from shaftwork.drawing.items import Letters, circuit_items, train_items
+
+        equations = self.equations(expand=expand, phase=phase)
+        graph, items = equations.form.graph, circuit_items if as_circuit else train_items
+        modes = {} if phase is None else words_of_modes(self.graph(), words_of(phase))
+        return drawn(graph, tuple(items(Letters(graph, equations.symbol_names, values, modes))), train=not as_circuit)
 
     def save(self, path: str | Path) -> None:
         """Write the network to a text file from which `load` makes the same network.

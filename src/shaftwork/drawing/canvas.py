@@ -1,0 +1,259 @@
+"""A drawing as strokes and texts in groups, and as SVG, PDF, PNG and TikZ."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from shaftwork.core.domains import ROTATION
+from shaftwork.core.errors import ParameterError
+from shaftwork.drawing.items import Item
+from shaftwork.drawing.layout import HALF, LINE, Box, Placement, Spot
+from shaftwork.drawing.placement import placed
+from shaftwork.drawing.strokes import THICK, THIN, Stroke, Text, circle, line, moved, rectangle
+from shaftwork.drawing.symbols import EARTH, FRAME, LENGTH, WHITE
+from shaftwork.network.graph import CircuitGraph
+from shaftwork.results.plotting import new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MARGIN = 10.0
+"""Around the drawing, pt."""
+SIZE = 10.0
+"""Of letters, pt."""
+SIDES = {"left": "left", "centre": "center", "right": "right"}
+FORMATS = ("svg", "pdf", "png", "tex")
+
+
+@dataclass(frozen=True)
+class DrawnGroup:
+    """What belongs together: the symbol of a part with its texts, or the wires of a node.
+
+    Args:
+        name: "part J1" or "node rotor".
+        strokes: its lines and areas, the later ones above the earlier.
+        texts: its texts.
+    """
+
+    name: str
+    strokes: tuple[Stroke, ...]
+    texts: tuple[Text, ...] = ()
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A drawing of a network.
+
+    Args:
+        name: of the network.
+        groups: what is drawn, in points.
+
+    Examples:
+        >>> import shaftwork as sw
+        >>> drawing = sw.scenes.crane_start().draw(as_circuit=True)
+        >>> drawing.svg[:5]
+        '<?xml'
+    """
+
+    name: str
+    groups: tuple[DrawnGroup, ...]
+
+    @cached_property
+    def size(self) -> tuple[float, float, float, float]:
+        """Left, bottom, right and top of all that is drawn, pt."""
+        xs, ys = [0.0], [0.0]
+        for group in self.groups:
+            for stroke in group.strokes:
+                xs += [x + r for x, _ in stroke.points for r in (stroke.radius, -stroke.radius)]
+                ys += [y + r for _, y in stroke.points for r in (stroke.radius, -stroke.radius)]
+            for text in group.texts:
+                left, bottom, right, top = box_of(text)
+                xs += [left, right]
+                ys += [bottom, top]
+        return min(xs) - MARGIN, min(ys) - MARGIN, max(xs) + MARGIN, max(ys) + MARGIN
+
+    def figure(self) -> Figure:
+        """As a figure of matplotlib, in its own size.
+
+        Raises:
+            MissingExtraError: matplotlib is not installed.
+        """
+        left, bottom, right, top = self.size
+        figure = new_figure("Network.draw()", (right - left) / 72.0, (top - bottom) / 72.0)
+        figure.set_layout_engine("none")
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        axes.set_axis_off()
+        axes.set(xlim=(left, right), ylim=(bottom, top))
+        for order, group in enumerate(self.groups):
+            for k, stroke in enumerate(group.strokes):
+                _draw(axes, stroke, f"{order}:{k}:{group.name}", order)
+            for k, text in enumerate(group.texts):
+                style: dict[str, Any] = {"size": text.size, "gid": f"{order}:text {k}:{group.name}", "zorder": order}
+                axes.text(*text.at, text.words, ha=SIDES[text.anchor], va="baseline", **style)
+        return figure
+
+    def save(self, path: str | Path) -> None:
+        """Write it; the format follows from the end of the name: .svg, .pdf, .png, or .tex for TikZ.
+
+        Raises:
+            ParameterError: another end.
+            MissingExtraError: matplotlib is not installed.
+        """
+        path = Path(path)
+        ending = path.suffix.removeprefix(".").lower()
+        if ending not in FORMATS:
+            raise ParameterError(f"A drawing is no '{path.suffix}'. Take .{', .'.join(FORMATS)}.")
+        if ending == "tex":
+            path.write_text(self.tikz, encoding="utf-8")
+        else:
+            path.write_bytes(self._bytes(ending))
+
+    def _bytes(self, ending: str) -> bytes:
+        import matplotlib as mpl
+
+        stream = io.BytesIO()
+        with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": self.name, "pdf.fonttype": 42}):
+            metadata: dict[str, Any] = {"Title": self.name} if ending != "png" else {}
+            dates = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(ending, {})
+            self.figure().savefig(stream, format=ending, dpi=200, metadata=metadata | dates)
+        return stream.getvalue()
+
+    @cached_property
+    def svg(self) -> str:
+        """As SVG; the ids of its groups end with "part J1" or "node rotor" for what they belong to."""
+        return self._bytes("svg").decode()
+
+    @property
+    def tikz(self) -> str:
+        """As TikZ, for a LaTeX document that loads the package tikz; lengths in pt."""
+        lines = [r"\begin{tikzpicture}[x=1pt, y=1pt]"]
+        for group in self.groups:
+            lines.append(f"% {group.name}")
+            lines += [_tikz_stroke(stroke) for stroke in group.strokes]
+            lines += [_tikz_text(text) for text in group.texts]
+        return "\n".join([*lines, r"\end{tikzpicture}", ""])
+
+    def _repr_svg_(self) -> str:
+        return self.svg[self.svg.index("<svg") :]
+
+
+def _draw(axes: Any, stroke: Stroke, name: str, order: int) -> None:
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path as Curve
+    from matplotlib.transforms import Affine2D
+
+    if stroke.radius:
+        first, last = stroke.angles
+        unit = Curve.arc(first, last) if last - first < 360.0 else Curve.unit_circle()
+        curve = Affine2D().scale(stroke.radius).translate(*stroke.points[0]).transform_path(unit)
+    else:
+        curve = Curve([*stroke.points, stroke.points[0]] if stroke.closed else stroke.points, closed=stroke.closed)
+    face = "none" if stroke.fill is None else str(stroke.fill)
+    style = {"capstyle": "round", "joinstyle": "round", "gid": name, "zorder": order}
+    axes.add_patch(PathPatch(curve, facecolor=face, edgecolor="black", linewidth=stroke.width, **style))
+
+
+def _tikz_stroke(stroke: Stroke) -> str:
+    options = [f"line width={stroke.width:g}pt", "line cap=round", "line join=round"]
+    if stroke.fill is not None:
+        options.append(f"fill=black!{100 * (1 - stroke.fill):g}")
+    if stroke.radius:
+        (x, y), (first, last) = stroke.points[0], stroke.angles
+        if last - first >= 360.0:
+            path = f"({x:.2f},{y:.2f}) circle[radius={stroke.radius:g}]"
+        else:
+            path = (
+                f"({x:.2f},{y:.2f}) ++({first:g}:{stroke.radius:g}) "
+                f"arc[start angle={first:g}, end angle={last:g}, radius={stroke.radius:g}]"
+            )
+    else:
+        path = " -- ".join(f"({x:.2f},{y:.2f})" for x, y in stroke.points) + (" -- cycle" if stroke.closed else "")
+    return rf"\draw[{', '.join(options)}] {path};"
+
+
+def _tikz_text(text: Text) -> str:
+    anchor = {"left": "base west", "centre": "base", "right": "base east"}[text.anchor]
+    words = "$".join(
+        piece if k % 2 else re.sub(r"([#%&_{}$])", r"\\\1", piece) for k, piece in enumerate(text.words.split("$"))
+    )
+    return rf"\node[anchor={anchor}, inner sep=0pt] at ({text.at[0]:.2f},{text.at[1]:.2f}) {{{words}}};"
+
+
+@lru_cache(maxsize=4096)
+def width_of(words: str, size: float = SIZE) -> float:
+    """The width of a text, pt.
+
+    Raises:
+        MissingExtraError: matplotlib is not installed.
+    """
+    new_figure("Network.draw()", 1.0, 1.0)
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.textpath import TextToPath
+
+    return float(TextToPath().get_text_width_height_descent(words, FontProperties(size=size), "$" in words)[0])
+
+
+def box_of(text: Text) -> tuple[float, float, float, float]:
+    """Left, bottom, right and top of a text, pt."""
+    width = width_of(text.words, text.size)
+    left = text.at[0] - {"left": 0.0, "centre": width / 2, "right": width}[text.anchor]
+    return left, text.at[1] - 0.3 * text.size, left + width, text.at[1] + 0.8 * text.size
+
+
+def drawn(graph: CircuitGraph, items: Sequence[Item], *, train: bool) -> Drawing:
+    """Items as a drawing.
+
+    Args:
+        graph: of the network.
+        items: what is drawn.
+        train: thick lines for shafts and hatches for the frame; else a circuit with wires and dots.
+    """
+    result = placed(items, width_of)
+    return Drawing(graph.name, tuple(_groups(result, graph, train=train)))
+
+
+def _groups(result: Placement, graph: CircuitGraph, *, train: bool) -> Iterator[DrawnGroup]:
+    for node in dict.fromkeys((*result.wires, *result.leads)):
+        wires = result.wires[node]
+        width = THICK if train and graph.domains[node] is ROTATION else THIN
+        dots = () if train else (circle(point, 1.8, 0.0) for point in result.dots[node])
+        leads = (line(*wire) for wire in result.leads[node])
+        lines = (line(*wire, width=width) for wire in wires)
+        yield DrawnGroup(f"node {graph.node_name(node)}", (*leads, *lines, *dots))
+    foot = FRAME if train else EARTH
+    yield DrawnGroup("frame", tuple(stroke for point in result.grounds for stroke in moved(foot, point)))
+    for spot in result.spots:
+        yield DrawnGroup(f"part {spot.item.part}", tuple(_symbol(spot)), tuple(_texts(spot)))
+    for box in result.boxes:
+        frame = rectangle(box.left, box.middle - HALF, box.right, box.middle + HALF, WHITE)
+        yield DrawnGroup(f"part {box.item.part}", (frame,), tuple(_box_texts(box)))
+
+
+def _symbol(spot: Spot) -> Iterator[Stroke]:
+    for stroke in spot.item.shape.strokes:
+        ready = stroke.mirrored(LENGTH) if spot.mirrored else stroke
+        yield ready.moved(spot.at, 1 if spot.turned else 0)
+
+
+def _texts(spot: Spot) -> Iterator[Text]:
+    item, (x, y) = spot.item, spot.label
+    lines = item.lines
+    if spot.turned:
+        for k, words in enumerate(lines):
+            yield Text((x, y - 3.0 + LINE * (len(lines) - 1) / 2 - LINE * k), words, "left")
+    else:
+        for k, words in enumerate(reversed(lines)):
+            yield Text((x, y + 2.0 + LINE * k), words)
+    if item.shape.mark:
+        middle = (spot.at[0], spot.at[1] - LENGTH / 2) if spot.turned else (spot.at[0] + LENGTH / 2, spot.at[1])
+        yield Text((middle[0], middle[1] - 3.5), item.shape.mark)
+
+
+def _box_texts(box: Box) -> Iterator[Text]:
+    yield Text(((box.left + box.right) / 2, box.middle - 3.5), box.item.lines[0])

@@ -1,0 +1,134 @@
+"""Drawings, read back: nothing overlaps, and every connection of the network is there and no other."""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ET
+from collections import defaultdict
+from collections.abc import Iterator
+from itertools import combinations, pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import shaftwork as sw
+from shaftwork.drawing.canvas import Drawing, DrawnGroup, box_of
+from shaftwork.scenes import SCENES
+from tests.properties.examples import network_of
+from tests.strategies import Network, networks
+
+Box = tuple[float, float, float, float]
+"""Left, bottom, right, top."""
+Point = tuple[float, float]
+Segment = tuple[Point, Point]
+NEAR = 0.5
+"""Points, in which a line that ends at a symbol may miss it: half of a thin line."""
+
+
+def boxes_of(group: DrawnGroup) -> Iterator[Box]:
+    """The box of a symbol and those of its texts, but for letters within the symbol."""
+    xs = [x + r for stroke in group.strokes for x, _ in stroke.points for r in (-stroke.radius, stroke.radius)]
+    ys = [y + r for stroke in group.strokes for _, y in stroke.points for r in (-stroke.radius, stroke.radius)]
+    symbol = min(xs), min(ys), max(xs), max(ys)
+    yield symbol
+    yield from (box for box in map(box_of, group.texts) if not inside(box, symbol))
+
+
+def inside(box: Box, other: Box) -> bool:
+    return other[0] <= box[0] and other[1] <= box[1] and box[2] <= other[2] and box[3] <= other[3]
+
+
+def meet(box: Box, other: Box) -> bool:
+    return box[0] < other[2] and other[0] < box[2] and box[1] < other[3] and other[1] < box[3]
+
+
+def crosses(segment: Segment, box: Box, margin: float) -> bool:
+    """Whether an upright or level line meets a box with a margin around it."""
+    (x1, y1), (x2, y2) = segment
+    line = min(x1, x2), min(y1, y2), max(x1, x2), max(y1, y2)
+    grown = box[0] - margin, box[1] - margin, box[2] + margin, box[3] + margin
+    return line[0] <= grown[2] and grown[0] <= line[2] and line[1] <= grown[3] and grown[1] <= line[3]
+
+
+def read_back(drawing: Drawing) -> tuple[dict[str, list[Segment]], dict[str, list[Box]]]:
+    """The wires of each node, and the boxes of the symbols of each part, from the SVG alone; y points down."""
+    wires: dict[str, list[Segment]] = defaultdict(list)
+    symbols: dict[tuple[str, str], list[Point]] = defaultdict(list)
+    for group in ET.fromstring(drawing.svg).iter("{http://www.w3.org/2000/svg}g"):  # noqa: S314 (our own)
+        order, _, name = group.get("id", "").split(":", 2) if group.get("id", "").count(":") >= 2 else ("", "", "")
+        path = group.find("{http://www.w3.org/2000/svg}path")
+        if path is None or not name:
+            continue
+        numbers = [float(text) for text in re.findall(r"-?[\d.]+", path.get("d", ""))]
+        points = list(zip(numbers[::2], numbers[1::2], strict=True))
+        if name.startswith("node ") and "C" not in path.get("d", ""):
+            wires[name.removeprefix("node ")] += pairwise(points)
+        elif name.startswith("part "):
+            symbols[order, name.removeprefix("part ")] += points
+    boxes: dict[str, list[Box]] = defaultdict(list)
+    for (_, name), points in symbols.items():
+        xs, ys = zip(*points, strict=True)
+        boxes[name].append((min(xs), min(ys), max(xs), max(ys)))
+    return wires, boxes
+
+
+def connected(segments: list[Segment]) -> bool:
+    """Whether lines are one, where the end of one lies on another."""
+    if not segments:
+        return True
+    done, pending = {0}, [0]
+    while pending:
+        first = segments[pending.pop()]
+        for k, other in enumerate(segments):
+            ends = any(crosses((p, p), box_around(first), 0.1) for p in other)
+            if k not in done and (ends or any(crosses((p, p), box_around(other), 0.1) for p in first)):
+                done.add(k)
+                pending.append(k)
+    return len(done) == len(segments)
+
+
+def box_around(segment: Segment) -> Box:
+    (x1, y1), (x2, y2) = segment
+    return min(x1, x2), min(y1, y2), max(x1, x2), max(y1, y2)
+
+
+def check(net: sw.Network, *, as_circuit: bool, expected: dict[str, set[str]]) -> None:
+    drawing = net.draw(as_circuit=as_circuit, values=True)
+    parts = [group for group in drawing.groups if group.name.startswith("part ")]
+    boxes = [box for group in parts for box in boxes_of(group)]
+    overlapping = [(a, b) for a, b in combinations(boxes, 2) if meet(a, b)]
+    assert not overlapping
+    wires, symbols = read_back(drawing)
+    assert set(symbols) == {part for part, nodes in expected.items() if nodes}
+    for node, segments in wires.items():
+        assert connected(segments), node
+    for part, places in symbols.items():
+        touched = {node for node, lines in wires.items() for box in places for s in lines if crosses(s, box, NEAR)}
+        assert touched == expected[part], part
+    texts = [box for group in parts for box in map(box_of, group.texts)]
+    lines = [s for group in drawing.groups if group.name.startswith("node ") for stroke in group.strokes
+             if not stroke.radius for s in pairwise(stroke.points)]  # fmt: skip
+    assert not [(s, box) for s in lines for box in texts if crosses(s, box, -NEAR)]
+
+
+def nodes_of(net: sw.Network) -> dict[str, set[str]]:
+    graph = net.graph()
+    ends = {part.name: {part.nodes[port.name] for port in part.component.ports} for part in graph.parts}
+    return {name: {graph.node_name(node) for node in nodes if node >= 0} for name, nodes in ends.items()}
+
+
+@pytest.mark.parametrize("as_circuit", [False, True])
+@pytest.mark.parametrize("name", list(SCENES))
+def test_the_drawing_of_a_scene_has_its_connections_and_no_overlap(name: str, as_circuit: bool) -> None:  # noqa: FBT001
+    net = SCENES[name]()
+    check(net, as_circuit=as_circuit, expected=nodes_of(net))
+
+
+@given(networks(min_parts=5, max_inertias=20), st.booleans())
+def test_the_drawing_of_a_random_network_has_its_connections_and_no_overlap(
+    pieces: Network,
+    as_circuit: bool,  # noqa: FBT001
+) -> None:
+    net = network_of(pieces)
+    check(net, as_circuit=as_circuit, expected=nodes_of(net))
