@@ -7,6 +7,7 @@ import xml.etree.ElementTree as ET
 from collections import defaultdict
 from collections.abc import Iterator
 from itertools import combinations, pairwise
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -132,3 +133,41 @@ def test_the_drawing_of_a_random_network_has_its_connections_and_no_overlap(
 ) -> None:
     net = network_of(pieces)
     check(net, as_circuit=as_circuit, expected=nodes_of(net))
+
+
+@pytest.mark.parametrize(
+    ("ending", "begins"), [("svg", b"<?xml"), ("pdf", b"%PDF"), ("png", b"\x89PNG"), ("tex", b"\\begin{tikz")]
+)
+def test_a_drawing_is_written_in_each_format(tmp_path: Path, ending: str, begins: bytes) -> None:
+    path = tmp_path / f"crane.{ending}"
+    sw.scenes.crane().draw(values=True).save(path)
+    assert path.read_bytes().startswith(begins)
+
+
+def test_equal_networks_give_equal_files() -> None:
+    assert sw.scenes.crane().draw().svg == sw.scenes.crane().draw().svg
+
+
+def test_another_end_of_a_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(sw.ParameterError, match=r"no '\.gif'. Take \.svg, \.pdf, \.png, \.tex"):
+        sw.scenes.crane().draw().save(tmp_path / "crane.gif")
+
+
+def test_a_phase_is_drawn_with_contacts_and_its_words() -> None:
+    net = sw.scenes.six_phases()
+    drawing = net.draw(as_circuit=True, phase=net.start_phase())
+    words = {group.name: [text.words for text in group.texts] for group in drawing.groups}
+    assert words["part brake"] == ["brake", "released"]
+    assert words["part load"] == ["load", "stuck"]
+
+
+def test_a_network_that_cannot_be_assembled_has_no_picture_and_an_error_that_says_why() -> None:
+    net = sw.Network("torque on nothing")
+    net.add(sw.TorqueSource("motor", tau=1.0), "rotor")
+    assert net._repr_html_() is None
+    with pytest.raises(sw.NetworkError):
+        net.draw()
+
+
+def test_a_notebook_shows_the_drawing() -> None:
+    assert sw.scenes.crane()._repr_html_().startswith("<svg")

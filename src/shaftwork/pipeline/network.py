@@ -12,8 +12,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self
 
-from shaftwork.core.errors import Diagnostic, NetworkError, NetworkWarning, ParameterError
-from shaftwork.core.notices import warn
+from shaftwork.core.errors import Diagnostic, NetworkError, NetworkWarning, ParameterError, ShaftworkError
+from shaftwork.core.notices import muted, warn
 from shaftwork.equations.kirchhoff import kirchhoff
 from shaftwork.equations.records import Equations, NamedPhase
 from shaftwork.formulation.diagnosis import diagnose
@@ -270,6 +270,14 @@ class Network(NetworkBuilder):
         graph, items = equations.form.graph, circuit_items if as_circuit else train_items
         modes = {} if phase is None else words_of_modes(self.graph(), words_of(phase))
         return drawn(graph, tuple(items(Letters(graph, equations.symbol_names, values, modes))), train=not as_circuit)
+
+    def _repr_html_(self) -> str | None:
+        """What a notebook shows; nothing but the text where the network cannot be drawn."""
+        try:
+            with muted(NetworkWarning):
+                return self.draw()._repr_svg_()
+        except ShaftworkError:
+            return None
 
     def save(self, path: str | Path) -> None:
         """Write the network to a text file from which `load` makes the same network.
