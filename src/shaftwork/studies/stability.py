@@ -7,7 +7,7 @@ import re
 import time
 import warnings
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
@@ -23,8 +23,9 @@ from shaftwork.pipeline.arguments import NOMINAL
 from shaftwork.pipeline.model import Model
 from shaftwork.results.observer import Array
 from shaftwork.studies.stability_cases import CASES, TORQUE, Case
-from shaftwork.studies.stability_truth import QUANTITIES, EndMotion, exact, predicted
+from shaftwork.studies.stability_truth import QUANTITIES, exact, predicted
 from shaftwork.studies.study_arguments import engine_names, several, shaft_models, text_of
+from shaftwork.studies.truth import ShaftMotion
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -144,9 +145,9 @@ def stability(
 ) -> Stability:
     """Run extreme drives with every shaft model and every engine, and judge each run by what is independent of it.
 
-    The truth is that of characteristics or of the exact two-port; the error that a model may have is that of its own
-    matrices, exponentiated. A run that is neither right nor as coarse as its model must be, and that says nothing, is
-    wrong.
+    The truth is that of travelling waves, or with damping of polynomials of high degree; the error that a model may
+    have is that of its own matrices, exponentiated. A run that is neither right nor as coarse as its model must be,
+    and that says nothing, is wrong.
 
     Args:
         cases: cases, or names of those in `CASES`.
@@ -173,7 +174,7 @@ def _named(name: str) -> Case:
     raise ParameterError(f"There is no case {name!r}. There are: {', '.join(case.name for case in CASES)}.")
 
 
-def _row(case: Case, model: ShaftModel, engines: Sequence[str], truth: EndMotion) -> list[Cell]:
+def _row(case: Case, model: ShaftModel, engines: Sequence[str], truth: ShaftMotion) -> list[Cell]:
     """One model with each engine."""
     ideal = truth if isinstance(model, Wave) else predicted(case, model)
     label = (case.name, text_of(model))
@@ -192,8 +193,8 @@ def _cell(
     label: tuple[str, str],
     compiled: Model,
     engine: str,
-    truth: EndMotion,
-    ideal: EndMotion | None,
+    truth: ShaftMotion,
+    ideal: ShaftMotion | None,
     warned: str,
 ) -> Cell:
     began = time.process_time()
@@ -217,7 +218,7 @@ def _cell(
     return Cell(*label, engine, run.engine, verdict, measured, expected, deviation, energy, cpu, why)
 
 
-def distances(run: dict[str, Array], truth: EndMotion, ideal: EndMotion | None) -> tuple[float, float, float]:
+def distances(run: Mapping[str, Array], truth: ShaftMotion, ideal: ShaftMotion | None) -> tuple[float, float, float]:
     """Of a run from the truth, of its model's own motion from the truth, and of the run from that motion.
 
     All are the largest over time and quantities, of the largest torque or speed of the truth and of the model's own
@@ -229,7 +230,7 @@ def distances(run: dict[str, Array], truth: EndMotion, ideal: EndMotion | None) 
             kind = name.partition("_")[0]
             sizes[kind] = max(sizes[kind], float(np.abs(values).max()))
 
-    def distance(one: dict[str, Array], other: dict[str, Array]) -> float:
+    def distance(one: Mapping[str, Array], other: Mapping[str, Array]) -> float:
         gaps = [np.abs(one[name] - other[name]).max() / sizes[name.partition("_")[0]] for name in QUANTITIES]
         return float(np.max(gaps))
 

@@ -1,113 +1,39 @@
 """What an extreme drive really does, and what a model of its shaft must do by its own definition.
 
-Neither uses the network, its equations or an engine, so that what they say is evidence.
+The second uses no network, no equations of one and no engine, so that what it says is evidence. The first is computed
+far more exactly than a run, and the tests compare it with other solutions of the continuous shaft.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import expm
+from sympy import Expr, lambdify
 
-from shaftwork.components.discontinuities import breakpoints
+from shaftwork.components.laws import NUMERICAL
+from shaftwork.components.laws import t as TIME
 from shaftwork.components.shaft_models import OneSpring, Rigid, ShaftModel, Wave
 from shaftwork.results.observer import Array
-from shaftwork.studies.exact_shafts.exact_motion import JunctionTorque, motion
-from shaftwork.studies.exact_shafts.exact_response import Complex, laplace_response
-from shaftwork.studies.exact_shafts.line import Section, SectionLine
 from shaftwork.studies.stability_cases import TORQUE, Case
-from shaftwork.studies.truth import function_of_time
+from shaftwork.studies.truth import COARSE, ShaftMotion, exact_motion
 
 QUANTITIES = ("tau_a", "tau_b", "omega_a", "omega_b")
 MOST_PREDICTED = 200
 """Up to so many elements the motion of a model is computed by its own definition."""
-TERMS = 16384
-"""Of the Fourier series that inverts a Laplace transform."""
-DECAY = 12.0
-"""Its abscissa times its period: what it repeats is exp(-2 DECAY) of the motion."""
-MASSLESS = 1e-13
-"""Inertia of a spring that is written as a section, of that of the shaft."""
 
 
-@dataclass(frozen=True)
-class EndMotion:
-    """End torques and speeds of a shaft at the times of a case.
-
-    Args:
-        values: (k,) by name.
-        error: estimate of their own error, of the largest torque or speed.
-        source: where they come from.
-    """
-
-    values: dict[str, Array]
-    error: float
-    source: str
-
-
-def exact(case: Case) -> EndMotion:
+def exact(case: Case) -> ShaftMotion:
     """The motion of the continuous shaft.
 
-    Without damping and springs by characteristics, to rounding; after a pulse on a free shaft it repeats itself, so
-    late times are early ones. Otherwise by the exact two-port in s, inverted by a Fourier series.
-
-    Source: Dubner and Abate, Numerical inversion of Laplace transforms, 1968.
+    After a pulse a free shaft repeats its motion, so late times are early ones.
     """
-    if case.damping or case.spring:
-        return _by_transform(case)
-    line = _line(case)
-    late = case.t_end - 6 * case.section.delay if case.periods else 0.0
-    t = case.times - late
-    motor = JunctionTorque(0, function_of_time(case.torque), breakpoints(case.torque))
-    junctions = motion(line, [motor], case.t_end - late)
-    values = {
-        "tau_a": junctions.torque_in(0, t, "left"),
-        "tau_b": junctions.torque_in(0, t, "right"),
-        "omega_a": junctions.junction_speed(0, t),
-        "omega_b": junctions.junction_speed(1, t),
-    }
-    return EndMotion(values, junctions.error, "characteristics")
-
-
-def _line(case: Case) -> SectionLine:
-    """The shaft, and a spring behind it as a section that hardly weighs anything."""
-    section, ends = case.section, ("free", "clamped" if case.clamped else "free")
-    sections, discs, dampers = [section], [case.drive * case.inertia], [0.0]
-    if case.spring:
-        sections.append(Section(1.0, MASSLESS * case.inertia, case.spring * section.stiffness / section.length))
-        discs.append(0.0)
-        dampers.append(0.0)
-    loads = (*discs, case.load * case.inertia), (*dampers, case.damper * section.impedance)
-    return SectionLine(tuple(sections), *loads, ends=ends)  # type: ignore[arg-type]
-
-
-def _by_transform(case: Case) -> EndMotion:
-    t, period = case.times, 2 * case.t_end
-    s = np.asarray((DECAY + 1j * np.pi * np.arange(TERMS)) / period, dtype=np.complex128)
-    response, ends = laplace_response(_line(case), s, 0), np.array([0.0, case.section.length])
-    transforms = _transform(case, s)[:, None] * np.hstack([response.torques(ends, "left"), response.speeds(ends)])
-    transforms[0] /= 2
-    waves = np.exp(np.outer(t, s))
-    values, coarser = ((waves[:, :count] @ transforms[:count]).real / period for count in (TERMS, TERMS // 2))
-    sizes = np.repeat([np.abs(values[:, :2]).max(), np.abs(values[:, 2:]).max()], 2)
-    error = float((np.abs(values - coarser).max(axis=0) / sizes).max())
-    return EndMotion(dict(zip(QUANTITIES, values.T, strict=True)), error, "exact two-port")
-
-
-def _transform(case: Case, s: Complex) -> Complex:
-    """Of the torque, (k,)."""
-    rise = case.rise * case.section.delay
-    turn = 2 * np.pi / rise
-    match case.form:
-        case "step":
-            return TORQUE / s
-        case "pulse":
-            return np.asarray(-TORQUE * np.expm1(-s * rise) / s)
-        case "ramp":
-            return np.asarray(-TORQUE * np.expm1(-s * rise) / (s**2 * rise))
-        case "sine":
-            return TORQUE * turn**2 / (s * (s**2 + turn**2))
+    late = case.t_end - 6 * case.delay if case.periods else 0.0
+    motion = exact_motion(case.network(COARSE), "line", case.t_end - late, case.times - late)
+    return replace(motion, values={name: motion.values[name] for name in QUANTITIES})
 
 
 @dataclass(frozen=True)
@@ -135,14 +61,14 @@ class _Chain:
     far: Array
 
 
-def predicted(case: Case, model: ShaftModel) -> EndMotion | None:
+def predicted(case: Case, model: ShaftModel) -> ShaftMotion | None:
     """The motion that a model has by its definition, or None where it has none of its own or is too large.
 
     The matrices are written down here from the nodes, stations and weights of the model, in coordinates whose square is
     the energy, and exponentiated.
     """
     if (at_rest := _without_states(case, model)) is not None:
-        return EndMotion(dict(zip(QUANTITIES, at_rest, strict=True)), 0.0, repr(model))
+        return ShaftMotion(dict(zip(QUANTITIES, at_rest, strict=True)), 0.0, repr(model))
     chain = None if isinstance(model, Wave) else _chain(case, model)
     if chain is None or not (chain.masses > 0).all():
         return None
@@ -158,7 +84,13 @@ def predicted(case: Case, model: ShaftModel) -> EndMotion | None:
         "omega_a": speeds[:, 0],
         "omega_b": speeds @ chain.far,
     }
-    return EndMotion(values, 0.0, repr(model))
+    return ShaftMotion(values, 0.0, repr(model))
+
+
+def function_of_time(law: Expr) -> Callable[[Array], Array]:
+    """A law of time alone as a function of an array of times in s."""
+    value = lambdify(TIME, law, modules=[NUMERICAL, "numpy"])
+    return lambda t: np.broadcast_to(value(t), np.shape(t))
 
 
 def _without_states(case: Case, model: ShaftModel) -> tuple[Array, ...] | None:
@@ -167,25 +99,24 @@ def _without_states(case: Case, model: ShaftModel) -> tuple[Array, ...] | None:
     if isinstance(model, Rigid) and case.clamped:
         return torque, torque, np.zeros_like(torque), np.zeros_like(torque)
     if isinstance(model, OneSpring) and case.drive == case.load == 0 < case.damper and case.form in ("step", "pulse"):
-        speed = torque / (case.damper * case.section.impedance)
+        speed = torque / (case.damper * case.impedance)
         return torque, torque, speed, speed
     return None
 
 
 def _chain(case: Case, model: ShaftModel) -> _Chain | None:
-    section = case.section
     parts = _parts(model)
     if parts is None:
         return None
     shares, lengths, weights, gaps, slips = parts
-    springs, dashpots = section.stiffness / (section.length * lengths), section.damping / (section.length * gaps)
+    springs, dashpots = case.stiffness / lengths, case.dashpot / gaps
     last = len(shares) - 1
     far = np.eye(1, last + 1, last)[0]
     if case.spring and isinstance(model, OneSpring):  # two springs in a row, without an inertia between them
         springs, far = springs * case.spring / (1 + case.spring), np.array([1.0, case.spring]) / (1 + case.spring)
     elif case.spring:
         weights = np.block([[weights, np.zeros((len(lengths), 1))], [np.eye(1, last + 1, last), -np.ones((1, 1))]])
-        springs = np.append(springs, case.spring * section.stiffness / section.length)
+        springs = np.append(springs, case.spring * case.stiffness)
         shares, far, slips, last = (
             np.append(shares, 0.0),
             np.append(far, 0.0),
@@ -196,7 +127,7 @@ def _chain(case: Case, model: ShaftModel) -> _Chain | None:
     masses, brakes = shares.copy(), np.zeros(len(shares))
     masses[0] += case.drive * case.inertia
     masses[last] += case.load * case.inertia
-    brakes[last] = case.damper * section.impedance
+    brakes[last] = case.damper * case.impedance
     count = last if case.clamped else last + 1
     free = (masses[:count], shares[:count], weights[:, :count], springs, slips[:, :count], dashpots, brakes[:count])
     return _Chain(*free, np.zeros(count) if case.clamped else far)
@@ -241,7 +172,7 @@ def _propagated(case: Case, matrix: Array, drive: Array) -> Array:
 
     y' obeys the same equation as y. Taken from y it would have the errors of y times the fastest decay.
     """
-    size, rise = len(drive), case.rise * case.section.delay
+    size, rise = len(drive), case.rise * case.delay
     rates, torque = slice(size, 2 * size), 2 * size
     whole = np.zeros((torque + 3, torque + 3))
     whole[:size, rates], whole[rates, rates] = np.eye(size), matrix

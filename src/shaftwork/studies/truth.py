@@ -6,28 +6,16 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import pairwise
 
-import networkx as nx
 import numpy as np
-from sympy import Expr, lambdify
 
-from shaftwork.components.base import Component
-from shaftwork.components.discontinuities import breakpoints
-from shaftwork.components.laws import NUMERICAL, as_expression
-from shaftwork.components.laws import t as TIME
-from shaftwork.components.rotation import Damper, Inertia
 from shaftwork.components.shaft_models import OneSpring, Rigid, ShaftModel, Spectral, Wave
 from shaftwork.components.shafts import Shaft
-from shaftwork.components.sources import TorqueSource
-from shaftwork.core.errors import ParameterError, ShaftworkError
+from shaftwork.core.errors import ShaftworkError
 from shaftwork.frequency.natural_modes import Modes
-from shaftwork.network.netlist import REFERENCE, Netlist, Placed
 from shaftwork.pipeline.network import Network
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
-from shaftwork.studies.exact_shafts.exact_motion import JunctionTorque, motion
-from shaftwork.studies.exact_shafts.line import Section, SectionLine
 
 QUANTITIES = ("tau_a", "tau_b", "tau_mid", "omega_a", "omega_b")
 """What is compared: torque at both ends and in the middle, speed of both ends."""
@@ -47,21 +35,18 @@ MODES = 3
 
 
 @dataclass(frozen=True)
-class Truth:
-    """The exact motion of one shaft.
+class ShaftMotion:
+    """The motion of one shaft at the times asked for.
 
     Args:
-        values: (k,) of each of `QUANTITIES` at the times asked for.
-        frequencies: lowest natural frequencies |rate| / 2 pi of the network at rest in Hz, of modes that swing; empty
-            where unknown.
-        source: where it comes from, a few words.
+        values: (k,) of each compared quantity, by name.
         error: estimate of its own error, relative to the largest torque.
+        source: where it comes from, a few words.
     """
 
     values: Mapping[str, Array]
-    frequencies: Array
-    source: str
     error: float
+    source: str
 
 
 def with_model(net: Network, shaft: str, model: ShaftModel) -> Network:
@@ -78,12 +63,13 @@ def with_model(net: Network, shaft: str, model: ShaftModel) -> Network:
     return varied
 
 
-def truth(net: Network, shaft: str, t_end: float, t: Array, tell: Callable[[str], None] = lambda _: None) -> Truth:
+def exact_motion(
+    net: Network, shaft: str, t_end: float, t: Array, tell: Callable[[str], None] = lambda _: None
+) -> ShaftMotion:
     """The exact motion of a shaft.
 
-    A train of inertias, lossless shafts, bearings and torques of time is solved by characteristics; another network
-    without losses along its shafts by travelling waves; any other by a spectral model of high degree. Frequencies are
-    those of exact shafts, damping included.
+    A network without losses along its shafts is solved by travelling waves; any other by a spectral model of high
+    degree.
 
     Args:
         net: the network.
@@ -95,16 +81,10 @@ def truth(net: Network, shaft: str, t_end: float, t: Array, tell: Callable[[str]
     Raises:
         ShaftworkError: the network cannot be solved.
     """
-    tell("the exact natural frequencies")
-    exact = _exact_frequencies(with_model(net, shaft, COARSE))
     if not any(part.damping or part.friction for part in net.parts if isinstance(part, Shaft)):
-        waves = with_model(net, shaft, Wave(3))
         tell("the exact motion, by travelling waves")
-        with suppress(ParameterError):  # it is no train
-            values, error = _by_characteristics(waves.netlist(), shaft, t_end, t)
-            return Truth(values, exact, "characteristics", error)
         with suppress(ShaftworkError):  # such as a clearance at an end of a shaft where no inertia is
-            return Truth(_read(waves, shaft, t_end, t), exact, "travelling waves", TIGHT)
+            return ShaftMotion(_read(with_model(net, shaft, Wave(3)), shaft, t_end, t), TIGHT, "travelling waves")
     linear = with_model(net, shaft, COARSE).compile().linear
     degrees, rtol = ((FINE, FINER), TIGHT) if linear else (NONLINEAR, LOOSER)
     finer, gap, degree = dict[str, Array](), np.inf, 0
@@ -114,7 +94,7 @@ def truth(net: Network, shaft: str, t_end: float, t: Array, tell: Callable[[str]
         gap = max((_apart(fine[name], finer[name]) for name in ("tau_a", "tau_b") if fine), default=np.inf)
         if gap <= ALIKE and not linear:
             break
-    return Truth(finer, exact, f"Spectral({degree})", gap)
+    return ShaftMotion(finer, gap, f"Spectral({degree})")
 
 
 def _apart(one: Array, other: Array) -> float:
@@ -145,9 +125,13 @@ def frequencies(modes: Modes) -> Array:
     return modes.frequencies[modes.frequencies > 0]
 
 
-def _exact_frequencies(net: Network) -> Array:
+def exact_frequencies(net: Network, shaft: str) -> Array:
+    """The lowest natural frequencies |rate| / 2 pi in Hz of a network at rest with exact shafts, damping included.
+
+    They are those of modes that swing; empty where they are unknown.
+    """
     try:
-        exact = frequencies(net.modes(exact=True))
+        exact = frequencies(with_model(net, shaft, COARSE).modes(exact=True))
     except ShaftworkError:
         return np.empty(0)
     return exact[: MODES + 1] if len(exact) > MODES else np.empty(0)
@@ -155,67 +139,3 @@ def _exact_frequencies(net: Network) -> Array:
 
 def _read(net: Network, shaft: str, t_end: float, t: Array, rtol: float = TIGHT) -> dict[str, Array]:
     return quantities(net.simulate(t_end, t_eval=t, rtol=rtol), net, shaft)
-
-
-def _by_characteristics(netlist: Netlist, shaft: str, t_end: float, t: Array) -> tuple[dict[str, Array], float]:
-    order, shafts = _train(netlist)
-    sections = [_section(placed.part) for placed in shafts]
-    line = SectionLine(
-        tuple(sections),
-        tuple(_total(netlist, node, Inertia, "J") for node in order),
-        tuple(_total(netlist, node, Damper, "d") for node in order),
-    )
-    sources = [placed for placed in netlist.placed if isinstance(placed.part, TorqueSource)]
-    junctions = motion(line, [_torque(placed, order) for placed in sources], t_end)
-    number = next(k for k, placed in enumerate(shafts) if placed.part.name == shaft)
-    middle = line.junctions[number] + line.sections[number].length / 2
-    step = 1 if shafts[number].nodes[0] == order[number] else -1  # wired from left to right, or from right to left
-    tau_a, tau_b = [step * junctions.torque_in(number, t, side) for side in ("left", "right")][::step]
-    omega_a, omega_b = [junctions.junction_speed(k, t) for k in (number, number + 1)][::step]
-    tau_mid = step * junctions.torque(middle, t)
-    return dict(zip(QUANTITIES, (tau_a, tau_b, tau_mid, omega_a, omega_b), strict=True)), junctions.error
-
-
-def _train(netlist: Netlist) -> tuple[list[str], list[Placed]]:
-    """The nodes of a train from one end to the other, and the shafts between them."""
-    shafts = [placed for placed in netlist.placed if isinstance(placed.part, Shaft)]
-    kinds = (Inertia, Damper, TorqueSource, Shaft)
-    if not shafts or not all(isinstance(placed.part, kinds) for placed in netlist.placed):
-        raise ParameterError("The network is no train of inertias, shafts, bearings and torques.")
-    joints = nx.MultiGraph()
-    for placed in shafts:
-        joints.add_edge(*placed.nodes, placed=placed)
-    others = (placed.nodes for placed in netlist.placed if not isinstance(placed.part, Shaft))
-    attached = all(len(nodes) == 1 and nodes[0] in joints for nodes in others)
-    degrees = dict(joints.degree)
-    if not nx.is_tree(joints) or max(degrees.values()) > 2 or REFERENCE in joints or not attached:
-        raise ParameterError("The shafts are not in one row.")
-    first, last = (node for node, degree in degrees.items() if degree == 1)
-    order = nx.shortest_path(joints, first, last)
-    return order, [joints.edges[a, b, 0]["placed"] for a, b in pairwise(order)]
-
-
-def _section(part: Component) -> Section:
-    if not isinstance(part, Shaft) or not isinstance(part.model, Wave) or part.damping or part.friction:
-        raise ParameterError("Characteristics know neither losses along a shaft nor one that is rigid or one spring.")
-    return Section.of_geometry(
-        part.length, part.diameter, part.inner_diameter, density=part.density, shear_modulus=part.shear_modulus
-    )
-
-
-def _total(netlist: Netlist, node: str, kind: type, name: str) -> float:
-    members = (placed.part for placed in netlist.placed if isinstance(placed.part, kind) and placed.nodes[0] == node)
-    return float(sum(getattr(part, name) for part in members))
-
-
-def _torque(placed: Placed, order: list[str]) -> JunctionTorque:
-    law = as_expression(placed.part.tau)  # type: ignore[attr-defined]
-    if not law.free_symbols <= {TIME}:
-        raise ParameterError("A torque depends on more than time.")
-    return JunctionTorque(order.index(placed.nodes[0]), function_of_time(law), breakpoints(law))
-
-
-def function_of_time(law: Expr) -> Callable[[Array], Array]:
-    """A law of time alone as a function of an array of times in s."""
-    value = lambdify(TIME, law, modules=[NUMERICAL, "numpy"])
-    return lambda t: np.broadcast_to(value(t), np.shape(t))

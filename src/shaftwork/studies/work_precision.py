@@ -21,7 +21,16 @@ from shaftwork.pipeline.network import Network
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
 from shaftwork.studies.study_arguments import LADDER, engine_names, several, shaft_models, text_of
-from shaftwork.studies.truth import MODES, QUANTITIES, Truth, frequencies, quantities, truth, with_model
+from shaftwork.studies.truth import (
+    MODES,
+    QUANTITIES,
+    ShaftMotion,
+    exact_frequencies,
+    exact_motion,
+    frequencies,
+    quantities,
+    with_model,
+)
 from shaftwork.studies.work_precision_result import RTOL, Trial, WorkPrecision
 
 POINTS, CALLS = 401, 5
@@ -87,8 +96,11 @@ def work_precision(
     ]
     # the fronts of waves that start at zero pass at multiples of the delay; these times are none
     t = end * (np.arange(1, count + 1) - 0.5) / count
-    exact = truth(net, shaft, end, t, tell or _nothing)
-    trials = _tried(_Motion(net, shaft, end, t, exact), planned, allowed, report or _nothing)
+    tell = tell or _nothing
+    tell("the exact natural frequencies")
+    judged = exact_frequencies(net, shaft)
+    exact = exact_motion(net, shaft, end, t, tell)
+    trials = _tried(_Motion(net, shaft, end, t, exact, judged), planned, allowed, report or _nothing)
     return WorkPrecision(net.name, shaft, trials, (exact.source, exact.error), t, _ends(exact.values))
 
 
@@ -98,13 +110,14 @@ def _nothing(_: object) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Motion:
-    """The motion of a shaft that all models are compared on, and how it truly is."""
+    """The motion that all models are compared on, the true one of its shaft, and true natural frequencies in Hz."""
 
     net: Network
     shaft: str
     t_end: float
     t: Array
-    exact: Truth
+    exact: ShaftMotion
+    frequencies: Array
 
 
 def _tried(
@@ -159,8 +172,8 @@ def _trial(motion: _Motion, model: ShaftModel, plan: Trial) -> Trial:
     values, cpu = quantities(solution, varied, shaft), median(times)
     errors = {name: float(np.abs(values[name] - exact.values[name]).max()) / _size(exact, name) for name in QUANTITIES}
     extra = None
-    if exact.frequencies.size and (present := _frequencies(varied, compiled, exact.frequencies)).size:
-        judged, limit = exact.frequencies[:MODES], float(exact.frequencies[MODES - 1 : MODES + 1].mean())
+    if motion.frequencies.size and (present := _frequencies(varied, compiled, motion.frequencies)).size:
+        judged, limit = motion.frequencies[:MODES], float(motion.frequencies[MODES - 1 : MODES + 1].mean())
         errors |= {f"f_{k + 2}": float(np.abs(present / f - 1).min()) for k, f in enumerate(judged)}
         extra = int((present < limit).sum()) - MODES
     return dataclasses.replace(
@@ -202,7 +215,7 @@ def _timed(compiled: Model, shaft: str, plan: Trial, t_end: float, t: Array) -> 
     return solution, time.thread_time() - began
 
 
-def _size(exact: Truth, name: str) -> float:
+def _size(exact: ShaftMotion, name: str) -> float:
     """The largest value, of all torques or all speeds together, so that no quantity is judged by its own zero."""
     kind = name.partition("_")[0]
     family = [value for other, value in exact.values.items() if other.startswith(kind)]
