@@ -12,8 +12,7 @@ import numpy as np
 
 from shaftwork.components.discontinuities import breakpoints
 from shaftwork.studies.stability_cases import DENSITY, SHEAR_MODULUS, TORQUE, Case
-from shaftwork.studies.stability_truth import QUANTITIES, function_of_time
-from shaftwork.studies.truth import ShaftMotion
+from shaftwork.studies.truth import ENDS, ShaftMotion, function_of_time
 from tests.reference.exact_shafts.exact_motion import JunctionTorque, motion
 from tests.reference.exact_shafts.exact_response import Complex, laplace_response
 from tests.reference.exact_shafts.line import Section, SectionLine
@@ -74,7 +73,7 @@ def _by_transform(case: Case) -> ShaftMotion:
     values, coarser = ((waves[:, :count] @ transforms[:count]).real / period for count in (TERMS, TERMS // 2))
     sizes = np.repeat([np.abs(values[:, :2]).max(), np.abs(values[:, 2:]).max()], 2)
     error = float((np.abs(values - coarser).max(axis=0) / sizes).max())
-    return ShaftMotion(dict(zip(QUANTITIES, values.T, strict=True)), error, "exact two-port")
+    return ShaftMotion(dict(zip(ENDS, values.T, strict=True)), error, "exact two-port")
 
 
 def _transform(case: Case, s: Complex) -> Complex:

@@ -16,7 +16,7 @@ import shaftwork as sw
 from docs.generate import extreme_drives
 from shaftwork.studies.stability import RIGHT, SAME, distances, judge, stability
 from shaftwork.studies.stability_cases import CASES, TORQUE, Case
-from shaftwork.studies.stability_truth import QUANTITIES, exact, predicted
+from shaftwork.studies.truth import ENDS, exact, predicted
 from tests.reference.extreme_drives import continuous
 
 NAMED = {case.name: case for case in CASES}
@@ -170,7 +170,7 @@ def test_a_stiff_spring_behind_the_shaft_is_none() -> None:
     plain, sprung = (predicted(dataclasses.replace(case, spring=spring), sw.Lumped(5)) for spring in (0.0, 1e7))
     assert plain is not None
     assert sprung is not None
-    for name in QUANTITIES:
+    for name in ENDS:
         size = np.abs(plain.values[name]).max()
         np.testing.assert_allclose(sprung.values[name], plain.values[name], rtol=0, atol=1e-4 * size)
 
@@ -321,4 +321,4 @@ def test_a_case_is_a_record_that_can_be_made() -> None:
     case = Case("soft tube", length=3.0, diameter=0.05, load=7.0, form="sine", rise=30.0)
     found = stability([case], models=["Spectral(12)"], engines=["auto"])
     assert [cell.verdict for cell in found.cells] == ["right"]
-    assert set(QUANTITIES) == set(exact(case).values)
+    assert set(ENDS) == set(exact(case).values)

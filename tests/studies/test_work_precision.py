@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import sys
 from pathlib import Path
 
@@ -14,7 +15,7 @@ import shaftwork as sw
 from shaftwork.scenes.long_shafts import LOAD_INERTIA, MOTOR_INERTIA, RATED_TORQUE
 from shaftwork.studies.study_arguments import LADDER, rungs
 from shaftwork.studies.truth import QUANTITIES, exact_motion
-from shaftwork.studies.work_precision import _timed, work_precision
+from shaftwork.studies.work_precision import _timed, affordable_end, work_precision
 from shaftwork.studies.work_precision_result import Trial, WorkPrecision
 from tests.reference.exact_shafts.exact_motion import JunctionTorque, motion
 from tests.reference.exact_shafts.line import Section, SectionLine
@@ -168,6 +169,14 @@ def test_a_model_that_takes_too_long_is_given_up_and_says_when(monkeypatch: pyte
     monkeypatch.setattr(sys.modules["shaftwork.studies.work_precision"], "LONGEST", -1.0)
     with pytest.raises(sw.SimulationError, match=r"given up after -1 s at t = .* of 0\.01 s"):
         _timed(net.compile(), "line", Trial("", "scipy", 0, 0.0, np.inf, {}, asked="scipy"), 0.01, np.array([0.01]))
+
+
+def test_a_motion_that_takes_too_long_is_compared_over_a_part_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A clock that goes on by three seconds each time it is read stands for a slow engine."""
+    module, clock = sys.modules["shaftwork.studies.work_precision"], itertools.count(step=3)
+    assert affordable_end(sw.scenes.bldc_shaft(), "line", 0.002) == 0.002
+    monkeypatch.setattr(module.time, "thread_time", lambda: float(next(clock)))
+    assert 0 < affordable_end(sw.scenes.bldc_shaft(), "line", 0.02) < 0.01
 
 
 def test_models_are_named_with_sizes_or_without() -> None:

@@ -179,10 +179,9 @@ def _pull_out(curve: Curve, times: Array, top: float) -> Array:
     omega = np.linspace(-BEYOND * top, BEYOND * top, SPEEDS)
     tau = np.abs(curve(np.repeat(times, SPEEDS), np.tile(omega, len(times)))).reshape(len(times), SPEEDS)
     near = np.clip(tau.argmax(axis=1), 1, SPEEDS - 2)
-    peak = find_minimum(
-        lambda w, t: -np.abs(curve(t, w)), (omega[near - 1], omega[near], omega[near + 1]), args=(times,)
-    )
-    return np.where(peak.success, -peak.f_x, tau.max(axis=1))
+    bracket = omega[near - 1], omega[near], omega[near + 1]
+    peak = find_minimum(lambda w, t: -np.abs(curve(t, w)), bracket, args=(times,))
+    return np.asarray(np.where(peak.success, -peak.f_x, tau.max(axis=1)))
 
 
 def _fastest(motor: Component, top: float) -> float:

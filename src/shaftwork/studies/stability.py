@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import re
 import time
 import warnings
@@ -15,17 +14,18 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 
 from shaftwork.components.shaft_models import ShaftModel, Wave
-from shaftwork.core.errors import MissingExtraError, ParameterError, ShaftworkError, SimulationError, in_one_line
-from shaftwork.core.files import replaced
+from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError, in_one_line
+from shaftwork.core.files import write_rows
 from shaftwork.core.screen import in_columns
 from shaftwork.integrate.engines import ENGINES, available
 from shaftwork.pipeline.arguments import NOMINAL
 from shaftwork.pipeline.model import Model
 from shaftwork.results.observer import Array
+from shaftwork.results.plotting import new_figure
 from shaftwork.studies.stability_cases import CASES, TORQUE, Case
-from shaftwork.studies.stability_truth import QUANTITIES, exact, predicted
 from shaftwork.studies.study_arguments import engine_names, several, shaft_models, text_of
-from shaftwork.studies.truth import ShaftMotion
+from shaftwork.studies.truth import ENDS, ShaftMotion, exact, predicted
+from shaftwork.studies.work_precision_result import FLOOR
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -128,10 +128,7 @@ class Stability:
     def to_csv(self, path: str | Path) -> None:
         """Write every cell with all that is known about it."""
         names = tuple(Cell.__dataclass_fields__)
-        with replaced(path) as file:
-            writer = csv.writer(file)
-            writer.writerow(names)
-            writer.writerows([getattr(cell, name) for name in names] for cell in self.cells)
+        write_rows(path, names, ([getattr(cell, name) for name in names] for cell in self.cells))
 
     def plot(self) -> Figure:
         """The table as a coloured matrix (extra `plot`)."""
@@ -202,7 +199,7 @@ def _cell(
         with warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always")
             run = compiled.simulate(case.t_end, t_eval=case.times, engine=engine, max_steps=case.steps)  # type: ignore[arg-type]
-            quantities = {name: run[f"line.{name}"] for name in QUANTITIES}
+            quantities = {name: run[f"line.{name}"] for name in ENDS}
             cpu = time.process_time() - began
             balanced = engine == "auto" and not case.periods and len(compiled.states) <= MOST_BALANCED
             energy = run.energy_residual if balanced else np.nan
@@ -231,7 +228,7 @@ def distances(run: Mapping[str, Array], truth: ShaftMotion, ideal: ShaftMotion |
             sizes[kind] = max(sizes[kind], float(np.abs(values).max()))
 
     def distance(one: Mapping[str, Array], other: Mapping[str, Array]) -> float:
-        gaps = [np.abs(one[name] - other[name]).max() / sizes[name.partition("_")[0]] for name in QUANTITIES]
+        gaps = [np.abs(one[name] - other[name]).max() / sizes[name.partition("_")[0]] for name in ENDS]
         return float(np.max(gaps))
 
     if ideal is None:
@@ -269,8 +266,6 @@ COLOURS = {
     "unknown": "#b59ad6",
     "wrong": "#d62728",
 }
-LEAST = 1e-16
-"""Errors below are drawn as this one."""
 COLUMN, LETTER = 0.24, 0.075
 """Least width of a column, and width of a letter above the columns, in inches."""
 SIZE = re.compile(r"\b(?:m|n|places)=\d+(?:, )?")
@@ -281,12 +276,6 @@ def _figure(study: Stability) -> Figure:
 
     Models that differ by their size alone share columns, unless a case has several of them.
     """
-    try:
-        from matplotlib.colors import ListedColormap
-        from matplotlib.figure import Figure
-        from matplotlib.patches import Patch
-    except ImportError:
-        raise MissingExtraError("matplotlib", "plot", "Stability.plot()") from None
     engines, cases = study.engines, tuple(dict.fromkeys(cell.case for cell in study.cells))
     kind_of = _kinds(study)
     kinds = tuple(dict.fromkeys(kind_of.values()))
@@ -294,14 +283,17 @@ def _figure(study: Stability) -> Figure:
     names = list(COLOURS)
     longest = max(len(line) for kind in kinds for line in kind.splitlines())
     width = max(COLUMN * len(engines), LETTER * (longest + 2)) * len(kinds)
-    figure = Figure(figsize=(max(2.5 + width, 8.0), 2.4 + 0.22 * len(cases)), layout="constrained")
+    figure = new_figure("Stability.plot()", max(2.5 + width, 8.0), 2.4 + 0.22 * len(cases))
+    from matplotlib.colors import ListedColormap
+    from matplotlib.patches import Patch
+
     axes = figure.subplots()
     for cell in study.cells:
         row = cases.index(cell.case)
         column = kinds.index(kind_of[cell.model]) * len(engines) + engines.index(cell.engine)
         numbers[row, column] = 1 + names.index(cell.verdict)
         if np.isfinite(cell.error):
-            exponent = int(np.ceil(np.log10(max(cell.error, LEAST))))
+            exponent = int(np.ceil(np.log10(max(cell.error, FLOOR))))
             colour = "white" if cell.verdict in ("right", "wrong") else "black"
             axes.text(column, row, str(exponent), ha="center", va="center", fontsize=6, color=colour)
     axes.imshow(numbers, cmap=ListedColormap(["#ffffff", *COLOURS.values()]), vmin=0, vmax=len(names), aspect="auto")

@@ -20,8 +20,8 @@ from shaftwork.core.parameters import in_si
 from shaftwork.pipeline.network import Network
 from shaftwork.results.observer import Array
 
-DENSITY, SHEAR_MODULUS = 7900.0, 77.5e9
-"""Of steel, kg/m^3 and Pa."""
+DENSITY, SHEAR_MODULUS = (float(Shaft.declared[name].default) for name in ("density", "shear_modulus"))
+"""Of a shaft where nothing is said of them, kg/m^3 and Pa."""
 TORQUE = 10.0
 """Height of the torque in N m; every case is linear."""
 POINTS = 100
@@ -148,8 +148,6 @@ class Case:
             "line",
             length=self.length,
             diameter=self.diameter,
-            density=DENSITY,
-            shear_modulus=SHEAR_MODULUS,
             damping=self.dashpot * self.length,
             model=model,
         )

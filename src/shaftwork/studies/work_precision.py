@@ -22,6 +22,7 @@ from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
 from shaftwork.studies.study_arguments import LADDER, engine_names, several, shaft_models, text_of
 from shaftwork.studies.truth import (
+    COARSE,
     MODES,
     QUANTITIES,
     ShaftMotion,
@@ -35,10 +36,10 @@ from shaftwork.studies.work_precision_result import RTOL, Trial, WorkPrecision
 
 POINTS, CALLS = 401, 5
 """Output times, and warm calls of which the median counts."""
-SLOW = 3.0
-"""Where set-up and run have taken longer, in s of CPU, larger models of its kind are left out."""
 LONGEST = 5.0
-"""A run is given up after so long, s of CPU."""
+"""A run is given up after so long, s of CPU. Of a kind that took half of it, larger models are left out."""
+FINER_COSTS = 10.0
+"""Times as long as a coarse model the finest ones of a nonlinear network take, about."""
 BUDGET = 45.0
 """CPU time in s for all trials, from when the truth is known."""
 LOWEST = 20
@@ -75,7 +76,7 @@ def work_precision(
         points: number of output times.
         budget: CPU time in s for all trials together, from when the truth is known. The smallest model of each kind is
             tried in any case, with every engine and tolerance; then the next sizes of all. A run is given up after
-            `LONGEST` s of CPU, and larger models of a kind that took `SLOW` s are left out.
+            `LONGEST` s of CPU, and larger models of a kind that took half of it are left out.
         report: is told of each trial when it is done.
         tell: is told what is done meanwhile, in a line.
 
@@ -102,6 +103,28 @@ def work_precision(
     exact = exact_motion(net, shaft, end, t, tell)
     trials = _tried(_Motion(net, shaft, end, t, exact, judged), planned, allowed, report or _nothing)
     return WorkPrecision(net.name, shaft, trials, (exact.source, exact.error), t, _ends(exact.values))
+
+
+def affordable_end(net: Network, shaft: str, t_end: float) -> float:
+    """The end of a motion over which models of a shaft can be compared, s.
+
+    It is the one that is given where a coarse model comes to it before its run would be given up. Else it is a part of
+    the time that this model comes to, since finer ones take longer, and the truth is finer still.
+    """
+    model = with_model(net, shaft, COARSE).compile()
+    began, reached = time.thread_time(), 0.0
+
+    def watch(t: float) -> None:
+        nonlocal reached
+        if time.thread_time() - began > LONGEST:
+            raise SimulationError(f"given up after {LONGEST:g} s")
+        reached = t
+
+    try:
+        model.simulate(t_end, progress=watch)
+    except SimulationError:
+        return float(f"{reached / FINER_COSTS:.1g}") or t_end
+    return t_end
 
 
 def _nothing(_: object) -> None:
@@ -145,7 +168,7 @@ def _tried(
 def _too_slow(plan: Trial, trials: Iterable[Trial]) -> str:
     """Why a model is left out: a smaller one of its kind has taken too long already. Empty where it is not."""
     for trial in trials:
-        if trial.line == plan.line and trial.spent > SLOW:
+        if trial.line == plan.line and trial.spent > LONGEST / 2:
             return f"not tried, since {trial.model} took {trial.spent:.0f} s"
     return ""
 
@@ -164,7 +187,7 @@ def _trial(motion: _Motion, model: ShaftModel, plan: Trial) -> Trial:
         if compiled.form.waves:
             _bearable(compiled, shaft, plan, motion.t_end)
         solution, first = _timed(compiled, shaft, plan, motion.t_end, motion.t)
-        times = [first] if built + first > SLOW else []
+        times = [first] if built + first > LONGEST / 2 else []
         while not times or (len(times) < CALLS and sum(times) < 1.0):
             times.append(_timed(compiled, shaft, plan, motion.t_end, motion.t)[1])
     except ShaftworkError as error:
