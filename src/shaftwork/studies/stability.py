@@ -24,7 +24,7 @@ from shaftwork.results.observer import Array
 from shaftwork.results.plotting import new_figure
 from shaftwork.studies.stability_cases import CASES, TORQUE, Case
 from shaftwork.studies.study_arguments import engine_names, several, shaft_models, text_of
-from shaftwork.studies.truth import ENDS, ShaftMotion, exact, predicted
+from shaftwork.studies.truth import ENDS, MOST_PREDICTED, ShaftMotion, exact, predicted
 from shaftwork.studies.work_precision_result import FLOOR
 
 if TYPE_CHECKING:
@@ -34,8 +34,9 @@ RIGHT = 1e-2
 """Largest error of what is right, of the largest torque or speed."""
 SAME = 1e-3
 """Largest deviation of a run from what its model must do, and largest residual of its energy balance."""
-MOST_BALANCED = 500
-"""Up to so many states, where all of the motion is output, the energy balance is drawn for the engine "auto"."""
+MOST_BALANCED = 2 * MOST_PREDICTED
+"""Up to so many states, a speed and a torque for each element, the energy balance is drawn for the engine "auto", where
+all of the motion is output."""
 
 Verdict = Literal["right", "coarse", "warned", "refused", "failed", "too long", "unknown", "wrong"]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)

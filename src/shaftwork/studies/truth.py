@@ -40,7 +40,7 @@ TIGHT = 1e-11
 NONLINEAR, LOOSER = (8, 12, 16, 24, 32), 1e-8
 """The same for a nonlinear network that no wave solves, up to where two are alike: its modes are stepped through one by
 one, and of a shaft that is damped the high ones do not matter."""
-ALIKE = 1e-7
+ALIKE = 10 * LOOSER
 """So much of the largest torque two models may differ that stand for the truth of a nonlinear network."""
 MODES = 3
 """Elastic natural frequencies that are compared. The truth names one more, to tell those beyond from them."""

@@ -42,8 +42,9 @@ FINER_COSTS = 10.0
 """Times as long as a coarse model the finest ones of a nonlinear network take, about."""
 BUDGET = 45.0
 """CPU time in s for all trials, from when the truth is known."""
-LOWEST = 20
-"""Modes of a model that are computed, those of smallest rate; as many as the exact ones up to f_5 and their doubles."""
+LOWEST = 4 * (MODES + 2)
+"""Modes of a model that are computed, those of smallest rate: twice as many pairs as there are exact ones up to the
+second beyond those that are judged, since a model may have spurious ones between them."""
 
 
 def work_precision(
