@@ -194,7 +194,8 @@ def _trial(motion: _Motion, model: ShaftModel, plan: Trial) -> Trial:
     except ShaftworkError as error:
         return dataclasses.replace(plan, setup=time.thread_time() - began, why=in_one_line(error))
     values, cpu = quantities(solution, varied, shaft), median(times)
-    errors = {name: float(np.abs(values[name] - exact.values[name]).max()) / _size(exact, name) for name in QUANTITIES}
+    gaps = {name: float(np.abs(values[name] - exact.values[name]).max()) for name in QUANTITIES}
+    errors = {name: max(gap / _size(exact, name), exact.error) for name, gap in gaps.items()}
     extra = None
     if motion.frequencies.size and (present := _frequencies(varied, compiled, motion.frequencies)).size:
         judged, limit = motion.frequencies[:MODES], float(motion.frequencies[MODES - 1 : MODES + 1].mean())

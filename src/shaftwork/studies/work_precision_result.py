@@ -41,7 +41,8 @@ class Trial:
         states: number of states.
         setup: CPU time from the network to the first result, less a warm call, s; of a trial that failed, all of it.
         cpu: CPU time of a warm call with reading both end torques, s; the median of several.
-        errors: largest error of each quantity over its largest value, by name; of frequencies, relative to each.
+        errors: largest error of each quantity over its largest value, by name, and no less than that of the truth; of
+            frequencies, relative to each.
         extra_modes: oscillating modes, up to halfway between the highest frequency that is judged and the next, less
             those of the exact shaft: spurious ones, or missing ones where negative; None where unknown.
         why: why it failed or was not tried; empty where it was.
